@@ -1,0 +1,13 @@
+//! Values to bytes and back: the files that are a contract (DESIGN.md). Only `library_dir` touches
+//! the file system.
+
+pub mod csv;
+pub mod distance_map;
+pub mod flock_json;
+pub mod glb;
+pub mod library_dir;
+pub mod library_json;
+pub mod npy;
+pub mod picture;
+pub mod poses_json;
+pub mod svg;

@@ -1,0 +1,96 @@
+//! Angles: radians wrapped to (-pi, pi], and 16-bit turns in which wrapping is free.
+//!
+//! The plan compares headings as integers (ALGORITHMS.md 6), so that the same plan comes out on
+//! any machine: 65536 turns make the circle and differences wrap by themselves.
+
+use std::f64::consts::{PI, TAU};
+
+/// The angle equal to `angle_rad` modulo a full turn, in (-pi, pi].
+///
+/// ```
+/// use flockreel::geometry::wrap_rad;
+/// assert!((wrap_rad(3.5 * std::f64::consts::PI) + 0.5 * std::f64::consts::PI).abs() < 1e-12);
+/// assert_eq!(wrap_rad(-std::f64::consts::PI), std::f64::consts::PI);
+/// ```
+pub fn wrap_rad(angle_rad: f64) -> f64 {
+    let wrapped = angle_rad - TAU * ((angle_rad + PI) / TAU).floor();
+    if wrapped <= -PI { PI } else { wrapped }
+}
+
+/// The heading after a left-right mirror: pi - heading, wrapped.
+pub fn mirrored_rad(heading_rad: f64) -> f64 {
+    wrap_rad(PI - heading_rad)
+}
+
+/// The mean direction of some angles, in (-pi, pi]; `None` for no angles or when they cancel.
+pub fn mean_rad(angles_rad: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let (mut x, mut y) = (0.0, 0.0);
+    for angle in angles_rad {
+        x += libm::cos(angle);
+        y += libm::sin(angle);
+    }
+    (x.hypot(y) > 1e-9).then(|| libm::atan2(y, x))
+}
+
+/// A heading or a difference of headings in 65536ths of a circle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub struct Turns(pub u16);
+
+impl Turns {
+    /// Turns per radian: 65536 / 2 pi.
+    pub const PER_RAD: f64 = 65536.0 / TAU;
+
+    /// The nearest 65536th of a circle.
+    pub fn from_rad(angle_rad: f64) -> Turns {
+        // Wrapped first, so that the product fits an i32; a cast to u16 then wraps modulo 65536.
+        Turns((wrap_rad(angle_rad) * Self::PER_RAD).round() as i32 as u16)
+    }
+
+    /// The angle in (-pi, pi].
+    pub fn to_rad(self) -> f64 {
+        wrap_rad(f64::from(self.0) / Self::PER_RAD)
+    }
+
+    /// |self - other| the short way round: 0..=32768.
+    pub fn gap(self, other: Turns) -> u16 {
+        (self.0.wrapping_sub(other.0) as i16).unsigned_abs()
+    }
+
+    /// The heading after a left-right mirror.
+    pub fn mirrored(self) -> Turns {
+        Turns(32768u16.wrapping_sub(self.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_and_radians_agree_round_the_circle() {
+        for k in 0..65536u32 {
+            let turns = Turns(k as u16);
+            assert_eq!(Turns::from_rad(turns.to_rad()), turns);
+        }
+    }
+
+    #[test]
+    fn gaps_are_taken_the_short_way_round() {
+        let (a, b) = (Turns::from_rad(3.1), Turns::from_rad(-3.1));
+        assert!((f64::from(a.gap(b)) / Turns::PER_RAD - (TAU - 6.2)).abs() < 2e-4);
+    }
+
+    #[test]
+    fn mirroring_twice_changes_nothing() {
+        let heading = Turns::from_rad(1.234);
+        assert_eq!(heading.mirrored().mirrored(), heading);
+        assert_eq!(heading.mirrored(), Turns::from_rad(mirrored_rad(1.234)));
+    }
+
+    #[test]
+    fn the_mean_of_angles_across_the_seam_lies_on_the_seam() {
+        let mean = mean_rad([3.0, -3.0]).expect("the two do not cancel");
+        assert!((mean.abs() - PI).abs() < 1e-12);
+        assert_eq!(mean_rad([]), None);
+    }
+}

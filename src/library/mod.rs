@@ -1,0 +1,63 @@
+//! The library: all that one analysis yields, and all that a flock needs (DESIGN.md, names).
+//!
+//! Plain values that cannot be wrong once made; `formats` writes and reads them.
+
+pub mod playback;
+pub mod pose;
+pub mod sprites;
+
+pub use playback::{Jump, Patch, Playback, Transition};
+pub use pose::{Animal, Pose, Poses, View};
+pub use sprites::Sprites;
+
+use crate::raster::RgbImage;
+
+/// What one analysis yields.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Library {
+    /// What was measured in every frame.
+    pub poses: Poses,
+    /// The scene without the animal, of the footage's size.
+    pub background: RgbImage,
+    /// The animal cut out of every frame in which it was found.
+    pub sprites: Sprites,
+    /// f: how many sprites a clip holds.
+    pub clip_frames: usize,
+    /// Clips nearer than this (strictly) are alike.
+    pub epsilon: u64,
+    /// The median of D(i, i+1): how much the animal changes from one frame to the next.
+    pub natural_step: u64,
+    /// The pairs of clips that were found alike, by (from, to, mirrored).
+    pub transitions: Vec<Transition>,
+    /// What may follow what.
+    pub playback: Playback,
+    /// The runs of sprites between jumps.
+    pub patches: Vec<Patch>,
+    /// What is worth knowing about the above.
+    pub stats: LibraryStats,
+}
+
+/// Counts and shares that say how good a library is.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct LibraryStats {
+    /// Frames of the footage.
+    pub n_frames: usize,
+    /// Frames in which the animal was found.
+    pub n_detected: usize,
+    /// Pixels of the background that the animal never left free, filled from around them.
+    pub never_seen_px: u64,
+    /// Pairs of clips with D < epsilon, before any other test (O's figure 3).
+    pub n_candidates: u64,
+    /// The multiple of the natural step that epsilon is; null when epsilon was given.
+    pub kappa_used: Option<f64>,
+    /// Share of the frames that lie in the largest strongly connected component, 0..=1.
+    pub component_share: f64,
+    /// Frames of the component by heading: 36 bins of 10 degrees from -180.
+    pub heading_histogram: Vec<u32>,
+    /// Measured speeds of the animal, lengths a second: 5th percentile, median, 95th percentile.
+    pub speed_bl_per_s: Option<[f64; 3]>,
+    /// 95th percentile of the measured turn rate, radians a second.
+    pub turn_rate_rad_per_s: Option<f64>,
+    /// Median length of the animal in the image, pixels: the body length (BL) of the flock.
+    pub length_px: Option<f64>,
+}

@@ -1,0 +1,183 @@
+//! From decoded YUV to RGB and back, in 16.16 fixed point: the same values on every machine.
+//!
+//! Chroma belongs to its 2 x 2 block as it stands (no interpolation), as ffmpeg's own unscaled
+//! converter does: what is measured, cut out and put back is what an editor sees.
+
+/// Which luma weights the planes were made with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Matrix {
+    /// ITU-R BT.601: standard definition, and whatever says nothing.
+    #[default]
+    Bt601,
+    /// ITU-R BT.709: high definition.
+    Bt709,
+}
+
+/// Whether luma fills 16..=235 or 0..=255.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Range {
+    /// Luma 16..=235, chroma 16..=240: nearly all video.
+    #[default]
+    Limited,
+    /// 0..=255: motion JPEG and grey footage.
+    Full,
+}
+
+/// How the YUV values of a frame are to be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct ColorSpec {
+    /// Luma weights.
+    pub matrix: Matrix,
+    /// Range of the values.
+    pub range: Range,
+}
+
+const ONE: f64 = 65536.0;
+
+/// Fixed-point factors from YUV to RGB.
+#[derive(Clone, Copy, Debug)]
+pub struct ToRgb {
+    y_offset: i32,
+    y: i32,
+    r_v: i32,
+    g_u: i32,
+    g_v: i32,
+    b_u: i32,
+}
+
+/// Fixed-point factors from RGB to YUV.
+#[derive(Clone, Copy, Debug)]
+pub struct FromRgb {
+    y_offset: i32,
+    y: [i32; 3],
+    u: [i32; 3],
+    v: [i32; 3],
+}
+
+impl ColorSpec {
+    /// (K_r, K_b) of the matrix.
+    fn weights(self) -> (f64, f64) {
+        match self.matrix {
+            Matrix::Bt601 => (0.299, 0.114),
+            Matrix::Bt709 => (0.2126, 0.0722),
+        }
+    }
+
+    /// (luma offset, luma span, chroma span).
+    fn spans(self) -> (f64, f64, f64) {
+        match self.range {
+            Range::Limited => (16.0, 219.0, 224.0),
+            Range::Full => (0.0, 255.0, 255.0),
+        }
+    }
+
+    /// The factors that turn a YUV triple into RGB.
+    pub fn to_rgb(self) -> ToRgb {
+        let (kr, kb) = self.weights();
+        let kg = 1.0 - kr - kb;
+        let (offset, luma, chroma) = self.spans();
+        let fixed = |v: f64| (v * ONE).round() as i32;
+        ToRgb {
+            y_offset: offset as i32,
+            y: fixed(255.0 / luma),
+            r_v: fixed(2.0 * (1.0 - kr) * 255.0 / chroma),
+            g_u: fixed(-2.0 * (1.0 - kb) * kb / kg * 255.0 / chroma),
+            g_v: fixed(-2.0 * (1.0 - kr) * kr / kg * 255.0 / chroma),
+            b_u: fixed(2.0 * (1.0 - kb) * 255.0 / chroma),
+        }
+    }
+
+    /// The factors that turn an RGB triple into YUV.
+    pub fn from_rgb(self) -> FromRgb {
+        let (kr, kb) = self.weights();
+        let kg = 1.0 - kr - kb;
+        let (offset, luma, chroma) = self.spans();
+        let fixed = |v: f64, span: f64| (v * span / 255.0 * ONE).round() as i32;
+        let (u, v) = (0.5 / (1.0 - kb), 0.5 / (1.0 - kr));
+        FromRgb {
+            y_offset: offset as i32,
+            y: [fixed(kr, luma), fixed(kg, luma), fixed(kb, luma)],
+            u: [
+                fixed(-kr * u, chroma),
+                fixed(-kg * u, chroma),
+                fixed(0.5, chroma),
+            ],
+            v: [
+                fixed(0.5, chroma),
+                fixed(-kg * v, chroma),
+                fixed(-kb * v, chroma),
+            ],
+        }
+    }
+}
+
+impl ToRgb {
+    /// One pixel, each channel rounded and clamped to 0..=255.
+    pub fn convert(&self, y: u8, u: u8, v: u8) -> [u8; 3] {
+        let luma = (i32::from(y) - self.y_offset) * self.y + 32768;
+        let (u, v) = (i32::from(u) - 128, i32::from(v) - 128);
+        let channel = |value: i32| (value >> 16).clamp(0, 255) as u8;
+        [
+            channel(luma + self.r_v * v),
+            channel(luma + self.g_u * u + self.g_v * v),
+            channel(luma + self.b_u * u),
+        ]
+    }
+}
+
+impl FromRgb {
+    /// The luma of one pixel.
+    pub fn luma(&self, rgb: [u8; 3]) -> u8 {
+        let y = dot(self.y, rgb.map(i32::from));
+        (self.y_offset + ((y + 32768) >> 16)).clamp(0, 255) as u8
+    }
+
+    /// The chroma (U, V) of a block given the sums of its four pixels' channels.
+    pub fn chroma_of_block(&self, sum: [i32; 3]) -> [u8; 2] {
+        // Sums of four: two more bits to shift, half of the divisor for rounding.
+        let chroma = |k: [i32; 3]| (128 + ((dot(k, sum) + (1 << 17)) >> 18)).clamp(0, 255) as u8;
+        [chroma(self.u), chroma(self.v)]
+    }
+}
+
+fn dot(k: [i32; 3], v: [i32; 3]) -> i32 {
+    k[0] * v[0] + k[1] * v[1] + k[2] * v[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_black_and_red_have_their_textbook_values() {
+        let spec = ColorSpec::default();
+        let rgb = spec.to_rgb();
+        assert_eq!(rgb.convert(235, 128, 128), [255, 255, 255]);
+        assert_eq!(rgb.convert(16, 128, 128), [0, 0, 0]);
+        let [r, g, b] = rgb.convert(81, 90, 240);
+        assert!(r >= 253 && g <= 1 && b <= 1, "{r} {g} {b}");
+    }
+
+    #[test]
+    fn rgb_survives_the_round_trip_within_two_levels() {
+        for matrix in [Matrix::Bt601, Matrix::Bt709] {
+            for range in [Range::Limited, Range::Full] {
+                let spec = ColorSpec { matrix, range };
+                let (to, from) = (spec.to_rgb(), spec.from_rgb());
+                for rgb in [
+                    [0, 0, 0],
+                    [255, 255, 255],
+                    [200, 100, 20],
+                    [12, 250, 130],
+                    [90, 90, 91],
+                ] {
+                    let [u, v] = from.chroma_of_block(rgb.map(|c| i32::from(c) * 4));
+                    let back = to.convert(from.luma(rgb), u, v);
+                    for (a, b) in back.iter().zip(rgb) {
+                        assert!(a.abs_diff(b) <= 2, "{spec:?} {rgb:?} -> {back:?}");
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! A decoded picture: planar YUV 4:2:0, the form in which the decoder gives it and the encoder
+//! takes it. Only the boxes that matter are ever converted to RGB (ALGORITHMS.md 3 and 8).
+
+use super::{ColorSpec, RgbImage};
+use crate::geometry::Rect;
+
+/// One frame: a luma plane of `width` by `height`, then two chroma planes of half the size, the
+/// halves rounded up.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct Frame {
+    /// Columns of luma.
+    pub width: u32,
+    /// Rows of luma.
+    pub height: u32,
+    /// How the values are to be read.
+    pub color: ColorSpec,
+    /// Y, then U, then V, without padding.
+    pub planes: Vec<u8>,
+}
+
+impl Frame {
+    /// A frame of zeros.
+    pub fn new(width: u32, height: u32, color: ColorSpec) -> Frame {
+        Frame {
+            width,
+            height,
+            color,
+            planes: vec![0; Frame::n_bytes(width, height)],
+        }
+    }
+
+    /// The size in bytes of a frame of `width` by `height`.
+    pub fn n_bytes(width: u32, height: u32) -> usize {
+        let chroma = width.div_ceil(2) as usize * height.div_ceil(2) as usize;
+        width as usize * height as usize + 2 * chroma
+    }
+
+    /// The luma plane, row by row.
+    pub fn luma(&self) -> &[u8] {
+        &self.planes[..self.width as usize * self.height as usize]
+    }
+
+    /// The two chroma planes, rows of `chroma_width`.
+    pub fn chroma(&self) -> (&[u8], &[u8]) {
+        let luma = self.width as usize * self.height as usize;
+        self.planes[luma..].split_at((self.planes.len() - luma) / 2)
+    }
+
+    /// Columns of a chroma plane.
+    pub fn chroma_width(&self) -> u32 {
+        self.width.div_ceil(2)
+    }
+
+    /// The box converted to RGB. Panics when it does not lie inside the frame.
+    pub fn rgb(&self, rect: Rect) -> RgbImage {
+        let mut image = RgbImage::new(rect.w, rect.h);
+        self.rgb_into(rect, &mut image);
+        image
+    }
+
+    /// The whole frame converted to RGB.
+    pub fn to_rgb(&self) -> RgbImage {
+        self.rgb(Rect::of_size(self.width, self.height))
+    }
+
+    /// As `rgb`, reusing the image's memory; its size becomes that of the box.
+    pub fn rgb_into(&self, rect: Rect, image: &mut RgbImage) {
+        assert!(
+            rect.right() <= self.width && rect.bottom() <= self.height,
+            "box outside the frame"
+        );
+        let convert = self.color.to_rgb();
+        let (u, v) = self.chroma();
+        let (width, chroma_width) = (self.width as usize, self.chroma_width() as usize);
+        image.width = rect.w;
+        image.height = rect.h;
+        image.pixels.resize(rect.area() as usize * 3, 0);
+        let rows = image.pixels.chunks_exact_mut(rect.w.max(1) as usize * 3);
+        for (row, y) in rows.zip(rect.y as usize..) {
+            let luma = &self.luma()[y * width + rect.x as usize..][..rect.w as usize];
+            let chroma = y / 2 * chroma_width;
+            for (pixel, (&luma, x)) in row
+                .chunks_exact_mut(3)
+                .zip(luma.iter().zip(rect.x as usize..))
+            {
+                let at = chroma + x / 2;
+                pixel.copy_from_slice(&convert.convert(luma, u[at], v[at]));
+            }
+        }
+    }
+
+    /// Writes the box of a canvas of the frame's own size into the planes: luma of the box, chroma
+    /// of every 2 x 2 block that the box touches.
+    ///
+    /// Panics when the canvas has another size than the frame.
+    pub fn draw_rgb(&mut self, canvas: &RgbImage, rect: Rect) {
+        assert_eq!(
+            (canvas.width, canvas.height),
+            (self.width, self.height),
+            "sizes differ"
+        );
+        if rect.is_empty() {
+            return;
+        }
+        let from = self.color.from_rgb();
+        let (width, height) = (self.width as usize, self.height as usize);
+        let chroma_width = self.chroma_width() as usize;
+        let (luma, chroma) = self.planes.split_at_mut(width * height);
+        let (u_plane, v_plane) = chroma.split_at_mut(chroma.len() / 2);
+        let (x0, x1) = (rect.x as usize / 2, (rect.right() as usize).div_ceil(2));
+        let (y0, y1) = (rect.y as usize / 2, (rect.bottom() as usize).div_ceil(2));
+        for by in y0..y1 {
+            for bx in x0..x1 {
+                let mut sum = [0; 3];
+                for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    // At an odd right or bottom edge the last pixel stands in for the missing one.
+                    let (x, y) = ((2 * bx + dx).min(width - 1), (2 * by + dy).min(height - 1));
+                    let at = y * width + x;
+                    let rgb = [
+                        canvas.pixels[3 * at],
+                        canvas.pixels[3 * at + 1],
+                        canvas.pixels[3 * at + 2],
+                    ];
+                    luma[at] = from.luma(rgb);
+                    for (s, c) in sum.iter_mut().zip(rgb) {
+                        *s += i32::from(c);
+                    }
+                }
+                let [u, v] = from.chroma_of_block(sum);
+                u_plane[by * chroma_width + bx] = u;
+                v_plane[by * chroma_width + bx] = v;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawing_a_canvas_and_reading_it_back_returns_it_where_blocks_are_even_colored() {
+        let mut canvas = RgbImage::new(7, 5);
+        for y in 0..5 {
+            for x in 0..7 {
+                canvas.set_pixel(x, y, [(x / 2 * 40) as u8, 120, (y / 2 * 60) as u8]);
+            }
+        }
+        let mut frame = Frame::new(7, 5, ColorSpec::default());
+        frame.draw_rgb(&canvas, Rect::of_size(7, 5));
+        for (a, b) in frame.to_rgb().pixels.iter().zip(&canvas.pixels) {
+            assert!(a.abs_diff(*b) <= 2);
+        }
+    }
+
+    #[test]
+    fn a_box_is_the_same_as_that_part_of_the_whole() {
+        let mut frame = Frame::new(9, 6, ColorSpec::default());
+        for (k, byte) in frame.planes.iter_mut().enumerate() {
+            *byte = (k * 37 % 251) as u8;
+        }
+        let (whole, part) = (
+            frame.to_rgb(),
+            frame.rgb(Rect {
+                x: 3,
+                y: 1,
+                w: 5,
+                h: 4,
+            }),
+        );
+        for y in 0..4 {
+            for x in 0..5 {
+                assert_eq!(part.pixel(x, y), whole.pixel(x + 3, y + 1));
+            }
+        }
+    }
+}
