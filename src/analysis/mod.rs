@@ -3,6 +3,7 @@
 
 pub mod distance;
 pub mod error;
+mod gate;
 pub mod params;
 pub mod playback;
 pub mod transition;
