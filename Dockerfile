@@ -10,13 +10,8 @@ COPY scripts scripts
 RUN scripts/system-packages.sh build vendor && rm -rf /var/lib/apt/lists/*
 COPY web web
 RUN scripts/vendor.sh
-COPY Cargo.toml Cargo.lock ./
-COPY migrations migrations
-COPY static static
-COPY src src
-# Cargo wants to see the test program that Cargo.toml names; nothing of it is built.
-RUN mkdir -p tests/it && touch tests/it/main.rs \
-    && cargo build --release --locked --bin flockreel
+COPY . .
+RUN cargo build --release --locked --bin flockreel
 
 FROM debian:bookworm-slim
 COPY scripts/system-packages.sh /usr/local/sbin/system-packages
@@ -25,7 +20,7 @@ RUN /usr/local/sbin/system-packages run health \
     && useradd --system --uid 10001 --user-group --no-create-home flockreel \
     && install -d -o flockreel -g flockreel /data
 COPY --from=builder /src/target/release/flockreel /usr/local/bin/flockreel
-USER flockreel
+USER 10001:10001
 VOLUME /data
 EXPOSE 8080
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \

@@ -10,12 +10,12 @@ set -eu
 # One line for each thing: group, the command that must exist, the package that has it.
 needs() {
     cat <<'LIST'
-build     cc        gcc
+build     cc        gcc libc6-dev
 vendor    python3   python3-venv
 run       ffmpeg    ffmpeg
 run       ffprobe   ffmpeg
 health    curl      curl
-test      cc        gcc
+test      cc        gcc libc6-dev
 test      ffmpeg    ffmpeg
 test      ffprobe   ffmpeg
 page-test python3   python3-venv

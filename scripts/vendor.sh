@@ -46,4 +46,4 @@ say "installing from web/package-lock.json"
 find "$out" -mindepth 1 -delete
 (cd "$build" && node build.mjs "../../$out") || without "the bundler failed"
 printf '%s\n' "$want" >"$stamp"
-say "made $(cd "$out" && ls | tr '\n' ' ')in $out"
+say "made $(find "$out" -type f | sort | tr '\n' ' ')"
