@@ -13,17 +13,19 @@ export function filmForm(onLibrary) {
   const drop = byId("drop");
 
   input.addEventListener("change", () => { if (input.files[0]) measure(input.files[0]); });
+  // A film dropped beside the place must not replace the page.
+  for (const name of ["dragover", "drop"]) addEventListener(name, (event) => event.preventDefault());
   for (const name of ["dragenter", "dragover"]) drop.addEventListener(name, (event) => { event.preventDefault(); drop.classList.add("over"); });
   for (const name of ["dragleave", "drop"]) drop.addEventListener(name, () => drop.classList.remove("over"));
   drop.addEventListener("drop", (event) => {
     event.preventDefault();
     const file = event.dataTransfer?.files[0];
-    if (file && !input.disabled) measure(file);
+    if (file) measure(file);
   });
 
   /** @param {File} file */
   async function measure(file) {
-    input.disabled = true;
+    form.hidden = true;
     const place = byId("film-job");
     try {
       const footage = await send(file, place);
@@ -33,7 +35,7 @@ export function filmForm(onLibrary) {
       if (problem.name === "AbortError") place.replaceChildren();
       else showProblem(place, problem);
     } finally {
-      input.disabled = false;
+      form.hidden = false;
       input.value = "";
     }
   }

@@ -33,8 +33,9 @@ export function flockForm(onFlock) {
   });
 
   /** Which library the next flock is made of. */
-  return (id, fps) => {
+  return ({ id, fps, name }) => {
     library = { id, fps };
+    byId("make-of").textContent = name ? `Of “${name}”` : "Of the film below";
     byId("make").hidden = false;
     showTime();
   };

@@ -3,13 +3,12 @@
 import { degrees } from "./words.js";
 
 const SURE = 0.8;
-const MOST_POINTS = 4000;
 
 /** @typedef {{x: number, y: number, sure: boolean} | null} Point x frames, y degrees; null lifts the pen */
 
-/** @param {any} poses @returns {Point[]} */
-export function headingPoints(poses) {
-  const step = Math.max(1, Math.ceil(poses.frames.length / MOST_POINTS));
+/** @param {any} poses @param {number} most points drawn; the rest is stepped over @returns {Point[]} */
+export function headingPoints(poses, most) {
+  const step = Math.max(1, Math.ceil(poses.frames.length / most));
   const points = /** @type {Point[]} */ ([]);
   let last = /** @type {Point} */ (null);
   for (let x = 0; x < poses.frames.length; x += step) {

@@ -2,32 +2,36 @@
 // @ts-check
 import { byId, element } from "./element.js";
 import { headingPoints, pathOf } from "./heading-series.js";
+import { zoomingPlot } from "./heading-zoom.js";
 import { direction, percent, seconds } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
+const MOST_POINTS = 4000;
+
 /** @param {any} poses */
 export async function showHeading(poses) {
-  const plot = drawing(poses);
-  byId("heading-plot").replaceChildren(...plot.nodes);
   const slider = byId("heading-moment");
   slider.max = String(poses.frames.length - 1);
   slider.value = "0";
-  slider.oninput = () => {
-    plot.point(slider.valueAsNumber);
+  const plain = drawing(poses, show);
+  let point = plain.point;
+  byId("heading-plot").replaceChildren(...plain.nodes);
+
+  function show(frame) {
+    slider.value = String(frame);
     byId("heading-reading").textContent = reading(poses, slider.valueAsNumber);
-  };
-  plot.svg.onpointermove = (event) => {
-    const box = plot.svg.getBoundingClientRect();
-    slider.value = String(Math.round(((event.clientX - box.left) / box.width) * (poses.frames.length - 1)));
-    slider.oninput();
-  };
+  }
+  slider.oninput = () => { show(slider.valueAsNumber); point(slider.valueAsNumber); };
   slider.oninput();
+  const zooming = await zoomingPlot(poses, show);
+  byId("heading-zoom-help").hidden = !zooming;
+  if (zooming) point = zooming;
 }
 
-function drawing(poses) {
+function drawing(poses, onFrame) {
   const n_frames = Math.max(2, poses.frames.length);
-  const points = headingPoints(poses);
+  const points = headingPoints(poses, MOST_POINTS);
   const line = (name, d) => {
     const path = document.createElementNS(SVG, "path");
     path.setAttribute("class", name);
@@ -47,7 +51,14 @@ function drawing(poses) {
   const last_s = poses.frames.at(-1)?.time_s ?? 0;
   const foot = element("div", { className: "heading-foot", "aria-hidden": "true" },
     ...[0, 0.25, 0.5, 0.75, 1].map((share) => element("span", {}, seconds(share * last_s))));
-  return { nodes: [side, svg, foot], svg, point: (frame) => now.setAttribute("d", `M${frame} -180V180`) };
+  const point = (frame) => now.setAttribute("d", `M${frame} -180V180`);
+  svg.onpointermove = (event) => {
+    const box = svg.getBoundingClientRect();
+    const frame = Math.round(((event.clientX - box.left) / box.width) * (poses.frames.length - 1));
+    onFrame(frame);
+    point(frame);
+  };
+  return { nodes: [side, svg, foot], point };
 }
 
 function reading(poses, frame) {

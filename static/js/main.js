@@ -27,7 +27,7 @@ const redrawLists = () => showEarlier(made.libraries, made.flocks, current, { on
 async function chooseLibrary(id) {
   const library = await getLibrary(id);
   current.library = id;
-  makeFlocksOf(id, library.fps);
+  makeFlocksOf(library);
   redrawLists();
   await showLibrary(library);
 }

@@ -11,6 +11,7 @@ export function showFlock(flock, filmName) {
   const source = `/v1/flocks/${flock.id}/video.mp4`;
   if (video.getAttribute("src") !== source) video.src = source;
   video.hidden = false;
+  video.onerror = () => { video.hidden = true; showEmptyStage("This video cannot be played here. It can still be downloaded."); };
   video.setAttribute("aria-label", `${flock.count} individuals made of the film ${filmName}`);
   if (!calm.matches) video.play().catch(() => {});
   byId("stage-note").hidden = true;
@@ -18,7 +19,7 @@ export function showFlock(flock, filmName) {
   byId("stage-facts").textContent = [filmName && `Made of “${filmName}”`, `${count(flock.frames)} frames`, `seed ${flock.seed}`].filter(Boolean).join(" · ");
   byId("stage-video-link").href = source;
   byId("stage-plan-link").href = `/v1/flocks/${flock.id}/flock.json`;
-  byId("stage-downloads").hidden = false;
+  byId("stage-caption").hidden = false;
 }
 
 /** @param {string} text what is there instead of a flock */
