@@ -22,4 +22,4 @@ if ! cmp -s "$requirements" "$venv/installed.txt"; then
     "$venv/bin/pip" install -q --disable-pip-version-check -r "$requirements" || skip "its requirements cannot be installed here"
     cp "$requirements" "$venv/installed.txt"
 fi
-FLOCKREEL_PROGRAM=$program exec "$venv/bin/python" -m pytest -q tests/page
+FLOCKREEL_PROGRAM=$program exec "$venv/bin/python" -B -m pytest -q -p no:cacheprovider tests/page
