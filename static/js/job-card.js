@@ -28,14 +28,17 @@ export function progressCard(place, onCancel) {
  * @returns {Promise<boolean>} true when it is done
  */
 export async function showJob(place, id) {
-  const update = progressCard(place, () => cancelJob(id).catch((problem) => showProblem(place, problem)));
+  // A card of its own: when another has taken the place meanwhile, this one ends unseen.
+  const own = element("div");
+  place.replaceChildren(own);
+  const update = progressCard(own, () => cancelJob(id).catch((problem) => showProblem(own, problem)));
   try {
     const job = await followJob(id, (seen) => update(stageOf(seen), seen.progress ?? 0, attemptNote(seen)));
     if (job.state === "failed") throw new Problem(job.error ?? {});
-    place.replaceChildren();
+    own.remove();
     return job.state === "done";
   } catch (problem) {
-    showProblem(place, problem);
+    showProblem(own, problem);
     return false;
   }
 }

@@ -12,6 +12,7 @@ export async function showLibrary(library) {
   byId("library-numbers").replaceChildren(...numbersOf(library).map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
   byId("library-distance").src = `${at}/distance.png`;
   byId("library-background").src = `${at}/background.png`;
+  byId("library-table").href = `${at}/poses.csv`;
   byId("library-poses").href = `${at}/poses.json`;
   byId("library").hidden = false;
   try {

@@ -45,17 +45,21 @@ async function watch(id) {
   byId("stage").scrollIntoView();
 }
 
-/** The newest of what there is; jobs that were under way before the page was opened are followed. */
+/** The newest of what there is, unless something was chosen; jobs from before the visit are followed. */
 async function open() {
   await refresh();
-  if (made.flocks[0]) await chooseFlock(made.flocks[0].id);
-  else if (made.libraries[0]) await chooseLibrary(made.libraries[0].id);
+  if (made.flocks[0] && !current.flock) await chooseFlock(made.flocks[0].id);
+  else if (made.libraries[0] && !current.library) await chooseLibrary(made.libraries[0].id);
   const jobs = (await listJobs()).filter((job) => ["queued", "running"].includes(job.state));
-  if (!made.flocks[0]) showEmptyStage(jobs.length ? "The first flock is being made. It will play here." : "No flock yet. Choose a film of one animal, and its flock will play here.");
-  const job = jobs.at(-1);
-  if (!job) return;
-  if (job.kind === "flock") byId("make").hidden = false;
-  if (await showJob(byId(job.kind === "flock" ? "flock-job" : "film-job"), job.id)) await open();
+  if (!current.flock) showEmptyStage(jobs.length ? "The first flock is being made. It will play here." : "No flock yet. Choose a film of one animal, and its flock will play here.");
+  const oldest = jobs.at(-1);
+  if (oldest && await showJob(placeOf(oldest), oldest.id)) await open();
+}
+
+/** Where a job that was under way before the visit is shown. */
+function placeOf(job) {
+  if (job.kind !== "flock" || byId("make").hidden) return byId("film-job");
+  return byId("flock-job");
 }
 
 open().catch((problem) => { showEmptyStage(""); showProblem(byId("stage-note"), problem); });

@@ -21,21 +21,14 @@ export function direction(heading_rad) {
 }
 
 const STAGES = {
-  "probe": "Looking into the file",
-  "decode": "Reading the film",
-  "background": "Finding the still scene",
-  "tracking": "Following the animal",
-  "pose": "Measuring its poses",
-  "sprites": "Cutting it out of every frame",
-  "distances": "Comparing its moments",
-  "transitions": "Finding where playback may jump",
-  "playback": "Finding where playback may jump",
-  "simulation": "Letting the boids move",
-  "plan": "Choosing frames for every individual",
-  "composite": "Painting the flock",
-  "render": "Painting the flock",
-  "encode": "Writing the video",
-  "store": "Putting it away",
+  background: "Finding the still scene",
+  tracking: "Following the animal",
+  distances: "Comparing its moments",
+  writing: "Putting it away",
+  loading: "Opening the film’s library",
+  simulating: "Letting the boids move",
+  planning: "Choosing frames for every individual",
+  rendering: "Painting the flock",
 };
 
 /** What a job does now. */
