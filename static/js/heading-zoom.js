@@ -1,5 +1,5 @@
 // The zooming plot of the heading, drawn by uPlot where `make vendor` has made it: drag to look closer,
-// double-click to see all. Without the library the plain drawing stays.
+// double-click to see all. Without the library, a mouse, or room, the plain drawing stays.
 // @ts-check
 import { byId, element } from "./element.js";
 import { headingPoints } from "./heading-series.js";
@@ -12,6 +12,7 @@ const SIDES = [[-180, "← left"], [-90, "↑ up"], [0, "→ right"], [90, "↓ 
  * @returns {Promise<((frame: number) => void) | null>} moves the cursor; null without the library
  */
 export async function zoomingPlot(poses, onFrame) {
+  if (!matchMedia("(pointer: fine) and (min-width: 40rem)").matches) return null;
   const library = await import("/vendor/uplot.js").catch(() => null);
   if (!library) return null;
   await styled("/vendor/uplot.css");
