@@ -277,3 +277,30 @@ fn the_page_stays_within_its_budget() {
         "the page's own files take {n_bytes} bytes, limit 60,000"
     );
 }
+
+#[test]
+fn the_readme_names_every_setting() {
+    let readme = read("README.md");
+    let config = read("src/config.rs");
+    let faults = (config.split("env = \"").skip(1))
+        .filter_map(|rest| rest.split('"').next())
+        .filter(|variable| !readme.contains(&format!("`{variable}`")))
+        .map(|variable| format!("README.md: says nothing of {variable}"));
+    assert_no(faults.collect());
+}
+
+#[test]
+fn every_code_is_raised_somewhere() {
+    let sources: Vec<String> = (rust_files("src").iter())
+        .filter(|file| !["src/code.rs", "src/api/problem.rs"].contains(&file.as_str()))
+        .map(|file| code_of(file))
+        .collect();
+    let faults = (flockreel::code::Code::ALL.iter())
+        .filter(|code| {
+            !sources
+                .iter()
+                .any(|source| source.contains(&format!("Code::{code:?}")))
+        })
+        .map(|code| format!("src/code.rs: nothing raises {code}"));
+    assert_no(faults.collect());
+}
