@@ -22,7 +22,7 @@ export const byId = (id) => document.getElementById(id);
 /** Shows a problem in words, next to where it happened. @param {Element} place @param {any} problem */
 export function showProblem(place, problem) {
   const box = element("div", { className: "problem", role: "alert" }, element("strong", {}, problem.title ?? problem.message));
-  if (problem.detail) box.append(problem.detail);
+  if (problem.detail && problem.detail !== problem.title) box.append(problem.detail);
   if (problem.code) box.append(element("small", {}, `Reason code: ${problem.code}`));
   place.replaceChildren(box);
 }

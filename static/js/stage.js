@@ -11,12 +11,13 @@ export function showFlock(flock, filmName) {
   const source = `/v1/flocks/${flock.id}/video.mp4`;
   if (video.getAttribute("src") !== source) video.src = source;
   video.hidden = false;
+  const origin = flock.sample ? "A sample, made of a film of a virtual fish" : filmName && `Made of “${filmName}”`;
   video.onerror = () => { video.hidden = true; showEmptyStage("This video cannot be played here. It can still be downloaded."); };
   video.setAttribute("aria-label", `${flock.count} individuals made of the film ${filmName}`);
   if (!calm.matches) video.play().catch(() => {});
   byId("stage-note").hidden = true;
   byId("stage-title").textContent = `A flock of ${count(flock.count)}`;
-  byId("stage-facts").textContent = [filmName && `Made of “${filmName}”`, `${count(flock.frames)} frames`, `seed ${flock.seed}`].filter(Boolean).join(" · ");
+  byId("stage-facts").textContent = [origin, `${count(flock.frames)} frames`, `seed ${flock.seed}`].filter(Boolean).join(" · ");
   byId("stage-video-link").href = source;
   byId("stage-plan-link").href = `/v1/flocks/${flock.id}/flock.json`;
   byId("stage-caption").hidden = false;
