@@ -3,7 +3,10 @@
 //! Reads raw RGBA sprites from a file, times the engine alone for one thread and for all, measures
 //! this machine's own psadbw peak in the same run, and writes d and D as .npy to be compared.
 //! Arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR. Prints one line of JSON.
-#![expect(unsafe_code, reason = "the bare instruction is timed by inline assembly")]
+#![expect(
+    unsafe_code,
+    reason = "the bare instruction is timed by inline assembly"
+)]
 
 use std::path::Path;
 use std::time::Instant;
@@ -16,7 +19,10 @@ use flockreel::library::{Pose, Poses, Sprites, View};
 use flockreel::progress::Silent;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
     let [path, width, height, clip_frames, out] = &arguments[..] else {
         // `cargo test --benches` runs this without arguments.
         return println!("arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR");
@@ -77,7 +83,9 @@ fn distances(pixels: &ComparedSprites, clip_frames: usize) -> Distances<'_> {
 
 /// The best of five runs, seconds.
 fn time(pixels: &ComparedSprites, clip_frames: usize, n_threads: usize) -> f64 {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads)
+        .build();
     let pool = pool.expect("threads can be made");
     let run = || {
         let start = Instant::now();

@@ -30,8 +30,8 @@ pub fn write(matrix: &DistanceMatrix, out: &mut impl Write) -> io::Result<()> {
 
 fn header(kind: &str, n: usize) -> Vec<u8> {
     const PREFIX: usize = 10;
-    let mut text =
-        format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({n}, {n}), }}").into_bytes();
+    let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({n}, {n}), }}")
+        .into_bytes();
     let padded = (PREFIX + text.len() + 1).next_multiple_of(64) - PREFIX;
     text.resize(padded - 1, b' ');
     text.push(b'\n');
@@ -68,6 +68,9 @@ mod tests {
         let mut bytes = Vec::new();
         write(&matrix, &mut bytes).expect("memory takes all");
         assert!(matrix.max() > u64::from(u32::MAX));
-        assert_eq!(bytes[128 + 8..128 + 16], matrix.distance(0, 1).to_le_bytes());
+        assert_eq!(
+            bytes[128 + 8..128 + 16],
+            matrix.distance(0, 1).to_le_bytes()
+        );
     }
 }
