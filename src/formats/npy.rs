@@ -7,9 +7,41 @@
 use std::io::{self, Write};
 
 use crate::analysis::distance::DistanceMatrix;
+use crate::code::Code;
 
 /// Above this many frames the file is refused: it would hold more than 256 MB.
 pub const MAX_FRAMES: usize = 8192;
+
+/// Why there is no such file.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The footage is too long for a whole matrix.
+    #[error(
+        "the library has {n_frames} frames, a whole matrix is written of at most {MAX_FRAMES}; \
+         take distance.png, which is never refused, or analyze a shorter piece"
+    )]
+    TooManyFrames {
+        /// Frames of the footage.
+        n_frames: usize,
+    },
+}
+
+impl Error {
+    /// The stable code.
+    pub fn code(&self) -> Code {
+        match self {
+            Error::TooManyFrames { .. } => Code::TooManyFrames,
+        }
+    }
+}
+
+/// Whether a footage is short enough for a whole matrix; to be asked before one is computed.
+pub fn check(n_frames: usize) -> Result<(), Error> {
+    match n_frames {
+        0..=MAX_FRAMES => Ok(()),
+        _ => Err(Error::TooManyFrames { n_frames }),
+    }
+}
 
 /// Writes the matrix. Fails only when the writer does.
 pub fn write(matrix: &DistanceMatrix, out: &mut impl Write) -> io::Result<()> {
@@ -59,6 +91,14 @@ mod tests {
             wanted.extend_from_slice(&distance.to_le_bytes());
         }
         assert_eq!(bytes, wanted);
+    }
+
+    #[test]
+    fn footage_above_8192_frames_is_refused_with_advice() {
+        assert_eq!(check(8192), Ok(()));
+        let refusal = check(8193).expect_err("too long");
+        assert_eq!(refusal.code(), Code::TooManyFrames);
+        assert!(refusal.to_string().contains("distance.png"));
     }
 
     #[test]
