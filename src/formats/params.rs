@@ -29,7 +29,7 @@ pub enum Error {
 
 /// The parameters that an object of overrides, with or without a `preset`, asks for.
 ///
-/// Objects within objects are replaced whole. Fails with a sentence that names the parameter.
+/// Fails with a sentence that names the parameter.
 pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
     let start = match overrides.remove("preset") {
         None | Some(Value::Null) => P::default(),
@@ -39,12 +39,22 @@ pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
         }
     };
     let mut merged = serde_json::to_value(start).map_err(invalid)?;
-    if let Value::Object(merged) = &mut merged {
-        merged.extend(overrides);
-    }
+    override_with(&mut merged, Value::Object(overrides));
     let params: P = serde_json::from_value(merged).map_err(invalid)?;
     params.check().map_err(Error::Invalid)?;
     Ok(params)
+}
+
+/// Objects are overridden field by field, everything else whole.
+fn override_with(value: &mut Value, overrides: Value) {
+    match (value, overrides) {
+        (Value::Object(fields), Value::Object(overrides)) => {
+            for (name, value) in overrides {
+                override_with(fields.entry(name).or_insert(Value::Null), value);
+            }
+        }
+        (value, overrides) => *value = overrides,
+    }
 }
 
 impl Preset for analysis::Params {

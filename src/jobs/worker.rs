@@ -131,8 +131,12 @@ impl Worker {
         result: Result<Outcome, Error>,
     ) -> Result<Step, store::Error> {
         let (store, job) = (&self.context.store, lease.job_id);
+        let result = match result {
+            Ok(outcome) => finish(store, lease, &outcome).await.map_err(Error::from),
+            Err(error) => Err(error),
+        };
         let (change, step) = match result {
-            Ok(outcome) => (finish(store, lease, &outcome).await?, Step::Done(job)),
+            Ok(change) => (change, Step::Done(job)),
             Err(error) if crate::progress::Progress::cancelled(listener) => {
                 tracing::debug!(job.id = %job, %error, "the work let go");
                 if self.context.draining.is_cancelled() {
@@ -198,10 +202,15 @@ where
     })
 }
 
-/// Links the result; one that came too late is thrown away.
+/// Links the result; one that came too late is thrown away. After an error the row decides: where
+/// none names the folder, nothing was linked.
 async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Change, store::Error> {
     let change = store.finish(lease, outcome, now_ms()).await;
-    if !matches!(change, Ok(Change::Made)) {
+    let is_linked = match &change {
+        Ok(change) => *change == Change::Made,
+        Err(_) => store.is_folder_known(&outcome.folder).await?,
+    };
+    if !is_linked {
         store.blobs().discard(&outcome.folder)?;
     }
     change

@@ -129,6 +129,13 @@ impl Store {
         let blob = sqlx::query_as(sql).bind(folder).bind(name);
         Ok(blob.fetch_optional(&self.reader).await?)
     }
+
+    /// Whether a row names the folder.
+    pub async fn is_folder_known(&self, folder: &str) -> Result<bool, Error> {
+        let sql = "select exists (select 1 from blobs where folder = $1)";
+        let known = sqlx::query_scalar(sql).bind(folder);
+        Ok(known.fetch_one(&self.reader).await?)
+    }
 }
 
 /// Adds the rows of a folder's files, in the transaction that makes the folder's owner.
@@ -179,6 +186,11 @@ pub(super) fn hash_file(path: &Path) -> io::Result<(i64, Vec<u8>)> {
         hasher.update(&buffer[..n]);
         size_bytes += n as i64;
     }
+}
+
+/// A hash as people and ETags write it.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

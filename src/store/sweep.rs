@@ -51,12 +51,7 @@ impl Store {
         for kind in ["footage", "libraries", "flocks", "fish"] {
             for entry in fs::read_dir(self.blobs.root().join(kind))? {
                 let folder = format!("{kind}/{}", entry?.file_name().to_string_lossy());
-                let sql = "select exists (select 1 from blobs where folder = $1)";
-                let known: bool = sqlx::query_scalar(sql)
-                    .bind(&folder)
-                    .fetch_one(&self.reader)
-                    .await?;
-                if !known {
+                if !self.is_folder_known(&folder).await? {
                     strays.push(folder);
                 }
             }
