@@ -3,24 +3,34 @@
 //!
 //! [`analyze`] is the whole way of the data; the modules follow in its order.
 
-pub mod background;
-pub mod depth;
-pub mod distance;
-pub mod error;
-pub mod heading;
-pub mod light;
-pub mod matte;
-pub mod moments;
 pub mod params;
-pub mod playback;
-pub mod pose;
+
+pub mod error;
+
+// What the scene looks like, and where a frame differs from it.
+pub mod background;
+pub mod light;
 mod refusal;
 pub mod shadow;
 pub mod silhouette;
-pub mod smooth;
+
+// The animal followed and cut out.
+pub mod matte;
+pub mod moments;
 pub mod sprite;
-mod stats;
 pub mod tracking;
+
+// What it did.
+pub mod depth;
+pub mod heading;
+pub mod pose;
+pub mod smooth;
+
+// Which moments look alike.
+pub mod distance;
+mod gate;
+pub mod playback;
+mod stats;
 pub mod transition;
 
 pub use error::Error;
