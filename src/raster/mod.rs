@@ -1,8 +1,10 @@
 //! Pictures as values: frames as they are decoded, RGB and RGBA images, masks.
 
+pub mod blend;
 pub mod color;
 pub mod frame;
 pub mod image;
+pub mod resample;
 
 pub use color::{ColorSpec, Matrix, Range};
 pub use frame::Frame;
