@@ -111,6 +111,9 @@ mod tests {
         let said = |json| analysis(json).unwrap_err().to_string();
         assert_eq!(said(r#"{"preset": "p"}"#), "there is no such preset: \"p\"");
         assert!(said(r#"{"colour": 1}"#).contains("colour"));
-        assert_eq!(said(r#"{"threshold": 0}"#), "threshold must lie in 1..=254: 0");
+        assert_eq!(
+            said(r#"{"threshold": 0}"#),
+            "threshold must lie in 1..=254: 0"
+        );
     }
 }

@@ -8,7 +8,7 @@ use uuid::Uuid;
 use super::{Attempt, Context, Error, Product, Stages, clock};
 use crate::analysis::{Params, analyze};
 use crate::formats::library_json::FootageSummary;
-use crate::formats::{csv, distance_map, library_dir, svg};
+use crate::formats::{csv, library_dir};
 use crate::ids::{FootageId, JobId, LibraryId};
 use crate::library::{Library, View};
 use crate::media::{Limits, Video, read_image};
@@ -59,10 +59,7 @@ pub struct Summary {
 }
 
 /// Queues an analysis; the library will have the id given back.
-pub async fn enqueue(
-    context: &Context,
-    input: &Input,
-) -> Result<(JobId, LibraryId), store::Error> {
+pub async fn enqueue(context: &Context, input: &Input) -> Result<(JobId, LibraryId), store::Error> {
     let (job_id, library_id) = (JobId(Uuid::now_v7()), LibraryId(Uuid::now_v7()));
     let job = NewJob {
         job_id,

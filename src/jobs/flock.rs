@@ -76,7 +76,10 @@ impl Input {
         attempt.listener.report("loading", 0.0);
         let library = library_dir::read(&folder)?.library;
         let flock = plan_flock(&library, &self.params, attempt.listener)?;
-        std::fs::write(attempt.folder().join("flock.json"), flock_json::write(&flock))?;
+        std::fs::write(
+            attempt.folder().join("flock.json"),
+            flock_json::write(&flock),
+        )?;
         render(attempt, &library, &flock)?;
         let summary = Summary {
             fps: flock.fps,

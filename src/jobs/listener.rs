@@ -48,7 +48,10 @@ impl Listener {
     /// Where the computation is.
     pub fn position(&self) -> Position {
         // A panic while reporting cannot leave half a position: it is written whole.
-        *self.position.lock().unwrap_or_else(|broken| broken.into_inner())
+        *self
+            .position
+            .lock()
+            .unwrap_or_else(|broken| broken.into_inner())
     }
 
     /// The share of the whole at a point of a stage; nothing for a stage that is not in the table.
@@ -62,7 +65,10 @@ impl Listener {
 impl Progress for Listener {
     fn report(&self, stage: &'static str, fraction: f64) {
         let overall = self.overall(stage, fraction);
-        let mut position = self.position.lock().unwrap_or_else(|broken| broken.into_inner());
+        let mut position = self
+            .position
+            .lock()
+            .unwrap_or_else(|broken| broken.into_inner());
         position.stage = stage;
         position.progress = position.progress.max(overall.unwrap_or(0.0)).min(1.0);
     }

@@ -76,7 +76,11 @@ impl Worker {
         Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
     {
         let lease_ms = self.lease_ms();
-        let claimed = self.context.store.claim(self.id, now_ms(), lease_ms).await?;
+        let claimed = self
+            .context
+            .store
+            .claim(self.id, now_ms(), lease_ms)
+            .await?;
         let Some(lease) = claimed else {
             return Ok(Step::Idle);
         };
@@ -115,7 +119,10 @@ impl Worker {
 
     async fn beat(&self, lease: &Lease, listener: &Listener, at: Position) {
         let until_ms = now_ms() + self.lease_ms();
-        let beat = self.context.store.heartbeat(lease, until_ms, at.stage, at.progress);
+        let beat = self
+            .context
+            .store
+            .heartbeat(lease, until_ms, at.stage, at.progress);
         match beat.await {
             Ok(Beat::Held) => {}
             Ok(Beat::CancelRequested | Beat::Lost) => listener.cancel(),

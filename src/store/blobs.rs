@@ -217,7 +217,10 @@ mod tests {
         let files = blobs.seal(&draft).unwrap();
         blobs.adopt(draft, "flocks/1.1").unwrap();
         assert_eq!(
-            files.iter().map(|f| (f.name.as_str(), f.size_bytes)).collect::<Vec<_>>(),
+            files
+                .iter()
+                .map(|f| (f.name.as_str(), f.size_bytes))
+                .collect::<Vec<_>>(),
             [("a", 0), ("b", 3)]
         );
         assert_eq!(files[1].sha256[..4], [0xba, 0x78, 0x16, 0xbf]);

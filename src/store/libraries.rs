@@ -2,8 +2,8 @@
 
 use sqlx::types::Uuid;
 
-use super::jobs::finish::Outcome;
 use super::jobs::Lease;
+use super::jobs::finish::Outcome;
 use super::{Connection, Error, Store};
 
 /// One library as stored; its files lie in `folder`.
@@ -17,6 +17,8 @@ pub struct Library {
     pub footage_id: Uuid,
     /// Its folder in the blob store.
     pub folder: String,
+    /// What the footage is called.
+    pub name: String,
     /// The parameters it was made with, JSON.
     pub params: String,
     /// What is worth knowing at a glance, JSON.
@@ -32,7 +34,7 @@ pub struct Library {
 impl Store {
     /// One library, if it is finished and there.
     pub async fn library(&self, id: Uuid) -> Result<Option<Library>, Error> {
-        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, sample, \
+        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
                    from libraries l join footage f on f.id = footage_id where l.id = $1";
         let row = sqlx::query_as(sql).bind(id);
@@ -45,7 +47,7 @@ impl Store {
         limit: i64,
         before: Option<Uuid>,
     ) -> Result<Vec<Library>, Error> {
-        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, sample, \
+        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
                    from libraries l join footage f on f.id = footage_id \
                    where $1 is null or l.id < $1 order by l.id desc limit $2";

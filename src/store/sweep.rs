@@ -40,7 +40,11 @@ impl Store {
             }
         }
         if swept != Swept::default() {
-            tracing::warn!(swept.n_drafts, swept.n_folders, "leftovers of a crash swept");
+            tracing::warn!(
+                swept.n_drafts,
+                swept.n_folders,
+                "leftovers of a crash swept"
+            );
         }
         Ok(swept)
     }
