@@ -9,6 +9,8 @@ pub mod params;
 pub mod placement;
 pub mod plan;
 pub mod quality;
+#[cfg(test)]
+pub(crate) mod synthetic;
 
 pub use composite::Compositor;
 pub use error::Error;
