@@ -35,6 +35,7 @@ codes! {
     ContainerNotAllowed "container_not_allowed" "The container format is not among those accepted."
     CodecNotAllowed "codec_not_allowed" "The video codec is not among those accepted."
     TooManyPixels "too_many_pixels" "The picture is larger than the limit."
+    TooFewPixels "too_few_pixels" "The picture is smaller than the limit."
     TooManyFrames "too_many_frames" "The footage has more frames than the limit."
     TooManyStreams "too_many_streams" "The file holds more streams than the limit."
     TooLong "too_long" "The footage lasts longer than the limit."
