@@ -142,3 +142,6 @@ fn place(stage: &Stage, tracks: Vec<BoidTrack>, plans: Vec<Plan>) -> Vec<Individ
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,11 @@
-//! A library drawn by code, for tests: an animal of known motion that comes back to the same poses,
-//! so that its jumps are known by hand.
+//! A library drawn by code, for tests: an animal of known motion, so that what may follow what is
+//! known without looking at pixels.
+
+use std::f64::consts::{PI, TAU};
 
 use crate::flock::boids::vector::unit;
 use crate::geometry::angle::mirrored_rad;
+use crate::geometry::wrap_rad;
 use crate::library::{
     Jump, Library, LibraryStats, Patch, Playback, Pose, Poses, Sprites, Transition, View,
 };
@@ -10,22 +13,24 @@ use crate::raster::RgbImage;
 
 /// Length of the animal when seen from the side.
 pub(crate) const LENGTH_PX: f64 = 40.0;
-/// After so many frames it does the same again.
-pub(crate) const PERIOD: u32 = 90;
-const N_FRAMES: u32 = 3 * PERIOD + 12;
+const N_FRAMES: u32 = 600;
 const CLIP_FRAMES: usize = 8;
+/// The tail beats once in so many frames.
+const BEAT: u32 = 10;
 const SIZE_PX: [u32; 2] = [320, 240];
 
-/// An animal that swims in a circle: seen from above, or from the side with its length shrinking as
-/// it turns away.
+/// An animal that turns now this way, now that: seen from above, or from the side with its length
+/// shrinking as it turns away. It may jump where it points, turns and beats alike.
 pub(crate) fn library(view: View) -> Library {
     let mut sprites = Sprites::missing(56, 56, N_FRAMES as usize);
-    let frames: Vec<Pose> = (0..N_FRAMES).map(|frame| pose(view, frame)).collect();
+    let frames = poses(view);
     for (idx, pose) in frames.iter().enumerate() {
         draw(sprites.fill(idx), pose, idx as u32);
     }
     let jumps = jumps(view);
-    let component: Vec<u32> = (0..N_FRAMES).collect();
+    let first = jumps.iter().map(|jump| jump.to).min().unwrap_or(0);
+    let last = jumps.iter().map(|jump| jump.from).max().unwrap_or(0);
+    let component: Vec<u32> = (first..=last).collect();
     Library {
         stats: stats(&frames),
         poses: Poses {
@@ -43,29 +48,47 @@ pub(crate) fn library(view: View) -> Library {
         natural_step: 500,
         transitions: jumps.iter().map(transition).collect(),
         patches: vec![Patch {
-            frames: 0..N_FRAMES,
+            frames: first..last + 1,
             next: vec![0],
         }],
         playback: Playback { jumps, component },
     }
 }
 
-fn phase(frame: u32) -> f64 {
-    std::f64::consts::TAU * f64::from(frame) / f64::from(PERIOD)
+/// Where it points: 0 = right, a quarter turn = away from the viewer (in top view: down).
+fn yaw_rad(frame: u32) -> f64 {
+    let turn = |period: f64, phase: f64| libm::sin(TAU * f64::from(frame) / period + phase);
+    2.4 * turn(173.0, 0.0) + 1.3 * turn(61.0, 1.0)
 }
 
-fn pose(view: View, frame: u32) -> Pose {
-    let (sin, cos) = (libm::sin(phase(frame)), libm::cos(phase(frame)));
-    let forward = match view {
-        View::Top => [-sin, cos, 0.0],
-        View::Side => unit([-sin, 0.25 * libm::cos(2.0 * phase(frame)), cos]),
-    };
+fn turn_rad(frame: u32) -> f64 {
+    yaw_rad(frame + 1) - yaw_rad(frame)
+}
+
+fn poses(view: View) -> Vec<Pose> {
+    let mut centroid = [160.0, 120.0];
+    (0..N_FRAMES)
+        .map(|frame| {
+            let (cos, sin) = (libm::cos(yaw_rad(frame)), libm::sin(yaw_rad(frame)));
+            let pitch = 0.25 * libm::sin(TAU * f64::from(frame) / 71.0);
+            let forward = match view {
+                View::Top => [cos, sin, 0.0],
+                View::Side => unit([cos, pitch, sin]),
+            };
+            for axis in 0..2 {
+                centroid[axis] += 2.0 * forward[axis];
+            }
+            pose(frame, forward, centroid)
+        })
+        .collect()
+}
+
+fn pose(frame: u32, forward: [f64; 3], centroid_px: [f64; 2]) -> Pose {
     let shown = forward[0].hypot(forward[1]).max(0.35);
-    let heading_rad = libm::atan2(forward[1], forward[0]);
     Pose {
         time_s: f64::from(frame) / 30.0,
-        centroid_px: Some([160.0 + 100.0 * cos, 120.0 + 70.0 * sin]),
-        heading_rad: Some(heading_rad),
+        centroid_px: Some(centroid_px),
+        heading_rad: Some(libm::atan2(forward[1], forward[0])),
         length_px: Some(LENGTH_PX * shown),
         height_px: Some(0.4 * LENGTH_PX),
         forward: Some(forward),
@@ -73,26 +96,31 @@ fn pose(view: View, frame: u32) -> Pose {
     }
 }
 
-/// The same pose one period off, and in side view the mirrored pose half a period off.
 fn jumps(view: View) -> Vec<Jump> {
     let mut jumps = Vec::new();
-    for from in (0..N_FRAMES - 1).step_by(5) {
-        let cost = 300 + u64::from(from * 37 % 400);
-        let ends = [
-            (i64::from(from) + 1 - i64::from(PERIOD), false),
-            (i64::from(from) + 1 + i64::from(PERIOD), false),
-            (i64::from(from) + 1 - i64::from(PERIOD / 2), true),
-            (i64::from(from) + 1 + i64::from(PERIOD / 2), true),
-        ];
-        for (to, mirrored) in ends {
-            let inside = (0..i64::from(N_FRAMES)).contains(&to);
-            if inside && (view == View::Side || !mirrored) {
-                jumps.push(Jump {
-                    from,
-                    to: to as u32,
-                    cost,
-                    mirrored,
-                });
+    for from in 0..N_FRAMES - 2 {
+        for to in (1..N_FRAMES - 1).filter(|to| (from + 1) % BEAT == to % BEAT && *to != from + 1) {
+            for mirrored in [false, true] {
+                let side = if mirrored { -1.0 } else { 1.0 };
+                let meant = if mirrored {
+                    PI - yaw_rad(to)
+                } else {
+                    yaw_rad(to)
+                };
+                let gap = match view {
+                    View::Top => 0.0,
+                    View::Side => wrap_rad(yaw_rad(from + 1) - meant).abs(),
+                };
+                let turn_gap = (turn_rad(from + 1) - side * turn_rad(to)).abs();
+                if gap < 0.15 && turn_gap < 0.05 {
+                    let cost = 300 + (2000.0 * gap + 10_000.0 * turn_gap) as u64;
+                    jumps.push(Jump {
+                        from,
+                        to,
+                        cost,
+                        mirrored,
+                    });
+                }
             }
         }
     }
@@ -139,7 +167,7 @@ fn draw(rgba: &mut [u8], pose: &Pose, frame: u32) {
     let upside_down = libm::cos(heading) < 0.0;
     let (cos, sin) = (libm::cos(heading), libm::sin(heading));
     let half = pose.length_px.unwrap_or(LENGTH_PX) / 2.0;
-    let beat = 3.0 * libm::sin(8.0 * phase(frame));
+    let beat = 3.0 * libm::sin(TAU * f64::from(frame) / f64::from(BEAT));
     for (k, pixel) in rgba.chunks_exact_mut(4).enumerate() {
         let (dx, dy) = ((k % 56) as f64 - 27.5, (k / 56) as f64 - 27.5);
         let along = (cos * dx + sin * dy) / half;
@@ -152,7 +180,7 @@ fn draw(rgba: &mut [u8], pose: &Pose, frame: u32) {
         let eye = (along - 0.6).powi(2) * half * half + (across + 2.0).powi(2) < 3.0;
         let color = match eye {
             true => [10, 10, 20],
-            false => [240, 130 - (4.0 * across) as i32 as u8, 40],
+            false => [240, (130.0 - 4.0 * across).clamp(60.0, 200.0) as u8, 40],
         };
         pixel[..3].copy_from_slice(&color);
         pixel[3] = (255.0 * alpha).round() as u8;
@@ -160,9 +188,17 @@ fn draw(rgba: &mut [u8], pose: &Pose, frame: u32) {
 }
 
 #[test]
-fn half_a_period_later_it_heads_the_mirrored_way() {
+fn jumps_lead_to_headings_alike() {
     let library = library(View::Side);
-    let heading = |frame: usize| library.poses.frames[frame].heading_rad.unwrap();
-    let gap = heading(20 + PERIOD as usize / 2) - mirrored_rad(heading(20));
-    assert!(gap.abs() < 1e-9, "{gap}");
+    let heading = |frame: u32| library.poses.frames[frame as usize].heading_rad.unwrap();
+    assert!(library.playback.jumps.len() > 200);
+    for jump in &library.playback.jumps {
+        let to = heading(jump.to);
+        let meant = if jump.mirrored { mirrored_rad(to) } else { to };
+        let steep = libm::cos(yaw_rad(jump.to)).abs() < 0.5;
+        assert!(
+            steep || wrap_rad(heading(jump.from + 1) - meant).abs() < 0.5,
+            "{jump:?}"
+        );
+    }
 }
