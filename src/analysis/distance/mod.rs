@@ -5,14 +5,16 @@
 //! computed. The rows stream by in order, in panels of 48: no N x N matrix is held here.
 
 mod kernel;
+mod matrix;
 mod minima;
 mod pixels;
 mod upright;
 mod window;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
+pub use matrix::{DistanceMatrix, PooledMatrix};
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;
 

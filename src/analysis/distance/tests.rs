@@ -38,6 +38,22 @@ fn from_the_side(sprites: &Sprites) -> Poses {
     poses(View::Side, vec![Some(0.0); sprites.n_frames()])
 }
 
+/// D for f = 1 of sprites that are `n_pixels` opaque grays in a row, one level a frame.
+pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMatrix {
+    let mut sprites = Sprites::missing(n_pixels, 1, levels.len());
+    for (frame_idx, &level) in levels.iter().enumerate() {
+        let pixels = sprites.fill(frame_idx).as_chunks_mut::<4>().0;
+        pixels.fill([level, level, level, 255]);
+    }
+    let distances = Distances {
+        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        clip_frames: 1,
+        side: Side::Plain,
+        cpu: Level::detect(),
+    };
+    DistanceMatrix::of(&distances, &Silent).expect("nobody cancels")
+}
+
 /// The engine's upper triangle.
 fn triangle(sprites: &Sprites, poses: &Poses, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
     let distances = Distances {
@@ -245,4 +261,39 @@ fn cancelling_stops_at_the_next_panel() {
         distances.for_each_row(&Impatient, |_, _| ()),
         Err(Cancelled)
     );
+}
+
+#[test]
+fn the_matrix_holds_every_distance_both_ways_round() {
+    let matrix = matrix_of_gray_levels(&[10, 13, 11, 30], 2);
+    for (i, a) in [10u64, 13, 11, 30].into_iter().enumerate() {
+        for (j, b) in [10u64, 13, 11, 30].into_iter().enumerate() {
+            assert_eq!(matrix.distance(i, j), 6 * a.abs_diff(b));
+        }
+    }
+    assert_eq!(matrix.max(), 120);
+}
+
+#[test]
+fn pooling_keeps_the_least_distance_of_each_cell() {
+    let sprites = noise(4, 4, 29, 5);
+    let distances = Distances {
+        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        clip_frames: 3,
+        side: Side::Plain,
+        cpu: Level::Scalar,
+    };
+    let matrix = DistanceMatrix::of(&distances, &Silent).expect("nobody cancels");
+    let pooled = PooledMatrix::of(&distances, 10, &Silent).expect("nobody cancels");
+    assert_eq!((matrix.n_clips(), pooled.side), (27, 10));
+    for (k, &least) in pooled.cells.iter().enumerate() {
+        let falls_in = |clip: &usize, cell: usize| clip * 10 / 27 == cell;
+        let rows = (0..27).filter(|i| falls_in(i, k / 10));
+        let all = rows.flat_map(|i| {
+            let columns = (0..27).filter(|j| falls_in(j, k % 10));
+            columns.map(move |j| (i, j))
+        });
+        let wanted = all.map(|(i, j)| matrix.distance(i, j)).min();
+        assert_eq!(Some(least), wanted);
+    }
 }

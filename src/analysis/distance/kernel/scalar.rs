@@ -6,11 +6,11 @@ use crate::analysis::distance::pixels::Line;
 /// Adds d of every pair of the tile.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
     for block in 0..tile.rows.n_blocks() {
-        for row in 0..tile.rows.n_sprites {
+        for (row, sums) in sums.iter_mut().enumerate().take(tile.rows.n_sprites) {
             let a = tile.rows.strip(block, row);
             for column in tile.columns_of(row) {
                 let b = tile.columns.strip(block, column);
-                sums[row][column] += a.iter().zip(b).map(|(a, b)| sad_line(a, b)).sum::<u64>();
+                sums[column] += a.iter().zip(b).map(|(a, b)| sad_line(a, b)).sum::<u64>();
             }
         }
     }
