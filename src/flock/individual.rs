@@ -55,7 +55,7 @@ pub struct Fade {
     pub weight: Vec<f64>,
 }
 
-/// The plan's cost, radians; the sum of integers times 2 pi / 65536 (ALGORITHMS.md 6).
+/// The plan's cost, radians: sums of integers times 2 pi / 65536, to 6 decimals (ALGORITHMS.md 6).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PlanCost {
     /// The sum of the four below.
@@ -77,5 +77,6 @@ pub struct PlanCost {
 /// `value` to so many decimals, as files hold it.
 pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
-    (value * unit).round() / unit
+    // + 0.0 turns -0 into 0.
+    (value * unit).round() / unit + 0.0
 }

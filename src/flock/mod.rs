@@ -9,6 +9,8 @@ pub mod params;
 pub mod placement;
 pub mod plan;
 pub mod quality;
+#[cfg(test)]
+pub(crate) mod synthetic;
 
 pub use composite::Compositor;
 pub use error::Error;
@@ -140,3 +142,6 @@ fn place(stage: &Stage, tracks: Vec<BoidTrack>, plans: Vec<Plan>) -> Vec<Individ
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! What a boid may do is what the animal was seen to do: speeds, turn rates, and in side view how
 //! steeply it points (ALGORITHMS.md 7, "from the footage").
 
+use crate::flock::individual::rounded;
 use crate::flock::params::Params;
 use crate::flock::plan::cost::FrameMotion;
 use crate::library::{Library, View};
@@ -32,7 +33,7 @@ impl Calibration {
         // An animal that mostly sits still would make a flock of statues: it moves at half its best.
         let cruise = cruise.max(0.5 * fast).max(0.05);
         Calibration {
-            length_px: stats.length_px.unwrap_or(1.0).max(1.0),
+            length_px: rounded(stats.length_px.unwrap_or(1.0).max(1.0), 2),
             cruise_bl_per_s: cruise,
             speed_limits_bl_per_s: [slow.max(0.25 * cruise).min(cruise), fast.max(cruise)],
             turn_rad_per_s: stats.turn_rate_rad_per_s.unwrap_or(2.0).clamp(0.5, 6.0),

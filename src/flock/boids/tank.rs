@@ -92,8 +92,8 @@ impl Tank {
         for wall in self.upright_walls() {
             let room = wall.offset_bl - dot(wall.outward, position);
             let approach = dot(wall.outward, velocity) * horizon_s;
-            if approach > room {
-                let strength = ((approach - room.max(0.0)) / approach).clamp(0.0, 1.0);
+            if approach > room.max(0.0) {
+                let strength = (approach - room.max(0.0)) / approach;
                 for (push, outward) in push.iter_mut().zip(wall.outward) {
                     *push -= strength * outward;
                 }

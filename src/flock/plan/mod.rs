@@ -14,7 +14,7 @@ use self::crowd::{Crowd, Lookalike};
 use self::trellis::Trellis;
 use self::viterbi::{Path, cheapest_paths};
 use super::error::Error;
-use super::individual::{BoidTrack, PlanCost};
+use super::individual::{BoidTrack, PlanCost, rounded};
 use super::params::Params;
 use crate::geometry::{Turns, wrap_rad};
 use crate::library::Library;
@@ -201,7 +201,7 @@ impl<'a> Planner<'a> {
                 transition += self.jump_cost(path.states[t - 1], state);
             }
         }
-        let rad = |turns: u32| f64::from(turns) / Turns::PER_RAD;
+        let rad = |turns: u32| rounded(f64::from(turns) / Turns::PER_RAD, 6);
         Plan {
             shown: path
                 .states

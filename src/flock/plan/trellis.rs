@@ -15,6 +15,8 @@ pub struct Trellis {
     frames: Vec<u32>,
     mirrored: Vec<bool>,
     barriers: Vec<u32>,
+    /// Which run a state belongs to.
+    runs: Vec<u32>,
     /// States that some jump leads to, rising.
     targets: Vec<u32>,
     /// `sources[first_source[k]..first_source[k + 1]]` lead to target k.
@@ -31,6 +33,7 @@ impl Trellis {
             frames: Vec::new(),
             mirrored: Vec::new(),
             barriers: Vec::new(),
+            runs: Vec::new(),
             targets: Vec::new(),
             first_source: vec![0],
             sources: Vec::new(),
@@ -99,10 +102,7 @@ impl Trellis {
     /// Whether `state + ahead` is reached from `state` by continuing alone.
     pub fn continues(&self, state: usize, ahead: usize) -> bool {
         let end = state + ahead;
-        end < self.frames.len()
-            && self.frames[state] != NO_FRAME
-            && self.frames[end] == self.frames[state].wrapping_add(ahead as u32)
-            && self.mirrored[end] == self.mirrored[state]
+        self.frames[state] != NO_FRAME && self.runs.get(end) == Some(&self.runs[state])
     }
 
     fn lay_side(&mut self, component: &[u32], side: bool) {
@@ -112,9 +112,11 @@ impl Trellis {
                 self.barriers.push(self.frames.len() as u32);
                 self.frames.push(NO_FRAME);
                 self.mirrored.push(side);
+                self.runs.push(self.barriers.len() as u32);
             }
             self.frames.push(frame);
             self.mirrored.push(side);
+            self.runs.push(self.barriers.len() as u32);
             last = Some(frame);
         }
     }
@@ -224,6 +226,13 @@ mod tests {
         assert!(trellis.continues(at(4), 2));
         assert!(!trellis.continues(at(4), 3));
         assert!(!trellis.continues(at(12), 1));
+        let gap_of_one = Playback {
+            component: vec![0, 2],
+            ..playback()
+        };
+        let trellis = Trellis::new(&gap_of_one, false, |d| d as u32);
+        assert!(!trellis.continues(1, 2), "a barrier stands between");
+        let trellis = Trellis::new(&playback(), true, |d| d as u32);
         assert!(!trellis.continues(at(12), 2));
     }
 }

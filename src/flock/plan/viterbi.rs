@@ -46,6 +46,9 @@ pub(super) fn cheapest_paths_by_segments<const LANES: usize>(
     row: impl Fn(usize, &mut [[u32; LANES]]),
 ) -> Option<[Path; LANES]> {
     assert!(n_frames > 0 && dwell > 0 && segment > 0, "nothing to plan");
+    if trellis.n_states() == 0 {
+        return None;
+    }
     let mut column = Column::start(trellis, dwell, &row);
     let mut trace = Trace::default();
     let mut checkpoints = Vec::new();
