@@ -34,7 +34,9 @@ const PROFILE: [[f64; 4]; 12] = [
 /// How far the trunk reaches above the spine, below it and to each side at `s`, lengths.
 pub(super) fn profile_bl(s: f64) -> [f64; 3] {
     let u = (s / TRUNK_END_S).clamp(0.0, 1.0);
-    let k = PROFILE.partition_point(|knot| knot[0] <= u).clamp(1, PROFILE.len() - 1);
+    let k = PROFILE
+        .partition_point(|knot| knot[0] <= u)
+        .clamp(1, PROFILE.len() - 1);
     std::array::from_fn(|column| HALF_DEPTH_BL * hermite(k - 1, column + 1, u))
 }
 
@@ -108,7 +110,10 @@ fn ring_u(i: usize) -> f64 {
 fn hermite(k: usize, column: usize, u: f64) -> f64 {
     let knot = |i: usize| (PROFILE[i][0], PROFILE[i][column]);
     let slope = |i: usize| {
-        let ((u0, v0), (u1, v1)) = (knot(i.saturating_sub(1)), knot((i + 1).min(PROFILE.len() - 1)));
+        let ((u0, v0), (u1, v1)) = (
+            knot(i.saturating_sub(1)),
+            knot((i + 1).min(PROFILE.len() - 1)),
+        );
         (v1 - v0) / (u1 - u0)
     };
     let ((u0, v0), (u1, v1)) = (knot(k), knot(k + 1));
@@ -134,7 +139,13 @@ mod tests {
             }
         }
         let above = |k: i32| profile_bl(f64::from(k) * 0.001)[0];
-        assert!((1..=319).all(|k| above(k) >= above(k - 1)), "rises to the nape");
-        assert!((321..=740).all(|k| above(k) <= above(k - 1) + 1e-9), "falls to the tail");
+        assert!(
+            (1..=319).all(|k| above(k) >= above(k - 1)),
+            "rises to the nape"
+        );
+        assert!(
+            (321..=740).all(|k| above(k) <= above(k - 1) + 1e-9),
+            "falls to the tail"
+        );
     }
 }

@@ -7,11 +7,42 @@ use super::paint::Coat;
 
 /// Adds every fin.
 pub(super) fn add_fins(sketch: &mut Sketch, coat: &Coat) {
-    add_fin(sketch, coat, &FinShape { across: 33, out: 13, rays: 20.0 }, tail);
-    add_fin(sketch, coat, &FinShape { across: 25, out: 9, rays: 17.0 }, dorsal);
-    add_fin(sketch, coat, &FinShape { across: 13, out: 9, rays: 8.0 }, anal);
+    add_fin(
+        sketch,
+        coat,
+        &FinShape {
+            across: 33,
+            out: 13,
+            rays: 20.0,
+        },
+        tail,
+    );
+    add_fin(
+        sketch,
+        coat,
+        &FinShape {
+            across: 25,
+            out: 9,
+            rays: 17.0,
+        },
+        dorsal,
+    );
+    add_fin(
+        sketch,
+        coat,
+        &FinShape {
+            across: 13,
+            out: 9,
+            rays: 8.0,
+        },
+        anal,
+    );
     for sign in [1.0, -1.0] {
-        let shape = FinShape { across: 11, out: 9, rays: 8.0 };
+        let shape = FinShape {
+            across: 11,
+            out: 9,
+            rays: 8.0,
+        };
         add_fin(sketch, coat, &shape, |v, w| mirrored(pelvic(v, w), sign));
         add_fin(sketch, coat, &shape, |v, w| mirrored(pectoral(v, w), sign));
     }
@@ -50,7 +81,10 @@ fn tail(v: f64, w: f64) -> [f64; 3] {
     let side = 2.0 * v - 1.0;
     let a = side.abs();
     let [above, below, _] = profile_bl(TRUNK_END_S);
-    let base = [TRUNK_END_S - 0.022, side * if side < 0.0 { above } else { below } * 0.92];
+    let base = [
+        TRUNK_END_S - 0.022,
+        side * if side < 0.0 { above } else { below } * 0.92,
+    ];
     // The edge runs from the notch out to the lobe, rounds its tip and comes a little forward again.
     let reach = 0.845 + 0.155 * smooth(a / 0.86) - 0.035 * smooth((a - 0.86) / 0.14);
     let spread = 0.185 * libm::pow(a, 0.85) * side.signum();

@@ -26,7 +26,11 @@ impl Surface {
             weights[0] * of(corners[0]) + weights[1] * of(corners[1]) + weights[2] * of(corners[2])
         };
         Surface {
-            normal: [mix(|s| s.normal[0]), mix(|s| s.normal[1]), mix(|s| s.normal[2])],
+            normal: [
+                mix(|s| s.normal[0]),
+                mix(|s| s.normal[1]),
+                mix(|s| s.normal[2]),
+            ],
             color: [
                 mix(|s| s.color[0]),
                 mix(|s| s.color[1]),
@@ -45,7 +49,11 @@ pub(super) fn shade(surface: &Surface) -> [f32; 3] {
     let mut n = surface.normal;
     let length = dot(n, n).sqrt().max(1e-12);
     // A fin is seen from both sides: its normal is turned toward the camera.
-    let turn = if n[2] > 0.0 && surface.grain_depth < 0.0 { -1.0 } else { 1.0 };
+    let turn = if n[2] > 0.0 && surface.grain_depth < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
     n = n.map(|c| turn * c / length);
     let wrapped = ((dot(n, KEY) + 0.35) / 1.35).max(0.0);
     let sky = 0.5 - 0.5 * n[1];
@@ -102,7 +110,10 @@ mod tests {
     #[test]
     fn the_two_directions_of_light_have_unit_length() {
         for direction in [KEY, HALF] {
-            assert!((dot(direction, direction) - 1.0).abs() < 2e-2, "{direction:?}");
+            assert!(
+                (dot(direction, direction) - 1.0).abs() < 2e-2,
+                "{direction:?}"
+            );
         }
     }
 

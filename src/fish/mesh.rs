@@ -126,7 +126,10 @@ impl Sketch {
             vertex.position_m[1] *= scale;
             vertex.position_m[2] *= scale;
         }
-        let (body, fins) = (drop_slivers(self.body, &vertices), drop_slivers(self.fins, &vertices));
+        let (body, fins) = (
+            drop_slivers(self.body, &vertices),
+            drop_slivers(self.fins, &vertices),
+        );
         set_normals(&mut vertices, &[&body, &fins]);
         Mesh {
             vertices,
@@ -253,7 +256,12 @@ mod tests {
         let volume: f64 = mesh
             .body
             .iter()
-            .map(|t| dot(area_normal(t, &mesh.vertices), mesh.vertices[t[0] as usize].position_m))
+            .map(|t| {
+                dot(
+                    area_normal(t, &mesh.vertices),
+                    mesh.vertices[t[0] as usize].position_m,
+                )
+            })
             .sum::<f64>()
             / 6.0;
         assert!(volume > 0.0, "inside out: {volume}");

@@ -103,7 +103,10 @@ mod tests {
     fn yaw_turns_from_right_to_away_and_pitch_points_the_nose_down() {
         let close = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-12, "{a} {b}");
         close(rotation_of(0.0, 0.0, 0.0) * DVec3::X, DVec3::X);
-        close(rotation_of(std::f64::consts::FRAC_PI_2, 0.0, 0.0) * DVec3::X, DVec3::Z);
+        close(
+            rotation_of(std::f64::consts::FRAC_PI_2, 0.0, 0.0) * DVec3::X,
+            DVec3::Z,
+        );
         assert!((rotation_of(0.3, 0.4, 0.0) * DVec3::X).y > 0.3);
     }
 
@@ -119,7 +122,10 @@ mod tests {
     fn a_fish_leans_into_its_turn() {
         let lean = bank_rad(2.0, 0.2, 0.3);
         let back = rotation_of(0.0, 0.0, lean) * -DVec3::Y;
-        assert!(back.z > 0.05, "turning left, toward +z, the back leans to +z: {back}");
+        assert!(
+            back.z > 0.05,
+            "turning left, toward +z, the back leans to +z: {back}"
+        );
         assert_eq!(bank_rad(100.0, 1.0, 0.2), -0.2);
     }
 

@@ -54,7 +54,11 @@ impl Coat {
         // Cheeks are smooth and a little paler; the edge of the gill cover is a dark crescent.
         let s = s as f32;
         let cheek = 1.0 - smoothstep(0.14, 0.19, s);
-        color = mix(color, mix(self.flank, self.belly, 0.35), 0.35 * cheek * (1.0 - up.abs()));
+        color = mix(
+            color,
+            mix(self.flank, self.belly, 0.35),
+            0.35 * cheek * (1.0 - up.abs()),
+        );
         let (along, across) = ((s - 0.125) / 0.085, (up + 0.12) / 0.92);
         let radius = (along * along + across * across).sqrt();
         let crescent = bump((radius - 1.0) / 0.075) * smoothstep(0.05, 0.5, along);
@@ -77,7 +81,11 @@ impl Coat {
     pub(super) fn eye(&self, out: f64, up: f64) -> [f32; 4] {
         let out = out as f32;
         let iris = self.iris.map(|c| c * (1.0 + 0.15 * up as f32));
-        let rim = mix(self.back.map(|c| 0.45 * c), iris, smoothstep(0.18, 0.42, out));
+        let rim = mix(
+            self.back.map(|c| 0.45 * c),
+            iris,
+            smoothstep(0.18, 0.42, out),
+        );
         let color = mix(rim, [0.03, 0.03, 0.04], smoothstep(0.72, 0.80, out));
         [color[0], color[1], color[2], 1.0]
     }

@@ -73,7 +73,10 @@ impl Renderer {
             let moved = |k: usize| {
                 let j = usize::from(vertex.joints[k]);
                 let (pivot, turn) = joints[j];
-                (pivot + turn * (at - joint_at_rest_m(length_m, j)), turn * normal)
+                (
+                    pivot + turn * (at - joint_at_rest_m(length_m, j)),
+                    turn * normal,
+                )
             };
             let ((at_a, normal_a), (at_b, normal_b)) = (moved(0), moved(1));
             let share = f64::from(vertex.share);
@@ -123,7 +126,12 @@ impl Drawing {
     pub fn to_rgba(&self) -> RgbaImage {
         let straight = |&[r, g, b, a]: &[f32; 4]| {
             let scale = if a > 0.0 { 255.0 / a } else { 0.0 };
-            [byte(r * scale), byte(g * scale), byte(b * scale), byte(a * 255.0)]
+            [
+                byte(r * scale),
+                byte(g * scale),
+                byte(b * scale),
+                byte(a * 255.0),
+            ]
         };
         RgbaImage {
             width: self.rect.w,
@@ -231,7 +239,12 @@ impl Samples {
                 let at = row * self.width + column;
                 let z = u * a.z + v * b.z + w * c.z;
                 if z < self.depth[at] {
-                    put(self, at, z, Surface::between([&a.surface, &b.surface, &c.surface], [u, v, w]));
+                    put(
+                        self,
+                        at,
+                        z,
+                        Surface::between([&a.surface, &b.surface, &c.surface], [u, v, w]),
+                    );
                 }
             }
         }
@@ -258,7 +271,10 @@ impl Samples {
         let mut pixels = vec![[0.0f32; 4]; self.rect.area() as usize];
         for (row, samples) in self.color.chunks_exact(self.width.max(1)).enumerate() {
             let start = row / SAMPLES * self.rect.w as usize;
-            for (pixel, group) in pixels[start..].iter_mut().zip(samples.chunks_exact(SAMPLES)) {
+            for (pixel, group) in pixels[start..]
+                .iter_mut()
+                .zip(samples.chunks_exact(SAMPLES))
+            {
                 for (k, sum) in pixel.iter_mut().enumerate() {
                     *sum += group.iter().map(|sample| sample[k]).sum::<f32>();
                 }

@@ -246,7 +246,10 @@ fn posture(stroke: &Stroke, size: Animal) -> Posture {
     let roll = bank_rad(stroke.turn_rad_per_s, stroke.speed_m_per_s, limit_rad);
     Posture {
         joint_angles_rad: swimming.joint_angles_rad(),
-        ..Posture::at(stroke.position_m, rotation_of(stroke.yaw_rad, stroke.pitch_rad, roll))
+        ..Posture::at(
+            stroke.position_m,
+            rotation_of(stroke.yaw_rad, stroke.pitch_rad, roll),
+        )
     }
 }
 
@@ -258,7 +261,12 @@ fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
     for y in 0..rect.h {
         for x in (0..rect.w).filter(|&x| drawing.alpha(x, y) > 0.5) {
             let (px, py) = (rect.x + x, rect.y + y);
-            edges = [edges[0].min(px), edges[1].min(py), edges[2].max(px + 1), edges[3].max(py + 1)];
+            edges = [
+                edges[0].min(px),
+                edges[1].min(py),
+                edges[2].max(px + 1),
+                edges[3].max(py + 1),
+            ];
             sum = [sum[0] + u64::from(px), sum[1] + u64::from(py)];
             n += 1;
         }
@@ -289,7 +297,10 @@ const NOISE_STARTS: usize = 1 << 17;
 /// Normal numbers, long enough for a row of `width` from any start.
 fn noise_table(seed: u64, sigma: f64, width: u32) -> Vec<i8> {
     let draw = |k: u64| (sigma * random::normal(seed, &[NOISE, k])).round() as i8;
-    (0..NOISE_STARTS as u64 + u64::from(width)).into_par_iter().map(draw).collect()
+    (0..NOISE_STARTS as u64 + u64::from(width))
+        .into_par_iter()
+        .map(draw)
+        .collect()
 }
 
 /// Adds noise; chroma, which averages over a block, takes half of it.

@@ -12,12 +12,44 @@ const WATER: [[f64; 3]; 2] = [[126.0, 184.0, 188.0], [34.0, 84.0, 98.0]];
 /// The scene without the fish.
 pub fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
     let mut scene = Scene::of_water(width, height, seed);
-    scene.plants(&PlantBed { key: 1, n: 16, span: [0.04, 0.96], foot: 0.772, tall: [0.16, 0.36], wide: 0.0042, haze: 0.62 });
+    scene.plants(&PlantBed {
+        key: 1,
+        n: 16,
+        span: [0.04, 0.96],
+        foot: 0.772,
+        tall: [0.16, 0.36],
+        wide: 0.0042,
+        haze: 0.62,
+    });
     scene.gravel();
-    scene.plants(&PlantBed { key: 2, n: 9, span: [0.01, 0.15], foot: 0.80, tall: [0.22, 0.56], wide: 0.0062, haze: 0.34 });
-    scene.plants(&PlantBed { key: 3, n: 11, span: [0.82, 0.99], foot: 0.81, tall: [0.18, 0.62], wide: 0.0066, haze: 0.30 });
+    scene.plants(&PlantBed {
+        key: 2,
+        n: 9,
+        span: [0.01, 0.15],
+        foot: 0.80,
+        tall: [0.22, 0.56],
+        wide: 0.0062,
+        haze: 0.34,
+    });
+    scene.plants(&PlantBed {
+        key: 3,
+        n: 11,
+        span: [0.82, 0.99],
+        foot: 0.81,
+        tall: [0.18, 0.62],
+        wide: 0.0066,
+        haze: 0.30,
+    });
     scene.rocks();
-    scene.plants(&PlantBed { key: 4, n: 7, span: [0.63, 0.74], foot: 0.80, tall: [0.06, 0.17], wide: 0.0048, haze: 0.36 });
+    scene.plants(&PlantBed {
+        key: 4,
+        n: 7,
+        span: [0.63, 0.74],
+        foot: 0.80,
+        tall: [0.06, 0.17],
+        wide: 0.0048,
+        haze: 0.36,
+    });
     scene.into_image()
 }
 
@@ -74,7 +106,11 @@ impl Scene {
             let at = |k: u64| self.unit(bed.key, plant, k);
             let root = bed.span[0] + (bed.span[1] - bed.span[0]) * at(0);
             let n_leaves = 3 + (4.0 * at(1)) as u64;
-            let green = [38.0 + 60.0 * at(2), 112.0 + 52.0 * at(3), 40.0 + 22.0 * at(4)];
+            let green = [
+                38.0 + 60.0 * at(2),
+                112.0 + 52.0 * at(3),
+                40.0 + 22.0 * at(4),
+            ];
             let tall = bed.tall[0] + (bed.tall[1] - bed.tall[0]) * at(5);
             for leaf in 0..n_leaves {
                 let id = bed.key * 100 + plant;
@@ -100,7 +136,10 @@ impl Scene {
             let t = k as f64 / (n - 1) as f64;
             let [size, waves, start] = blade.sway;
             let sway = size * t * libm::sin(waves * t + start) + blade.lean * t * t;
-            let at = [(blade.root[0] + sway) * w, (blade.root[1] - blade.tall * t) * h];
+            let at = [
+                (blade.root[0] + sway) * w,
+                (blade.root[1] - blade.tall * t) * h,
+            ];
             let radius = blade.wide * w * (1.0 - 0.85 * t * t) * (0.5 + 0.5 * (6.0 * t).min(1.0));
             // The foot lies in shadow, the tip in the light; the left edge catches more of it.
             let glow = 0.62 + 0.55 * t;
@@ -180,8 +219,9 @@ impl Scene {
             let cell = [(x * 0.9) as u64, (y * 0.9) as u64];
             let grain = 0.93 + 0.14 * random::unit(grain_seed, &cell);
             let far = water([x / w, y / h], 0);
-            let color =
-                std::array::from_fn(|c| stone.color[c] * lit * grain * (1.0 - haze) + far[c] * haze);
+            let color = std::array::from_fn(|c| {
+                stone.color[c] * lit * grain * (1.0 - haze) + far[c] * haze
+            });
             (cover, color)
         });
     }
@@ -239,7 +279,9 @@ fn water([x, y]: [f64; 2], seed: u64) -> [f64; 3] {
     let ramp = 1.0 - (1.0 - down) * (1.0 - down);
     let side = 2.0 * x - 1.0;
     let slant = x + 0.32 * y + (seed % 7) as f64 * 0.03;
-    let shafts = libm::sin(19.0 * slant) + 0.7 * libm::sin(31.0 * slant + 1.0) + 0.5 * libm::sin(53.0 * slant);
+    let shafts = libm::sin(19.0 * slant)
+        + 0.7 * libm::sin(31.0 * slant + 1.0)
+        + 0.5 * libm::sin(53.0 * slant);
     let light = 1.0 - 0.20 * side * side + 0.035 * shafts * (1.0 - down) * (1.0 - down);
     std::array::from_fn(|c| (WATER[0][c] + ramp * (WATER[1][c] - WATER[0][c])) * light)
 }

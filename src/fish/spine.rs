@@ -196,7 +196,11 @@ mod tests {
         let at_root = swimming.lateral_bl(JOINT_S[0]);
         for (j, (pivot, _)) in frames.iter().enumerate().skip(2) {
             let want = swimming.lateral_bl(JOINT_S[j]) - at_root;
-            assert!((pivot.z - want).abs() < 0.02, "joint {j}: {} {want}", pivot.z);
+            assert!(
+                (pivot.z - want).abs() < 0.02,
+                "joint {j}: {} {want}",
+                pivot.z
+            );
         }
     }
 
@@ -215,7 +219,12 @@ mod tests {
     fn a_straight_midline_gives_a_straight_spine_and_a_curved_one_its_own_turn() {
         let heading: f64 = 2.5;
         let straight: Vec<[f64; 2]> = (0..11)
-            .map(|k| [-10.0 * f64::from(k) * heading.cos(), -10.0 * f64::from(k) * heading.sin()])
+            .map(|k| {
+                [
+                    -10.0 * f64::from(k) * heading.cos(),
+                    -10.0 * f64::from(k) * heading.sin(),
+                ]
+            })
             .collect();
         let angles = joint_angles_of_midline_rad(&straight, heading).expect("it has a length");
         assert!(angles.iter().all(|a| a.abs() < 1e-9), "{angles:?}");

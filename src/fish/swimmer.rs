@@ -149,7 +149,10 @@ mod tests {
             let along = step.dot(pair[1].forward());
             n_slid += usize::from((step.length() - along).abs() > 1e-9);
         }
-        assert!(n_slid < strokes.len() / 20, "slid along a wall in {n_slid} frames");
+        assert!(
+            n_slid < strokes.len() / 20,
+            "slid along a wall in {n_slid} frames"
+        );
     }
 
     #[test]

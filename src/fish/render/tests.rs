@@ -21,7 +21,10 @@ fn camera() -> Camera {
 }
 
 fn draw(yaw_rad: f64, pitch_rad: f64) -> Drawing {
-    let posture = Posture::at(DVec3::new(0.0, 0.0, 0.7), rotation_of(yaw_rad, pitch_rad, 0.0));
+    let posture = Posture::at(
+        DVec3::new(0.0, 0.0, 0.7),
+        rotation_of(yaw_rad, pitch_rad, 0.0),
+    );
     Renderer::new(SIZE, Palette::Goldfish).draw(&camera(), IMAGE_PX, &posture)
 }
 
@@ -69,7 +72,9 @@ fn its_back_is_above_its_belly_whether_it_swims_left_or_right() {
         let drawing = draw(yaw, 0.0);
         let column = drawing.rect.w / 2;
         let blue = |y: u32| drawing.pixels[(y * drawing.rect.w + column) as usize][2];
-        let rows: Vec<u32> = (0..drawing.rect.h).filter(|&y| drawing.alpha(column, y) > 0.99).collect();
+        let rows: Vec<u32> = (0..drawing.rect.h)
+            .filter(|&y| drawing.alpha(column, y) > 0.99)
+            .collect();
         let (upper, lower) = (rows[rows.len() / 4], rows[rows.len() * 7 / 8]);
         assert!(blue(upper) + 0.1 < blue(lower), "the pale belly is below");
     }
@@ -78,7 +83,11 @@ fn its_back_is_above_its_belly_whether_it_swims_left_or_right() {
 #[test]
 fn its_edges_are_soft() {
     let drawing = draw(0.3, 0.1);
-    let partly = drawing.pixels.iter().filter(|p| (0.05..0.95).contains(&p[3])).count();
+    let partly = drawing
+        .pixels
+        .iter()
+        .filter(|p| (0.05..0.95).contains(&p[3]))
+        .count();
     let fully = drawing.pixels.iter().filter(|p| p[3] > 0.999).count();
     assert!(partly > 100 && fully > 1000, "{partly} {fully}");
 }

@@ -77,8 +77,8 @@ fn the_true_heading_points_from_the_tail_to_the_head() {
     for k in (0..300).step_by(17) {
         let (pose, posture) = (film.true_pose(k), &motion.frames[k]);
         let ahead = posture.position_m + 1e-6 * posture.forward();
-        let [from, to] = [posture.position_m, ahead]
-            .map(|p| motion.camera.image_from_camera(p.to_array()));
+        let [from, to] =
+            [posture.position_m, ahead].map(|p| motion.camera.image_from_camera(p.to_array()));
         let seen = libm::atan2(to[1] - from[1], to[0] - from[0]);
         let gap = crate::geometry::wrap_rad(seen - pose.heading_rad.expect("it is in sight"));
         assert!(gap.abs() < 1e-3, "frame {k}: {gap}");
@@ -91,7 +91,11 @@ fn noise_has_the_strength_asked_for() {
     let (mut noisy, mut clean) = (Frame::default(), Frame::default());
     film.render(0, &mut noisy);
     film.film.render(0, &mut clean);
-    let gaps = noisy.luma().iter().zip(clean.luma()).map(|(a, b)| f64::from(*a) - f64::from(*b));
+    let gaps = noisy
+        .luma()
+        .iter()
+        .zip(clean.luma())
+        .map(|(a, b)| f64::from(*a) - f64::from(*b));
     let (n, sum, square) = gaps.fold((0.0, 0.0, 0.0), |(n, s, q), g| (n + 1.0, s + g, q + g * g));
     let sigma = (square / n - (sum / n) * (sum / n)).sqrt();
     assert!((sigma - 1.7f64.hypot(0.29)).abs() < 0.1, "{sigma}");
@@ -103,7 +107,10 @@ fn sizes_and_rates_out_of_range_are_refused() {
         n_frames: 0,
         ..SampleParams::default()
     };
-    assert!(matches!(SampleFilm::new(params), Err(Error::InvalidParams(_))));
+    assert!(matches!(
+        SampleFilm::new(params),
+        Err(Error::InvalidParams(_))
+    ));
     let params = SampleParams {
         fps: f64::NAN,
         ..SampleParams::default()
