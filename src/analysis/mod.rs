@@ -1,11 +1,79 @@
 //! Footage to library: what the animal did in every frame, and which moments look alike
 //! (ALGORITHMS.md 2 to 5).
+//!
+//! [`analyze`] is the whole way of the data; the modules follow in its order.
 
-pub mod distance;
-pub mod error;
 pub mod params;
+
+pub mod error;
+
+// What the scene looks like, and where a frame differs from it.
+pub mod background;
+pub mod light;
+mod refusal;
+pub mod shadow;
+pub mod silhouette;
+
+// The animal followed and cut out.
+pub mod matte;
+pub mod moments;
+pub mod sprite;
+pub mod tracking;
+
+// What it did.
+pub mod depth;
+pub mod heading;
+pub mod pose;
+pub mod smooth;
+
+// Which moments look alike.
+pub mod distance;
+mod gate;
 pub mod playback;
+mod stats;
 pub mod transition;
 
 pub use error::Error;
 pub use params::Params;
+
+use crate::cpu;
+use crate::footage::FrameSource;
+use crate::library::Library;
+use crate::progress::Progress;
+use crate::raster::RgbImage;
+
+/// Analyses a footage: the scene without the animal, the animal's pose in every frame, its sprites,
+/// and which of its moments may follow which.
+///
+/// `background` is a picture of the empty scene, if there is one. The same footage and parameters
+/// give the same library on any machine and any number of threads.
+///
+/// Fails with a reason of ALGORITHMS.md 2.9 when the footage cannot become a library, and with
+/// `Cancelled` soon after `progress` says so.
+pub fn analyze(
+    source: &dyn FrameSource,
+    background: Option<&RgbImage>,
+    params: &Params,
+    cpu: cpu::Level,
+    progress: &dyn Progress,
+) -> Result<Library, Error> {
+    let plate = background::estimate(source, background, params, progress)?;
+    let track = tracking::follow(source, &plate, params, progress)?;
+    let poses = pose::measure(&track, &source.format(), params);
+    let sprites = sprite::align(&track, poses.view);
+    drop(track);
+    let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
+    let stats = stats::of(&poses, &connections, plate.never_seen_px);
+    Ok(Library {
+        poses,
+        background: plate.rgb,
+        sprites,
+        clip_frames: connections.clip_frames,
+        epsilon: connections.epsilon,
+        natural_step: connections.natural_step,
+        transitions: connections.transitions,
+        playback: connections.playback,
+        patches: connections.patches,
+        stats,
+    })
+}

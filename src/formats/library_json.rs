@@ -1,1 +1,261 @@
-//! To be written.
+//! library.json: what may follow what, and how good a library is (DESIGN.md, a library on disk).
+//!
+//! Poses, background and sprites lie beside it; `library_dir` puts all together.
+
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::Params;
+use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Transition};
+
+/// The schema's name and version.
+pub const SCHEMA: &str = "flockreel/library@1";
+
+/// Which footage a library was made from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FootageSummary {
+    /// SHA-256 of the file, hexadecimal.
+    pub sha256: String,
+    /// Size of the file.
+    pub n_bytes: u64,
+}
+
+/// Everything of a library that library.json holds.
+pub struct Summary {
+    /// Which footage it was made from.
+    pub footage: FootageSummary,
+    /// With which parameters.
+    pub params: Params,
+    /// Width and height of the sprites.
+    pub sprite_size_px: [u32; 2],
+    /// f.
+    pub clip_frames: usize,
+    /// Clips nearer than this are alike.
+    pub epsilon: u64,
+    /// Median of D(i, i+1).
+    pub natural_step: u64,
+    /// Pairs of like clips.
+    pub transitions: Vec<Transition>,
+    /// Jumps and component.
+    pub playback: Playback,
+    /// Runs between jump ends.
+    pub patches: Vec<Patch>,
+    /// Counts and shares.
+    pub stats: LibraryStats,
+}
+
+/// The JSON of a library.
+pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Vec<u8> {
+    let file = LibraryFile {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        params: params.clone(),
+        footage: footage.clone(),
+        sprite_size_px: [library.sprites.width(), library.sprites.height()],
+        clip_frames: library.clip_frames,
+        epsilon: library.epsilon,
+        natural_step: library.natural_step,
+        stats: StatsFile::of(&library.stats),
+        transitions: library.transitions.iter().map(TransitionFile::of).collect(),
+        playback: library.playback.jumps.iter().map(JumpFile::of).collect(),
+        component: library.playback.component.clone(),
+        patches: library
+            .patches
+            .iter()
+            .enumerate()
+            .map(|(id, p)| PatchFile::of(id, p))
+            .collect(),
+    };
+    serde_json::to_vec(&file).expect("plain values serialise")
+}
+
+/// Reads what `write` wrote.
+pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
+    let file: LibraryFile = serde_json::from_slice(bytes)?;
+    Ok(Summary {
+        footage: file.footage,
+        params: file.params,
+        sprite_size_px: file.sprite_size_px,
+        clip_frames: file.clip_frames,
+        epsilon: file.epsilon,
+        natural_step: file.natural_step,
+        transitions: file
+            .transitions
+            .into_iter()
+            .map(TransitionFile::into_transition)
+            .collect(),
+        playback: Playback {
+            jumps: file.playback.into_iter().map(JumpFile::into_jump).collect(),
+            component: file.component,
+        },
+        patches: file
+            .patches
+            .into_iter()
+            .map(PatchFile::into_patch)
+            .collect(),
+        stats: file.stats.into_stats(),
+    })
+}
+
+#[derive(Serialize, Deserialize)]
+struct LibraryFile {
+    schema: String,
+    version: String,
+    params: Params,
+    footage: FootageSummary,
+    sprite_size_px: [u32; 2],
+    clip_frames: usize,
+    epsilon: u64,
+    natural_step: u64,
+    stats: StatsFile,
+    transitions: Vec<TransitionFile>,
+    playback: Vec<JumpFile>,
+    component: Vec<u32>,
+    patches: Vec<PatchFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct TransitionFile {
+    from: u32,
+    to: u32,
+    mirrored: bool,
+    distance: u64,
+    heading_gap_rad: f64,
+}
+
+impl TransitionFile {
+    fn of(transition: &Transition) -> TransitionFile {
+        TransitionFile {
+            from: transition.from,
+            to: transition.to,
+            mirrored: transition.mirrored,
+            distance: transition.distance,
+            heading_gap_rad: super::poses_json::round(transition.heading_gap_rad, 5),
+        }
+    }
+
+    fn into_transition(self) -> Transition {
+        Transition {
+            from: self.from,
+            to: self.to,
+            mirrored: self.mirrored,
+            distance: self.distance,
+            heading_gap_rad: self.heading_gap_rad,
+        }
+    }
+}
+
+/// [frame, next frame, cost] or [frame, next frame, cost, true] where the mirror side changes.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+enum JumpFile {
+    Same(u32, u32, u64),
+    Mirrored(u32, u32, u64, bool),
+}
+
+impl JumpFile {
+    fn of(jump: &Jump) -> JumpFile {
+        if jump.mirrored {
+            JumpFile::Mirrored(jump.from, jump.to, jump.cost, true)
+        } else {
+            JumpFile::Same(jump.from, jump.to, jump.cost)
+        }
+    }
+
+    fn into_jump(self) -> Jump {
+        let (from, to, cost, mirrored) = match self {
+            JumpFile::Same(from, to, cost) => (from, to, cost, false),
+            JumpFile::Mirrored(from, to, cost, mirrored) => (from, to, cost, mirrored),
+        };
+        Jump {
+            from,
+            to,
+            cost,
+            mirrored,
+        }
+    }
+}
+
+/// Frames `start..end`: `end` is one past the last.
+#[derive(Serialize, Deserialize)]
+struct PatchFile {
+    id: usize,
+    start: u32,
+    end: u32,
+    next: Vec<u32>,
+}
+
+impl PatchFile {
+    fn of(id: usize, patch: &Patch) -> PatchFile {
+        let next = patch.next.clone();
+        PatchFile {
+            id,
+            start: patch.frames.start,
+            end: patch.frames.end,
+            next,
+        }
+    }
+
+    fn into_patch(self) -> Patch {
+        Patch {
+            frames: self.start..self.end,
+            next: self.next,
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct StatsFile {
+    n_frames: usize,
+    n_detected: usize,
+    background: BackgroundStats,
+    n_candidates: u64,
+    n_transitions: usize,
+    kappa_used: Option<f64>,
+    component_share: f64,
+    heading_histogram: Vec<u32>,
+    speed_bl_per_s: Option<[f64; 3]>,
+    turn_rate_rad_per_s: Option<f64>,
+    length_px: Option<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct BackgroundStats {
+    never_seen_px: u64,
+}
+
+impl StatsFile {
+    fn of(stats: &LibraryStats) -> StatsFile {
+        let digits = |n: i32| move |value: f64| super::poses_json::round(value, n);
+        StatsFile {
+            n_frames: stats.n_frames,
+            n_detected: stats.n_detected,
+            background: BackgroundStats {
+                never_seen_px: stats.never_seen_px,
+            },
+            n_candidates: stats.n_candidates,
+            n_transitions: stats.n_transitions,
+            kappa_used: stats.kappa_used,
+            component_share: digits(5)(stats.component_share),
+            heading_histogram: stats.heading_histogram.clone(),
+            speed_bl_per_s: stats.speed_bl_per_s.map(|s| s.map(digits(4))),
+            turn_rate_rad_per_s: stats.turn_rate_rad_per_s.map(digits(4)),
+            length_px: stats.length_px.map(digits(3)),
+        }
+    }
+
+    fn into_stats(self) -> LibraryStats {
+        LibraryStats {
+            n_frames: self.n_frames,
+            n_detected: self.n_detected,
+            never_seen_px: self.background.never_seen_px,
+            n_candidates: self.n_candidates,
+            n_transitions: self.n_transitions,
+            kappa_used: self.kappa_used,
+            component_share: self.component_share,
+            heading_histogram: self.heading_histogram,
+            speed_bl_per_s: self.speed_bl_per_s,
+            turn_rate_rad_per_s: self.turn_rate_rad_per_s,
+            length_px: self.length_px,
+        }
+    }
+}

@@ -1,1 +1,113 @@
-//! To be written.
+//! Pictures as PNG bytes and back: plates, sprites, maps. Fast deflate: files are many and small.
+
+use std::io::Cursor;
+
+use png::{BitDepth, ColorType, Compression};
+
+use crate::raster::{RgbImage, RgbaImage};
+
+/// PNG bytes that are not such a picture.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The bytes are not a PNG.
+    #[error("not a PNG: {0}")]
+    Decode(#[from] png::DecodingError),
+    /// The pixels are of another kind.
+    #[error("expected 8-bit {wanted}, found {found:?}")]
+    Kind {
+        /// What was expected.
+        wanted: &'static str,
+        /// What the file holds.
+        found: (ColorType, BitDepth),
+    },
+}
+
+/// An RGB image as PNG.
+pub fn write_rgb(image: &RgbImage) -> Vec<u8> {
+    encode(image.width, image.height, ColorType::Rgb, &image.pixels)
+}
+
+/// Straight-alpha RGBA pixels as PNG. Panics when there are not `width * height * 4` of them.
+pub fn write_rgba(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
+    encode(width, height, ColorType::Rgba, pixels)
+}
+
+/// Grey levels as PNG. Panics when there are not `width * height` of them.
+pub fn write_grey(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
+    encode(width, height, ColorType::Grayscale, pixels)
+}
+
+/// Reads an 8-bit RGB PNG.
+pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
+    let (width, height, pixels) = decode(bytes, ColorType::Rgb, "RGB")?;
+    Ok(RgbImage {
+        width,
+        height,
+        pixels,
+    })
+}
+
+/// Reads an 8-bit RGBA PNG.
+pub fn read_rgba(bytes: &[u8]) -> Result<RgbaImage, Error> {
+    let (width, height, pixels) = decode(bytes, ColorType::Rgba, "RGBA")?;
+    Ok(RgbaImage {
+        width,
+        height,
+        pixels,
+    })
+}
+
+fn encode(width: u32, height: u32, color: ColorType, pixels: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::Fast);
+    encoder
+        .write_header()
+        .and_then(|mut writer| writer.write_image_data(pixels))
+        .expect("writing to memory fails only for a wrong number of pixels");
+    bytes
+}
+
+fn decode(
+    bytes: &[u8],
+    color: ColorType,
+    wanted: &'static str,
+) -> Result<(u32, u32, Vec<u8>), Error> {
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
+    let found = reader.output_color_type();
+    if found != (color, BitDepth::Eight) {
+        return Err(Error::Kind { wanted, found });
+    }
+    let (width, height) = (reader.info().width, reader.info().height);
+    let mut pixels = vec![0; width as usize * height as usize * color.samples()];
+    reader.next_frame(&mut pixels)?;
+    Ok((width, height, pixels))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_come_back_as_they_were() {
+        let mut rgb = RgbImage::new(5, 3);
+        rgb.pixels
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, p)| *p = (k * 29) as u8);
+        assert_eq!(read_rgb(&write_rgb(&rgb)).expect("our own PNG"), rgb);
+        let mut rgba = RgbaImage::new(3, 4);
+        rgba.pixels
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, p)| *p = (k * 41) as u8);
+        let bytes = write_rgba(3, 4, &rgba.pixels);
+        assert_eq!(read_rgba(&bytes).expect("our own PNG"), rgba);
+        assert!(matches!(
+            read_rgb(&bytes),
+            Err(Error::Kind { wanted: "RGB", .. })
+        ));
+    }
+}

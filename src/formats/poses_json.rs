@@ -1,1 +1,242 @@
-//! To be written.
+//! poses.json: what was measured in every frame (DESIGN.md, a library on disk).
+//!
+//! Numbers are rounded to the last digit that means something (`round`): files stay readable, and
+//! equal measurements give equal bytes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::Params;
+use crate::geometry::{Camera, Rect};
+use crate::library::{Animal, Pose, Poses, View};
+
+/// The schema's name and version.
+pub const SCHEMA: &str = "flockreel/poses@1";
+
+/// The poses as JSON, one line a frame.
+pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
+    let file = PosesFile {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        params: params.cloned(),
+        fps: poses.fps,
+        image_size_px: poses.image_size_px,
+        view: match poses.view {
+            View::Side => ViewName::Side,
+            View::Top => ViewName::Top,
+        },
+        camera: poses.camera.map(|c| CameraFile {
+            z_min_m: c.z_min_m,
+            pane_px_per_m: c.pane_px_per_m,
+            center_px: c.center_px,
+            medium_index: c.medium_index,
+        }),
+        animal: poses.animal.map(|a| AnimalFile {
+            length_m: a.length_m,
+            height_m: a.height_m,
+        }),
+        frames: (), // written line by line below
+    };
+    let head = serde_json::to_string(&file).expect("plain values serialise");
+    let mut bytes = head
+        .strip_suffix("null}")
+        .expect("frames come last")
+        .as_bytes()
+        .to_vec();
+    bytes.extend(b"[\n");
+    for (idx, pose) in poses.frames.iter().enumerate() {
+        serde_json::to_writer(&mut bytes, &PoseFile::of(idx, pose))
+            .expect("plain values serialise");
+        bytes.extend(if idx + 1 < poses.frames.len() {
+            &b",\n"[..]
+        } else {
+            b"\n"
+        });
+    }
+    bytes.extend(b"]}\n");
+    bytes
+}
+
+/// Reads what `write` wrote.
+pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
+    let file: PosesFile<Vec<PoseFile>> = serde_json::from_slice(bytes)?;
+    Ok(Poses {
+        fps: file.fps,
+        image_size_px: file.image_size_px,
+        view: match file.view {
+            ViewName::Side => View::Side,
+            ViewName::Top => View::Top,
+        },
+        camera: file.camera.map(|c| Camera {
+            z_min_m: c.z_min_m,
+            pane_px_per_m: c.pane_px_per_m,
+            center_px: c.center_px,
+            medium_index: c.medium_index,
+        }),
+        animal: file.animal.map(|a| Animal {
+            length_m: a.length_m,
+            height_m: a.height_m,
+        }),
+        frames: file.frames.into_iter().map(PoseFile::into_pose).collect(),
+    })
+}
+
+/// `value` rounded to `digits` after the point.
+pub(super) fn round(value: f64, digits: i32) -> f64 {
+    let scale = 10f64.powi(digits);
+    // + 0.0 turns -0 into 0.
+    (value * scale).round() / scale + 0.0
+}
+
+#[derive(Serialize, Deserialize)]
+struct PosesFile<Frames> {
+    schema: String,
+    version: String,
+    params: Option<Params>,
+    fps: f64,
+    image_size_px: [u32; 2],
+    view: ViewName,
+    camera: Option<CameraFile>,
+    animal: Option<AnimalFile>,
+    frames: Frames,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum ViewName {
+    Side,
+    Top,
+}
+
+#[derive(Serialize, Deserialize)]
+struct CameraFile {
+    z_min_m: f64,
+    pane_px_per_m: f64,
+    center_px: [f64; 2],
+    medium_index: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct AnimalFile {
+    length_m: f64,
+    height_m: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PoseFile {
+    frame: usize,
+    time_s: f64,
+    detected: bool,
+    cut: bool,
+    confidence: Option<f64>,
+    head_confidence: Option<f64>,
+    depth_sign_confidence: Option<f64>,
+    centroid_px: Option<[f64; 2]>,
+    box_px: Option<[u32; 4]>,
+    area_px: Option<f64>,
+    axis_rad: Option<f64>,
+    heading_rad: Option<f64>,
+    length_px: Option<f64>,
+    height_px: Option<f64>,
+    skew: Option<f64>,
+    midline_px: Option<Vec<[f64; 2]>>,
+    bend_rad: Option<f64>,
+    position_m: Option<[f64; 3]>,
+    forward: Option<[f64; 3]>,
+    yaw_rad: Option<f64>,
+    pitch_rad: Option<f64>,
+    gamma_rad: Option<f64>,
+}
+
+impl PoseFile {
+    fn of(frame: usize, pose: &Pose) -> PoseFile {
+        let digits = |n: i32| move |value: f64| round(value, n);
+        PoseFile {
+            frame,
+            time_s: round(pose.time_s, 6),
+            detected: pose.detected(),
+            cut: pose.cut,
+            confidence: pose.confidence.map(digits(4)),
+            head_confidence: pose.head_confidence.map(digits(4)),
+            depth_sign_confidence: pose.depth_sign_confidence.map(digits(4)),
+            centroid_px: pose.centroid_px.map(|p| p.map(digits(3))),
+            box_px: pose.box_px.map(|r| [r.x, r.y, r.w, r.h]),
+            area_px: pose.area_px.map(digits(2)),
+            axis_rad: pose.axis_rad.map(digits(5)),
+            heading_rad: pose.heading_rad.map(digits(5)),
+            length_px: pose.length_px.map(digits(3)),
+            height_px: pose.height_px.map(digits(3)),
+            skew: pose.skew.map(digits(5)),
+            midline_px: pose
+                .midline_px
+                .as_ref()
+                .map(|points| points.iter().map(|p| p.map(digits(2))).collect()),
+            bend_rad: pose.bend_rad.map(digits(5)),
+            position_m: pose.position_m.map(|p| p.map(digits(5))),
+            forward: pose.forward.map(|p| p.map(digits(5))),
+            yaw_rad: pose.yaw_rad.map(digits(5)),
+            pitch_rad: pose.pitch_rad.map(digits(5)),
+            gamma_rad: pose.gamma_rad.map(digits(5)),
+        }
+    }
+
+    fn into_pose(self) -> Pose {
+        Pose {
+            time_s: self.time_s,
+            cut: self.cut,
+            confidence: self.confidence,
+            head_confidence: self.head_confidence,
+            depth_sign_confidence: self.depth_sign_confidence,
+            centroid_px: self.centroid_px,
+            box_px: self.box_px.map(|[x, y, w, h]| Rect { x, y, w, h }),
+            area_px: self.area_px,
+            axis_rad: self.axis_rad,
+            heading_rad: self.heading_rad,
+            length_px: self.length_px,
+            height_px: self.height_px,
+            skew: self.skew,
+            midline_px: self.midline_px,
+            bend_rad: self.bend_rad,
+            position_m: self.position_m,
+            forward: self.forward,
+            yaw_rad: self.yaw_rad,
+            pitch_rad: self.pitch_rad,
+            gamma_rad: self.gamma_rad,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_come_back_as_they_were_written() {
+        let pose = Pose {
+            time_s: 0.033,
+            centroid_px: Some([12.25, 7.5]),
+            box_px: Some(Rect {
+                x: 3,
+                y: 4,
+                w: 5,
+                h: 6,
+            }),
+            heading_rad: Some(-1.5),
+            ..Pose::default()
+        };
+        let poses = Poses {
+            fps: 30.0,
+            image_size_px: [64, 48],
+            view: View::Top,
+            camera: None,
+            animal: Some(Animal {
+                length_m: 0.1,
+                height_m: 0.057,
+            }),
+            frames: vec![Pose::default(), pose],
+        };
+        assert_eq!(
+            read(&write(&poses, Some(&Params::default()))).expect("our own file"),
+            poses
+        );
+    }
+}

@@ -48,6 +48,8 @@ pub struct LibraryStats {
     pub never_seen_px: u64,
     /// Pairs of clips with D < epsilon, before any other test (O's figure 3).
     pub n_candidates: u64,
+    /// Transitions found: pairs that are alike, point the same way and are the best around (O: 72).
+    pub n_transitions: usize,
     /// The multiple of the natural step that epsilon is; null when epsilon was given.
     pub kappa_used: Option<f64>,
     /// Share of the frames that lie in the largest strongly connected component, 0..=1.

@@ -1,1 +1,23 @@
-//! To be written.
+//! Video files in and out, by ffmpeg as a child process behind one gate (RELIABILITY.md, "Facts"
+//! and "The gate"; ECOSYSTEM.md 5). A decoder's crash or exploit must never be ours.
+//!
+//! [`Video`] parses a foreign file at the door: once it is open, its size, rate and length are
+//! within the [`Limits`], and its frames come as planar 4:2:0 at a constant rate.
+
+mod container; // which of the accepted containers a file is, by its first bytes
+mod decode; // Video: footage -> frames
+mod encode; // VideoWriter: frames -> MP4
+mod error;
+mod gate; // the one place that starts a process
+mod image; // a given background
+mod limits;
+mod probe; // what a file holds
+mod sandbox; // what the child may do
+mod timeline; // presentation times -> a constant rate
+
+pub use decode::Video;
+pub use encode::{Quality, VideoFormat, VideoWriter};
+pub use error::Error;
+pub use gate::tool_version;
+pub use image::{decode_image, read_image};
+pub use limits::Limits;

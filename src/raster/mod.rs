@@ -3,7 +3,10 @@
 pub mod color;
 pub mod frame;
 pub mod image;
+pub mod mask;
+pub mod runs;
 
 pub use color::{ColorSpec, Matrix, Range};
 pub use frame::Frame;
 pub use image::{RgbImage, RgbaImage};
+pub use mask::Mask;

@@ -6,4 +6,5 @@ mod cli;
 mod common;
 mod film;
 mod jobs;
+mod media;
 mod tidy;

@@ -1,0 +1,145 @@
+//! How fast the distance engine is (ALGORITHMS.md 5 and 9), for `bench/distance.py`.
+//!
+//! Reads raw RGBA sprites from a file, times the engine alone for one thread and for all, measures
+//! this machine's own psadbw peak in the same run, and writes d and D as .npy to be compared.
+//! Arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR. Prints one line of JSON.
+#![expect(
+    unsafe_code,
+    reason = "the bare instruction is timed by inline assembly"
+)]
+
+use std::path::Path;
+use std::time::Instant;
+
+use flockreel::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
+use flockreel::analysis::params::Planes;
+use flockreel::cpu::Level;
+use flockreel::formats::npy;
+use flockreel::library::{Pose, Poses, Sprites, View};
+use flockreel::progress::Silent;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
+    let [path, width, height, clip_frames, out] = &arguments[..] else {
+        // `cargo test --benches` runs this without arguments.
+        return println!("arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR");
+    };
+    let size = [width, height].map(|text| text.parse().expect("a number of pixels"));
+    let clip_frames = clip_frames.parse().expect("a number of frames");
+    let (sprites, poses) = read(Path::new(path), size);
+    let start = Instant::now();
+    let pixels = ComparedSprites::new(&sprites, &poses, Planes::Rgba);
+    let prepare_s = start.elapsed().as_secs_f64();
+    let n_threads = rayon::current_num_threads();
+    let one = time(&pixels, clip_frames, 1);
+    let all = time(&pixels, clip_frames, n_threads);
+    for (name, f) in [("d.npy", 1), ("D.npy", clip_frames)] {
+        let matrix = DistanceMatrix::of(&distances(&pixels, f), &Silent).expect("not cancelled");
+        let mut file = std::fs::File::create(Path::new(out).join(name)).expect("a file");
+        npy::write(&matrix, &mut file).expect("room for the matrix");
+    }
+    let n = sprites.n_frames() as f64;
+    let pair_bytes = n * (n + 1.0) / 2.0 * pixels.n_bytes() as f64;
+    println!(
+        "{{\"level\":\"{}\",\"prepare_s\":{prepare_s:.6},\"one_thread_s\":{one:.6},\
+         \"threads\":{n_threads},\"all_threads_s\":{all:.6},\"one_thread_gb_per_s\":{:.3},\
+         \"psadbw_peak_gb_per_s\":{:.3}}}",
+        Level::detect().name(),
+        pair_bytes / one / 1e9,
+        peak_gb_per_s(),
+    );
+}
+
+fn read(path: &Path, [width, height]: [u32; 2]) -> (Sprites, Poses) {
+    let bytes = std::fs::read(path).expect("the sprites");
+    let n_bytes = (width * height * 4) as usize;
+    let n_frames = bytes.len() / n_bytes;
+    let mut sprites = Sprites::missing(width, height, n_frames);
+    for (frame_idx, sprite) in bytes.chunks_exact(n_bytes).enumerate() {
+        sprites.fill(frame_idx).copy_from_slice(sprite);
+    }
+    let poses = Poses {
+        fps: 30.0,
+        image_size_px: [width, height],
+        view: View::Side,
+        camera: None,
+        animal: None,
+        frames: vec![Pose::default(); n_frames],
+    };
+    (sprites, poses)
+}
+
+fn distances(pixels: &ComparedSprites, clip_frames: usize) -> Distances<'_> {
+    Distances {
+        pixels,
+        clip_frames,
+        side: Side::Plain,
+        cpu: Level::detect(),
+    }
+}
+
+/// The best of five runs, seconds.
+fn time(pixels: &ComparedSprites, clip_frames: usize, n_threads: usize) -> f64 {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads)
+        .build();
+    let pool = pool.expect("threads can be made");
+    let run = || {
+        let start = Instant::now();
+        let mut total = 0u64;
+        let mut add = |_, row: &[u64]| total = total.wrapping_add(row.iter().sum());
+        pool.install(|| distances(pixels, clip_frames).for_each_row(&Silent, &mut add))
+            .expect("not cancelled");
+        std::hint::black_box(total);
+        start.elapsed().as_secs_f64()
+    };
+    (0..5).map(|_| run()).fold(f64::INFINITY, f64::min)
+}
+
+/// Bytes a second of psadbw at the width that the engine uses, each followed by its addition, from
+/// registers alone: no kernel that sums absolute differences can be faster. 0 on other machines.
+fn peak_gb_per_s() -> f64 {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        const ROUNDS: u64 = 20_000_000;
+        let run = || {
+            let start = Instant::now();
+            // SAFETY: AVX2 is there; only registers that are declared are touched.
+            unsafe { sad_and_add_8(ROUNDS) };
+            (ROUNDS * 8 * 32) as f64 / start.elapsed().as_secs_f64() / 1e9
+        };
+        return (0..5).map(|_| run()).fold(0.0, f64::max);
+    }
+    0.0
+}
+
+/// `rounds` times eight psadbw of 32 bytes, with eight additions.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn sad_and_add_8(rounds: u64) {
+    // SAFETY: no memory is touched, and every register that changes is declared.
+    unsafe {
+        std::arch::asm!(
+            "2:",
+            "vpsadbw ymm8, ymm12, ymm14", "vpaddq ymm0, ymm0, ymm8",
+            "vpsadbw ymm9, ymm13, ymm14", "vpaddq ymm1, ymm1, ymm9",
+            "vpsadbw ymm10, ymm12, ymm15", "vpaddq ymm2, ymm2, ymm10",
+            "vpsadbw ymm11, ymm13, ymm15", "vpaddq ymm3, ymm3, ymm11",
+            "vpsadbw ymm8, ymm12, ymm14", "vpaddq ymm4, ymm4, ymm8",
+            "vpsadbw ymm9, ymm13, ymm14", "vpaddq ymm5, ymm5, ymm9",
+            "vpsadbw ymm10, ymm12, ymm15", "vpaddq ymm6, ymm6, ymm10",
+            "vpsadbw ymm11, ymm13, ymm15", "vpaddq ymm7, ymm7, ymm11",
+            "dec {rounds}",
+            "jnz 2b",
+            rounds = inout(reg) rounds => _,
+            out("ymm0") _, out("ymm1") _, out("ymm2") _, out("ymm3") _,
+            out("ymm4") _, out("ymm5") _, out("ymm6") _, out("ymm7") _,
+            out("ymm8") _, out("ymm9") _, out("ymm10") _, out("ymm11") _,
+            out("ymm12") _, out("ymm13") _, out("ymm14") _, out("ymm15") _,
+            options(nomem, nostack),
+        );
+    }
+}

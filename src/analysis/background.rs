@@ -1,0 +1,229 @@
+//! The plate: what the scene looks like without the animal, and how much each pixel of it wavers
+//! (ALGORITHMS.md 2.1, 2.2, 2.4).
+//!
+//! Median over frames spread through the footage, then again over those samples in which the
+//! silhouettes found by the first plate leave a pixel free. An animal that slept in the first median
+//! is seen as a ghost wherever it is gone, and its pixels are taken from just those frames.
+
+use super::silhouette::Blocks;
+use super::{Error, Params, refusal, shadow};
+use crate::footage::FrameSource;
+use crate::geometry::Rect;
+use crate::progress::Progress;
+use crate::raster::runs::Component;
+use crate::raster::{Frame, RgbImage};
+
+mod fill;
+mod samples;
+mod scenery;
+
+use samples::Samples;
+
+/// Least noise of a pixel, levels of 255: a lossy codec's plate looks steadier than it is.
+const SIGMA_FLOOR: f32 = 1.5;
+/// A pixel is known when it is free in at least this many samples.
+const FREE_LEAST: u32 = 5;
+
+/// The scene without the animal.
+pub struct Plate {
+    /// The picture, as the decoder would give it.
+    pub frame: Frame,
+    /// The same in RGB.
+    pub rgb: RgbImage,
+    /// Noise of each pixel (the largest over R, G, B), one standard deviation, levels of 255.
+    pub sigma: Vec<f32>,
+    /// Least difference that counts as the animal for certain: max(threshold, 4 sigma).
+    pub core_threshold: Vec<u8>,
+    /// Means and noise of 4 x 4 blocks, to find places worth looking at.
+    pub blocks: Blocks,
+    /// Pixels that the animal never left free.
+    pub never_seen_px: u64,
+}
+
+/// Estimates the plate, or takes the picture given and estimates its noise alone.
+///
+/// Fails when the given picture has another size than the footage, or when the footage is too
+/// short to tell the animal from the scene.
+pub fn estimate(
+    source: &dyn FrameSource,
+    given: Option<&RgbImage>,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<Plate, Error> {
+    let mut samples = Samples::spread(source, progress)?;
+    let mut plate = match given {
+        Some(image) => given_plate(image, &samples, params)?,
+        None => plate_of(
+            samples.median_frame(),
+            vec![SIGMA_FLOOR; samples.n_px()],
+            params,
+        ),
+    };
+    samples.even_out_light(&plate);
+    // Two rounds: what the first plate took for the animal may have been its ghost.
+    for _round in 0..2 {
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let seen = occupancy(&samples, &plate);
+        let frame = match given {
+            Some(_) => plate.frame.clone(),
+            None => samples.median_where_free(&plate.frame, &seen),
+        };
+        let sigma = samples.noise(&frame, &seen);
+        plate = plate_of(frame, sigma, params);
+        if given.is_none() {
+            plate.never_seen_px = fill_never_seen(&mut plate, &samples, &seen, params);
+        }
+        plate.blocks.measure_noise(&samples.frames);
+    }
+    refuse(&samples, &plate, params)?;
+    Ok(plate)
+}
+
+/// Refuses a footage that shows nothing, too much, or more than one animal.
+fn refuse(samples: &Samples, plate: &Plate, params: &Params) -> Result<(), Error> {
+    let found: Vec<Vec<Component>> = samples.components(plate);
+    refusal::judge(&found, samples.n_px(), params, |k, component| {
+        shadow::is_shadow_alone(&samples.frames[k], plate, component)
+    })
+}
+
+/// Which samples show the animal, and which its ghost, at each pixel: bit k for sample k.
+pub(super) struct Occupancy {
+    /// The animal (or anything as large) stands before the plate.
+    pub(super) taken: Vec<u64>,
+    /// The plate shows the animal, the sample does not.
+    pub(super) ghost: Vec<u64>,
+    /// Something of the scene sways here.
+    pub(super) scenery: Vec<bool>,
+}
+
+impl Occupancy {
+    /// The samples, as bits, in which the pixel shows the scene.
+    pub(super) fn free(&self, px: usize, all: u64) -> u64 {
+        if self.ghost[px] != 0 {
+            self.ghost[px]
+        } else {
+            all & !self.taken[px]
+        }
+    }
+}
+
+fn given_plate(image: &RgbImage, samples: &Samples, params: &Params) -> Result<Plate, Error> {
+    let first = &samples.frames[0];
+    if (image.width, image.height) != (first.width, first.height) {
+        return Err(Error::BackgroundSizeDiffers {
+            found: [image.width, image.height],
+            wanted: [first.width, first.height],
+        });
+    }
+    let mut frame = Frame::new(first.width, first.height, first.color);
+    frame.draw_rgb(image, Rect::of_size(first.width, first.height));
+    Ok(plate_of(frame, vec![SIGMA_FLOOR; samples.n_px()], params))
+}
+
+fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
+    let threshold = f32::from(params.threshold);
+    Plate {
+        rgb: frame.to_rgb(),
+        core_threshold: sigma
+            .iter()
+            .map(|s| (4.0 * s).max(threshold).min(255.0) as u8)
+            .collect(),
+        blocks: Blocks::of(&frame),
+        frame,
+        sigma,
+        never_seen_px: 0,
+    }
+}
+
+/// Marks the large components of every sample as the animal, its ghost, or swaying scenery.
+fn occupancy(samples: &Samples, plate: &Plate) -> Occupancy {
+    let found: Vec<Vec<Component>> = samples
+        .components(plate)
+        .into_iter()
+        .map(|components| {
+            let largest = components.iter().map(|c| c.area).max().unwrap_or(0);
+            let large = |c: &Component| c.area >= 12 && 10 * c.area >= 3 * largest;
+            components.into_iter().filter(large).collect()
+        })
+        .collect();
+    let n_px = samples.n_px();
+    let mut seen = Occupancy {
+        taken: vec![0; n_px],
+        ghost: vec![0; n_px],
+        scenery: vec![false; n_px],
+    };
+    for (k, components) in found.iter().enumerate() {
+        for component in components {
+            let rect = component
+                .rect
+                .inflated(3, plate.frame.width, plate.frame.height);
+            let mask = component.mask(rect).dilated().dilated().dilated();
+            let width = plate.frame.width as usize;
+            let set = mask
+                .bits
+                .iter()
+                .enumerate()
+                .filter(|&(_, &bit)| bit == 1)
+                .map(|(at, _)| {
+                    let (x, y) = (at % mask.width(), at / mask.width());
+                    (rect.y as usize + y) * width + rect.x as usize + x
+                });
+            if scenery::is_scenery(&found, k, component) {
+                set.for_each(|px| seen.scenery[px] = true);
+            } else if is_ghost(&samples.frames[k], plate, component) {
+                set.for_each(|px| seen.ghost[px] |= 1 << k);
+            } else {
+                set.for_each(|px| seen.taken[px] |= 1 << k);
+            }
+        }
+    }
+    seen
+}
+
+/// Whether a component's outline lives in the plate rather than in the frame: the sum over the
+/// outline of |grad I| - |grad B| is negative (ALGORITHMS.md 2.2).
+fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
+    let (w, h) = (frame.width as usize, frame.height as usize);
+    let rect = component.rect.inflated(1, frame.width, frame.height);
+    let mask = component.mask(rect);
+    let inner = mask.eroded();
+    let gradient = |luma: &[u8], x: usize, y: usize| {
+        let at = |x: usize, y: usize| i32::from(luma[y * w + x]);
+        let dx = at((x + 1).min(w - 1), y) - at(x.saturating_sub(1), y);
+        let dy = at(x, (y + 1).min(h - 1)) - at(x, y.saturating_sub(1));
+        (dx.abs() + dy.abs()) as f32
+    };
+    let mut sum = 0.0;
+    for (k, (&set, &inside)) in mask.bits.iter().zip(&inner.bits).enumerate() {
+        if set == 1 && inside == 0 {
+            let (x, y) = (
+                rect.x as usize + k % mask.width(),
+                rect.y as usize + k / mask.width(),
+            );
+            sum += gradient(frame.luma(), x, y) - gradient(plate.frame.luma(), x, y);
+        }
+    }
+    sum < 0.0
+}
+
+/// Fills the pixels that are free in too few samples from around them; returns how many there are.
+fn fill_never_seen(plate: &mut Plate, samples: &Samples, seen: &Occupancy, params: &Params) -> u64 {
+    let all = samples.all_bits();
+    let least = FREE_LEAST.min(samples.frames.len() as u32 / 3);
+    let unknown: Vec<bool> = (0..samples.n_px())
+        .map(|px| seen.free(px, all).count_ones() < least)
+        .collect();
+    let count = unknown.iter().filter(|&&u| u).count() as u64;
+    if count > 0 {
+        fill::fill_from_around(&mut plate.rgb, &unknown);
+        let whole = Rect::of_size(plate.frame.width, plate.frame.height);
+        let mut frame = plate.frame.clone();
+        frame.draw_rgb(&plate.rgb, whole);
+        let sigma = std::mem::take(&mut plate.sigma);
+        *plate = plate_of(frame, sigma, params);
+    }
+    count
+}

@@ -1,0 +1,144 @@
+//! Local minima of D: of many pairs of clips around one moment, the one that fits best (Kovar,
+//! Gleicher & Pighin, Motion Graphs, 2002; ALGORITHMS.md 5, candidates).
+//!
+//! A pair is a local minimum when no other pair within two frames of it, in either clip, has a
+//! smaller D; among equals the smaller (i, j) wins. Clips that cannot be used are no neighbors.
+//! Pairs close to the diagonal count as neighbors like all others, although they make no
+//! transition themselves: a slope toward D(i, i) = 0 is no minimum.
+
+use std::cmp::Ordering;
+
+/// Neighbors this far away, in each clip, are compared.
+const REACH: usize = 2;
+const N_ROWS: usize = 2 * REACH + 1;
+
+/// Two clips, `from <= to`, and their distance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ClipPair {
+    /// First frame of the one clip.
+    pub from: usize,
+    /// First frame of the other clip.
+    pub to: usize,
+    /// D or Dm.
+    pub distance: u64,
+}
+
+/// Finds the local minima below a limit in rows that stream by.
+pub struct LocalMinima<'a> {
+    usable: &'a [bool],
+    limit: u64,
+    rows: [Vec<u64>; N_ROWS],
+    n_rows: usize,
+}
+
+impl LocalMinima<'_> {
+    /// For clips of which `usable` says which take part; only D < `limit` is reported.
+    pub fn new(usable: &[bool], limit: u64) -> LocalMinima<'_> {
+        LocalMinima {
+            usable,
+            limit,
+            rows: Default::default(),
+            n_rows: 0,
+        }
+    }
+
+    /// Takes D(i, i..) for the next i, and reports the minima that are settled by it.
+    pub fn push(&mut self, row: &[u64], on_minimum: impl FnMut(ClipPair)) {
+        let i = self.n_rows;
+        let usable = &self.usable[i..];
+        let kept = &mut self.rows[i % N_ROWS];
+        kept.clear();
+        kept.extend(row.iter().zip(usable).map(|(&distance, &usable_too)| {
+            let both = usable[0] && usable_too;
+            if both { distance } else { u64::MAX }
+        }));
+        self.n_rows += 1;
+        if let Some(settled) = i.checked_sub(REACH) {
+            self.report(settled, on_minimum);
+        }
+    }
+
+    /// Reports the minima of the last rows.
+    pub fn finish(self, mut on_minimum: impl FnMut(ClipPair)) {
+        for i in self.n_rows.saturating_sub(REACH)..self.n_rows {
+            self.report(i, &mut on_minimum);
+        }
+    }
+
+    fn report(&self, from: usize, mut on_minimum: impl FnMut(ClipPair)) {
+        for (to, &distance) in (from..).zip(&self.rows[from % N_ROWS]) {
+            let pair = ClipPair { from, to, distance };
+            if distance < self.limit && self.is_minimum(pair) {
+                on_minimum(pair);
+            }
+        }
+    }
+
+    fn is_minimum(&self, pair: ClipPair) -> bool {
+        let around = |center: usize| center.saturating_sub(REACH)..=center + REACH;
+        around(pair.from).all(|a| {
+            around(pair.to).all(|b| {
+                self.distance(a, b)
+                    .is_none_or(|other| order(other, pair) != Ordering::Less)
+            })
+        })
+    }
+
+    /// The pair of clips a and b in the order of the upper triangle, unless there is none.
+    fn distance(&self, a: usize, b: usize) -> Option<ClipPair> {
+        let (from, to) = (a.min(b), a.max(b));
+        if from >= self.n_rows {
+            return None;
+        }
+        let distance = *self.rows[from % N_ROWS].get(to - from)?;
+        Some(ClipPair { from, to, distance })
+    }
+}
+
+fn order(a: ClipPair, b: ClipPair) -> Ordering {
+    (a.distance, a.from, a.to).cmp(&(b.distance, b.from, b.to))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn minima(rows: &[&[u64]], usable: &[bool], limit: u64) -> Vec<(usize, usize)> {
+        let mut found = Vec::new();
+        let mut minima = LocalMinima::new(usable, limit);
+        for row in rows {
+            minima.push(row, |pair| found.push((pair.from, pair.to)));
+        }
+        minima.finish(|pair| found.push((pair.from, pair.to)));
+        found
+    }
+
+    #[test]
+    fn the_best_pair_around_a_moment_is_kept_alone() {
+        let rows: [&[u64]; 8] = [
+            &[0, 9, 9, 9, 9, 9, 5, 9],
+            &[0, 9, 9, 9, 9, 4, 5],
+            &[0, 9, 9, 9, 9, 9],
+            &[0, 9, 9, 9, 9],
+            &[0, 9, 9, 9],
+            &[0, 9, 9],
+            &[0, 9],
+            &[0],
+        ];
+        let off_diagonal = |pairs: Vec<(usize, usize)>| -> Vec<_> {
+            pairs.into_iter().filter(|(i, j)| i != j).collect()
+        };
+        assert_eq!(off_diagonal(minima(&rows, &[true; 8], 9)), [(1, 6)]);
+        let mut usable = [true; 8];
+        usable[1] = false;
+        assert_eq!(off_diagonal(minima(&rows, &usable, 9)), [(0, 6)]);
+        assert_eq!(off_diagonal(minima(&rows, &[true; 8], 4)), []);
+    }
+
+    #[test]
+    fn of_equal_pairs_the_smaller_is_kept() {
+        let row = [7u64; 6];
+        let rows: Vec<&[u64]> = (0..6).map(|i| &row[i..]).collect();
+        assert_eq!(minima(&rows, &[true; 6], 8), [(0, 0)]);
+    }
+}

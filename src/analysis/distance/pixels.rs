@@ -1,0 +1,232 @@
+//! The pixels that distances compare (ALGORITHMS.md 5), laid out for the kernels.
+//!
+//! Each sprite becomes U: four bytes a pixel, color premultiplied as `(A*C + 127) div 255`, then A;
+//! with `planes: rgb` the byte of A is 0 in every sprite and adds nothing. Sprites stand in groups
+//! of 48. Inside a group the bytes are cut into blocks of 1 KB, and block 0 of all 48 sprites comes
+//! before block 1: a tile of 48 x 48 distances then reads two runs of 48 KB at a time, without the
+//! cache conflicts of sprites whose size is a multiple of 4 KB. Bytes beyond the last sprite and
+//! beyond the last pixel are 0.
+
+use rayon::prelude::*;
+
+use super::upright::Canvas;
+use crate::analysis::params::Planes;
+use crate::library::{Poses, Sprites, View};
+
+/// Sprites in a group: the side of a tile of distances.
+pub(super) const GROUP: usize = 48;
+/// Lines in a block of 1 KB.
+pub(super) const BLOCK: usize = 16;
+
+/// 64 bytes on a cache line of their own.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Line(pub(super) [u8; 64]);
+
+/// How a sprite is mirrored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Flip {
+    /// Columns reversed: the side view's left-right mirror.
+    Columns,
+    /// Rows reversed: an animal that heads along +x, mirrored across its own axis.
+    Rows,
+}
+
+/// Every frame's U.
+pub struct ComparedSprites {
+    n_frames: usize,
+    width: usize,
+    height: usize,
+    flip: Flip,
+    lines: Vec<Line>,
+}
+
+/// 48 sprites, the last ones blank where the footage ends.
+#[derive(Clone, Copy)]
+pub(super) struct Group<'a> {
+    pub(super) n_sprites: usize,
+    n_lines: usize,
+    lines: &'a [Line],
+}
+
+impl ComparedSprites {
+    /// U of every frame: as the sprites stand in side view, turned to heading 0 in top view.
+    ///
+    /// Missing sprites are blank; so are, in top view, those of unknown heading.
+    pub fn new(sprites: &Sprites, poses: &Poses, planes: Planes) -> ComparedSprites {
+        let canvas = match poses.view {
+            View::Side => None,
+            View::Top => Some(Canvas::around(sprites, poses)),
+        };
+        let (width, height, flip) = match &canvas {
+            None => (
+                sprites.width() as usize,
+                sprites.height() as usize,
+                Flip::Columns,
+            ),
+            Some(canvas) => (canvas.width, canvas.height, Flip::Rows),
+        };
+        let n_frames = sprites.n_frames();
+        let mut compared = ComparedSprites {
+            n_frames,
+            width,
+            height,
+            flip,
+            lines: Vec::new(),
+        };
+        let n_lines = compared.n_lines();
+        compared
+            .lines
+            .resize(n_frames.div_ceil(GROUP) * GROUP * n_lines, Line([0; 64]));
+        let per_group = (GROUP * n_lines).max(1);
+        let groups = compared.lines.par_chunks_mut(per_group).enumerate();
+        groups.for_each(|(group_idx, group)| {
+            let mut bytes = vec![0; width * height * 4];
+            let mut plain = vec![0; sprites.n_bytes()];
+            let first = group_idx * GROUP;
+            for frame_idx in first..n_frames.min(first + GROUP) {
+                match &canvas {
+                    None => premultiply(sprites.sprite(frame_idx), planes, &mut bytes),
+                    Some(canvas) => {
+                        premultiply(sprites.sprite(frame_idx), planes, &mut plain);
+                        canvas.turn(&plain, poses.frames[frame_idx].heading_rad, &mut bytes);
+                    }
+                }
+                scatter(&bytes, frame_idx - first, n_lines, group);
+            }
+        });
+        compared
+    }
+
+    /// Frames of the footage.
+    pub fn n_frames(&self) -> usize {
+        self.n_frames
+    }
+
+    /// Bytes that one pair of sprites compares.
+    pub fn n_bytes(&self) -> usize {
+        self.width * self.height * 4
+    }
+
+    /// d(i, j): the sum of absolute differences of two frames.
+    pub fn sad(&self, i: usize, j: usize) -> u64 {
+        let (a, b) = (self.group(i / GROUP), self.group(j / GROUP));
+        (0..a.n_blocks())
+            .flat_map(|block| {
+                let a = a.strip(block, i % GROUP);
+                a.iter().zip(b.strip(block, j % GROUP))
+            })
+            .map(|(a, b)| super::kernel::scalar::sad_line(a, b))
+            .sum()
+    }
+
+    pub(super) fn n_groups(&self) -> usize {
+        self.n_frames.div_ceil(GROUP)
+    }
+
+    pub(super) fn group(&self, group_idx: usize) -> Group<'_> {
+        let n = GROUP * self.n_lines();
+        self.group_of(group_idx, &self.lines[group_idx * n..][..n])
+    }
+
+    /// The group mirrored, in memory that the caller lends.
+    pub(super) fn mirrored_group<'a>(
+        &self,
+        group_idx: usize,
+        memory: &'a mut Vec<Line>,
+    ) -> Group<'a> {
+        let group = self.group(group_idx);
+        memory.clear();
+        memory.resize(GROUP * self.n_lines(), Line([0; 64]));
+        let mut bytes = vec![0; self.n_bytes()];
+        for sprite in 0..group.n_sprites {
+            gather(group, sprite, &mut bytes);
+            self.mirror(&mut bytes);
+            scatter(&bytes, sprite, self.n_lines(), memory);
+        }
+        self.group_of(group_idx, memory)
+    }
+
+    fn group_of<'a>(&self, group_idx: usize, lines: &'a [Line]) -> Group<'a> {
+        Group {
+            n_sprites: (self.n_frames - group_idx * GROUP).min(GROUP),
+            n_lines: self.n_lines(),
+            lines,
+        }
+    }
+
+    fn mirror(&self, bytes: &mut [u8]) {
+        let row_bytes = self.width * 4;
+        match self.flip {
+            Flip::Columns => {
+                for row in bytes.chunks_exact_mut(row_bytes) {
+                    row.as_chunks_mut::<4>().0.reverse();
+                }
+            }
+            Flip::Rows => {
+                for y in 0..self.height / 2 {
+                    let (upper, lower) = bytes.split_at_mut((self.height - 1 - y) * row_bytes);
+                    upper[y * row_bytes..][..row_bytes].swap_with_slice(&mut lower[..row_bytes]);
+                }
+            }
+        }
+    }
+
+    fn n_lines(&self) -> usize {
+        self.n_bytes().div_ceil(64)
+    }
+}
+
+impl<'a> Group<'a> {
+    /// Blocks in each sprite; the last may hold fewer than 16 lines.
+    pub(super) fn n_blocks(&self) -> usize {
+        self.n_lines.div_ceil(BLOCK)
+    }
+
+    /// One block of one of the 48 sprites.
+    pub(super) fn strip(&self, block: usize, sprite: usize) -> &'a [Line] {
+        let depth = (self.n_lines - block * BLOCK).min(BLOCK);
+        &self.lines[block * BLOCK * GROUP + sprite * depth..][..depth]
+    }
+}
+
+/// U of a straight-alpha sprite.
+fn premultiply(sprite: &[u8], planes: Planes, out: &mut [u8]) {
+    let keep_alpha = match planes {
+        Planes::Rgba => 255,
+        Planes::Rgb => 0,
+    };
+    let pixels = out.as_chunks_mut::<4>().0.iter_mut();
+    for (out, &[r, g, b, a]) in pixels.zip(sprite.as_chunks::<4>().0) {
+        let times_alpha = |c: u8| ((u32::from(a) * u32::from(c) + 127) / 255) as u8;
+        *out = [
+            times_alpha(r),
+            times_alpha(g),
+            times_alpha(b),
+            a & keep_alpha,
+        ];
+    }
+}
+
+/// Writes one sprite's bytes to its place in a group.
+fn scatter(bytes: &[u8], sprite: usize, n_lines: usize, group: &mut [Line]) {
+    for (line_idx, chunk) in bytes.chunks(64).enumerate() {
+        let line = &mut group[place(sprite, line_idx, n_lines)].0;
+        line[..chunk.len()].copy_from_slice(chunk);
+    }
+}
+
+/// Reads one sprite's bytes from a group.
+fn gather(group: Group<'_>, sprite: usize, bytes: &mut [u8]) {
+    for (line_idx, chunk) in bytes.chunks_mut(64).enumerate() {
+        let line = &group.lines[place(sprite, line_idx, group.n_lines)].0;
+        chunk.copy_from_slice(&line[..chunk.len()]);
+    }
+}
+
+/// Where a sprite's line lies in its group.
+fn place(sprite: usize, line_idx: usize, n_lines: usize) -> usize {
+    let block = line_idx / BLOCK;
+    let depth = (n_lines - block * BLOCK).min(BLOCK);
+    block * BLOCK * GROUP + sprite * depth + line_idx % BLOCK
+}

@@ -1,0 +1,299 @@
+//! D against its definition, written out pixel by pixel, at every level that the machine has.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::analysis::params::Planes;
+use crate::library::{Pose, Poses, Sprites, View};
+use crate::progress::Silent;
+use crate::random;
+
+/// Noise: every byte of every sprite at random, alpha included.
+fn noise(width: u32, height: u32, n_frames: usize, seed: u64) -> Sprites {
+    let mut sprites = Sprites::missing(width, height, n_frames);
+    for frame_idx in 0..n_frames {
+        for (k, byte) in sprites.fill(frame_idx).iter_mut().enumerate() {
+            *byte = random::bits(seed, &[frame_idx as u64, k as u64]) as u8;
+        }
+    }
+    sprites
+}
+
+fn poses(view: View, headings_rad: impl IntoIterator<Item = Option<f64>>) -> Poses {
+    let frames = headings_rad.into_iter().map(|heading_rad| Pose {
+        heading_rad,
+        ..Pose::default()
+    });
+    Poses {
+        fps: 30.0,
+        image_size_px: [640, 480],
+        view,
+        camera: None,
+        animal: None,
+        frames: frames.collect(),
+    }
+}
+
+fn from_the_side(sprites: &Sprites) -> Poses {
+    poses(View::Side, vec![Some(0.0); sprites.n_frames()])
+}
+
+/// D for f = 1 of sprites that are `n_pixels` opaque grays in a row, one level a frame.
+pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMatrix {
+    let mut sprites = Sprites::missing(n_pixels, 1, levels.len());
+    for (frame_idx, &level) in levels.iter().enumerate() {
+        let pixels = sprites.fill(frame_idx).as_chunks_mut::<4>().0;
+        pixels.fill([level, level, level, 255]);
+    }
+    let distances = Distances {
+        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        clip_frames: 1,
+        side: Side::Plain,
+        cpu: Level::detect(),
+    };
+    DistanceMatrix::of(&distances, &Silent).expect("nobody cancels")
+}
+
+/// The engine's upper triangle.
+fn triangle(sprites: &Sprites, poses: &Poses, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
+    let distances = Distances {
+        pixels: &ComparedSprites::new(sprites, poses, Planes::Rgba),
+        clip_frames: f,
+        side,
+        cpu,
+    };
+    let mut rows = Vec::new();
+    distances
+        .for_each_row(&Silent, |i, row| {
+            assert_eq!(i, rows.len(), "rows come in order");
+            rows.push(row.to_vec());
+        })
+        .expect("nobody cancels");
+    rows
+}
+
+/// ALGORITHMS.md 5 to the letter: U(n, m, p) of one frame.
+fn u(sprites: &Sprites, frame: usize, n: usize, m: usize, p: usize) -> i64 {
+    let at = (m * sprites.width() as usize + n) * 4;
+    let pixel = &sprites.sprite(frame)[at..at + 4];
+    let (a, c) = (i64::from(pixel[3]), i64::from(pixel[p]));
+    if p == 3 { a } else { (a * c + 127) / 255 }
+}
+
+fn triangle_by_definition(sprites: &Sprites, f: usize, side: Side) -> Vec<Vec<u64>> {
+    let (w, h) = (sprites.width() as usize, sprites.height() as usize);
+    let d = |i: usize, j: usize| -> u64 {
+        let mut sum = 0;
+        for m in 0..h {
+            for n in 0..w {
+                let n_of_j = match side {
+                    Side::Plain => n,
+                    Side::Mirrored => w - 1 - n,
+                };
+                for p in 0..4 {
+                    let difference = u(sprites, i, n, m, p) - u(sprites, j, n_of_j, m, p);
+                    sum += difference.unsigned_abs();
+                }
+            }
+        }
+        sum
+    };
+    let n_clips = (sprites.n_frames() + 1).saturating_sub(f);
+    let window = |i: usize, j: usize| (0..f).map(|k| d(i + k, j + k)).sum();
+    (0..n_clips)
+        .map(|i| (i..n_clips).map(|j| window(i, j)).collect())
+        .collect()
+}
+
+#[test]
+fn every_level_gives_the_sums_of_the_definition_at_the_edges_of_its_tiles() {
+    // Below and above groups of 48, lines of 64 bytes and blocks of 1 KB; longer clips than footage.
+    for (w, h, n_frames, f) in [
+        (1, 1, 1, 1),
+        (3, 5, 47, 2),
+        (8, 2, 48, 48),
+        (16, 16, 49, 3),
+        (17, 16, 50, 8),
+        (5, 3, 7, 8),
+        (2, 1, 100, 60),
+    ] {
+        let sprites = noise(w, h, n_frames, 1);
+        for side in [Side::Plain, Side::Mirrored] {
+            let wanted = triangle_by_definition(&sprites, f, side);
+            for cpu in Level::available() {
+                let found = triangle(&sprites, &from_the_side(&sprites), f, side, cpu);
+                assert!(
+                    found == wanted,
+                    "{w}x{h}, {n_frames} frames, {side:?}, {cpu:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_largest_possible_differences_do_not_overflow() {
+    let mut sprites = Sprites::missing(64, 64, 2);
+    sprites.fill(1).fill(255);
+    for cpu in Level::available() {
+        let found = triangle(&sprites, &from_the_side(&sprites), 1, Side::Plain, cpu);
+        assert_eq!(found, [vec![0, 64 * 64 * 4 * 255], vec![0]]);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn every_level_equals_scalar(
+        (w, h, n_frames, f) in (1u32..40, 1u32..20, 1usize..120, 1usize..12),
+        seed: u64,
+        mirrored: bool,
+    ) {
+        let sprites = noise(w, h, n_frames, seed);
+        let side = if mirrored { Side::Mirrored } else { Side::Plain };
+        let scalar = triangle(&sprites, &from_the_side(&sprites), f, side, Level::Scalar);
+        for cpu in Level::available() {
+            let found = triangle(&sprites, &from_the_side(&sprites), f, side, cpu);
+            prop_assert!(found == scalar, "{cpu:?}");
+        }
+    }
+}
+
+#[test]
+fn one_thread_and_two_give_the_same() {
+    let sprites = noise(24, 16, 130, 2);
+    let with_threads = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
+        pool.expect("threads can be made").install(|| {
+            let poses = from_the_side(&sprites);
+            triangle(&sprites, &poses, 8, Side::Mirrored, Level::detect())
+        })
+    };
+    assert_eq!(with_threads(1), with_threads(2));
+}
+
+#[test]
+fn rgb_planes_leave_alpha_out() {
+    let mut sprites = Sprites::missing(1, 1, 2);
+    sprites.fill(0).copy_from_slice(&[0, 0, 0, 255]);
+    sprites.fill(1).copy_from_slice(&[200, 0, 0, 51]);
+    let poses = from_the_side(&sprites);
+    let d = |planes| ComparedSprites::new(&sprites, &poses, planes).sad(0, 1);
+    assert_eq!(d(Planes::Rgb), 40);
+    assert_eq!(d(Planes::Rgba), 40 + 204);
+}
+
+/// An L of three pixels about the center of an 8 x 8 sprite, turned by quarter turns: its long arm
+/// points along the heading, its short arm to the left of it (or to the right).
+fn letter(quarter_turns: u32, short_arm: i32) -> (Sprites, Option<f64>) {
+    let mut sprites = Sprites::missing(8, 8, 1);
+    let bytes = sprites.fill(0);
+    for (x, y, red) in [(1, 1, 9), (3, 1, 90), (5, 1, 200), (1, 3 * short_arm, 50)] {
+        // Odd half pixels about the center; a quarter turn takes (x, y) to (-y, x).
+        let (mut x, mut y) = (x, y);
+        for _ in 0..quarter_turns {
+            (x, y) = (-y, x);
+        }
+        let at = (((y + 7) / 2) * 8 + (x + 7) / 2) as usize * 4;
+        bytes[at..at + 4].copy_from_slice(&[red, 255 - red, 30, 255]);
+    }
+    (
+        sprites,
+        Some(f64::from(quarter_turns) * 0.5 * std::f64::consts::PI),
+    )
+}
+
+fn top_view(letters: &[(Sprites, Option<f64>)]) -> (Sprites, Poses) {
+    let mut sprites = Sprites::missing(8, 8, letters.len());
+    for (frame_idx, (letter, _)) in letters.iter().enumerate() {
+        sprites.fill(frame_idx).copy_from_slice(letter.sprite(0));
+    }
+    let headings = letters.iter().map(|(_, heading_rad)| *heading_rad);
+    let poses = poses(View::Top, headings.collect::<Vec<_>>());
+    (sprites, poses)
+}
+
+#[test]
+fn from_above_an_animal_looks_the_same_wherever_it_points() {
+    let (sprites, poses) = top_view(&[letter(0, 1), letter(1, 1), letter(2, 1), letter(3, 1)]);
+    for row in triangle(&sprites, &poses, 1, Side::Plain, Level::Scalar) {
+        assert!(row.iter().all(|&distance| distance == 0), "{row:?}");
+    }
+}
+
+#[test]
+fn from_above_the_mirror_is_across_the_animals_own_axis() {
+    // Pixels stand at odd half offsets, so the mirror of y = 1 is y = -1.
+    let (mut mirror_image, heading_rad) = letter(0, 1);
+    let rows = mirror_image.sprite(0).to_vec();
+    for (y, row) in rows.chunks_exact(32).enumerate() {
+        mirror_image.fill(0)[(7 - y) * 32..][..32].copy_from_slice(row);
+    }
+    let (sprites, poses) = top_view(&[letter(3, 1), (mirror_image, heading_rad)]);
+    assert_eq!(
+        triangle(&sprites, &poses, 1, Side::Mirrored, Level::Scalar)[0][1],
+        0
+    );
+    assert_ne!(
+        triangle(&sprites, &poses, 1, Side::Plain, Level::Scalar)[0][1],
+        0
+    );
+}
+
+#[test]
+fn cancelling_stops_at_the_next_panel() {
+    struct Impatient;
+    impl Progress for Impatient {
+        fn report(&self, _: &'static str, _: f64) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let sprites = noise(8, 8, 5, 3);
+    let distances = Distances {
+        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        clip_frames: 1,
+        side: Side::Plain,
+        cpu: Level::Scalar,
+    };
+    assert_eq!(
+        distances.for_each_row(&Impatient, |_, _| ()),
+        Err(Cancelled)
+    );
+}
+
+#[test]
+fn the_matrix_holds_every_distance_both_ways_round() {
+    let matrix = matrix_of_gray_levels(&[10, 13, 11, 30], 2);
+    for (i, a) in [10u64, 13, 11, 30].into_iter().enumerate() {
+        for (j, b) in [10u64, 13, 11, 30].into_iter().enumerate() {
+            assert_eq!(matrix.distance(i, j), 6 * a.abs_diff(b));
+        }
+    }
+    assert_eq!(matrix.max(), 120);
+}
+
+#[test]
+fn pooling_keeps_the_least_distance_of_each_cell() {
+    let sprites = noise(4, 4, 29, 5);
+    let distances = Distances {
+        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        clip_frames: 3,
+        side: Side::Plain,
+        cpu: Level::Scalar,
+    };
+    let matrix = DistanceMatrix::of(&distances, &Silent).expect("nobody cancels");
+    let pooled = PooledMatrix::of(&distances, 10, &Silent).expect("nobody cancels");
+    assert_eq!((matrix.n_clips(), pooled.side), (27, 10));
+    for (k, &least) in pooled.cells.iter().enumerate() {
+        let falls_in = |clip: &usize, cell: usize| clip * 10 / 27 == cell;
+        let rows = (0..27).filter(|i| falls_in(i, k / 10));
+        let all = rows.flat_map(|i| {
+            let columns = (0..27).filter(|j| falls_in(j, k % 10));
+            columns.map(move |j| (i, j))
+        });
+        let wanted = all.map(|(i, j)| matrix.distance(i, j)).min();
+        assert_eq!(Some(least), wanted);
+    }
+}

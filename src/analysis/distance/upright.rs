@@ -1,0 +1,114 @@
+//! Top-view sprites turned to heading 0 before they are compared (ALGORITHMS.md 5, View): seen from
+//! above any heading can be shown by rotation, so likeness must not depend on it.
+//!
+//! Exactly, so that others can recompute it; all divisions round down. Let t = the heading as
+//! `geometry::Turns` (round(heading * 65536 / 2 pi)), c = round(65536 cos(t)), s = round(65536 sin(t)),
+//! P the premultiplied sprite of w x h, and W x H the canvas, both even. For output pixel (x, y)
+//!
+//! ```text
+//! u = (w << 16) + c (2x + 1 - W) - s (2y + 1 - H) - 65536      v = (h << 16) + s (..) + c (..) - 65536
+//! x0 = u >> 17, a = (u >> 9) & 255      y0 = v >> 17, b = (v >> 9) & 255      (131072ths of a pixel)
+//! out = ((256-a)(256-b) P[y0][x0] + a (256-b) P[y0][x0+1] + (256-a) b P[y0+1][x0] + a b P[y0+1][x0+1] + 32768) >> 16
+//! ```
+//!
+//! with P = 0 outside the sprite. The canvas is as large as the turned animals need; a larger one
+//! would only add zeros to every sprite, so D does not depend on its size.
+
+use crate::geometry::Turns;
+use crate::library::{Poses, Sprites};
+
+/// The common picture into which sprites are turned, their center in its middle.
+pub(super) struct Canvas {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    source_width: usize,
+    source_height: usize,
+}
+
+impl Canvas {
+    /// The smallest canvas, in multiples of 8, that holds every sprite of known heading.
+    pub(super) fn around(sprites: &Sprites, poses: &Poses) -> Canvas {
+        let (w, h) = (sprites.width() as usize, sprites.height() as usize);
+        let (mut half_width, mut half_height) = (0.0f64, 0.0f64);
+        for (frame_idx, pose) in poses.frames.iter().enumerate() {
+            let Some(heading) = pose.heading_rad else {
+                continue;
+            };
+            let (c, s) = (libm::cos(heading), libm::sin(heading));
+            for corner in outline(sprites.sprite(frame_idx), w) {
+                let (x, y) = (corner[0] - w as f64 / 2.0, corner[1] - h as f64 / 2.0);
+                half_width = half_width.max((c * x + s * y).abs());
+                half_height = half_height.max((c * y - s * x).abs());
+            }
+        }
+        // One pixel for the reach of the interpolation, one for the rounding of the heading.
+        let side = |half: f64| ((half + 2.0) * 2.0).ceil() as usize;
+        Canvas {
+            width: side(half_width).next_multiple_of(8),
+            height: side(half_height).next_multiple_of(8),
+            source_width: w,
+            source_height: h,
+        }
+    }
+
+    /// Turns a premultiplied sprite to heading 0; blank when the heading is unknown.
+    pub(super) fn turn(&self, sprite: &[u8], heading_rad: Option<f64>, out: &mut [u8]) {
+        let Some(heading_rad) = heading_rad else {
+            out.fill(0);
+            return;
+        };
+        let heading = Turns::from_rad(heading_rad).to_rad();
+        let c = (libm::cos(heading) * 65536.0).round() as i64;
+        let s = (libm::sin(heading) * 65536.0).round() as i64;
+        let source = sprite.as_chunks::<4>().0;
+        let rows = out.as_chunks_mut::<4>().0.chunks_exact_mut(self.width);
+        for (row, y) in rows.zip(0i64..) {
+            let dy = 2 * y + 1 - self.height as i64;
+            for (pixel, x) in row.iter_mut().zip(0i64..) {
+                let dx = 2 * x + 1 - self.width as i64;
+                let u = ((self.source_width as i64) << 16) + c * dx - s * dy - 65536;
+                let v = ((self.source_height as i64) << 16) + s * dx + c * dy - 65536;
+                *pixel = self.sample(source, u, v);
+            }
+        }
+    }
+
+    fn sample(&self, source: &[[u8; 4]], u: i64, v: i64) -> [u8; 4] {
+        let (x0, y0) = (u >> 17, v >> 17);
+        let (a, b) = ((u >> 9 & 255) as u32, (v >> 9 & 255) as u32);
+        let mut sum = [32768u32; 4];
+        let corners = [
+            (x0, y0, (256 - a) * (256 - b)),
+            (x0 + 1, y0, a * (256 - b)),
+            (x0, y0 + 1, (256 - a) * b),
+            (x0 + 1, y0 + 1, a * b),
+        ];
+        for (x, y, weight) in corners {
+            let inside = (0..self.source_width as i64).contains(&x)
+                && (0..self.source_height as i64).contains(&y);
+            if inside {
+                let pixel = source[y as usize * self.source_width + x as usize];
+                for (sum, value) in sum.iter_mut().zip(pixel) {
+                    *sum += weight * u32::from(value);
+                }
+            }
+        }
+        sum.map(|value| (value >> 16) as u8)
+    }
+}
+
+/// Corners whose convex hull covers every pixel that is not transparent: per row the outer edges.
+fn outline(sprite: &[u8], width: usize) -> Vec<[f64; 2]> {
+    let mut corners = Vec::new();
+    for (y, row) in sprite.as_chunks::<4>().0.chunks_exact(width).enumerate() {
+        let first = row.iter().position(|pixel| pixel[3] > 0);
+        let last = row.iter().rposition(|pixel| pixel[3] > 0);
+        if let (Some(first), Some(last)) = (first, last) {
+            for y in [y, y + 1] {
+                corners.push([first as f64, y as f64]);
+                corners.push([(last + 1) as f64, y as f64]);
+            }
+        }
+    }
+    corners
+}

@@ -1,0 +1,138 @@
+//! The heading gate: clips may only be joined when the animal points the same way, O 3.3, or, seen
+//! from above where any heading can be shown by rotation, when it turns alike (ALGORITHMS.md 5).
+
+use std::f64::consts::TAU;
+
+use crate::analysis::Params;
+use crate::geometry::angle::{mean_rad, mirrored_rad, wrap_rad};
+use crate::library::{Poses, View};
+
+/// Largest difference of turning rates in top view, radians a second: 20 degrees.
+const TURN_GATE_RAD_PER_S: f64 = TAU / 18.0;
+
+/// Lets pairs of clips pass.
+pub(super) struct Gate {
+    mean_heading_rad: Vec<Option<f64>>,
+    turn_rate_rad_per_s: Vec<Option<f64>>,
+    view: View,
+    heading_gate_rad: f64,
+}
+
+impl Gate {
+    /// For every clip of the footage.
+    pub(super) fn new(poses: &Poses, clip_frames: usize, params: &Params) -> Gate {
+        let headings: Vec<Option<f64>> = poses.frames.iter().map(|pose| pose.heading_rad).collect();
+        let of_clips = |value: fn(&[f64]) -> Option<f64>| -> Vec<Option<f64>> {
+            headings
+                .windows(clip_frames)
+                .map(|clip| clip.iter().copied().collect::<Option<Vec<f64>>>())
+                .map(|clip| value(&clip?))
+                .collect()
+        };
+        let per_frame = of_clips(|clip| Some(turn_rate(clip)));
+        Gate {
+            mean_heading_rad: of_clips(|clip| mean_rad(clip.iter().copied())),
+            turn_rate_rad_per_s: per_frame
+                .into_iter()
+                .map(|rate| Some(rate? * poses.fps))
+                .collect(),
+            view: poses.view,
+            heading_gate_rad: params.heading_gate_deg.to_radians(),
+        }
+    }
+
+    /// The difference of the clips' mean headings, 0..=pi, if the pair may pass.
+    ///
+    /// A mirrored pair compares heading i with pi - heading j, and turning rate i with minus that
+    /// of j. A clip with an unknown heading never passes.
+    pub(super) fn pass(&self, i: usize, j: usize, mirrored: bool) -> Option<f64> {
+        let (a, b) = (self.mean_heading_rad[i]?, self.mean_heading_rad[j]?);
+        let gap_rad = wrap_rad(a - if mirrored { mirrored_rad(b) } else { b }).abs();
+        let passes = match self.view {
+            View::Side => gap_rad < self.heading_gate_rad,
+            View::Top => {
+                let (a, b) = (self.turn_rate_rad_per_s[i]?, self.turn_rate_rad_per_s[j]?);
+                (a - if mirrored { -b } else { b }).abs() < TURN_GATE_RAD_PER_S
+            }
+        };
+        passes.then_some(gap_rad)
+    }
+}
+
+/// Slope of the line fitted to the unwrapped headings, radians a frame; 0 for a single frame.
+fn turn_rate(headings_rad: &[f64]) -> f64 {
+    let middle = (headings_rad.len() as f64 - 1.0) / 2.0;
+    let mut heading = headings_rad[0];
+    let (mut covariance, mut variance) = (0.0, 0.0);
+    for (t, &measured) in headings_rad.iter().enumerate() {
+        heading += wrap_rad(measured - heading);
+        covariance += (t as f64 - middle) * heading;
+        variance += (t as f64 - middle).powi(2);
+    }
+    if variance > 0.0 {
+        covariance / variance
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::Pose;
+
+    fn gate(view: View, headings_deg: &[f64]) -> Gate {
+        let frames = headings_deg.iter().map(|deg| Pose {
+            heading_rad: Some(wrap_rad(deg.to_radians())),
+            ..Pose::default()
+        });
+        let poses = Poses {
+            fps: 10.0,
+            image_size_px: [100, 100],
+            view,
+            camera: None,
+            animal: None,
+            frames: frames.collect(),
+        };
+        Gate::new(&poses, 2, &Params::default())
+    }
+
+    #[test]
+    fn from_the_side_clips_must_point_the_same_way() {
+        // Mean headings of the clips: 1, 90 and 178 degrees where the pairs below look.
+        let gate = gate(View::Side, &[0.0, 2.0, 13.0, 19.0, 178.0, 178.0]);
+        let gap_deg = gate
+            .pass(0, 1, false)
+            .expect("6.5 degrees apart")
+            .to_degrees();
+        assert!((gap_deg - 6.5).abs() < 1e-9);
+        assert_eq!(gate.pass(0, 2, false), None, "exactly 15 degrees apart");
+        assert_eq!(gate.pass(0, 4, false), None);
+    }
+
+    #[test]
+    fn a_mirrored_pair_compares_with_the_heading_left_right_reversed() {
+        let gate = gate(View::Side, &[0.0, 2.0, 178.0, 178.0]);
+        let gap_deg = gate
+            .pass(0, 2, true)
+            .expect("178 mirrored is 2")
+            .to_degrees();
+        assert!((gap_deg - 1.0).abs() < 1e-9);
+        assert_eq!(gate.pass(0, 2, false), None);
+    }
+
+    #[test]
+    fn from_above_clips_must_turn_alike_wherever_they_point() {
+        // Rates in degrees a second: +30 across the seam, then +40 and -30 elsewhere.
+        let gate = gate(View::Top, &[179.0, 182.0, 10.0, 14.0, 50.0, 47.0]);
+        assert!(gate.pass(0, 2, false).is_some());
+        assert!(gate.pass(0, 4, false).is_none());
+        assert!(gate.pass(0, 4, true).is_some());
+    }
+
+    #[test]
+    fn a_clip_of_one_frame_does_not_turn() {
+        assert_eq!(turn_rate(&[1.0]), 0.0);
+        assert!((turn_rate(&[3.0, 3.2, 3.4 - TAU]) - 0.2).abs() < 1e-12);
+    }
+}

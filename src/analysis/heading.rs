@@ -1,0 +1,263 @@
+//! Which end is the head: one decision for the whole footage (ALGORITHMS.md 4; against O 3.3, where
+//! one early error lasts for ever).
+//!
+//! Two states a frame, the head at either end of the length axis. A state is likely when the animal
+//! moves that way and when the heavier side lies as it does while the animal moves; a change of state
+//! that turns the head by more than a quarter circle costs much while the animal is seen at length.
+//! The cheapest sequence is found by Viterbi, its certainty by the forward-backward algorithm.
+
+use super::pose::Axes;
+
+/// Speed at which the direction of motion decides, lengths a second.
+const DECISIVE_SPEED: f64 = 0.45;
+
+/// The decision for one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Head {
+    /// The head lies toward +axis (the axis in (-pi/2, pi/2]).
+    pub forward: bool,
+    /// Posterior probability of that, 0.5..=1 where the decision is not against the odds.
+    pub confidence: f64,
+}
+
+/// Decides for every frame with an axis. `velocity_px` is in pixels a second; `pin` is a frame whose
+/// head is known to lie toward +axis (true) or -axis.
+pub fn decode(
+    axes: &[Option<Axes>],
+    velocity_px: &[Option<[f64; 2]>],
+    length_px: f64,
+    pin: Option<(usize, bool)>,
+) -> Vec<Option<Head>> {
+    let evidence = evidence(axes, velocity_px, length_px, pin);
+    let seen: Vec<usize> = (0..axes.len()).filter(|&k| evidence[k].is_some()).collect();
+    let emissions: Vec<f64> = seen.iter().filter_map(|&k| evidence[k]).collect();
+    let switches: Vec<(f64, f64)> = seen
+        .windows(2)
+        .filter_map(|pair| {
+            Some(switch_costs(
+                axes[pair[0]].as_ref()?,
+                axes[pair[1]].as_ref()?,
+            ))
+        })
+        .collect();
+    let path = viterbi(&emissions, &switches);
+    let posterior = forward_backward(&emissions, &switches);
+    let mut heads = vec![None; axes.len()];
+    for ((&k, forward), p) in seen.iter().zip(path).zip(posterior) {
+        heads[k] = Some(Head {
+            forward,
+            confidence: if forward { p } else { 1.0 - p },
+        });
+    }
+    heads
+}
+
+/// What speaks for the head toward +axis in each frame: minus the emission cost of that state.
+fn evidence(
+    axes: &[Option<Axes>],
+    velocity_px: &[Option<[f64; 2]>],
+    length_px: f64,
+    pin: Option<(usize, bool)>,
+) -> Vec<Option<f64>> {
+    let speed_along: Vec<Option<f64>> = axes
+        .iter()
+        .zip(velocity_px)
+        .map(|(axes, velocity)| {
+            let (u, v) = (axes.as_ref()?.direction()?, (*velocity)?);
+            Some((v[0] * u[0] + v[1] * u[1]) / (DECISIVE_SPEED * length_px))
+        })
+        .collect();
+    let heavier_side: f64 = axes
+        .iter()
+        .zip(&speed_along)
+        .filter_map(|(axes, speed)| {
+            let (axes, speed) = (axes.as_ref()?, (*speed)?);
+            (speed.abs() > 1.0).then(|| speed.signum() * axes.skew)
+        })
+        .sum();
+    let heavier_side = if heavier_side == 0.0 {
+        0.0
+    } else {
+        heavier_side.signum()
+    };
+    let one = |k: usize| {
+        let axes = axes[k].as_ref()?;
+        axes.axis_rad?;
+        let motion = speed_along[k].unwrap_or(0.0).clamp(-3.0, 3.0);
+        let shape = 0.5 * (heavier_side * axes.skew / 0.3).clamp(-2.0, 2.0);
+        let pinned = match pin {
+            Some((frame, forward)) if frame == k => {
+                if forward {
+                    1e6
+                } else {
+                    -1e6
+                }
+            }
+            _ => 0.0,
+        };
+        Some(motion + shape + pinned)
+    };
+    (0..axes.len()).map(one).collect()
+}
+
+/// The costs of (keeping, changing) the state from one axis to the next.
+fn switch_costs(a: &Axes, b: &Axes) -> (f64, f64) {
+    let (Some(u), Some(v)) = (a.direction(), b.direction()) else {
+        return (0.0, 0.0);
+    };
+    let cost = 2.0 + 10.0 * (b.length_px / (2.5 * b.height_px.max(1.0))).clamp(0.0, 1.0);
+    // The axis itself may jump across the vertical: then keeping the state turns the head.
+    if u[0] * v[0] + u[1] * v[1] >= 0.0 {
+        (0.0, cost)
+    } else {
+        (cost, 0.0)
+    }
+}
+
+/// True where the cheapest sequence has the head toward +axis.
+fn viterbi(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<bool> {
+    let mut costs = [0.0f64; 2];
+    let mut came_from: Vec<[usize; 2]> = Vec::with_capacity(emissions.len());
+    for (k, &evidence) in emissions.iter().enumerate() {
+        let (keep, change) = if k == 0 { (0.0, 0.0) } else { switches[k - 1] };
+        let mut next = [0.0; 2];
+        let mut from = [0; 2];
+        for state in 0..2 {
+            let (stay, swap) = (costs[state] + keep, costs[1 - state] + change);
+            from[state] = if stay <= swap { state } else { 1 - state };
+            next[state] = stay.min(swap) + if state == 1 { -evidence } else { evidence };
+        }
+        costs = next;
+        came_from.push(from);
+    }
+    let mut state = usize::from(costs[1] < costs[0]);
+    let mut path = vec![false; emissions.len()];
+    for k in (0..emissions.len()).rev() {
+        path[k] = state == 1;
+        state = came_from[k][state];
+    }
+    path
+}
+
+/// The posterior probability of the head toward +axis in each frame, costs being negative logarithms.
+fn forward_backward(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<f64> {
+    let n = emissions.len();
+    let log_sum = |a: f64, b: f64| a.max(b) + libm::log1p(libm::exp(-(a - b).abs()));
+    let pass = |order: &mut dyn Iterator<Item = usize>, switch: &dyn Fn(usize) -> (f64, f64)| {
+        let mut messages = vec![[0.0f64; 2]; n];
+        let mut last = [0.0f64; 2];
+        for (step, k) in order.enumerate() {
+            if step > 0 {
+                let (keep, change) = switch(k);
+                last = [0, 1].map(|s: usize| log_sum(last[s] - keep, last[1 - s] - change));
+                // Only the difference matters.
+                last = [last[0] - last[1], 0.0];
+            }
+            messages[k] = last;
+            last = [last[0] - emissions[k], last[1] + emissions[k]];
+        }
+        messages
+    };
+    let ahead = pass(&mut (0..n), &|k| switches[k - 1]);
+    let behind = pass(&mut (0..n).rev(), &|k| switches[k]);
+    (0..n)
+        .map(|k| {
+            let odds =
+                (ahead[k][1] - ahead[k][0]) + (behind[k][1] - behind[k][0]) + 2.0 * emissions[k];
+            1.0 / (1.0 + libm::exp(-odds))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::*;
+
+    /// An animal that swims round a circle, 60 px long, seen as its axis alone.
+    fn circling(
+        n: usize,
+        speed_px_s: impl Fn(usize) -> f64,
+    ) -> (Vec<f64>, Vec<Option<Axes>>, Vec<Option<[f64; 2]>>) {
+        let heading = |k: usize| crate::geometry::wrap_rad(k as f64 * 0.05);
+        let axis = |h: f64| {
+            if h > FRAC_PI_2 {
+                h - PI
+            } else if h <= -FRAC_PI_2 {
+                h + PI
+            } else {
+                h
+            }
+        };
+        let headings: Vec<f64> = (0..n).map(heading).collect();
+        let axes = headings
+            .iter()
+            .map(|&h| {
+                let toward_axis = (axis(h) - h).abs() < 1e-9;
+                let skew = if toward_axis { -0.3 } else { 0.3 };
+                Some(Axes {
+                    axis_rad: Some(axis(h)),
+                    length_px: 60.0,
+                    height_px: 20.0,
+                    skew,
+                })
+            })
+            .collect();
+        let velocity = (0..n)
+            .map(|k| {
+                Some([
+                    speed_px_s(k) * headings[k].cos(),
+                    speed_px_s(k) * headings[k].sin(),
+                ])
+            })
+            .collect();
+        (headings, axes, velocity)
+    }
+
+    fn errors(headings: &[f64], axes: &[Option<Axes>], heads: &[Option<Head>]) -> usize {
+        let wrong = |k: &usize| {
+            let axis = axes[*k]
+                .as_ref()
+                .and_then(|a| a.axis_rad)
+                .expect("every frame has one");
+            let toward_axis = crate::geometry::wrap_rad(headings[*k] - axis).abs() < 1e-6;
+            heads[*k].expect("decided").forward != toward_axis
+        };
+        (0..headings.len()).filter(wrong).count()
+    }
+
+    #[test]
+    fn the_head_is_right_all_round_a_circle() {
+        let (headings, axes, velocity) = circling(400, |_| 60.0);
+        let heads = decode(&axes, &velocity, 60.0, None);
+        assert_eq!(errors(&headings, &axes, &heads), 0);
+        assert!(heads.iter().flatten().all(|head| head.confidence > 0.99));
+    }
+
+    #[test]
+    fn a_spell_of_drifting_backward_does_not_turn_the_head() {
+        let (headings, axes, velocity) =
+            circling(400, |k| if (150..200).contains(&k) { -20.0 } else { 50.0 });
+        let heads = decode(&axes, &velocity, 60.0, None);
+        assert_eq!(errors(&headings, &axes, &heads), 0);
+    }
+
+    #[test]
+    fn a_pinned_head_decides_for_an_animal_that_never_moves() {
+        let axes = vec![
+            Some(Axes {
+                axis_rad: Some(0.1),
+                length_px: 60.0,
+                height_px: 20.0,
+                skew: 0.0
+            });
+            30
+        ];
+        let velocity = vec![Some([0.0; 2]); 30];
+        for forward in [true, false] {
+            let heads = decode(&axes, &velocity, 60.0, Some((7, forward)));
+            assert!(heads.iter().flatten().all(|head| head.forward == forward));
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Soft alpha and clean color: the animal cut out of a frame so that it can be put over anything
+//! (ALGORITHMS.md 2.7).
+//!
+//! Inside the silhouette alpha is 1; in a band around its outline alpha is how far the pixel lies
+//! from the plate toward the animal's color nearby, and the color is what remains when the plate's
+//! share is taken away. Computed in encoded values, as the compositor blends: putting the cut-out
+//! back over the plate returns the frame.
+
+use super::background::Plate;
+use super::light::Gain;
+use super::silhouette::{self, Difference};
+use crate::geometry::Rect;
+use crate::raster::{Frame, Mask, RgbaImage};
+
+/// The animal cut out of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cutout {
+    /// Where it lies in the frame.
+    pub rect: Rect,
+    /// Straight alpha, in the plate's light.
+    pub image: RgbaImage,
+    /// Mean difference of the silhouette from the plate, levels of 255.
+    pub contrast: f64,
+}
+
+/// How many inside pixels give a band pixel its animal color.
+const N_NEAREST: usize = 4;
+
+/// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
+/// pixels wide, or 2 % of it.
+pub fn cut_out(
+    frame: &Frame,
+    plate: &Plate,
+    gain: &Gain,
+    silhouette: &Mask,
+    length_px: f64,
+) -> Cutout {
+    let band_px = ((0.02 * length_px).round() as u32).clamp(2, 8);
+    let rect = silhouette
+        .rect
+        .inflated(band_px + 1, frame.width, frame.height);
+    let difference = silhouette::difference(frame, plate, gain, rect);
+    let mask = moved(silhouette, rect);
+    let inside = (0..band_px).fold(mask.clone(), |mask, _| mask.eroded());
+    let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
+    let matte = Matte {
+        difference: &difference,
+        plate,
+        mask: &mask,
+        inside: &inside,
+        band_px,
+    };
+    let mut image = RgbaImage::new(rect.w, rect.h);
+    for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {
+        let rgba = if inside.bits[k] == 1 {
+            let [r, g, b] = matte.frame_color(k);
+            [r, g, b, 255]
+        } else if outer.bits[k] == 1 {
+            matte.band_pixel(k)
+        } else {
+            [0; 4]
+        };
+        pixel.copy_from_slice(&rgba);
+    }
+    Cutout {
+        rect,
+        contrast: contrast(&difference, &mask),
+        image,
+    }
+}
+
+/// The mask over another box; what lies outside the old one is clear.
+fn moved(mask: &Mask, rect: Rect) -> Mask {
+    let mut result = Mask::new(rect);
+    let both = mask.rect.intersection(&rect);
+    for y in both.y..both.bottom() {
+        let from = ((y - mask.rect.y) * mask.rect.w + both.x - mask.rect.x) as usize;
+        let to = ((y - rect.y) * rect.w + both.x - rect.x) as usize;
+        let n = both.w as usize;
+        result.bits[to..to + n].copy_from_slice(&mask.bits[from..from + n]);
+    }
+    result
+}
+
+fn contrast(difference: &Difference, mask: &Mask) -> f64 {
+    let sum: u64 = difference
+        .levels
+        .iter()
+        .zip(&mask.bits)
+        .map(|(&level, &bit)| u64::from(level) * u64::from(bit))
+        .sum();
+    sum as f64 / mask.area().max(1) as f64
+}
+
+struct Matte<'a> {
+    difference: &'a Difference,
+    plate: &'a Plate,
+    mask: &'a Mask,
+    inside: &'a Mask,
+    band_px: u32,
+}
+
+impl Matte<'_> {
+    fn frame_color(&self, k: usize) -> [u8; 3] {
+        let rgb = &self.difference.rgb.pixels[3 * k..3 * k + 3];
+        [rgb[0], rgb[1], rgb[2]]
+    }
+
+    /// A pixel of the band: straight color and alpha.
+    fn band_pixel(&self, k: usize) -> [u8; 4] {
+        let rect = self.difference.rect;
+        let (x, y) = (k % rect.w as usize, k / rect.w as usize);
+        let (px, py) = (rect.x + x as u32, rect.y + y as u32);
+        let back = self.plate.rgb.pixel(px, py).map(f32::from);
+        let seen = self.frame_color(k).map(f32::from);
+        let Some(fore) = self.color_nearby(x, y) else {
+            return [0; 4];
+        };
+        let sigma = self.plate.sigma[py as usize * self.plate.frame.width as usize + px as usize];
+        let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
+        let span_squared = dot(span, span);
+        let alpha = if span_squared < (3.0 * sigma).powi(2) {
+            self.blurred_mask(x, y)
+        } else {
+            let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
+            (dot(seen_span, span) / span_squared).clamp(0.0, 1.0)
+        };
+        // A trace of alpha is noise, not animal.
+        if alpha < 0.04 {
+            return [0; 4];
+        }
+        let color = if alpha > 0.2 {
+            [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
+        } else {
+            fore
+        };
+        let [r, g, b] = color.map(|c| c.round() as u8);
+        [r, g, b, (alpha * 255.0).round() as u8]
+    }
+
+    /// The animal's color near a band pixel: the mean of the nearest inside pixels; where the
+    /// silhouette is too thin to have an inside, the pixel nearby that differs most from the plate.
+    fn color_nearby(&self, x: usize, y: usize) -> Option<[f32; 3]> {
+        let reach = i64::from(self.band_px) * 2 + 1;
+        let mut nearest: Vec<(i64, usize)> = Vec::with_capacity(16);
+        let mut starkest: Option<(u8, usize)> = None;
+        for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
+            let Some(at) = self.at(x as i64 + dx, y as i64 + dy) else {
+                continue;
+            };
+            let distance = dx * dx + dy * dy;
+            if self.inside.bits[at] == 1 {
+                nearest.push((distance, at));
+            } else if self.mask.bits[at] == 1 && distance <= 8 {
+                let level = self.difference.levels[at];
+                if starkest.is_none_or(|(most, _)| level > most) {
+                    starkest = Some((level, at));
+                }
+            }
+        }
+        if nearest.is_empty() {
+            return starkest.map(|(_, at)| self.frame_color(at).map(f32::from));
+        }
+        nearest.sort_unstable();
+        nearest.truncate(N_NEAREST);
+        let mut sum = [0.0; 3];
+        for &(_, at) in &nearest {
+            for (s, c) in sum.iter_mut().zip(self.frame_color(at)) {
+                *s += f32::from(c) / nearest.len() as f32;
+            }
+        }
+        Some(sum)
+    }
+
+    /// The mask blurred by a Gaussian of 0.7 pixels (5 x 5).
+    fn blurred_mask(&self, x: usize, y: usize) -> f32 {
+        // exp(-d^2 / (2 * 0.49)) for d = 0, 1, 2.
+        const WEIGHTS: [f32; 3] = [1.0, 0.3604, 0.0169];
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (dx, dy) in (-2..=2i64).flat_map(|dy| (-2..=2i64).map(move |dx| (dx, dy))) {
+            let weight = WEIGHTS[dx.unsigned_abs() as usize] * WEIGHTS[dy.unsigned_abs() as usize];
+            total += weight;
+            if let Some(at) = self.at(x as i64 + dx, y as i64 + dy) {
+                sum += weight * f32::from(self.mask.bits[at]);
+            }
+        }
+        sum / total
+    }
+
+    fn at(&self, x: i64, y: i64) -> Option<usize> {
+        let (w, h) = (i64::from(self.mask.rect.w), i64::from(self.mask.rect.h));
+        ((0..w).contains(&x) && (0..h).contains(&y)).then_some((y * w + x) as usize)
+    }
+}
+
+fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}

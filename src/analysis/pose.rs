@@ -1,0 +1,281 @@
+//! From sightings to poses: the length axis, the heading, and with a calibrated camera the position
+//! and direction in space (N 5 and 6, O 3.3, corrected as ALGORITHMS.md 1 and 4 say).
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+
+use super::smooth::{Smoothed, smooth};
+use super::tracking::{Sighting, Tracked};
+use super::{Params, depth, heading};
+use crate::footage::FootageFormat;
+use crate::geometry::wrap_rad;
+use crate::library::{Pose, Poses, View};
+
+/// The side view keeps its length axis unless the other one is nearer the horizontal by this much.
+const MEMORY_RAD: f64 = 10.0 * PI / 180.0;
+
+/// The length axis of one frame and what was measured along it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    /// In (-pi/2, pi/2]; `None` where the silhouette is round.
+    pub axis_rad: Option<f64>,
+    /// Extent along the axis.
+    pub length_px: f64,
+    /// Extent across it.
+    pub height_px: f64,
+    /// Third standardised moment along it.
+    pub skew: f64,
+}
+
+impl Axes {
+    /// The unit vector of the axis.
+    pub fn direction(&self) -> Option<[f64; 2]> {
+        self.axis_rad
+            .map(|angle| [libm::cos(angle), libm::sin(angle)])
+    }
+}
+
+/// The poses of a track.
+pub fn measure(track: &[Tracked], format: &FootageFormat, params: &Params) -> Poses {
+    let view = params.view().unwrap_or_else(|| guess_view(track));
+    let axes = length_axes(track, view);
+    let motion = Motion::of(track, format.fps);
+    let reference_px = reference_length_px(&axes);
+    let pin = params.head.and_then(|head| {
+        let frame = head.frame as usize;
+        let direction = axes.get(frame)?.as_ref()?.direction()?;
+        let centroid = track[frame].sighting.as_ref()?.moments.centroid_px;
+        let toward = (head.point[0] - centroid[0]) * direction[0]
+            + (head.point[1] - centroid[1]) * direction[1];
+        Some((frame, toward >= 0.0))
+    });
+    let heads = heading::decode(&axes, &motion.velocity_px(), reference_px, pin);
+    let mut poses = Poses {
+        fps: format.fps,
+        image_size_px: [format.width, format.height],
+        view,
+        camera: params.camera(format.width, format.height),
+        animal: params.animal(),
+        frames: track.iter().map(|tracked| seen(tracked, params)).collect(),
+    };
+    for ((pose, axes), head) in poses.frames.iter_mut().zip(&axes).zip(&heads) {
+        let Some(axes) = axes else { continue };
+        pose.axis_rad = axes.axis_rad;
+        pose.length_px = Some(axes.length_px);
+        pose.height_px = Some(axes.height_px);
+        pose.skew = Some(axes.skew);
+        pose.head_confidence = head.map(|head| head.confidence);
+        pose.heading_rad = head.zip(axes.axis_rad).map(|(head, axis)| {
+            if head.forward {
+                axis
+            } else {
+                wrap_rad(axis + PI)
+            }
+        });
+    }
+    if view == View::Side {
+        depth::place_in_space(&mut poses, &motion, params);
+    }
+    poses
+}
+
+/// The centroid's smoothed path.
+pub struct Motion {
+    /// Horizontal.
+    pub x: Smoothed,
+    /// Vertical.
+    pub y: Smoothed,
+}
+
+impl Motion {
+    fn of(track: &[Tracked], fps: f64) -> Motion {
+        let coordinate = |k: usize| -> Vec<Option<f64>> {
+            track
+                .iter()
+                .map(|t| t.sighting.as_ref().map(|s| s.moments.centroid_px[k]))
+                .collect()
+        };
+        Motion {
+            x: smooth(&coordinate(0), fps),
+            y: smooth(&coordinate(1), fps),
+        }
+    }
+
+    /// Pixels a second.
+    pub fn velocity_px(&self) -> Vec<Option<[f64; 2]>> {
+        self.x
+            .rate
+            .iter()
+            .zip(&self.y.rate)
+            .map(|(x, y)| Some([(*x)?, (*y)?]))
+            .collect()
+    }
+}
+
+/// The animal's length in the image when it is seen at length: the 80th percentile, pixels.
+pub fn reference_length_px(axes: &[Option<Axes>]) -> f64 {
+    let mut lengths: Vec<f64> = axes.iter().flatten().map(|a| a.length_px).collect();
+    if lengths.is_empty() {
+        return 1.0;
+    }
+    let rank = lengths.len() * 4 / 5;
+    lengths
+        .select_nth_unstable_by(rank, f64::total_cmp)
+        .1
+        .max(1.0)
+}
+
+fn seen(tracked: &Tracked, params: &Params) -> Pose {
+    let mut pose = Pose {
+        time_s: tracked.time_s,
+        ..Pose::default()
+    };
+    if let Some(sighting) = &tracked.sighting {
+        pose.cut = sighting.cut;
+        // Certain when the silhouette differs, on average, by three thresholds or more.
+        let contrast = sighting.cutout.contrast / f64::from(params.threshold);
+        pose.confidence = Some((contrast / 3.0).clamp(0.0, 1.0));
+        pose.centroid_px = Some(sighting.moments.centroid_px);
+        pose.box_px = Some(sighting.box_px);
+        pose.area_px = Some(sighting.moments.area_px);
+    }
+    pose
+}
+
+/// The length axis of every sighting.
+///
+/// From above it is the major axis. From the side it is the one farther from the vertical (N 5.3),
+/// with memory: the axis nearest to the last frame's, unless the other one is nearer the
+/// horizontal by 10 degrees. A fish seen head-on is taller than long, one that pitches steeply has
+/// its major axis upright.
+fn length_axes(track: &[Tracked], view: View) -> Vec<Option<Axes>> {
+    let mut last: Option<f64> = None;
+    track
+        .iter()
+        .map(|tracked| {
+            let sighting = tracked.sighting.as_ref()?;
+            let Some(major) = sighting.moments.major_rad else {
+                return Some(along(sighting, true));
+            };
+            let minor = half_circle(major + FRAC_PI_2);
+            let major_is_length = match view {
+                View::Top => true,
+                View::Side => {
+                    let upright = |axis: f64| FRAC_PI_2 - axis.abs();
+                    let lead = upright(major) - upright(minor);
+                    let near = |last: f64| half_circle(major - last).abs() <= FRAC_PI_4;
+                    match last.map(near) {
+                        Some(true) => lead > -MEMORY_RAD,
+                        Some(false) => lead > MEMORY_RAD,
+                        None => lead >= 0.0,
+                    }
+                }
+            };
+            let axes = along(sighting, major_is_length);
+            last = axes.axis_rad;
+            Some(axes)
+        })
+        .collect()
+}
+
+fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
+    let (moments, extent) = (&sighting.moments, sighting.extent_px);
+    if major_is_length {
+        let axis_rad = moments.major_rad;
+        return Axes {
+            axis_rad,
+            length_px: extent[0],
+            height_px: extent[1],
+            skew: moments.skew[0],
+        };
+    }
+    let turned = moments.major_rad.map(|major| major + FRAC_PI_2);
+    let axis_rad = turned.map(half_circle);
+    // The skew was taken along major + pi/2: the folded axis may point the other way.
+    let folded = turned.is_some_and(|turned| turned > FRAC_PI_2);
+    let skew = if folded {
+        -moments.skew[1]
+    } else {
+        moments.skew[1]
+    };
+    Axes {
+        axis_rad,
+        length_px: extent[1],
+        height_px: extent[0],
+        skew,
+    }
+}
+
+/// An axis's angle folded into (-pi/2, pi/2].
+fn half_circle(angle_rad: f64) -> f64 {
+    let folded = wrap_rad(2.0 * angle_rad) / 2.0;
+    if folded <= -FRAC_PI_2 {
+        FRAC_PI_2
+    } else {
+        folded
+    }
+}
+
+/// Seen from above when the animal, seen at length, often stands upright in the picture and is
+/// symmetric about its length: an animal filmed from the side lies mostly level and has a back and
+/// a belly.
+fn guess_view(track: &[Tracked]) -> View {
+    let sightings: Vec<&Sighting> = track.iter().filter_map(|t| t.sighting.as_ref()).collect();
+    let mut lengths: Vec<f64> = sightings.iter().map(|s| s.extent_px[0]).collect();
+    if lengths.is_empty() {
+        return View::Side;
+    }
+    let rank = lengths.len() * 9 / 10;
+    let long = 0.7 * *lengths.select_nth_unstable_by(rank, f64::total_cmp).1;
+    let at_length: Vec<&&Sighting> = sightings
+        .iter()
+        .filter(|s| s.extent_px[0] >= long && s.moments.major_rad.is_some())
+        .collect();
+    let share = |n: usize| n as f64 / at_length.len().max(1) as f64;
+    let upright = |s: &&&&Sighting| {
+        s.moments
+            .major_rad
+            .is_some_and(|axis| axis.abs() > FRAC_PI_4)
+    };
+    let symmetric = |s: &&&&Sighting| symmetry(s) > 0.7;
+    let upright_share = share(at_length.iter().filter(upright).count());
+    let symmetric_share = share(at_length.iter().filter(symmetric).count());
+    if upright_share > 0.2 && symmetric_share > 0.5 {
+        View::Top
+    } else {
+        View::Side
+    }
+}
+
+/// How much of the silhouette lies on itself when folded along its major axis, 0..=1 (Jaccard).
+fn symmetry(sighting: &Sighting) -> f64 {
+    let Some(axis) = sighting.moments.major_rad else {
+        return 0.0;
+    };
+    let (c, s) = (libm::cos(axis), libm::sin(axis));
+    let rect = sighting.cutout.rect;
+    let image = &sighting.cutout.image;
+    let [cx, cy] = sighting.moments.centroid_px;
+    let inside = |x: f64, y: f64| {
+        let (column, row) = (
+            (x - f64::from(rect.x)).floor(),
+            (y - f64::from(rect.y)).floor(),
+        );
+        let within =
+            column >= 0.0 && row >= 0.0 && column < f64::from(rect.w) && row < f64::from(rect.h);
+        within && image.pixel(column as u32, row as u32)[3] >= 128
+    };
+    let (mut both, mut either) = (0u32, 0u32);
+    for (row, column) in (0..rect.h).flat_map(|row| (0..rect.w).map(move |column| (row, column))) {
+        let (x, y) = (
+            f64::from(rect.x + column) + 0.5,
+            f64::from(rect.y + row) + 0.5,
+        );
+        let (dx, dy) = (x - cx, y - cy);
+        let (u, v) = (dx * c + dy * s, dy * c - dx * s);
+        let folded = inside(cx + u * c + v * s, cy + u * s - v * c);
+        let here = inside(x, y);
+        both += u32::from(here && folded);
+        either += u32::from(here || folded);
+    }
+    f64::from(both) / f64::from(either.max(1))
+}

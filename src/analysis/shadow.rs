@@ -1,0 +1,121 @@
+//! Shadows that the animal casts: darker pixels of the same color and texture as the plate, taken out
+//! of the silhouette (ALGORITHMS.md 2.5; Horprasert et al. 1999).
+//!
+//! Only weak pixels are ever taken out; and none when the animal is much darker than the scene,
+//! because a black mouse looks like its own shadow.
+
+use super::background::Plate;
+use super::light::Gain;
+use super::silhouette::{self, Difference};
+use crate::raster::runs::Component;
+use crate::raster::{Frame, Mask};
+
+/// Brightness ratios that a shadow may have.
+const RATIO: std::ops::RangeInclusive<f32> = 0.45..=0.95;
+/// Half side of the patch whose texture is compared.
+const RADIUS: i64 = 2;
+/// Least correlation of the patch with the plate's.
+const CORRELATION: f32 = 0.9;
+/// An animal of less than this share of the scene's light is dark.
+const DARK: f32 = 0.45;
+
+/// Clears the weak pixels that are shadow and not core.
+pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Plate) {
+    if is_dark(core, difference, plate) {
+        return;
+    }
+    let rect = difference.rect;
+    for k in 0..weak.bits.len() {
+        if weak.bits[k] == 1 && core.bits[k] == 0 {
+            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
+            if is_shadow(difference, plate, x, y) {
+                weak.bits[k] = 0;
+            }
+        }
+    }
+}
+
+/// Whether nearly all of a component looks like the plate, only darker.
+pub fn is_shadow_alone(frame: &Frame, plate: &Plate, component: &Component) -> bool {
+    let difference = silhouette::difference(frame, plate, &Gain::ONE, component.rect);
+    let mask = component.mask(component.rect);
+    let width = mask.width();
+    let like = (0..mask.bits.len()).filter(|&k| {
+        mask.bits[k] == 1 && has_shadow_color(&difference, plate, k % width, k / width)
+    });
+    10 * like.count() as u64 >= 7 * component.area
+}
+
+/// Whether the certain pixels are, in the median, much darker than the plate behind them.
+fn is_dark(core: &Mask, difference: &Difference, plate: &Plate) -> bool {
+    let rect = difference.rect;
+    let mut ratios: Vec<f32> = (0..core.bits.len())
+        .filter(|&k| core.bits[k] == 1)
+        .map(|k| {
+            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
+            let sum = |rgb: [u8; 3]| rgb.iter().map(|&c| f32::from(c)).sum::<f32>();
+            sum(difference.rgb.pixel(x as u32, y as u32))
+                / sum(plate.rgb.pixel(rect.x + x as u32, rect.y + y as u32)).max(1.0)
+        })
+        .collect();
+    if ratios.is_empty() {
+        return false;
+    }
+    let middle = ratios.len() / 2;
+    *ratios.select_nth_unstable_by(middle, f32::total_cmp).1 < DARK
+}
+
+fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
+    has_shadow_color(difference, plate, x, y) && correlation(difference, plate, x, y) > CORRELATION
+}
+
+/// Darker than the plate within the range of a shadow, and of the same color.
+fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
+    let rect = difference.rect;
+    let (px, py) = (rect.x + x as u32, rect.y + y as u32);
+    let color = |rgb: [u8; 3]| rgb.map(f32::from);
+    let i = color(difference.rgb.pixel(x as u32, y as u32));
+    let b = color(plate.rgb.pixel(px, py));
+    let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    let ratio = dot(i, b) / dot(b, b).max(1.0);
+    if !RATIO.contains(&ratio) {
+        return false;
+    }
+    let gap = [
+        i[0] - ratio * b[0],
+        i[1] - ratio * b[1],
+        i[2] - ratio * b[2],
+    ];
+    let sigma = plate.sigma[py as usize * plate.frame.width as usize + px as usize];
+    dot(gap, gap) < (3.0 * sigma).powi(2)
+}
+
+/// Normalised correlation of the green channel around a pixel with the plate's, -1..=1; 1 where both
+/// are flat, for a shadow on an even wall has no texture to keep.
+fn correlation(difference: &Difference, plate: &Plate, x: usize, y: usize) -> f32 {
+    let rect = difference.rect;
+    let (mut n, mut i1, mut b1, mut ii, mut bb, mut ib) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    for dy in -RADIUS..=RADIUS {
+        for dx in -RADIUS..=RADIUS {
+            let (sx, sy) = (x as i64 + dx, y as i64 + dy);
+            if sx < 0 || sy < 0 || sx >= i64::from(rect.w) || sy >= i64::from(rect.h) {
+                continue;
+            }
+            let (sx, sy) = (sx as u32, sy as u32);
+            let i = f32::from(difference.rgb.pixel(sx, sy)[1]);
+            let b = f32::from(plate.rgb.pixel(rect.x + sx, rect.y + sy)[1]);
+            n += 1.0;
+            i1 += i;
+            b1 += b;
+            ii += i * i;
+            bb += b * b;
+            ib += i * b;
+        }
+    }
+    let (vi, vb) = (ii - i1 * i1 / n, bb - b1 * b1 / n);
+    let flat = n * 2.0 * 2.0;
+    if vi < flat && vb < flat {
+        return 1.0;
+    }
+    (ib - i1 * b1 / n) / (vi * vb).sqrt().max(1e-6)
+}

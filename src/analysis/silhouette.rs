@@ -1,0 +1,146 @@
+//! Where a frame differs from the plate: components of foreground pixels (ALGORITHMS.md 2.4 to 2.6, 3).
+//!
+//! The means of 4 x 4 blocks propose boxes; only inside them is the frame converted to RGB and
+//! compared pixel by pixel. A pixel differs for certain above the core threshold; pixels above half
+//! of it count when they hang together with a certain one.
+
+mod blocks;
+
+pub use blocks::Blocks;
+
+use super::background::Plate;
+use super::light::Gain;
+use super::shadow;
+use crate::geometry::Rect;
+use crate::raster::runs::{self, Component};
+use crate::raster::{Frame, Mask, RgbImage};
+
+/// How far a proposed box is widened before it is looked at.
+const MARGIN_PX: u32 = 6;
+/// How far a box grows when a component runs into its edge.
+const GROWTH_PX: u32 = 16;
+
+/// The components of foreground pixels that lie in or reach into `region`, from the top left; raw:
+/// neither holes nor ragged edges mended (`shaped` does).
+pub fn components(frame: &Frame, plate: &Plate, gain: &Gain, region: Rect) -> Vec<Component> {
+    let mut found: Vec<Component> = Vec::new();
+    for rect in disjoint(plate.blocks.proposals(frame, gain, region, MARGIN_PX)) {
+        for component in components_in(frame, plate, gain, rect) {
+            if !found.contains(&component) {
+                found.push(component);
+            }
+        }
+    }
+    found.sort_by_key(|c| c.runs.first().map(|run| (run.y, run.x0)));
+    found
+}
+
+/// A component as a silhouette: holes filled, edges smoothed by 3 x 3 majority; over its box and one
+/// pixel more. Empty when nothing of it is left.
+pub fn shaped(component: &Component, width: u32, height: u32) -> Mask {
+    let mut mask = component.mask(component.rect.inflated(1, width, height));
+    mask.fill_holes();
+    mask.majority()
+}
+
+/// The difference of a box from the plate: the largest over R, G, B of |I / gain - B|.
+pub struct Difference {
+    /// The box.
+    pub rect: Rect,
+    /// The frame's pixels in the plate's light.
+    pub rgb: RgbImage,
+    /// Largest channel difference of each pixel.
+    pub levels: Vec<u8>,
+}
+
+/// Compares a box of a frame with the plate.
+pub fn difference(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Difference {
+    let mut rgb = frame.rgb(rect);
+    let factors = gain.to_plate();
+    if factors != [4096; 3] {
+        for pixel in rgb.pixels.chunks_exact_mut(3) {
+            for (value, factor) in pixel.iter_mut().zip(factors) {
+                *value = ((i32::from(*value) * factor + 2048) >> 12).min(255) as u8;
+            }
+        }
+    }
+    let width = plate.rgb.width as usize;
+    let mut levels = Vec::with_capacity(rect.area() as usize);
+    for (row, y) in rgb
+        .pixels
+        .chunks_exact(rect.w as usize * 3)
+        .zip(rect.y as usize..)
+    {
+        let base = &plate.rgb.pixels[(y * width + rect.x as usize) * 3..][..row.len()];
+        levels.extend(row.chunks_exact(3).zip(base.chunks_exact(3)).map(|(i, b)| {
+            i[0].abs_diff(b[0])
+                .max(i[1].abs_diff(b[1]))
+                .max(i[2].abs_diff(b[2]))
+        }));
+    }
+    Difference { rect, rgb, levels }
+}
+
+/// The components of one box, which grows while any of them runs into its edge.
+fn components_in(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Vec<Component> {
+    let mut rect = rect;
+    loop {
+        let difference = difference(frame, plate, gain, rect);
+        let found = hysteresis(&difference, plate);
+        let grown = rect.inflated(GROWTH_PX, frame.width, frame.height);
+        let runs_out = |c: &Component| {
+            (c.rect.x == rect.x && grown.x < rect.x)
+                || (c.rect.y == rect.y && grown.y < rect.y)
+                || (c.rect.right() == rect.right() && grown.right() > rect.right())
+                || (c.rect.bottom() == rect.bottom() && grown.bottom() > rect.bottom())
+        };
+        if !found.iter().any(runs_out) {
+            return found;
+        }
+        rect = grown;
+    }
+}
+
+/// Components of pixels above half the core threshold that hold a pixel above all of it.
+fn hysteresis(difference: &Difference, plate: &Plate) -> Vec<Component> {
+    let rect = difference.rect;
+    let width = plate.frame.width as usize;
+    let mut weak = Mask::new(rect);
+    let mut core = Mask::new(rect);
+    let row_length = rect.w as usize;
+    for (k, &level) in difference.levels.iter().enumerate() {
+        let px = (rect.y as usize + k / row_length) * width + rect.x as usize + k % row_length;
+        let threshold = plate.core_threshold[px];
+        weak.bits[k] = u8::from(level > threshold / 2);
+        core.bits[k] = u8::from(level > threshold);
+    }
+    shadow::remove(&mut weak, &core, difference, plate);
+    let has_core = |component: &Component| {
+        component.runs.iter().any(|run| {
+            let row = (run.y - rect.y) as usize * row_length;
+            let (x0, x1) = ((run.x0 - rect.x) as usize, (run.x1 - rect.x) as usize);
+            core.bits[row + x0..row + x1].contains(&1)
+        })
+    };
+    runs::components(&weak)
+        .into_iter()
+        .filter(has_core)
+        .collect()
+}
+
+/// Boxes joined until no two of them meet.
+fn disjoint(mut boxes: Vec<Rect>) -> Vec<Rect> {
+    let mut idx = 0;
+    while idx < boxes.len() {
+        let meets = |other: &Rect| !boxes[idx].intersection(other).is_empty();
+        match (idx + 1..boxes.len()).find(|&other| meets(&boxes[other])) {
+            Some(other) => {
+                boxes[idx] = boxes[idx].union(&boxes[other]);
+                boxes.remove(other);
+                idx = 0;
+            }
+            None => idx += 1,
+        }
+    }
+    boxes
+}

@@ -1,0 +1,251 @@
+//! Smoothing over time: a constant-velocity Kalman filter and the Rauch-Tung-Striebel smoother, with
+//! Huber weights on large innovations (ALGORITHMS.md 4; Rauch, Tung & Striebel 1965).
+//!
+//! Nothing is tuned by hand: the measurement noise comes from the second differences of the data, the
+//! process noise is the one under which the data are likeliest.
+
+/// A smoothed series.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothed {
+    /// Values; `None` in gaps too long to bridge.
+    pub value: Vec<Option<f64>>,
+    /// Their rates, per second.
+    pub rate: Vec<Option<f64>>,
+}
+
+/// Innovations beyond this many standard deviations count less.
+const HUBER: f64 = 2.5;
+/// Longest gap that is bridged, seconds.
+const BRIDGE_S: f64 = 0.5;
+
+/// Smooths measurements taken every `1 / fps` seconds; `None` where there is none. Gaps up to half a
+/// second are bridged, longer ones stay empty, and so does what lies before the first measurement
+/// and after the last.
+pub fn smooth(measured: &[Option<f64>], fps: f64) -> Smoothed {
+    let noise = measurement_variance(measured);
+    let dt = 1.0 / fps;
+    let likelihood = |q: f64| filter(measured, dt, q, noise).log_likelihood;
+    // Accelerations from a hundredth to a hundred times what would move the value by its noise in
+    // a tenth of a second.
+    let unit = noise / libm::pow(0.1, 3.0);
+    let candidates = (0..=16).map(|k| unit * libm::pow(10.0, -2.0 + 0.25 * f64::from(k)));
+    let best =
+        candidates
+            .map(|q| (likelihood(q), q))
+            .fold((f64::NEG_INFINITY, unit), |best, next| {
+                if next.0 > best.0 { next } else { best }
+            });
+    back(
+        &filter(measured, dt, best.1, noise),
+        measured,
+        dt,
+        (BRIDGE_S * fps).round() as usize,
+    )
+}
+
+/// Variance of white noise on a smooth signal: second differences of such noise have six times its
+/// variance; their median absolute value makes it robust.
+fn measurement_variance(measured: &[Option<f64>]) -> f64 {
+    let mut seconds: Vec<f64> = measured
+        .windows(3)
+        .filter_map(|w| Some((w[0]? - 2.0 * w[1]? + w[2]?).abs()))
+        .collect();
+    if seconds.is_empty() {
+        return 1e-12;
+    }
+    let middle = seconds.len() / 2;
+    let median = *seconds.select_nth_unstable_by(middle, f64::total_cmp).1;
+    (1.4826 * median).powi(2).max(1e-12) / 6.0
+}
+
+/// State (value, rate) and its covariance.
+#[derive(Clone, Copy)]
+struct State {
+    x: [f64; 2],
+    p: [[f64; 2]; 2],
+}
+
+struct Filtered {
+    /// Before and after each measurement.
+    predicted: Vec<State>,
+    updated: Vec<State>,
+    log_likelihood: f64,
+}
+
+fn filter(measured: &[Option<f64>], dt: f64, q: f64, r: f64) -> Filtered {
+    let first = measured.iter().flatten().next().copied().unwrap_or(0.0);
+    // Broad at first: any value within reach of the data, any rate.
+    let mut state = State {
+        x: [first, 0.0],
+        p: [[1e6 * r, 0.0], [0.0, 1e6 * r / dt]],
+    };
+    let mut filtered = Filtered {
+        predicted: Vec::with_capacity(measured.len()),
+        updated: Vec::with_capacity(measured.len()),
+        log_likelihood: 0.0,
+    };
+    for (idx, z) in measured.iter().enumerate() {
+        if idx > 0 {
+            state = predict(&state, dt, q);
+        }
+        filtered.predicted.push(state);
+        if let Some(z) = z {
+            let innovation = z - state.x[0];
+            let expected = state.p[0][0] + r;
+            let sigmas = innovation.abs() / expected.sqrt();
+            // Huber: a measurement too far off counts as one with more noise.
+            let weight = if sigmas > HUBER { HUBER / sigmas } else { 1.0 };
+            let s = state.p[0][0] + r / weight;
+            let loss = if sigmas > HUBER {
+                2.0 * HUBER * sigmas - HUBER * HUBER
+            } else {
+                sigmas * sigmas
+            };
+            filtered.log_likelihood -= 0.5 * (loss + libm::log(expected));
+            let k = [state.p[0][0] / s, state.p[1][0] / s];
+            let [[a, b], [_, d]] = state.p;
+            state = State {
+                x: [
+                    state.x[0] + k[0] * innovation,
+                    state.x[1] + k[1] * innovation,
+                ],
+                p: [
+                    [(1.0 - k[0]) * a, (1.0 - k[0]) * b],
+                    [(1.0 - k[0]) * b, d - k[1] * b],
+                ],
+            };
+        }
+        filtered.updated.push(state);
+    }
+    filtered
+}
+
+/// One step of constant velocity with white acceleration of spectral density `q`.
+fn predict(state: &State, dt: f64, q: f64) -> State {
+    let [[a, b], [c, d]] = state.p;
+    State {
+        x: [state.x[0] + dt * state.x[1], state.x[1]],
+        p: [
+            [
+                a + dt * (b + c) + dt * dt * d + q * dt * dt * dt / 3.0,
+                b + dt * d + q * dt * dt / 2.0,
+            ],
+            [c + dt * d + q * dt * dt / 2.0, d + q * dt],
+        ],
+    }
+}
+
+/// The backward pass, and the gaps taken out.
+fn back(filtered: &Filtered, measured: &[Option<f64>], dt: f64, bridge: usize) -> Smoothed {
+    let n = measured.len();
+    let mut smoothed: Vec<[f64; 2]> = filtered.updated.iter().map(|s| s.x).collect();
+    for k in (0..n.saturating_sub(1)).rev() {
+        let (u, p) = (&filtered.updated[k], &filtered.predicted[k + 1]);
+        // G = P F' (P predicted)^-1.
+        let pf = [
+            [u.p[0][0] + dt * u.p[0][1], u.p[0][1]],
+            [u.p[1][0] + dt * u.p[1][1], u.p[1][1]],
+        ];
+        let det = p.p[0][0] * p.p[1][1] - p.p[0][1] * p.p[1][0];
+        let inv = [
+            [p.p[1][1] / det, -p.p[0][1] / det],
+            [-p.p[1][0] / det, p.p[0][0] / det],
+        ];
+        let gap = [smoothed[k + 1][0] - p.x[0], smoothed[k + 1][1] - p.x[1]];
+        let step = [
+            inv[0][0] * gap[0] + inv[0][1] * gap[1],
+            inv[1][0] * gap[0] + inv[1][1] * gap[1],
+        ];
+        for (row, value) in pf.iter().zip(&mut smoothed[k]) {
+            *value += row[0] * step[0] + row[1] * step[1];
+        }
+    }
+    let known = bridged(measured, bridge);
+    let take = |part: usize| {
+        smoothed
+            .iter()
+            .zip(&known)
+            .map(|(s, &k)| k.then_some(s[part]))
+            .collect()
+    };
+    Smoothed {
+        value: take(0),
+        rate: take(1),
+    }
+}
+
+/// True where there is a measurement, or a gap of at most `bridge` between two.
+fn bridged(measured: &[Option<f64>], bridge: usize) -> Vec<bool> {
+    let mut known: Vec<bool> = measured.iter().map(Option::is_some).collect();
+    let mut last = None;
+    for (idx, value) in measured.iter().enumerate() {
+        if value.is_some() {
+            if let Some(last) = last
+                && idx - last - 1 <= bridge
+            {
+                known[last..idx].fill(true);
+            }
+            last = Some(idx);
+        }
+    }
+    known
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random;
+
+    fn wave(k: usize) -> f64 {
+        libm::sin(k as f64 * 0.05) * 10.0
+    }
+
+    fn noisy(k: usize) -> Option<f64> {
+        Some(wave(k) + 0.5 * random::normal(3, &[k as u64]))
+    }
+
+    fn rmse(values: &[Option<f64>]) -> f64 {
+        let gaps = values
+            .iter()
+            .enumerate()
+            .filter_map(|(k, v)| Some((v.as_ref()? - wave(k)).powi(2)));
+        (gaps.clone().sum::<f64>() / gaps.count() as f64).sqrt()
+    }
+
+    #[test]
+    fn noise_is_reduced_and_the_signal_kept() {
+        let measured: Vec<Option<f64>> = (0..400).map(noisy).collect();
+        let smoothed = smooth(&measured, 30.0);
+        assert!(
+            rmse(&smoothed.value) < 0.5 * rmse(&measured),
+            "{}",
+            rmse(&smoothed.value)
+        );
+    }
+
+    #[test]
+    fn a_wild_value_hardly_counts() {
+        let mut measured: Vec<Option<f64>> = (0..200).map(noisy).collect();
+        measured[100] = Some(80.0);
+        let smoothed = smooth(&measured, 30.0);
+        assert!((smoothed.value[100].expect("measured") - wave(100)).abs() < 1.5);
+    }
+
+    #[test]
+    fn short_gaps_are_bridged_and_long_ones_stay_empty() {
+        let mut measured: Vec<Option<f64>> = (0..200).map(noisy).collect();
+        measured[50..60].fill(None);
+        measured[100..140].fill(None);
+        measured[..3].fill(None);
+        let smoothed = smooth(&measured, 30.0);
+        assert!((smoothed.value[55].expect("bridged") - wave(55)).abs() < 1.0);
+        assert_eq!((smoothed.value[120], smoothed.value[1]), (None, None));
+    }
+
+    #[test]
+    fn rates_are_per_second() {
+        let measured: Vec<Option<f64>> = (0..100).map(|k| Some(k as f64 * 0.1)).collect();
+        let rate = smooth(&measured, 30.0).rate[50].expect("measured");
+        assert!((rate - 3.0).abs() < 1e-3, "{rate}");
+    }
+}

@@ -1,0 +1,93 @@
+//! What is worth knowing about a library: how much was found, how the animal moves, what it covers.
+
+use super::pose;
+use super::smooth::smooth;
+use super::transition::Connections;
+use crate::geometry::wrap_rad;
+use crate::library::{LibraryStats, Poses};
+
+/// Bins of the heading histogram: 10 degrees each, from -180.
+const N_BINS: usize = 36;
+
+/// The statistics of a library.
+pub(super) fn of(poses: &Poses, connections: &Connections, never_seen_px: u64) -> LibraryStats {
+    let component = &connections.playback.component;
+    let length_px = length_px(poses);
+    LibraryStats {
+        n_frames: poses.frames.len(),
+        n_detected: poses.frames.iter().filter(|pose| pose.detected()).count(),
+        never_seen_px,
+        n_candidates: connections.n_candidates,
+        n_transitions: connections.transitions.len(),
+        kappa_used: connections.kappa_used,
+        component_share: component.len() as f64 / poses.frames.len().max(1) as f64,
+        heading_histogram: histogram(poses, component),
+        speed_bl_per_s: length_px.and_then(|length| speeds(poses, length)),
+        turn_rate_rad_per_s: turn_rate(poses),
+        length_px,
+    }
+}
+
+fn length_px(poses: &Poses) -> Option<f64> {
+    let axes: Vec<Option<pose::Axes>> = poses
+        .frames
+        .iter()
+        .map(|p| {
+            let (length_px, height_px, skew) = (p.length_px?, p.height_px?, p.skew?);
+            (!p.cut).then_some(pose::Axes {
+                axis_rad: p.axis_rad,
+                length_px,
+                height_px,
+                skew,
+            })
+        })
+        .collect();
+    axes.iter()
+        .any(Option::is_some)
+        .then(|| pose::reference_length_px(&axes))
+}
+
+fn histogram(poses: &Poses, component: &[u32]) -> Vec<u32> {
+    let mut bins = vec![0; N_BINS];
+    for &frame in component {
+        if let Some(heading) = poses.frames[frame as usize].heading_rad {
+            let turn = (heading + std::f64::consts::PI) / std::f64::consts::TAU;
+            bins[((turn * N_BINS as f64) as usize).min(N_BINS - 1)] += 1;
+        }
+    }
+    bins
+}
+
+/// Speeds of the smoothed centroid, lengths a second: 5th percentile, median, 95th.
+fn speeds(poses: &Poses, length_px: f64) -> Option<[f64; 3]> {
+    let along = |k: usize| -> Vec<Option<f64>> {
+        poses
+            .frames
+            .iter()
+            .map(|p| p.centroid_px.map(|c| c[k]))
+            .collect()
+    };
+    let (x, y) = (smooth(&along(0), poses.fps), smooth(&along(1), poses.fps));
+    let speed = |(x, y): (&Option<f64>, &Option<f64>)| Some(libm::hypot((*x)?, (*y)?) / length_px);
+    let mut speeds: Vec<f64> = x.rate.iter().zip(&y.rate).filter_map(speed).collect();
+    speeds.sort_by(f64::total_cmp);
+    let at = |share: f64| speeds[((speeds.len() - 1) as f64 * share).round() as usize];
+    (!speeds.is_empty()).then(|| [at(0.05), at(0.5), at(0.95)])
+}
+
+/// 95th percentile of how fast the heading turns, over a tenth of a second either way.
+fn turn_rate(poses: &Poses) -> Option<f64> {
+    let reach = ((poses.fps * 0.1).round() as usize).max(1);
+    let rate = |pair: &[crate::library::Pose]| {
+        let (first, last) = (pair[0].heading_rad?, pair[2 * reach].heading_rad?);
+        Some(wrap_rad(last - first).abs() * poses.fps / (2 * reach) as f64)
+    };
+    let mut rates: Vec<f64> = poses
+        .frames
+        .windows(2 * reach + 1)
+        .filter_map(rate)
+        .collect();
+    rates.sort_by(f64::total_cmp);
+    let rank = rates.len().saturating_sub(1) * 19 / 20;
+    rates.get(rank).copied()
+}

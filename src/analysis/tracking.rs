@@ -1,0 +1,282 @@
+//! The animal followed from frame to frame (N 4; ALGORITHMS.md 2.6, 3).
+//!
+//! Its place is predicted by constant velocity; near it the component is taken that fits the track
+//! in place and area. Another component elsewhere (a reflection, a second animal) is taken only when
+//! nothing near the prediction has been seen for five frames, or when it is the only one there is.
+
+use super::background::Plate;
+use super::light::{self, Gain};
+use super::matte::{self, Cutout};
+use super::moments::{self, Moments};
+use super::params::Search;
+use super::silhouette;
+use super::{Error, Params};
+use crate::footage::FrameSource;
+use crate::geometry::Rect;
+use crate::progress::Progress;
+use crate::raster::runs::Component;
+use crate::raster::{Frame, Mask};
+
+/// Components smaller than this are noise.
+const LEAST_AREA_PX: u64 = 12;
+/// Frames without the animal before it is looked for anew, anywhere.
+const MISSES: u32 = 5;
+/// Every so many frames the whole frame is searched.
+const FULL_EVERY: usize = 30;
+
+/// What was seen of the animal in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sighting {
+    /// The animal cut out.
+    pub cutout: Cutout,
+    /// Its moments, weighed by alpha.
+    pub moments: Moments,
+    /// Extents along the major axis and across it, after a 3 x 3 opening.
+    pub extent_px: [f64; 2],
+    /// Bounding box of the silhouette.
+    pub box_px: Rect,
+    /// The silhouette touches the border of the frame.
+    pub cut: bool,
+}
+
+/// One frame of the track.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracked {
+    /// True time of the picture, seconds from the first frame.
+    pub time_s: f64,
+    /// The animal, where it was found.
+    pub sighting: Option<Sighting>,
+}
+
+/// Follows the animal through the footage: one entry a frame.
+pub fn follow(
+    source: &dyn FrameSource,
+    plate: &Plate,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<Vec<Tracked>, Error> {
+    let n_frames_hint = source.format().n_frames_hint.max(1);
+    let mut tracker = Tracker::new(plate, params);
+    let mut stream = source.open()?;
+    let mut frame = Frame::default();
+    let mut track = Vec::with_capacity(n_frames_hint);
+    while let Some(time_s) = stream.next_frame(&mut frame)? {
+        track.push(Tracked {
+            time_s,
+            sighting: tracker.step(&frame),
+        });
+        if track.len() % 16 == 0 {
+            progress.report("tracking", track.len() as f64 / n_frames_hint as f64);
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+        }
+    }
+    if track.iter().all(|t| t.sighting.is_none()) {
+        return Err(Error::NothingMoves);
+    }
+    Ok(track)
+}
+
+struct Tracker<'a> {
+    plate: &'a Plate,
+    params: &'a Params,
+    whole: Rect,
+    frame_idx: usize,
+    /// The last two centroids, the newest first, and the frames they are from.
+    last: Option<(usize, [f64; 2])>,
+    velocity_px: [f64; 2],
+    box_px: Rect,
+    misses: u32,
+    /// Areas of the last silhouettes, for their running median.
+    areas: Vec<f64>,
+}
+
+impl<'a> Tracker<'a> {
+    fn new(plate: &'a Plate, params: &'a Params) -> Tracker<'a> {
+        Tracker {
+            plate,
+            params,
+            whole: Rect::of_size(plate.frame.width, plate.frame.height),
+            frame_idx: 0,
+            last: None,
+            velocity_px: [0.0; 2],
+            box_px: Rect::default(),
+            misses: MISSES,
+            areas: Vec::new(),
+        }
+    }
+
+    /// Looks at the next frame.
+    fn step(&mut self, frame: &Frame) -> Option<Sighting> {
+        let gain = light::gain(frame, self.plate, self.box_px);
+        let found = self
+            .near(frame, &gain)
+            .or_else(|| self.anywhere(frame, &gain))
+            .and_then(|component| self.see(frame, &gain, component));
+        match &found {
+            Some(sighting) => self.remember(sighting),
+            None => self.misses = (self.misses + 1).min(MISSES),
+        }
+        self.frame_idx += 1;
+        found
+    }
+
+    /// The best component in the search window; `None` when the window is not to be trusted.
+    fn near(&mut self, frame: &Frame, gain: &Gain) -> Option<Component> {
+        let whole_frame =
+            self.params.search == Search::Full || self.frame_idx.is_multiple_of(FULL_EVERY);
+        if whole_frame || self.misses >= MISSES {
+            return None;
+        }
+        let window = self.window();
+        let components = silhouette::components(frame, self.plate, gain, window);
+        self.best(&components, window)
+    }
+
+    /// The best component of the whole frame.
+    fn anywhere(&mut self, frame: &Frame, gain: &Gain) -> Option<Component> {
+        let components = silhouette::components(frame, self.plate, gain, self.whole);
+        if self.misses >= MISSES {
+            return components
+                .into_iter()
+                .filter(|c| c.area >= LEAST_AREA_PX)
+                .max_by_key(|c| c.area);
+        }
+        self.best(&components, self.window()).or_else(|| {
+            let mut fitting = components.iter().filter(|c| self.fits(c));
+            let only = fitting.next();
+            only.filter(|_| fitting.next().is_none()).cloned()
+        })
+    }
+
+    /// The last box where it should be now, widened by how far it may have gone besides.
+    fn window(&self) -> Rect {
+        let steps = f64::from(self.misses + 1);
+        let speed = libm::hypot(self.velocity_px[0], self.velocity_px[1]);
+        let margin = (1.5 * speed + 8.0) * libm::pow(1.6, f64::from(self.misses));
+        let (dx, dy) = (self.velocity_px[0] * steps, self.velocity_px[1] * steps);
+        let last = self.box_px;
+        Rect::clipped(
+            (f64::from(last.x) + dx.min(0.0) - margin).floor() as i64,
+            (f64::from(last.y) + dy.min(0.0) - margin).floor() as i64,
+            (f64::from(last.right()) + dx.max(0.0) + margin).ceil() as i64,
+            (f64::from(last.bottom()) + dy.max(0.0) + margin).ceil() as i64,
+            self.whole.w,
+            self.whole.h,
+        )
+    }
+
+    /// The component of fitting area in the window that lies nearest the prediction and differs
+    /// least in area.
+    fn best(&self, components: &[Component], window: Rect) -> Option<Component> {
+        let (_, last) = self.last?;
+        let steps = f64::from(self.misses + 1);
+        let predicted = [
+            last[0] + self.velocity_px[0] * steps,
+            last[1] + self.velocity_px[1] * steps,
+        ];
+        let scale = f64::from(self.box_px.w.max(self.box_px.h)).max(8.0);
+        let usual = self.usual_area();
+        let cost = |component: &Component| {
+            let rect = component.rect;
+            let center = [
+                f64::from(rect.x) + f64::from(rect.w) / 2.0,
+                f64::from(rect.y) + f64::from(rect.h) / 2.0,
+            ];
+            let distance = (center[0] - predicted[0]).hypot(center[1] - predicted[1]);
+            distance / scale + libm::log(component.area as f64 / usual).abs()
+        };
+        components
+            .iter()
+            .filter(|c| self.fits(c) && !c.rect.intersection(&window).is_empty())
+            .min_by(|a, b| cost(a).total_cmp(&cost(b)))
+            .cloned()
+    }
+
+    /// Whether a component may be the animal by its area: near what it was last, or near what it
+    /// mostly is (an animal that turns toward the camera shrinks within a few frames).
+    fn fits(&self, component: &Component) -> bool {
+        let near = |area: f64| (0.4..=2.5).contains(&(component.area as f64 / area));
+        component.area >= LEAST_AREA_PX
+            && (near(self.usual_area()) || self.areas.last().copied().is_some_and(near))
+    }
+
+    /// The median area of the last silhouettes.
+    fn usual_area(&self) -> f64 {
+        let mut areas = self.areas.clone();
+        if areas.is_empty() {
+            return 1.0;
+        }
+        let middle = areas.len() / 2;
+        *areas.select_nth_unstable_by(middle, f64::total_cmp).1
+    }
+
+    /// Cuts the component out and measures it.
+    fn see(&self, frame: &Frame, gain: &Gain, component: Component) -> Option<Sighting> {
+        let silhouette = silhouette::shaped(&component, frame.width, frame.height);
+        if silhouette.area() == 0 {
+            return None;
+        }
+        let rect = component.rect;
+        let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
+        let cutout = matte::cut_out(frame, self.plate, gain, &silhouette, length_px);
+        let weights: Vec<u8> = cutout
+            .image
+            .pixels
+            .chunks_exact(4)
+            .map(|rgba| rgba[3])
+            .collect();
+        let moments = moments::moments(cutout.rect, &weights)?;
+        let axis = moments.major_rad.unwrap_or(0.0);
+        let opened = opened(&silhouette);
+        let across = axis + std::f64::consts::FRAC_PI_2;
+        let extent_px = [
+            moments::extent_px(&opened, axis),
+            moments::extent_px(&opened, across),
+        ];
+        let cut = rect.x == 0
+            || rect.y == 0
+            || rect.right() == frame.width
+            || rect.bottom() == frame.height;
+        Some(Sighting {
+            cutout,
+            moments,
+            extent_px,
+            box_px: rect,
+            cut,
+        })
+    }
+
+    fn remember(&mut self, sighting: &Sighting) {
+        let centroid = sighting.moments.centroid_px;
+        self.velocity_px = match self.last {
+            Some((frame_idx, last)) if self.misses < MISSES => {
+                let steps = (self.frame_idx - frame_idx) as f64;
+                [
+                    (centroid[0] - last[0]) / steps,
+                    (centroid[1] - last[1]) / steps,
+                ]
+            }
+            _ => [0.0; 2],
+        };
+        self.last = Some((self.frame_idx, centroid));
+        self.box_px = sighting.box_px;
+        self.misses = 0;
+        let area = sighting.moments.area_px;
+        if self.areas.len() == 61 {
+            self.areas.remove(0);
+        }
+        self.areas.push(area);
+    }
+}
+
+/// Opened, unless nothing would be left of a thin animal.
+fn opened(silhouette: &Mask) -> Mask {
+    let opened = silhouette.opened();
+    if opened.area() * 2 < silhouette.area() {
+        silhouette.clone()
+    } else {
+        opened
+    }
+}

@@ -1,0 +1,275 @@
+//! Which moments look alike: from the distances between clips to transitions and the playback
+//! graph (ALGORITHMS.md 5; O 3.2 and 3.3).
+//!
+//! A frame can be shown when its sprite is present and uncut and its heading known; a clip can be
+//! used when all its frames can be shown. Plain pairs must be max(f, 0.5 s) apart: nearer ones are
+//! the same moment. Mirrored pairs need no such gap, because a clip is not its own mirror image:
+//! where it nearly is, seen head-on, turning over on the spot is just what is wanted.
+
+#[cfg(test)]
+mod tests;
+
+use crate::analysis::distance::{
+    Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Side,
+};
+use crate::analysis::gate::Gate;
+use crate::analysis::{Error, Params, playback};
+use crate::cpu::Level;
+use crate::library::{Patch, Playback, Poses, Sprites, Transition};
+use crate::progress::Progress;
+
+/// Larger multiples of the natural step, tried while the component holds too little.
+const KAPPA_LADDER: [f64; 3] = [2.5, 3.0, 4.0];
+/// A component that lasts shorter than this is too little.
+const LEAST_COMPONENT_S: f64 = 2.0;
+/// Plain pairs of clips are at least this far apart.
+const LEAST_GAP_S: f64 = 0.5;
+
+/// What the distances say about a footage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Connections {
+    /// f.
+    pub clip_frames: usize,
+    /// Clips nearer than this (strictly) are alike.
+    pub epsilon: u64,
+    /// The median of D(i, i+1) over clips whose sprites are all present, of an even number the
+    /// lower one; 0 when there are none.
+    pub natural_step: u64,
+    /// The multiple of the natural step that epsilon is, rounded up; `None` when epsilon was given.
+    pub kappa_used: Option<f64>,
+    /// Pairs i < j of clips whose sprites are all present with D < epsilon, before any other test.
+    pub n_candidates: u64,
+    /// By (from, to, mirrored).
+    pub transitions: Vec<Transition>,
+    /// What may follow what.
+    pub playback: Playback,
+    /// The runs of sprites between jumps.
+    pub patches: Vec<Patch>,
+    /// Share of the footage's frames that lie in the component, 0..=1.
+    pub component_share: f64,
+}
+
+/// Compares all clips and joins those alike.
+///
+/// A footage without any two moments alike is no error: its component is empty. Fails only when
+/// cancelled. The result is the same at every level and with any number of threads.
+pub fn connect(
+    sprites: &Sprites,
+    poses: &Poses,
+    params: &Params,
+    cpu: Level,
+    progress: &dyn Progress,
+) -> Result<Connections, Error> {
+    let clip_frames = params.clip_frames_at(poses.fps);
+    let pixels = ComparedSprites::new(sprites, poses, params.planes);
+    let clips = Clips::new(sprites, poses, clip_frames);
+    let natural_step = natural_step(&pixels, &clips);
+    let rungs = rungs(params, natural_step);
+    let search = Search {
+        distances: Distances {
+            pixels: &pixels,
+            clip_frames,
+            side: Side::Plain,
+            cpu,
+        },
+        clips: &clips,
+        gate: Gate::new(poses, clip_frames, params),
+        least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
+    };
+    let found = search
+        .run(&rungs, params.mirror, progress)
+        .map_err(|Cancelled| Error::Cancelled)?;
+    Ok(choose(found, &rungs, &clips, natural_step, poses.fps))
+}
+
+/// Which frames and clips can be used.
+struct Clips {
+    clip_frames: usize,
+    shown: Vec<bool>,
+    usable: Vec<bool>,
+    all_present: Vec<bool>,
+}
+
+impl Clips {
+    fn new(sprites: &Sprites, poses: &Poses, clip_frames: usize) -> Clips {
+        let present: Vec<bool> = (0..sprites.n_frames())
+            .map(|frame_idx| sprites.is_present(frame_idx))
+            .collect();
+        let shown: Vec<bool> = present
+            .iter()
+            .zip(&poses.frames)
+            .map(|(&present, pose)| present && !pose.cut && pose.heading_rad.is_some())
+            .collect();
+        let whole = |frames: &[bool]| -> Vec<bool> {
+            frames
+                .windows(clip_frames)
+                .map(|clip| clip.iter().all(|&frame| frame))
+                .collect()
+        };
+        Clips {
+            clip_frames,
+            usable: whole(&shown),
+            all_present: whole(&present),
+            shown,
+        }
+    }
+}
+
+/// How much the animal changes from one frame to the next.
+fn natural_step(pixels: &ComparedSprites, clips: &Clips) -> u64 {
+    let steps: Vec<u64> = (1..pixels.n_frames())
+        .map(|frame_idx| pixels.sad(frame_idx - 1, frame_idx))
+        .collect();
+    let mut of_clips: Vec<u64> = steps
+        .windows(clips.clip_frames)
+        .zip(clips.all_present.windows(2))
+        .filter(|(_, present)| present[0] && present[1])
+        .map(|(steps, _)| steps.iter().sum())
+        .collect();
+    if of_clips.is_empty() {
+        return 0;
+    }
+    let middle = (of_clips.len() - 1) / 2;
+    *of_clips.select_nth_unstable(middle).1
+}
+
+/// An epsilon to try, and the kappa that it comes from.
+struct Rung {
+    kappa: Option<f64>,
+    epsilon: u64,
+}
+
+fn rungs(params: &Params, natural_step: u64) -> Vec<Rung> {
+    if let Some(epsilon) = params.epsilon {
+        return vec![Rung {
+            kappa: None,
+            epsilon,
+        }];
+    }
+    let larger = KAPPA_LADDER.into_iter().filter(|&k| k > params.kappa);
+    std::iter::once(params.kappa)
+        .chain(larger)
+        .map(|kappa| Rung {
+            kappa: Some(kappa),
+            // D is whole: D < kappa * step is D < the next whole number.
+            epsilon: (kappa * natural_step as f64).ceil() as u64,
+        })
+        .collect()
+}
+
+/// All that decides which pairs become transitions.
+struct Search<'a> {
+    distances: Distances<'a>,
+    clips: &'a Clips,
+    gate: Gate,
+    least_gap: usize,
+}
+
+/// What a search found below the last rung's epsilon.
+struct Found {
+    transitions: Vec<Transition>,
+    /// Raw pairs below each rung's epsilon.
+    n_candidates: Vec<u64>,
+}
+
+impl Search<'_> {
+    fn run(
+        &self,
+        rungs: &[Rung],
+        mirror: bool,
+        progress: &dyn Progress,
+    ) -> Result<Found, Cancelled> {
+        let mut found = Found {
+            transitions: Vec::new(),
+            n_candidates: vec![0; rungs.len()],
+        };
+        self.one_side(Side::Plain, rungs, progress, &mut found)?;
+        if mirror {
+            self.one_side(Side::Mirrored, rungs, progress, &mut found)?;
+        }
+        let key = |t: &Transition| (t.from, t.to, t.mirrored);
+        found.transitions.sort_unstable_by_key(key);
+        Ok(found)
+    }
+
+    fn one_side(
+        &self,
+        side: Side,
+        rungs: &[Rung],
+        progress: &dyn Progress,
+        found: &mut Found,
+    ) -> Result<(), Cancelled> {
+        let limit = rungs.iter().map(|rung| rung.epsilon).max().unwrap_or(0);
+        let mut minima = LocalMinima::new(&self.clips.usable, limit);
+        let distances = Distances {
+            side,
+            ..self.distances
+        };
+        let Found {
+            transitions,
+            n_candidates,
+        } = found;
+        distances.for_each_row(progress, |i, row| {
+            if side == Side::Plain && self.clips.all_present[i] {
+                self.count(i, row, limit, rungs, n_candidates);
+            }
+            minima.push(row, |pair| transitions.extend(self.transition(pair, side)));
+        })?;
+        minima.finish(|pair| transitions.extend(self.transition(pair, side)));
+        Ok(())
+    }
+
+    fn count(&self, i: usize, row: &[u64], limit: u64, rungs: &[Rung], n_candidates: &mut [u64]) {
+        let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
+        for (&distance, _) in others.filter(|(d, present)| **d < limit && **present) {
+            for (n, rung) in n_candidates.iter_mut().zip(rungs) {
+                *n += u64::from(distance < rung.epsilon);
+            }
+        }
+    }
+
+    fn transition(&self, pair: ClipPair, side: Side) -> Option<Transition> {
+        let mirrored = side == Side::Mirrored;
+        if !mirrored && pair.to - pair.from < self.least_gap {
+            return None;
+        }
+        let heading_gap_rad = self.gate.pass(pair.from, pair.to, mirrored)?;
+        Some(Transition {
+            from: pair.from as u32,
+            to: pair.to as u32,
+            mirrored,
+            distance: pair.distance,
+            heading_gap_rad,
+        })
+    }
+}
+
+/// The first rung whose component lasts long enough, else the last.
+fn choose(found: Found, rungs: &[Rung], clips: &Clips, natural_step: u64, fps: f64) -> Connections {
+    let n_frames = clips.shown.len();
+    let mut chosen = None;
+    for (rung, &n_candidates) in rungs.iter().zip(&found.n_candidates) {
+        let alike = found.transitions.iter();
+        let transitions: Vec<Transition> = alike
+            .filter(|t| t.distance < rung.epsilon)
+            .copied()
+            .collect();
+        let playback = playback::playback(&transitions, &clips.shown, clips.clip_frames);
+        let long_enough = playback.component.len() as f64 >= LEAST_COMPONENT_S * fps;
+        chosen = Some(Connections {
+            clip_frames: clips.clip_frames,
+            epsilon: rung.epsilon,
+            natural_step,
+            kappa_used: rung.kappa,
+            n_candidates,
+            component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
+            patches: playback::patches(&playback),
+            transitions,
+            playback,
+        });
+        if long_enough {
+            break;
+        }
+    }
+    chosen.expect("there is always a first rung")
+}

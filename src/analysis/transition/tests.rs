@@ -1,0 +1,198 @@
+//! Transitions of small films whose likenesses are known.
+
+use super::*;
+use crate::geometry::angle::mirrored_rad;
+use crate::library::{Pose, View};
+use crate::progress::Silent;
+use libm::{cos, sin};
+
+const FPS: f64 = 10.0;
+
+/// What the animal does in a frame: a phase of its stroke in 0..1, and its heading.
+type Moment = (f64, f64);
+
+/// A bright dot that circles about the middle of a 16 x 16 sprite by the phase of the stroke,
+/// left-right mirrored where the animal heads left. `None` where it was not found.
+fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
+    let mut sprites = Sprites::missing(16, 16, moments.len());
+    for (frame_idx, moment) in moments.iter().enumerate() {
+        let &Some((phase, heading_rad)) = moment else {
+            continue;
+        };
+        let turn = std::f64::consts::TAU * phase;
+        let side = cos(heading_rad).signum();
+        let (dot_x, dot_y) = (side * 5.0 * cos(turn), 3.0 * sin(turn));
+        let pixels = sprites.fill(frame_idx).as_chunks_mut::<4>().0;
+        for (k, pixel) in pixels.iter_mut().enumerate() {
+            let (x, y) = ((k % 16) as f64 - 7.5 - dot_x, (k / 16) as f64 - 7.5 - dot_y);
+            let light = 250.0 * libm::exp(-(x * x + y * y) / 8.0);
+            *pixel = [light as u8, light as u8, 20, 255];
+        }
+    }
+    let pose = |moment: &Option<Moment>| Pose {
+        heading_rad: moment.map(|(_, heading_rad)| heading_rad),
+        ..Pose::default()
+    };
+    let poses = Poses {
+        fps: FPS,
+        image_size_px: [320, 240],
+        view: View::Side,
+        camera: None,
+        animal: None,
+        frames: moments.iter().map(pose).collect(),
+    };
+    (sprites, poses)
+}
+
+/// Strokes of 20 frames, all alike, at one heading.
+fn strokes(n_frames: usize, heading_rad: f64) -> Vec<Option<Moment>> {
+    let phase = |k: usize| (k % 20) as f64 / 20.0;
+    (0..n_frames)
+        .map(|k| Some((phase(k), heading_rad)))
+        .collect()
+}
+
+fn params() -> Params {
+    Params {
+        clip_frames: Some(4),
+        ..Params::default()
+    }
+}
+
+fn connections(moments: &[Option<Moment>], params: &Params) -> Connections {
+    let (sprites, poses) = film(moments);
+    connect(&sprites, &poses, params, Level::detect(), &Silent).expect("nobody cancels")
+}
+
+#[test]
+fn an_animal_that_repeats_its_stroke_may_jump_by_whole_strokes() {
+    let found = connections(&strokes(61, 0.0), &params());
+    assert!(found.natural_step > 0);
+    assert_eq!(found.epsilon, 2 * found.natural_step);
+    assert_eq!(found.kappa_used, Some(2.0));
+    let plain = found.transitions.iter().filter(|t| !t.mirrored);
+    let gaps: Vec<u32> = plain.map(|t| t.to - t.from).collect();
+    assert!(
+        !gaps.is_empty() && gaps.iter().all(|gap| gap % 20 == 0),
+        "{gaps:?}"
+    );
+    assert!(found.component_share > 0.5, "{}", found.component_share);
+    assert!(!found.patches.is_empty());
+}
+
+#[test]
+fn candidates_are_counted_before_any_other_test() {
+    let still = vec![Some((0.0, 0.0)); 8];
+    let params = Params {
+        epsilon: Some(1),
+        ..params()
+    };
+    let found = connections(&still, &params);
+    // Five clips, all equal: ten pairs. They lie too near each other for a transition.
+    assert_eq!((found.n_candidates, found.kappa_used), (10, None));
+    assert!(
+        found.transitions.iter().all(|t| t.mirrored),
+        "{:?}",
+        found.transitions
+    );
+}
+
+#[test]
+fn epsilon_is_strict() {
+    let with = |epsilon| {
+        let params = Params {
+            epsilon: Some(epsilon),
+            mirror: false,
+            ..params()
+        };
+        connections(&strokes(61, 0.0), &params).n_candidates
+    };
+    assert_eq!(with(0), 0);
+    assert_ne!(with(1), 0);
+}
+
+#[test]
+fn clips_that_point_elsewhere_are_not_joined() {
+    let mut moments = strokes(40, 0.0);
+    moments.extend(strokes(40, 0.5));
+    let found = connections(&moments, &params());
+    assert!(!found.transitions.is_empty());
+    for t in found.transitions.iter().filter(|t| !t.mirrored) {
+        assert!(t.to <= 36 || t.from >= 37, "{t:?} joins two headings");
+        assert!(t.heading_gap_rad < 15f64.to_radians());
+    }
+}
+
+#[test]
+fn an_animal_that_swims_back_is_joined_to_its_mirror_image() {
+    let mut moments = strokes(40, 0.2);
+    moments.extend(strokes(40, mirrored_rad(0.2)));
+    let found = connections(&moments, &params());
+    let across = |t: &&Transition| t.mirrored && t.from <= 36 && t.to >= 40;
+    let joined: Vec<_> = found.transitions.iter().filter(across).collect();
+    assert!(
+        joined
+            .iter()
+            .any(|t| t.distance == 0 && t.to - t.from == 40)
+    );
+    let papers = Params {
+        mirror: false,
+        ..params()
+    };
+    let plain = connections(&moments, &papers);
+    assert!(plain.transitions.iter().all(|t| !t.mirrored));
+}
+
+#[test]
+fn no_clip_with_a_missing_cut_or_headless_frame_is_joined() {
+    let (mut sprites, mut poses) = film(&strokes(100, 0.0));
+    poses.frames[50].cut = true;
+    poses.frames[70].heading_rad = None;
+    let mut missing = strokes(100, 0.0);
+    missing[25] = None;
+    sprites = {
+        let (with_gap, _) = film(&missing);
+        assert!(!with_gap.is_present(25) && sprites.is_present(25));
+        with_gap
+    };
+    let found = connect(&sprites, &poses, &params(), Level::Scalar, &Silent);
+    let found = found.expect("nobody cancels");
+    assert!(!found.transitions.is_empty());
+    for t in &found.transitions {
+        for clip in [t.from..t.from + 4, t.to..t.to + 4] {
+            assert!([25, 50, 70].iter().all(|bad| !clip.contains(bad)), "{t:?}");
+        }
+    }
+    assert!(
+        [25, 50, 70]
+            .iter()
+            .all(|bad| !found.playback.component.contains(bad))
+    );
+}
+
+#[test]
+fn epsilon_grows_while_the_component_is_short() {
+    // Never the same twice: one stroke that takes longer than the footage.
+    let moments: Vec<_> = (0..60).map(|k| Some((f64::from(k) / 70.0, 0.0))).collect();
+    let found = connections(&moments, &params());
+    assert_eq!(found.kappa_used, Some(4.0));
+    assert_eq!(found.epsilon, 4 * found.natural_step);
+    assert!(found.playback.component.len() < 20);
+}
+
+#[test]
+fn footage_shorter_than_a_clip_has_no_transitions() {
+    let found = connections(&strokes(3, 0.0), &params());
+    assert_eq!((found.natural_step, found.n_candidates), (0, 0));
+    assert_eq!(found.playback, Playback::default());
+}
+
+#[test]
+fn every_level_finds_the_same_connections() {
+    let (sprites, poses) = film(&strokes(70, 0.1));
+    let at = |cpu| connect(&sprites, &poses, &params(), cpu, &Silent).expect("nobody cancels");
+    let scalar = at(Level::Scalar);
+    for cpu in Level::available() {
+        assert_eq!(at(cpu), scalar, "{cpu:?}");
+    }
+}

@@ -1,0 +1,174 @@
+//! Which container a file is, by its first bytes and by nothing else (RELIABILITY.md, "Facts": a
+//! playlist or a script under a video's name must never be taken for one). The demuxer found here is
+//! then forced on ffmpeg, so that its own guessing never runs.
+
+use super::error::Error;
+
+/// How many bytes of a file [`Container::of`] wants to see.
+pub(super) const HEAD_BYTES: usize = 4096;
+
+/// The accepted containers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Container {
+    /// MP4, QuickTime and their relatives.
+    Mov,
+    /// Matroska and WebM.
+    Matroska,
+    /// RIFF AVI.
+    Avi,
+    /// MPEG transport stream.
+    MpegTs,
+    /// ASF, WMV.
+    Asf,
+}
+
+/// First bytes of files that are no video: (offset, bytes, what it is).
+const PICTURES: [(usize, &[u8], &str); 8] = [
+    (0, b"\x89PNG", "a still image"),
+    (0, b"\xff\xd8\xff", "a still image"),
+    (0, b"BM", "a still image"),
+    (0, b"II*\0", "a still image"),
+    (0, b"MM\0*", "a still image"),
+    (8, b"WEBP", "a still image"),
+    (0, b"GIF8", "an image"),
+    (0, b"%PDF", "a document"),
+];
+
+/// First bytes of sound files.
+const SOUNDS: [(usize, &[u8]); 6] = [
+    (8, b"WAVE"),
+    (0, b"fLaC"),
+    (0, b"ID3"),
+    (0, b"\xff\xfb"),
+    (0, b"\xff\xf1"),
+    (8, b"AIFF"),
+];
+
+/// First bytes of containers that are not accepted.
+const OTHER_CONTAINERS: [(usize, &[u8], &str); 5] = [
+    (0, b"FLV\x01", "flv"),
+    (0, b"OggS", "ogg"),
+    (0, b"\0\0\x01\xba", "mpeg program stream"),
+    (0, b"DKIF", "ivf"),
+    (0, b"YUV4MPEG2", "yuv4mpeg"),
+];
+
+/// Brands of still images in the MP4 container.
+const STILL_BRANDS: [&[u8; 4]; 6] = [b"heic", b"heix", b"mif1", b"msf1", b"avif", b"avis"];
+
+impl Container {
+    /// The container that begins with `head` (the first [`HEAD_BYTES`] bytes, or all there are).
+    pub(super) fn of(head: &[u8]) -> Result<Container, Error> {
+        let has = |at: usize, magic: &[u8]| head.get(at..at + magic.len()) == Some(magic);
+        if has(0, b"\x1a\x45\xdf\xa3") {
+            return Ok(Container::Matroska);
+        }
+        if has(0, b"RIFF") && has(8, b"AVI ") {
+            return Ok(Container::Avi);
+        }
+        if has(0, b"\x30\x26\xb2\x75\x8e\x66\xcf\x11\xa6\xd9") {
+            return Ok(Container::Asf);
+        }
+        if is_mov(head) {
+            return match STILL_BRANDS.iter().any(|b| has(4, b"ftyp") && has(8, *b)) {
+                true => Err(Error::NotAVideo("a still image".into())),
+                false => Ok(Container::Mov),
+            };
+        }
+        if is_transport_stream(head) {
+            return Ok(Container::MpegTs);
+        }
+        if let Some((_, _, name)) = OTHER_CONTAINERS.iter().find(|c| has(c.0, c.1)) {
+            return Err(Error::ContainerNotAllowed(name));
+        }
+        if SOUNDS.iter().any(|s| has(s.0, s.1)) {
+            return Err(Error::NoVideoStream);
+        }
+        let what = match PICTURES.iter().find(|p| has(p.0, p.1)) {
+            Some((_, _, what)) => what,
+            None if head.is_empty() => "the file is empty",
+            None if std::str::from_utf8(head).is_ok() => "a text",
+            None => "of no known kind",
+        };
+        Err(Error::NotAVideo(what.into()))
+    }
+
+    /// ffmpeg's name of the demuxer, for `-f`.
+    pub(super) fn demuxer(self) -> &'static str {
+        match self {
+            Container::Mov => "mov",
+            Container::Matroska => "matroska",
+            Container::Avi => "avi",
+            Container::MpegTs => "mpegts",
+            Container::Asf => "asf",
+        }
+    }
+}
+
+/// The first box of a QuickTime file, whose size must make sense too.
+fn is_mov(head: &[u8]) -> bool {
+    let Some((size, name)) = head.get(..8).map(|b| b.split_at(4)) else {
+        return false;
+    };
+    let size = u32::from_be_bytes([size[0], size[1], size[2], size[3]]);
+    let known: [&[u8]; 7] = [
+        b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp",
+    ];
+    // A brand list is short; a text that happens to have these letters is not.
+    let longest = if name == b"ftyp" { 4096 } else { u32::MAX };
+    known.contains(&name) && (8..=longest).contains(&size) || (name == b"mdat" && size <= 1)
+}
+
+/// Sync bytes at a packet's distance, for packets of 188 or 192 bytes, at least four of them.
+fn is_transport_stream(head: &[u8]) -> bool {
+    [(188, 0), (192, 4)].iter().any(|&(step, first)| {
+        let mut syncs = head.iter().skip(first).step_by(step);
+        head.len() >= first + 3 * step + 1 && syncs.all(|&byte| byte == 0x47)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::Code;
+
+    fn code_of(head: &[u8]) -> Code {
+        Container::of(head)
+            .expect_err("these bytes are no accepted container")
+            .code()
+    }
+
+    #[test]
+    fn each_accepted_container_is_known_by_its_first_bytes() {
+        let mut packets = vec![0; 188 * 6];
+        packets.iter_mut().step_by(188).for_each(|b| *b = 0x47);
+        let cases: [(&[u8], Container); 4] = [
+            (b"\0\0\0\x20ftypisom", Container::Mov),
+            (b"\x1a\x45\xdf\xa3\x01", Container::Matroska),
+            (b"RIFF\x10\0\0\0AVI LIST", Container::Avi),
+            (&packets, Container::MpegTs),
+        ];
+        for (head, container) in cases {
+            assert_eq!(Container::of(head).ok(), Some(container));
+        }
+    }
+
+    #[test]
+    fn what_is_no_video_is_told_apart() {
+        assert_eq!(code_of(b""), Code::NotAVideo);
+        assert_eq!(
+            code_of(b"#EXTM3U\n#EXTINF:1,\nother.mp4\n"),
+            Code::NotAVideo
+        );
+        assert_eq!(code_of(b"ffconcat version 1.0\n"), Code::NotAVideo);
+        assert_eq!(code_of(b"\0\0\0\x20ftypheic"), Code::NotAVideo);
+        assert_eq!(code_of(b"\x89PNG\r\n"), Code::NotAVideo);
+        assert_eq!(code_of(b"RIFF\x10\0\0\0WAVEfmt "), Code::NoVideoStream);
+        assert_eq!(code_of(b"FLV\x01\x05"), Code::ContainerNotAllowed);
+    }
+
+    #[test]
+    fn a_text_that_only_speaks_of_boxes_is_no_mov() {
+        assert_eq!(code_of(b"see ftyp"), Code::NotAVideo);
+    }
+}

@@ -1,0 +1,250 @@
+//! Footage as frames: planar 4:2:0 over a pipe, each frame read once into the caller's memory
+//! (ECOSYSTEM.md 5, "Drive"; RELIABILITY.md, "Facts": decoded frames are counted, headers are only
+//! claims).
+//!
+//! ffmpeg turns nothing and drops nothing by itself: the turn, the square pixels and the
+//! deinterlacing are filters that we choose, and the last of them fixes the size, so that a picture
+//! that changes its size in the middle cannot shift the bytes of the frames after it.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::error::Error;
+use super::gate::{Child, Order, Tool, input_args};
+use super::limits::Limits;
+use super::probe::{Probe, Turn, is_rgb, probe};
+use super::timeline::Timeline;
+use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use crate::raster::{Frame, Matrix, Range};
+
+/// A video file that is within its limits and can be read any number of times.
+#[derive(Clone, Debug)]
+pub struct Video {
+    path: PathBuf,
+    limits: Limits,
+    probe: Probe,
+}
+
+impl Video {
+    /// Looks at the file: container, codec, size, rate, length. Reads it once but decodes nothing.
+    ///
+    /// Fails with the reason of the first limit that the file breaks. `path` must be ours: a
+    /// person's file name never comes here.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
+        Ok(Video {
+            path: std::path::absolute(path).map_err(Error::io("finding the footage"))?,
+            limits: limits.clone(),
+            probe: probe(path, limits)?,
+        })
+    }
+
+    fn args(&self) -> Vec<OsString> {
+        let probe = &self.probe;
+        let threads = self.limits.threads.to_string();
+        let mut args: Vec<OsString> =
+            ["-nostdin", "-copyts", "-noautorotate", "-threads", &threads]
+                .map(Into::into)
+                .into();
+        args.extend(input_args(probe.container, &self.path, &self.limits));
+        let stream = format!("0:{}", probe.stream_idx);
+        let filters = self.filters();
+        args.extend(
+            [
+                "-map",
+                &stream,
+                "-an",
+                "-sn",
+                "-dn",
+                "-fps_mode",
+                "passthrough",
+            ]
+            .map(Into::into),
+        );
+        args.extend(["-vf", &filters, "-f", "rawvideo", "pipe:1"].map(Into::into));
+        args
+    }
+
+    fn filters(&self) -> String {
+        let probe = &self.probe;
+        let matrix = match probe.color.matrix {
+            Matrix::Bt601 => "bt601",
+            Matrix::Bt709 => "bt709",
+        };
+        let (range, format) = match probe.color.range {
+            Range::Limited => ("tv", "yuv420p"),
+            Range::Full => ("pc", "yuvj420p"),
+        };
+        let mut filters = Vec::new();
+        if probe.interlaced {
+            filters.push("bwdif=mode=send_frame:deint=interlaced".to_owned());
+        }
+        let turn = turn_filters(probe.turn);
+        filters.extend(turn.iter().map(|&filter| filter.to_owned()));
+        // Bit-exact scaling: the same bytes from every processor.
+        let mut scale = format!(
+            "scale={}:{}:flags=bicubic+accurate_rnd+bitexact",
+            probe.width, probe.height
+        );
+        match is_rgb(&probe.pix_fmt) {
+            true => scale += ":out_range=tv:out_color_matrix=bt601",
+            false => {
+                let stored = if probe.color_space.starts_with("bt2020") {
+                    "bt2020"
+                } else {
+                    matrix
+                };
+                scale += &format!(
+                    ":in_range={range}:out_range={range}:in_color_matrix={stored}:out_color_matrix={matrix}"
+                );
+            }
+        }
+        filters.push(scale);
+        filters.push(format!("format={format}"));
+        filters.join(",")
+    }
+}
+
+fn turn_filters(turn: Turn) -> Vec<&'static str> {
+    match (turn.transpose, turn.flip_x, turn.flip_y) {
+        (true, true, false) => vec!["transpose=clock"],
+        (true, false, true) => vec!["transpose=cclock"],
+        (true, true, true) => vec!["transpose=clock_flip"],
+        (true, false, false) => vec!["transpose=cclock_flip"],
+        (false, x, y) => [(x, "hflip"), (y, "vflip")]
+            .into_iter()
+            .filter_map(|(wanted, filter)| wanted.then_some(filter))
+            .collect(),
+    }
+}
+
+impl FrameSource for Video {
+    fn format(&self) -> FootageFormat {
+        let probe = &self.probe;
+        FootageFormat {
+            width: probe.width,
+            height: probe.height,
+            fps: probe.timeline.fps(),
+            n_frames_hint: match &probe.timeline {
+                Timeline::Constant { .. } => probe.n_packets,
+                Timeline::Variable { sources, .. } => sources.len(),
+            },
+            color: probe.color,
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        let order = Order::new(
+            Tool::Ffmpeg,
+            self.args(),
+            &self.limits,
+            self.probe.n_packets,
+        );
+        Ok(Box::new(VideoStream {
+            video: self,
+            child: Some(Child::reading(order)?),
+            n_decoded: 0,
+            n_given: 0,
+            held: Frame::default(),
+        }))
+    }
+}
+
+/// One reading of a video.
+struct VideoStream<'a> {
+    video: &'a Video,
+    child: Option<Child>,
+    n_decoded: usize,
+    n_given: usize,
+    /// The last decoded frame, kept only where frames may be shown twice.
+    held: Frame,
+}
+
+impl FrameStream for VideoStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        let video = self.video;
+        let time_s = match &video.probe.timeline {
+            Timeline::Constant { fps } => self.decode(frame)?.then(|| self.n_given as f64 / fps),
+            Timeline::Variable {
+                times_s, sources, ..
+            } => self.resample(times_s, sources, frame)?,
+        };
+        self.n_given += usize::from(time_s.is_some());
+        Ok(time_s)
+    }
+}
+
+impl VideoStream<'_> {
+    /// The next decoded frame; false after the last, once the child has ended well.
+    fn decode(&mut self, frame: &mut Frame) -> Result<bool, Error> {
+        let Some(child) = &mut self.child else {
+            return Ok(false);
+        };
+        let probe = &self.video.probe;
+        (frame.width, frame.height, frame.color) = (probe.width, probe.height, probe.color);
+        frame
+            .planes
+            .resize(Frame::n_bytes(probe.width, probe.height), 0);
+        let n_read = child.read_full(&mut frame.planes)?;
+        if n_read < frame.planes.len() {
+            self.end(n_read)?;
+            return Ok(false);
+        }
+        self.n_decoded += 1;
+        match self.n_decoded > self.video.limits.max_frames {
+            true => Err(Error::TooManyFrames {
+                limit: self.video.limits.max_frames,
+            }),
+            false => Ok(true),
+        }
+    }
+
+    /// The next frame of the constant rate, which may be the last one again or some later one.
+    fn resample(
+        &mut self,
+        times_s: &[f64],
+        sources: &[u32],
+        frame: &mut Frame,
+    ) -> Result<Option<f64>, Error> {
+        let wanted = sources
+            .get(self.n_given)
+            .map_or(usize::MAX, |&source| source as usize);
+        let mut held = std::mem::take(&mut self.held);
+        while self.n_decoded <= wanted {
+            if !self.decode(&mut held)? {
+                return Ok(None);
+            }
+        }
+        frame.clone_from(&held);
+        self.held = held;
+        Ok(times_s.get(wanted).copied())
+    }
+
+    /// The child has closed its output, `n_left` bytes after the last whole frame.
+    fn end(&mut self, n_left: usize) -> Result<(), Error> {
+        let Some(child) = self.child.take() else {
+            return Ok(());
+        };
+        let end = child.finish()?.check()?;
+        if n_left > 0 {
+            return Err(Error::Crashed {
+                status: "it ended inside a frame".into(),
+                complaint: end.complaint,
+            });
+        }
+        let probe = &self.video.probe;
+        let promised = probe.n_packets;
+        let least = match probe.packets_may_be_silent {
+            true => promised / 2,
+            // A frame or two may be lost to an open start.
+            false => promised - (promised / 50).max(2).min(promised),
+        };
+        match self.n_decoded < least.max(1) && !self.video.limits.allow_truncated {
+            true => Err(Error::Truncated {
+                found: self.n_decoded as f64,
+                promised: promised as f64,
+                unit: "frames",
+            }),
+            false => Ok(()),
+        }
+    }
+}

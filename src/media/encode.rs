@@ -1,0 +1,274 @@
+//! Frames to an MP4 that browsers play: H.264 High, 4:2:0, index in front (ECOSYSTEM.md 5).
+//!
+//! Equal frames give equal bytes whatever the machine: x264 gets a fixed number of threads (its
+//! result depends on that number), no processor-dependent choices, and writes no name of itself.
+//! The file appears under its own name only when it is whole.
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use super::error::Error;
+use super::gate::{Child, Order, Tool};
+use super::limits::Limits;
+use crate::raster::{ColorSpec, Frame, Matrix, Range};
+
+/// What all frames of a video have in common.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VideoFormat {
+    /// Columns, 1..=8192; an odd number gains one column, a copy of the last.
+    pub width: u32,
+    /// Rows, 1..=8192; as the columns.
+    pub height: u32,
+    /// Frames a second, > 0 and <= 1000.
+    pub fps: f64,
+    /// How the values of the frames are to be read; written into the file.
+    pub color: ColorSpec,
+}
+
+/// How well to encode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// x264's constant rate factor, 0 (lossless) ..= 51; 18 looks like the original.
+    pub crf: u8,
+    /// Encoding threads. The bytes depend on them, so this is no automatic number.
+    pub threads: u32,
+}
+
+impl Default for Quality {
+    fn default() -> Quality {
+        Quality {
+            crf: 18,
+            threads: 4,
+        }
+    }
+}
+
+/// An MP4 file being written. Dropped before [`VideoWriter::finish`], it leaves nothing behind.
+pub struct VideoWriter {
+    format: VideoFormat,
+    /// None once the encoder has failed: every later frame is refused.
+    child: Option<Child>,
+    part: Part,
+    path: PathBuf,
+    padded: Vec<u8>,
+}
+
+impl VideoWriter {
+    /// Starts a video at `path`, with the default quality and limits.
+    pub fn create(path: &Path, format: &VideoFormat) -> Result<VideoWriter, Error> {
+        VideoWriter::create_with(path, format, Quality::default(), &Limits::default())
+    }
+
+    /// As `create`; of the limits, those on time, memory and output bytes hold.
+    pub fn create_with(
+        path: &Path,
+        format: &VideoFormat,
+        quality: Quality,
+        limits: &Limits,
+    ) -> Result<VideoWriter, Error> {
+        let sides = 1..=8192;
+        if !(sides.contains(&format.width) && sides.contains(&format.height)) {
+            return Err(Error::BadOutput("a size outside 1..=8192"));
+        }
+        if !(format.fps > 0.0 && format.fps <= 1000.0) {
+            return Err(Error::BadOutput("a frame rate outside 0..=1000"));
+        }
+        let path = std::path::absolute(path).map_err(Error::io("finding the output folder"))?;
+        let part = Part::beside(&path);
+        let args = encoder_args(&part.0, format, quality);
+        let order = Order::new(Tool::Ffmpeg, args, limits, limits.max_frames)
+            .with_output(limits.max_output_bytes);
+        Ok(VideoWriter {
+            format: *format,
+            child: Some(Child::writing(order)?),
+            part,
+            path,
+            padded: Vec::new(),
+        })
+    }
+
+    /// Adds a frame, of the video's size and colors.
+    pub fn write(&mut self, frame: &Frame) -> Result<(), Error> {
+        let VideoFormat {
+            width,
+            height,
+            color,
+            ..
+        } = self.format;
+        if (frame.width, frame.height, frame.color) != (width, height, color) {
+            return Err(Error::BadOutput("a frame of another size or color"));
+        }
+        let Some(child) = &mut self.child else {
+            return Err(Error::BadOutput("a frame after a failure"));
+        };
+        let written = if width % 2 == 0 && height % 2 == 0 {
+            child.write_all(&frame.planes)
+        } else {
+            pad(frame, &mut self.padded);
+            child.write_all(&self.padded)
+        };
+        if written.is_err() {
+            self.child = None;
+        }
+        written
+    }
+
+    /// Ends the video; only now does the file appear at its path.
+    pub fn finish(mut self) -> Result<(), Error> {
+        let child = self
+            .child
+            .take()
+            .ok_or(Error::BadOutput("an end after a failure"))?;
+        child.finish()?.check()?;
+        std::fs::rename(&self.part.0, &self.path).map_err(Error::io("naming the video"))
+    }
+}
+
+/// The file under its working name; removed when dropped, unless it has been renamed.
+struct Part(PathBuf);
+
+impl Part {
+    fn beside(path: &Path) -> Part {
+        let mut name = OsString::from(".");
+        name.push(path.file_name().unwrap_or_default());
+        name.push(".part");
+        Part(path.with_file_name(name))
+    }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        // After a rename there is nothing to remove.
+        std::fs::remove_file(&self.0).ok();
+    }
+}
+
+fn encoder_args(part: &Path, format: &VideoFormat, quality: Quality) -> Vec<OsString> {
+    let even = |side: u32| side.next_multiple_of(2);
+    let size = format!("{}x{}", even(format.width), even(format.height));
+    let (over, under) = fraction(format.fps);
+    let rate = format!("{over}/{under}");
+    let (range, pix_fmt) = match format.color.range {
+        Range::Limited => ("tv", "yuv420p"),
+        Range::Full => ("pc", "yuvj420p"),
+    };
+    let matrix = match format.color.matrix {
+        Matrix::Bt601 => "smpte170m",
+        Matrix::Bt709 => "bt709",
+    };
+    // Our RGB is sRGB, whatever the luma weights: its primaries are those of BT.709.
+    let tags = format!(
+        "setparams=range={range}:colorspace={matrix}:color_primaries=bt709:color_trc=bt709"
+    );
+    let (crf, threads) = (quality.crf.to_string(), quality.threads.to_string());
+    let mut file = OsString::from("file:");
+    file.push(part);
+    let mut args: Vec<OsString> = Vec::new();
+    for list in [
+        &["-nostdin", "-protocol_whitelist", "pipe", "-f", "rawvideo"][..],
+        &[
+            "-pixel_format",
+            pix_fmt,
+            "-video_size",
+            &size,
+            "-framerate",
+            &rate,
+        ],
+        &[
+            "-i", "pipe:0", "-map", "0:0", "-an", "-sn", "-dn", "-vf", &tags,
+        ],
+        &[
+            "-c:v",
+            "libx264",
+            "-preset",
+            "veryfast",
+            "-profile:v",
+            "high",
+            "-crf",
+            &crf,
+        ],
+        &[
+            "-threads",
+            &threads,
+            "-x264-params",
+            "cpu-independent=1:nal-hrd=none",
+        ],
+        // Drops the message in which x264 writes its version and settings.
+        &["-bsf:v", "filter_units=remove_types=6"],
+        &[
+            "-fflags",
+            "+bitexact",
+            "-flags:v",
+            "+bitexact",
+            "-map_metadata",
+            "-1",
+        ],
+        &["-movflags", "+faststart", "-f", "mp4", "-y"],
+    ] {
+        args.extend(list.iter().map(Into::into));
+    }
+    args.push(file);
+    args
+}
+
+/// The fraction nearest to a frame rate, with numbers that ffmpeg takes (up to 1,001,000).
+fn fraction(fps: f64) -> (u64, u64) {
+    const MOST: f64 = 1_001_000.0;
+    let (mut before, mut last, mut rest) = ((0.0, 1.0), (1.0, 0.0), fps);
+    // Continued fraction: each step is the best one with numbers of its size.
+    loop {
+        let whole = f64::floor(rest);
+        let next = (whole * last.0 + before.0, whole * last.1 + before.1);
+        if next.0 > MOST || next.1 > MOST {
+            break;
+        }
+        (before, last) = (last, next);
+        let left = rest - whole;
+        if left < 1e-9 || (last.0 / last.1 - fps).abs() <= 1e-9 * fps {
+            break;
+        }
+        rest = 1.0 / left;
+    }
+    (last.0.max(1.0) as u64, last.1.max(1.0) as u64)
+}
+
+/// The planes with an even number of rows and columns, the last ones doubled where needed. The
+/// chroma planes of an odd size are rounded up already.
+fn pad(frame: &Frame, padded: &mut Vec<u8>) {
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    padded.clear();
+    let rows = frame.luma().chunks_exact(width);
+    let last = frame.luma().len() - width;
+    let extra = (height % 2 == 1).then(|| &frame.luma()[last..]);
+    for row in rows.chain(extra) {
+        padded.extend_from_slice(row);
+        if width % 2 == 1 {
+            padded.push(row[width - 1]);
+        }
+    }
+    padded.extend_from_slice(&frame.planes[width * height..]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn usual_and_odd_rates_become_their_own_fractions() {
+        assert_eq!(fraction(25.0), (25, 1));
+        assert_eq!(fraction(30000.0 / 1001.0), (30000, 1001));
+        assert_eq!(fraction(1_000_000.0 / 33333.0), (1_000_000, 33333));
+        assert_eq!(fraction(0.5), (1, 2));
+    }
+
+    #[test]
+    fn an_odd_frame_gains_copies_of_its_last_row_and_column() {
+        let mut frame = Frame::new(3, 3, ColorSpec::default());
+        frame.planes = (1..=17).collect();
+        let mut padded = Vec::new();
+        pad(&frame, &mut padded);
+        let luma = [1, 2, 3, 3, 4, 5, 6, 6, 7, 8, 9, 9, 7, 8, 9, 9];
+        assert_eq!(padded[..16], luma);
+        assert_eq!(padded[16..], [10, 11, 12, 13, 14, 15, 16, 17]);
+    }
+}

@@ -1,0 +1,162 @@
+//! Why a video cannot be read or written: one variant a reason, each with its stable code
+//! (RELIABILITY.md, "Reason codes").
+
+use std::io;
+
+use crate::code::Code;
+use crate::footage::SourceError;
+
+/// The reasons. `complaint` is the end of what ffmpeg said, for the log.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Empty, text, a still image, a playlist, noise.
+    #[error("not a video: {0}")]
+    NotAVideo(String),
+    /// A container outside the list.
+    #[error("the container is not among those accepted: {0}")]
+    ContainerNotAllowed(&'static str),
+    /// A codec outside the list.
+    #[error("the codec is not among those accepted: {0}")]
+    CodecNotAllowed(String),
+    /// Sound, subtitles, data: no picture.
+    #[error("the file holds no video stream")]
+    NoVideoStream,
+    /// Wider, higher or larger than the limit.
+    #[error("the picture is too large: {width}x{height}")]
+    TooManyPixels {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+    },
+    /// Narrower or lower than the limit.
+    #[error("the picture is too small: {width}x{height}")]
+    TooFewPixels {
+        /// Columns.
+        width: u64,
+        /// Rows.
+        height: u64,
+    },
+    /// More frames than the limit.
+    #[error("the footage has more frames than the limit: {limit}")]
+    TooManyFrames {
+        /// The limit.
+        limit: usize,
+    },
+    /// Fewer frames than the limit.
+    #[error("the footage has too few frames: {n_frames}")]
+    TooFewFrames {
+        /// Frames found.
+        n_frames: usize,
+    },
+    /// More streams than the limit.
+    #[error("the file holds more streams than the limit: {limit}")]
+    TooManyStreams {
+        /// The limit.
+        limit: u32,
+    },
+    /// Longer than the limit, in seconds or in bytes.
+    #[error("the footage is too long: {found} {unit}")]
+    TooLong {
+        /// How long.
+        found: f64,
+        /// In what: `s` or `bytes`.
+        unit: &'static str,
+    },
+    /// A frame rate above the limit.
+    #[error("the frame rate is too high: {fps}")]
+    TooFast {
+        /// Frames a second.
+        fps: f64,
+    },
+    /// Ends before its header says, or damaged inside.
+    #[error("the file is cut off or damaged: {found} of {promised} {unit}")]
+    Truncated {
+        /// How much there is.
+        found: f64,
+        /// How much was promised.
+        promised: f64,
+        /// Of what: `frames`, `s` or `index` (no index at all).
+        unit: &'static str,
+    },
+    /// Encrypted samples.
+    #[error("the video is encrypted")]
+    Encrypted,
+    /// The wall clock, the wait for a frame, or the processor time ran out.
+    #[error("the media tool took longer than its time limit")]
+    TimeLimit,
+    /// The address space ran out.
+    #[error("the media tool needed more memory than its limit: {complaint}")]
+    MemoryLimit {
+        /// ffmpeg's last words.
+        complaint: String,
+    },
+    /// The child died or gave up.
+    #[error("the media tool stopped unexpectedly ({status}): {complaint}")]
+    Crashed {
+        /// Exit code or signal.
+        status: String,
+        /// ffmpeg's last words.
+        complaint: String,
+    },
+    /// No room for the output.
+    #[error("there is no room left for the output")]
+    StorageFull,
+    /// A frame of another size than the video that it is written to, or a rate that is none.
+    #[error("the encoder was given what it cannot take: {0}")]
+    BadOutput(&'static str),
+    /// ffmpeg is not installed.
+    #[error("the media tool is not installed: {0}")]
+    ToolMissing(&'static str),
+    /// A file or pipe of ours failed.
+    #[error("{doing}: {source}")]
+    Io {
+        /// What was being done.
+        doing: &'static str,
+        /// Why it failed.
+        source: io::Error,
+    },
+}
+
+impl Error {
+    /// The stable code.
+    pub fn code(&self) -> Code {
+        match self {
+            Error::NotAVideo(_) => Code::NotAVideo,
+            Error::ContainerNotAllowed(_) => Code::ContainerNotAllowed,
+            Error::CodecNotAllowed(_) => Code::CodecNotAllowed,
+            Error::NoVideoStream => Code::NoVideoStream,
+            Error::TooManyPixels { .. } => Code::TooManyPixels,
+            Error::TooFewPixels { .. } => Code::TooFewPixels,
+            Error::TooManyFrames { .. } => Code::TooManyFrames,
+            Error::TooFewFrames { .. } => Code::TooFewFrames,
+            Error::TooManyStreams { .. } => Code::TooManyStreams,
+            Error::TooLong { .. } => Code::TooLong,
+            Error::TooFast { .. } => Code::TooFast,
+            Error::Truncated { .. } => Code::Truncated,
+            Error::Encrypted => Code::Encrypted,
+            Error::TimeLimit => Code::TimeLimit,
+            Error::MemoryLimit { .. } => Code::MemoryLimit,
+            Error::Crashed { .. } => Code::DecoderCrashed,
+            Error::StorageFull => Code::StorageFull,
+            Error::BadOutput(_) | Error::ToolMissing(_) | Error::Io { .. } => Code::Internal,
+        }
+    }
+
+    /// Wraps a failure of ours; a full disk keeps its own reason.
+    pub(super) fn io(doing: &'static str) -> impl Fn(io::Error) -> Error {
+        move |source| match source.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Error::StorageFull,
+            _ => Error::Io { doing, source },
+        }
+    }
+}
+
+impl From<Error> for SourceError {
+    fn from(error: Error) -> SourceError {
+        SourceError {
+            code: error.code(),
+            cause: Box::new(error),
+        }
+    }
+}

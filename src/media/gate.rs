@@ -1,0 +1,455 @@
+//! The gate: the one place where a process is started (RELIABILITY.md, "The gate"). Every child
+//! gets its arguments as a list, an empty environment, the allow-lists, a cage (`sandbox`), a wall
+//! clock and a watch on its progress; it is killed and reaped, as a group, when its handle goes.
+//!
+//! The clock runs only while we wait for the child: a caller that thinks long between two frames
+//! does not use up its decoder's time.
+
+use std::ffi::OsString;
+use std::io::{self, Read, Write};
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::process::ExitStatusExt;
+use std::path::{Path, PathBuf};
+use std::process::{self, ChildStdin, ChildStdout, ExitStatus, Stdio};
+use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use rustix::event::{PollFd, PollFlags, Timespec};
+use rustix::process::{Pid, PidfdFlags, Signal};
+
+use super::container::Container;
+use super::error::Error;
+use super::limits::Limits;
+use super::sandbox::{self, Cage};
+
+/// The two programs that may be started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tool {
+    /// Reads headers and packet times.
+    Ffprobe,
+    /// Decodes and encodes.
+    Ffmpeg,
+}
+
+/// Demuxers that may run. `Container` chooses one of them; this list holds inside ffmpeg as well.
+const FORMATS: &str = "mov,matroska,avi,mpegts,asf";
+
+/// Decoders that may run, by ffmpeg's names.
+const DECODERS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
+                        ffv1,rawvideo,wmv2,wmv3,vc1";
+
+/// How much of a child's complaints is kept.
+const COMPLAINT_BYTES: usize = 8 << 10;
+
+/// The size we ask the kernel to give each pipe.
+const PIPE_BYTES: usize = 1 << 20;
+
+/// How long a child may take to end by itself once it has closed its output.
+const END_TIME: Duration = Duration::from_secs(30);
+
+/// The arguments that close the ways out of a file, then the file as the input.
+pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> Vec<OsString> {
+    let mut file = OsString::from("file:");
+    file.push(path);
+    // Decoders round sizes up to whole blocks; the picture's own size is checked by `probe`.
+    let max_pixels = limits.max_pixels + u64::from(limits.max_side_px) * 128;
+    let mut args: Vec<OsString> = [
+        ("-protocol_whitelist", "file".to_owned()),
+        ("-format_whitelist", FORMATS.to_owned()),
+        ("-codec_whitelist", DECODERS.to_owned()),
+        ("-max_streams", limits.max_streams.to_string()),
+        ("-max_pixels", max_pixels.to_string()),
+        ("-probesize", "5000000".to_owned()),
+        ("-analyzeduration", "5000000".to_owned()),
+        ("-f", container.demuxer().to_owned()),
+    ]
+    .into_iter()
+    .flat_map(|(name, value)| [name.into(), value.into()])
+    .collect();
+    args.extend(["-i".into(), file]);
+    args
+}
+
+/// The version line of the installed ffmpeg, for the log.
+pub fn tool_version() -> Result<String, Error> {
+    let limits = Limits::default();
+    let order = Order::new(Tool::Ffmpeg, vec!["-version".into()], &limits, 0);
+    let mut child = Child::start(order, Stdio::null())?;
+    let mut text = vec![0; 4096];
+    let n = child.read_full(&mut text)?;
+    let text = String::from_utf8_lossy(&text[..n]);
+    Ok(text.lines().next().unwrap_or_default().to_owned())
+}
+
+/// What to start, and within which limits.
+pub(super) struct Order {
+    tool: Tool,
+    args: Vec<OsString>,
+    cage: Cage,
+    time: Duration,
+    stall: Duration,
+}
+
+impl Order {
+    /// An order for work on `n_frames` frames (0 for reading headers). It may write no file.
+    pub(super) fn new(tool: Tool, args: Vec<OsString>, limits: &Limits, n_frames: usize) -> Order {
+        let time = match n_frames {
+            0 => limits.probe_time,
+            n => limits.work_time(n),
+        };
+        Order {
+            tool,
+            args,
+            cage: Cage {
+                memory_bytes: limits.max_memory_bytes,
+                cpu_s: (time.as_secs() + 1) * n_cores(),
+                file_bytes: 0,
+            },
+            time,
+            stall: limits.stall_time.min(time),
+        }
+    }
+
+    /// The same with `more` time on the wall clock.
+    pub(super) fn with_more_time(mut self, more: Duration) -> Order {
+        self.time += more;
+        self
+    }
+
+    /// The same, allowed to write files of `bytes`.
+    pub(super) fn with_output(mut self, bytes: u64) -> Order {
+        self.cage.file_bytes = bytes;
+        self
+    }
+}
+
+fn n_cores() -> u64 {
+    std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
+}
+
+/// How a child ended.
+pub(super) struct End {
+    /// Exit code or signal.
+    pub(super) status: ExitStatus,
+    /// The last of what it said.
+    pub(super) complaint: String,
+}
+
+impl End {
+    /// What an end by failure means.
+    pub(super) fn check(self) -> Result<End, Error> {
+        const SIGKILL: i32 = 9;
+        const SIGXCPU: i32 = 24;
+        const SIGXFSZ: i32 = 25;
+        let says = |what| self.complaint.contains(what);
+        match self.status.signal() {
+            None if self.status.success() => Ok(self),
+            Some(SIGXCPU) => Err(Error::TimeLimit),
+            Some(SIGXFSZ) => Err(Error::StorageFull),
+            _ if says("No space left on device") || says("Disk quota exceeded") => {
+                Err(Error::StorageFull)
+            }
+            // A kill that is not ours is the kernel's, out of memory.
+            signal if signal == Some(SIGKILL) || says("Cannot allocate memory") => {
+                Err(Error::MemoryLimit {
+                    complaint: self.complaint,
+                })
+            }
+            _ => Err(Error::Crashed {
+                status: self.status.to_string(),
+                complaint: self.complaint,
+            }),
+        }
+    }
+}
+
+/// A running child. Dropping it kills and reaps its whole group.
+pub(super) struct Child {
+    process: process::Child,
+    group: Pid,
+    ended: OwnedFd,
+    stdin: Option<ChildStdin>,
+    stdout: Option<ChildStdout>,
+    stderr: Option<JoinHandle<String>>,
+    time_left: Duration,
+    stall: Duration,
+}
+
+impl Child {
+    /// Starts a child that reads nothing and writes to us.
+    pub(super) fn reading(order: Order) -> Result<Child, Error> {
+        Child::start(order, Stdio::null())
+    }
+
+    /// Starts a child that reads from us and writes a file.
+    pub(super) fn writing(order: Order) -> Result<Child, Error> {
+        let child = Child::start(order, Stdio::piped())?;
+        if let Some(stdin) = &child.stdin {
+            // A blocking write could not be given up when the clock runs out.
+            let flags = rustix::fs::fcntl_getfl(stdin);
+            flags
+                .and_then(|flags| {
+                    rustix::fs::fcntl_setfl(stdin, flags | rustix::fs::OFlags::NONBLOCK)
+                })
+                .map_err(|e| Error::io("preparing the encoder's pipe")(e.into()))?;
+            grow(stdin);
+        }
+        Ok(child)
+    }
+
+    fn start(order: Order, stdin: Stdio) -> Result<Child, Error> {
+        let mut command = process::Command::new(program(order.tool)?);
+        command
+            .args(["-v", "error"])
+            .args(&order.args)
+            .env_clear()
+            .env("LC_ALL", "C")
+            // Each arena reserves address space, of which the cage leaves only so much.
+            .env("MALLOC_ARENA_MAX", "4")
+            .current_dir("/")
+            .stdin(stdin)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        sandbox::enclose(&mut command, order.cage);
+        let mut process = spawn(command).map_err(Error::io("starting the media tool"))?;
+        let group = Pid::from_child(&process);
+        let ended = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
+            Ok(ended) => ended,
+            Err(errno) => {
+                kill_and_reap(&mut process, group);
+                return Err(Error::io("watching the media tool")(errno.into()));
+            }
+        };
+        let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
+        if let Some(stdout) = &stdout {
+            grow(stdout);
+        }
+        let stderr = process
+            .stderr
+            .take()
+            .map(|pipe| std::thread::spawn(|| last_words(pipe)));
+        Ok(Child {
+            process,
+            group,
+            ended,
+            stdin,
+            stdout,
+            stderr,
+            time_left: order.time,
+            stall: order.stall,
+        })
+    }
+
+    /// Fills `buffer` from the child's output; less than its length only at the end of the output.
+    pub(super) fn read_full(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
+        let Some(mut stdout) = self.stdout.take() else {
+            return Ok(0);
+        };
+        let deadline = Instant::now() + self.stall;
+        let mut n_read = 0;
+        while n_read < buffer.len() {
+            self.wait_for(stdout.as_fd(), PollFlags::IN, deadline)?;
+            match stdout.read(&mut buffer[n_read..]) {
+                Ok(0) => break,
+                Ok(n) => n_read += n,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::io("reading from the media tool")(error)),
+            }
+        }
+        self.stdout = Some(stdout);
+        Ok(n_read)
+    }
+
+    /// Reads some of the child's output, as much as there is; 0 at its end.
+    pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
+        let Some(mut stdout) = self.stdout.take() else {
+            return Ok(0);
+        };
+        self.wait_for(stdout.as_fd(), PollFlags::IN, Instant::now() + self.stall)?;
+        let n_read = stdout
+            .read(buffer)
+            .map_err(Error::io("reading from the media tool"))?;
+        self.stdout = Some(stdout);
+        Ok(n_read)
+    }
+
+    /// Gives the child `bytes`. When it has died, says why.
+    pub(super) fn write_all(&mut self, mut bytes: &[u8]) -> Result<(), Error> {
+        let Some(mut stdin) = self.stdin.take() else {
+            return Err(Error::BadOutput("a frame after the last"));
+        };
+        let deadline = Instant::now() + self.stall;
+        while !bytes.is_empty() {
+            match stdin.write(bytes) {
+                Ok(n) => bytes = &bytes[n..],
+                Err(error) => match error.kind() {
+                    io::ErrorKind::WouldBlock => {
+                        self.wait_for(stdin.as_fd(), PollFlags::OUT, deadline)?;
+                    }
+                    io::ErrorKind::Interrupted => {}
+                    io::ErrorKind::BrokenPipe => {
+                        drop(stdin);
+                        return Err(self.reason_of_death());
+                    }
+                    _ => return Err(Error::io("writing to the media tool")(error)),
+                },
+            }
+        }
+        self.stdin = Some(stdin);
+        Ok(())
+    }
+
+    /// Closes the child's input, waits for its end, and says how it ended.
+    pub(super) fn finish(mut self) -> Result<End, Error> {
+        self.end()
+    }
+
+    fn reason_of_death(&mut self) -> Error {
+        match self.end().and_then(End::check) {
+            Err(error) => error,
+            Ok(end) => Error::Crashed {
+                status: "it closed its input".into(),
+                complaint: end.complaint,
+            },
+        }
+    }
+
+    fn end(&mut self) -> Result<End, Error> {
+        self.stdin = None;
+        self.stdout = None;
+        let ended = self
+            .ended
+            .try_clone()
+            .map_err(Error::io("watching the media tool"))?;
+        self.wait_for(
+            ended.as_fd(),
+            PollFlags::IN,
+            Instant::now() + END_TIME.max(self.stall),
+        )?;
+        // It has ended but is not reaped, so its number is still its own: whatever it may have
+        // started goes with it.
+        rustix::process::kill_process_group(self.group, Signal::KILL).ok();
+        let status = self
+            .process
+            .wait()
+            .map_err(Error::io("reaping the media tool"))?;
+        let complaint = self
+            .stderr
+            .take()
+            .map(|thread| thread.join().unwrap_or_default());
+        Ok(End {
+            status,
+            complaint: complaint.unwrap_or_default(),
+        })
+    }
+
+    /// Waits until `fd` is ready, at most until `deadline` and within the time that is left.
+    fn wait_for(
+        &mut self,
+        fd: BorrowedFd<'_>,
+        flags: PollFlags,
+        deadline: Instant,
+    ) -> Result<(), Error> {
+        loop {
+            let start = Instant::now();
+            let wait = self
+                .time_left
+                .min(deadline.saturating_duration_since(start));
+            let timeout = Timespec {
+                tv_sec: wait.as_secs() as i64,
+                tv_nsec: i64::from(wait.subsec_nanos()),
+            };
+            let n_ready =
+                rustix::event::poll(&mut [PollFd::from_borrowed_fd(fd, flags)], Some(&timeout));
+            self.time_left = self.time_left.saturating_sub(start.elapsed());
+            match n_ready {
+                Ok(0) => return Err(Error::TimeLimit),
+                Ok(_) => return Ok(()),
+                Err(rustix::io::Errno::INTR) => {}
+                Err(errno) => return Err(Error::io("waiting for the media tool")(errno.into())),
+            }
+        }
+    }
+}
+
+impl Drop for Child {
+    fn drop(&mut self) {
+        // Does nothing to a child that has been reaped already.
+        kill_and_reap(&mut self.process, self.group);
+    }
+}
+
+/// Kills what is left of the group, then reaps the child. The order matters: until it is reaped
+/// nobody else can get its number.
+fn kill_and_reap(process: &mut process::Child, group: Pid) {
+    if let Ok(None) = process.try_wait() {
+        rustix::process::kill_process_group(group, Signal::KILL).ok();
+        process.wait().ok();
+    }
+}
+
+/// Starts a command on a thread that never ends: the kernel takes the end of the thread that
+/// started a child for the parent's death, and would kill the child.
+fn spawn(command: process::Command) -> io::Result<process::Child> {
+    type Request = (process::Command, mpsc::Sender<io::Result<process::Child>>);
+    static SPAWNER: OnceLock<Mutex<mpsc::Sender<Request>>> = OnceLock::new();
+    let spawner = SPAWNER.get_or_init(|| {
+        let (send, receive) = mpsc::channel::<Request>();
+        std::thread::spawn(move || {
+            for (mut command, reply) in receive {
+                if let Err(mpsc::SendError(Ok(mut orphan))) = reply.send(command.spawn()) {
+                    let group = Pid::from_child(&orphan);
+                    kill_and_reap(&mut orphan, group);
+                }
+            }
+        });
+        Mutex::new(send)
+    });
+    let gone = || io::Error::other("the thread that starts children is gone");
+    let (send, receive) = mpsc::channel();
+    let spawner = spawner
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone();
+    spawner.send((command, send)).map_err(|_closed| gone())?;
+    receive.recv().map_err(|_closed| gone())?
+}
+
+/// Where a tool lies: looked up once, since the child's environment is empty.
+fn program(tool: Tool) -> Result<&'static Path, Error> {
+    static FFMPEG: OnceLock<Option<PathBuf>> = OnceLock::new();
+    static FFPROBE: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let (cell, name) = match tool {
+        Tool::Ffmpeg => (&FFMPEG, "ffmpeg"),
+        Tool::Ffprobe => (&FFPROBE, "ffprobe"),
+    };
+    let look = || {
+        let path = std::env::var_os("PATH")?;
+        let mut places = std::env::split_paths(&path).map(|folder| folder.join(name));
+        places.find(|file| file.is_absolute() && file.is_file())
+    };
+    cell.get_or_init(look)
+        .as_deref()
+        .ok_or(Error::ToolMissing(name))
+}
+
+/// A larger pipe means fewer turns between two processes; a refusal costs only speed.
+fn grow(pipe: impl AsFd) {
+    rustix::pipe::fcntl_setpipe_size(pipe, PIPE_BYTES).ok();
+}
+
+/// Reads to the end, keeping the last [`COMPLAINT_BYTES`].
+fn last_words(mut pipe: impl Read) -> String {
+    let mut kept = Vec::new();
+    let mut chunk = [0; 4096];
+    while let Ok(n) = pipe.read(&mut chunk) {
+        if n == 0 {
+            break;
+        }
+        kept.extend_from_slice(&chunk[..n]);
+        let surplus = kept.len().saturating_sub(COMPLAINT_BYTES);
+        kept.drain(..surplus);
+    }
+    String::from_utf8_lossy(&kept).into_owned()
+}

@@ -1,0 +1,105 @@
+//! A background that somebody gives: PNG or JPEG, within limits that hold before anything is
+//! decoded (RELIABILITY.md, "Parse at the door" of STYLE.md, habit 4).
+
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use image::{ImageError, ImageFormat, ImageReader};
+
+use super::error::Error;
+use super::limits::Limits;
+use crate::raster::RgbImage;
+
+/// Reads an image file; see [`decode_image`].
+pub fn read_image(path: &Path, limits: &Limits) -> Result<RgbImage, Error> {
+    let failed = Error::io("reading the image");
+    let file = std::fs::File::open(path).map_err(&failed)?;
+    let most = largest_file(limits);
+    let mut bytes = Vec::new();
+    file.take(most + 1)
+        .read_to_end(&mut bytes)
+        .map_err(&failed)?;
+    decode_image(&bytes, limits)
+}
+
+/// Decodes a PNG or JPEG; alpha is ignored, deeper channels become 8 bits.
+///
+/// Fails with `not_a_video` for anything else or damaged, and with the codes for too many or too
+/// few pixels.
+pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
+    if bytes.len() as u64 > largest_file(limits) {
+        return Err(Error::TooLong {
+            found: bytes.len() as f64,
+            unit: "bytes",
+        });
+    }
+    let format = image::guess_format(bytes).map_err(refused)?;
+    if !matches!(format, ImageFormat::Png | ImageFormat::Jpeg) {
+        return Err(Error::NotAVideo("the background is no PNG or JPEG".into()));
+    }
+    let reader = || ImageReader::with_format(Cursor::new(bytes), format);
+    let (width, height) = reader().into_dimensions().map_err(refused)?;
+    super::probe::check_size(u64::from(width), u64::from(height), limits)?;
+    let mut reader = reader();
+    let mut bounds = image::Limits::default();
+    bounds.max_image_width = Some(limits.max_side_px);
+    bounds.max_image_height = Some(limits.max_side_px);
+    bounds.max_alloc = Some(limits.max_pixels * 16);
+    reader.limits(bounds);
+    let pixels = reader.decode().map_err(refused)?.into_rgb8().into_raw();
+    Ok(RgbImage {
+        width,
+        height,
+        pixels,
+    })
+}
+
+/// More than any encoder needs for the largest picture.
+fn largest_file(limits: &Limits) -> u64 {
+    limits.max_pixels * 8 + (1 << 20)
+}
+
+fn refused(error: ImageError) -> Error {
+    Error::NotAVideo(format!("the background cannot be read: {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::Code;
+
+    fn png_of(width: u32, height: u32) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let image =
+            image::RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 7]));
+        image
+            .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
+            .expect("an image in memory can be encoded");
+        bytes
+    }
+
+    #[test]
+    fn a_png_comes_back_pixel_by_pixel() {
+        let image = decode_image(&png_of(40, 20), &Limits::default()).expect("a good image");
+        assert_eq!((image.width, image.height), (40, 20));
+        assert_eq!(image.pixel(33, 12), [33, 12, 7]);
+    }
+
+    #[test]
+    fn an_image_beyond_the_limits_or_cut_off_is_refused() {
+        let code = |bytes: &[u8], limits: &Limits| {
+            decode_image(bytes, limits).expect_err("a bad image").code()
+        };
+        let small = Limits {
+            max_pixels: 500,
+            ..Limits::default()
+        };
+        let png = png_of(40, 20);
+        assert_eq!(code(&png, &small), Code::TooManyPixels);
+        assert_eq!(
+            code(&png[..png.len() / 2], &Limits::default()),
+            Code::NotAVideo
+        );
+        assert_eq!(code(b"P6 40 20 255 ", &Limits::default()), Code::NotAVideo);
+    }
+}

@@ -1,0 +1,195 @@
+//! From the presentation times of a film to frames at a constant rate (ECOSYSTEM.md 5, "Drive").
+//!
+//! Telephones film at rates that wander; the algorithms want one rate. A film whose times lie on a
+//! regular grid, up to the rounding of its clock, is left as it is. Any other is given at its
+//! nominal rate, each frame being the one nearest in time, with its own true time.
+
+/// Rates that cameras are sold with; a wandering film was meant to have one of them.
+const COMMON_FPS: [f64; 11] = [
+    24000.0 / 1001.0,
+    24.0,
+    25.0,
+    30000.0 / 1001.0,
+    30.0,
+    50.0,
+    60000.0 / 1001.0,
+    60.0,
+    100.0,
+    120.0,
+    240.0,
+];
+
+/// How far from its nominal rate a wandering film may be: half a percent.
+const NEAR: f64 = 0.005;
+
+/// Which decoded frame is shown when.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Timeline {
+    /// Every frame once, at this rate.
+    Constant {
+        /// Frames a second.
+        fps: f64,
+    },
+    /// Frames skipped and repeated so that the rate becomes constant.
+    Variable {
+        /// Frames a second, after resampling.
+        fps: f64,
+        /// True time of each decoded frame, seconds from the first.
+        times_s: Vec<f64>,
+        /// For each given frame, the decoded frame it shows; never decreasing.
+        sources: Vec<u32>,
+    },
+}
+
+impl Timeline {
+    /// The timeline of frames shown at `times_s` (ascending), given the rates that the header
+    /// claims and the length of a tick of its clock.
+    ///
+    /// `None` when there are fewer than two times or all are equal.
+    pub(super) fn of(times_s: &[f64], claimed_fps: &[f64], tick_s: f64) -> Option<Timeline> {
+        let first = *times_s.first()?;
+        let span = times_s.last()? - first;
+        if span <= 0.0 {
+            return None;
+        }
+        let mean_fps = (times_s.len() - 1) as f64 / span;
+        let mut claimed = claimed_fps.iter().copied();
+        if let Some(fps) = claimed.find(|&fps| is_regular(times_s, fps, tick_s)) {
+            return Some(Timeline::Constant { fps });
+        }
+        if is_regular(times_s, mean_fps, tick_s) {
+            return Some(Timeline::Constant { fps: mean_fps });
+        }
+        let times_s: Vec<f64> = times_s.iter().map(|time| time - first).collect();
+        let fps = nominal_fps(&times_s, claimed_fps)?;
+        let sources = nearest(&times_s, fps);
+        Some(Timeline::Variable {
+            fps,
+            times_s,
+            sources,
+        })
+    }
+
+    /// Frames a second, as given.
+    pub(super) fn fps(&self) -> f64 {
+        match self {
+            Timeline::Constant { fps } | Timeline::Variable { fps, .. } => *fps,
+        }
+    }
+}
+
+/// Whether frame k is shown at k / fps, up to the rounding of two clock readings.
+fn is_regular(times_s: &[f64], fps: f64, tick_s: f64) -> bool {
+    if !(fps > 0.0 && fps.is_finite()) {
+        return false;
+    }
+    // Times arrive with six decimals. A coarse clock must not hide a missing frame.
+    let tolerance_s = (tick_s * 1.01 + 2e-6).min(0.25 / fps);
+    let regular =
+        |(k, time): (usize, &f64)| (time - times_s[0] - k as f64 / fps).abs() <= tolerance_s;
+    times_s.iter().enumerate().all(regular)
+}
+
+/// The rate that the film was meant to have: the mean of its ordinary steps, drawn to a claimed or
+/// common rate nearby.
+fn nominal_fps(times_s: &[f64], claimed_fps: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = times_s
+        .windows(2)
+        .map(|w| w[1] - w[0])
+        .filter(|s| *s > 0.0)
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    let median = *steps.get(steps.len() / 2)?;
+    let ordinary = || {
+        steps
+            .iter()
+            .filter(|step| (median * 0.5..median * 1.5).contains(*step))
+    };
+    let fps = ordinary().count() as f64 / ordinary().sum::<f64>();
+    let known = claimed_fps.iter().chain(&COMMON_FPS);
+    Some(
+        known
+            .copied()
+            .find(|k| (k / fps - 1.0).abs() < NEAR)
+            .unwrap_or(fps),
+    )
+}
+
+/// For each instant k / fps the index of the nearest time, the earlier one at a tie.
+fn nearest(times_s: &[f64], fps: f64) -> Vec<u32> {
+    let last_s = times_s[times_s.len() - 1];
+    let n_frames = (last_s * fps + 0.5) as usize + 1;
+    let mut at = 0;
+    let choose = |k: usize| {
+        let instant_s = k as f64 / fps;
+        let gap = |i: usize| (times_s[i] - instant_s).abs();
+        while at + 1 < times_s.len() && (gap(at + 1) < gap(at) || times_s[at + 1] <= instant_s) {
+            at += 1;
+        }
+        at as u32
+    };
+    (0..n_frames).map(choose).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn rounded(times_s: impl Iterator<Item = f64>, tick_s: f64) -> Vec<f64> {
+        times_s.map(|t| (t / tick_s).round() * tick_s).collect()
+    }
+
+    #[test]
+    fn times_rounded_to_milliseconds_are_a_constant_rate() {
+        let times = rounded((0..500).map(|k| f64::from(k) / 29.97), 0.001);
+        let timeline = Timeline::of(&times, &[29.97], 0.001);
+        assert_eq!(timeline, Some(Timeline::Constant { fps: 29.97 }));
+    }
+
+    #[test]
+    fn a_missing_frame_is_replaced_by_its_neighbor_and_keeps_its_true_time() {
+        let times: Vec<f64> = (0..10)
+            .filter(|k| *k != 4)
+            .map(|k| f64::from(k) / 25.0)
+            .collect();
+        let Some(Timeline::Variable {
+            fps,
+            times_s,
+            sources,
+        }) = Timeline::of(&times, &[25.0], 1e-4)
+        else {
+            panic!("a gap is not a constant rate");
+        };
+        assert_eq!(fps, 25.0);
+        assert_eq!(sources, [0, 1, 2, 3, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(times_s[4], 0.2);
+    }
+
+    #[test]
+    fn a_coarse_clock_does_not_hide_a_missing_frame() {
+        let times: Vec<f64> = (0..10)
+            .filter(|k| *k != 8)
+            .map(|k| f64::from(k) / 30.0)
+            .collect();
+        let timeline = Timeline::of(&times, &[30.0], 1.0 / 30.0);
+        assert!(matches!(timeline, Some(Timeline::Variable { .. })));
+    }
+
+    proptest! {
+        #[test]
+        fn every_given_frame_is_the_nearest_in_time(steps in prop::collection::vec(0.001f64..0.2, 2..60)) {
+            let mut time = 0.0;
+            let times: Vec<f64> = steps.iter().map(|step| { time += step; time }).collect();
+            if let Some(Timeline::Variable { fps, times_s, sources }) = Timeline::of(&times, &[], 1e-6) {
+                for (k, &source) in sources.iter().enumerate() {
+                    let instant_s = k as f64 / fps;
+                    let least = times_s.iter().map(|t| (t - instant_s).abs()).fold(f64::MAX, f64::min);
+                    prop_assert!((times_s[source as usize] - instant_s).abs() <= least + 1e-12);
+                }
+                prop_assert!(sources.is_sorted());
+            }
+        }
+    }
+}

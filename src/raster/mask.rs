@@ -1,0 +1,171 @@
+//! A yes or no for every pixel of a rectangle, and the small operations on it that a silhouette
+//! needs: holes filled, ragged edges smoothed by majority, erosion and opening (ALGORITHMS.md 2.6).
+
+use crate::geometry::Rect;
+
+/// Which pixels of `rect` are set; everything outside is clear.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct Mask {
+    /// The part of the image that the mask speaks of.
+    pub rect: Rect,
+    /// One byte a pixel, row by row: 0 or 1.
+    pub bits: Vec<u8>,
+}
+
+impl Mask {
+    /// A clear mask.
+    pub fn new(rect: Rect) -> Mask {
+        Mask {
+            rect,
+            bits: vec![0; rect.area() as usize],
+        }
+    }
+
+    /// Number of columns.
+    pub fn width(&self) -> usize {
+        self.rect.w as usize
+    }
+
+    /// Number of rows.
+    pub fn height(&self) -> usize {
+        self.rect.h as usize
+    }
+
+    /// Number of set pixels.
+    pub fn area(&self) -> usize {
+        self.bits.iter().map(|&bit| bit as usize).sum()
+    }
+
+    /// Sets every clear pixel that cannot be reached from the mask's border over clear pixels
+    /// (4-connected).
+    pub fn fill_holes(&mut self) {
+        let (w, h) = (self.width(), self.height());
+        if w == 0 || h == 0 {
+            return;
+        }
+        let mut outside = vec![false; self.bits.len()];
+        let mut open: Vec<usize> = Vec::new();
+        let border = (0..w).flat_map(|x| [x, (h - 1) * w + x]);
+        for at in border.chain((0..h).flat_map(|y| [y * w, y * w + w - 1])) {
+            if self.bits[at] == 0 && !outside[at] {
+                outside[at] = true;
+                open.push(at);
+            }
+        }
+        while let Some(at) = open.pop() {
+            let (x, y) = (at % w, at / w);
+            let mut visit = |next: usize| {
+                if self.bits[next] == 0 && !outside[next] {
+                    outside[next] = true;
+                    open.push(next);
+                }
+            };
+            if x > 0 {
+                visit(at - 1);
+            }
+            if x + 1 < w {
+                visit(at + 1);
+            }
+            if y > 0 {
+                visit(at - w);
+            }
+            if y + 1 < h {
+                visit(at + w);
+            }
+        }
+        for (bit, outside) in self.bits.iter_mut().zip(outside) {
+            *bit |= u8::from(!outside);
+        }
+    }
+
+    /// Each pixel as the majority of its 3 x 3 neighborhood says (5 of 9 or more).
+    pub fn majority(&self) -> Mask {
+        self.counted(|n, _| n >= 5)
+    }
+
+    /// Pixels whose 3 x 3 neighborhood is all set; the outside counts as clear.
+    pub fn eroded(&self) -> Mask {
+        self.counted(|n, _| n == 9)
+    }
+
+    /// Pixels with any set pixel in their 3 x 3 neighborhood.
+    pub fn dilated(&self) -> Mask {
+        self.counted(|n, _| n > 0)
+    }
+
+    /// Eroded, then dilated: without anything thinner than 3 pixels.
+    pub fn opened(&self) -> Mask {
+        self.eroded().dilated()
+    }
+
+    /// A mask from the number of set pixels in each 3 x 3 neighborhood and the pixel itself.
+    fn counted(&self, keep: impl Fn(u8, u8) -> bool) -> Mask {
+        let (w, h) = (self.width(), self.height());
+        let mut result = Mask::new(self.rect);
+        if w == 0 {
+            return result;
+        }
+        // Sums of three along rows first, then along columns.
+        let mut rows = vec![0u8; self.bits.len()];
+        for (sums, bits) in rows.chunks_exact_mut(w).zip(self.bits.chunks_exact(w)) {
+            for x in 0..w {
+                let left = if x > 0 { bits[x - 1] } else { 0 };
+                let right = if x + 1 < w { bits[x + 1] } else { 0 };
+                sums[x] = left + bits[x] + right;
+            }
+        }
+        for y in 0..h {
+            for x in 0..w {
+                let at = y * w + x;
+                let above = if y > 0 { rows[at - w] } else { 0 };
+                let below = if y + 1 < h { rows[at + w] } else { 0 };
+                result.bits[at] = u8::from(keep(above + rows[at] + below, self.bits[at]));
+            }
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mask(rows: &[&str]) -> Mask {
+        let rect = Rect::of_size(rows[0].len() as u32, rows.len() as u32);
+        Mask {
+            rect,
+            bits: rows
+                .iter()
+                .flat_map(|r| r.bytes().map(|b| u8::from(b == b'#')))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn holes_are_filled_but_bays_are_not() {
+        let mut ring = mask(&["......", ".####.", ".#..#.", ".####.", ".#...."]);
+        ring.fill_holes();
+        assert_eq!(
+            ring,
+            mask(&["......", ".####.", ".####.", ".####.", ".#...."])
+        );
+    }
+
+    #[test]
+    fn majority_drops_a_speck_and_closes_a_notch() {
+        let ragged = mask(&["#......", "...###.", "...#.#.", "...###.", "...###."]);
+        assert_eq!(
+            ragged.majority(),
+            mask(&[".......", "....#..", "...###.", "...###.", "....#.."])
+        );
+    }
+
+    #[test]
+    fn opening_removes_what_is_thinner_than_three() {
+        let thin = mask(&["........", ".###....", ".######.", ".###....", "........"]);
+        assert_eq!(
+            thin.opened(),
+            mask(&["........", ".###....", ".###....", ".###....", "........"])
+        );
+    }
+}

@@ -1,0 +1,49 @@
+//! Real recordings decode whole, with the counts and sizes of their table. They are not part of
+//! the repository: FLOCKREEL_FOOTAGE names their folder.
+
+use std::path::PathBuf;
+
+use flockreel::footage::FrameSource;
+use flockreel::media::{Limits, Video};
+use flockreel::raster::{Frame, Range};
+
+fn folder() -> Option<PathBuf> {
+    let folder = std::env::var_os("FLOCKREEL_FOOTAGE").map(PathBuf::from);
+    let folder = folder.filter(|folder| folder.is_dir());
+    if folder.is_none() {
+        println!("skipped: FLOCKREEL_FOOTAGE names no folder of real footage");
+    }
+    folder
+}
+
+#[test]
+fn every_real_clip_decodes_whole_at_its_own_size_and_rate() {
+    let Some(folder) = folder() else { return };
+    for (name, width, height, fps, n_frames) in [
+        ("mouse_openfield.mp4", 640, 480, 1e6 / 33333.0, 1200),
+        ("mouse_round_arena.webm", 640, 480, 30.0, 1200),
+        ("zebra_finch_cage.mp4", 1280, 720, 25.0, 497),
+        ("zebrafish_larva_single.mkv", 210, 80, 25.0, 385),
+        ("zebrafish_juvenile_single.avi", 260, 110, 30.0, 96),
+        ("flies_pair.mp4", 1024, 1024, 25.0, 1000),
+        ("spider_web_tiny.mp4", 1920, 1080, 60.0, 1442),
+    ] {
+        let video = Video::open(&folder.join(name), &Limits::default()).expect(name);
+        let format = video.format();
+        assert_eq!((format.width, format.height), (width, height), "{name}");
+        assert!((format.fps - fps).abs() < 1e-6, "{name}: {}", format.fps);
+        assert_eq!(format.n_frames_hint, n_frames, "{name}");
+        let full = name.starts_with("zebrafish");
+        assert_eq!(format.color.range == Range::Full, full, "{name}");
+        let (mut stream, mut frame) = (FrameSource::open(&video).expect(name), Frame::default());
+        let mut n_read = 0;
+        while let Some(time_s) = stream.next_frame(&mut frame).expect(name) {
+            assert!(
+                (time_s - n_read as f64 / fps).abs() < 1e-3,
+                "{name} {n_read}: {time_s}"
+            );
+            n_read += 1;
+        }
+        assert_eq!(n_read, n_frames, "{name}");
+    }
+}
