@@ -53,7 +53,9 @@ async function open() {
   const jobs = (await listJobs()).filter((job) => ["queued", "running"].includes(job.state));
   if (!current.flock) showEmptyStage(jobs.length ? "The first flock is being made. It will play here." : "No flock yet. Choose a film of one animal, and its flock will play here.");
   const oldest = jobs.at(-1);
-  if (oldest && await showJob(placeOf(oldest), oldest.id)) await open();
+  if (!oldest || !await showJob(placeOf(oldest), oldest.id)) return;
+  if (oldest.kind === "flock") current.flock = null; // what was waited for takes the stage
+  await open();
 }
 
 /** Where a job that was under way before the visit is shown. */

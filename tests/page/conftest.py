@@ -1,10 +1,12 @@
 """A really started service, a film made by the program, and Debian's chromium."""
 
+import json
 import os
 import re
 import socket
 import subprocess
 import time
+import urllib.parse
 import urllib.request
 from pathlib import Path
 
@@ -18,15 +20,21 @@ CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 @pytest.fixture(scope="session")
 def film(tmp_path_factory):
     """A short film of the virtual fish."""
-    path = tmp_path_factory.mktemp("film") / "goldfish <b>1</b>.mp4"
+    path = tmp_path_factory.mktemp("film") / "goldfish <b>one.mp4"
     subprocess.run([PROGRAM, "sample", "-o", path, "--frames", "150", "--seed", "1"], check=True)
     return path
 
 
 @pytest.fixture(scope="session")
-def service(tmp_path_factory):
-    """The address of a service that is filled by the tests in turn."""
-    yield from started(tmp_path_factory.mktemp("data"))
+def filled_service(tmp_path_factory, film):
+    """The address of a service that holds one film and one flock of 6, made by its API."""
+    for address in started(tmp_path_factory.mktemp("filled") / "data"):
+        name = urllib.parse.quote(film.name)
+        footage = post(f"{address}/v1/footage?name={name}", film.read_bytes(), "video/mp4")
+        analysis = post(f"{address}/v1/analyses", {"footage_id": footage["id"]})
+        flock = post(f"{address}/v1/flocks", {"library_id": analysis["library_id"], "count": 6, "frames": 60})
+        wait_for_job(address, flock["job_id"])
+        yield address
 
 
 @pytest.fixture
@@ -91,3 +99,21 @@ def wait_until_ready(service, address):
         except OSError:
             time.sleep(0.1)
     raise TimeoutError("the service did not answer within 30 s")
+
+
+def post(url, body, media_type="application/json"):
+    data = body if isinstance(body, bytes) else json.dumps(body).encode()
+    request = urllib.request.Request(url, data, {"Content-Type": media_type})
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def wait_for_job(address, job_id):
+    for _ in range(2400):
+        with urllib.request.urlopen(f"{address}/v1/jobs/{job_id}") as answer:
+            job = json.load(answer)
+        if job["finished_at"]:
+            assert job["state"] == "done", job["error"]
+            return
+        time.sleep(0.1)
+    raise TimeoutError("the job did not end within 240 s")

@@ -17,8 +17,8 @@ def measure(page, film):
 
 
 def make_a_flock(page, individuals, frames):
-    page.get_by_label("Individuals").fill(str(individuals))
-    page.get_by_label("Frames", exact=True).fill(str(frames))
+    page.get_by_role("spinbutton", name="Individuals").fill(str(individuals))
+    page.get_by_role("spinbutton", name="Frames").fill(str(frames))
     page.get_by_role("button", name="Make the flock").click()
     expect(page.locator("#stage-title")).to_have_text(f"A flock of {individuals}", timeout=LONG_MS)
 
@@ -36,8 +36,8 @@ def fetch(url):
         return answer.read()
 
 
-def test_a_chosen_film_becomes_a_flock_that_plays_and_downloads(page, service, film):
-    page.goto(service)
+def test_a_chosen_film_becomes_a_flock_that_plays_and_downloads(page, empty_service, film):
+    page.goto(empty_service)
     measure(page, film)
     expect(page.locator("#library-numbers")).to_contain_text("150")
     until(page, "[...document.querySelectorAll('#library img')].every((image) => image.naturalWidth > 0)")
@@ -49,21 +49,21 @@ def test_a_chosen_film_becomes_a_flock_that_plays_and_downloads(page, service, f
     with page.expect_download() as download:
         page.locator("#stage-video-link").click()
     assert download.value.path().read_bytes()[4:8] == b"ftyp"
-    flock = json.loads(fetch(service + page.locator("#stage-plan-link").get_attribute("href")))
+    flock = json.loads(fetch(empty_service + page.locator("#stage-plan-link").get_attribute("href")))
     assert len(flock["individuals"]) == 6
     assert all(len(one["source_frame"]) == 60 for one in flock["individuals"])
 
 
-def test_the_next_visit_shows_the_newest_flock_at_once(page, service):
-    page.goto(service)
+def test_the_next_visit_shows_the_newest_flock_at_once(page, filled_service):
+    page.goto(filled_service)
     expect(page.locator("#stage-title")).to_have_text("A flock of 6")
     until(page, "document.querySelector('#stage-video').readyState >= 2")
     expect(page.locator("#earlier-flocks li")).to_have_count(1)
 
 
-def test_the_slider_reads_the_heading_moment_by_moment(page, service):
-    page.goto(service)
-    slider = page.get_by_label("Moment")
+def test_the_slider_reads_the_heading_moment_by_moment(page, filled_service):
+    page.goto(filled_service)
+    slider = page.get_by_role("slider", name="Moment")
     expect(slider).to_have_attribute("max", "149")
     slider.focus()
     page.keyboard.press("ArrowRight")
@@ -71,16 +71,16 @@ def test_the_slider_reads_the_heading_moment_by_moment(page, service):
     expect(page.locator("#heading-reading")).to_contain_text("°")
 
 
-def test_the_heading_is_drawn_without_the_vendored_library(page, service):
+def test_the_heading_is_drawn_without_the_vendored_library(page, filled_service):
     page.route("**/vendor/**", lambda route: route.abort())
-    page.goto(service)
+    page.goto(filled_service)
     expect(page.locator("#heading-plot path.sure")).to_have_attribute("d", re.compile(r"^M[\d.]+ -?[\d.]+L"))
 
 
-def test_a_file_that_is_no_film_is_refused_in_words_where_it_was_dropped(page, service, tmp_path):
+def test_a_file_that_is_no_film_is_refused_in_words_where_it_was_dropped(page, filled_service, tmp_path):
     text = tmp_path / "holiday.mp4"
     text.write_text("not a film at all\n" * 50)
-    page.goto(service)
+    page.goto(filled_service)
     page.locator("#film-file").set_input_files(text)
     problem = page.locator("#film-job .problem")
     expect(problem).to_be_visible(timeout=60_000)
@@ -88,20 +88,10 @@ def test_a_file_that_is_no_film_is_refused_in_words_where_it_was_dropped(page, s
     expect(page.locator("#film-form")).to_be_visible()
 
 
-def test_a_file_name_is_shown_as_text(page, service):
-    page.goto(service)
+def test_a_file_name_is_shown_as_text(page, filled_service):
+    page.goto(filled_service)
     expect(page.locator("#earlier-libraries li").first).to_be_visible()
     assert page.locator("#earlier-libraries b").count() == 0
-
-
-def test_a_job_goes_on_when_the_page_is_opened_again(page, service):
-    page.goto(service)
-    page.get_by_label("Individuals").fill("7")
-    page.get_by_label("Frames", exact=True).fill("300")
-    page.get_by_role("button", name="Make the flock").click()
-    expect(page.locator("#flock-job .job")).to_be_visible()
-    page.reload()
-    expect(page.locator("#stage-title")).to_have_text("A flock of 7", timeout=LONG_MS)
 
 
 def test_an_empty_service_says_what_to_do(page, empty_service):
@@ -111,20 +101,30 @@ def test_an_empty_service_says_what_to_do(page, empty_service):
     expect(page.locator("#make")).to_be_hidden()
 
 
-def test_every_field_has_a_name_and_the_page_fits_a_phone(page, service):
+def test_every_field_has_a_name_and_the_page_fits_a_phone(page, filled_service):
     page.set_viewport_size({"width": 360, "height": 640})
-    page.goto(service)
+    page.goto(filled_service)
     expect(page.locator("#make")).to_be_visible()
     unnamed = "[...document.querySelectorAll('input, select')].filter((field) => !field.labels?.length).length"
     assert page.evaluate(unnamed) == 0
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
-def test_whoever_wants_no_motion_gets_none(browser, service):
+def test_whoever_wants_no_motion_gets_none(browser, filled_service):
     context = browser.new_context(reduced_motion="reduce")
     page = context.new_page()
-    page.goto(service)
+    page.goto(filled_service)
     until(page, "document.querySelector('#stage-video').readyState >= 1")
     page.wait_for_timeout(300)
     assert page.evaluate("document.querySelector('#stage-video').paused")
     context.close()
+
+
+def test_a_job_goes_on_when_the_page_is_opened_again(page, filled_service):
+    page.goto(filled_service)
+    page.get_by_role("spinbutton", name="Individuals").fill("7")
+    page.get_by_role("spinbutton", name="Frames").fill("300")
+    page.get_by_role("button", name="Make the flock").click()
+    expect(page.locator("#flock-job .job")).to_be_visible()
+    page.reload()
+    expect(page.locator("#stage-title")).to_have_text("A flock of 7", timeout=LONG_MS)
