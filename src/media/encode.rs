@@ -224,7 +224,7 @@ fn fraction(fps: f64) -> (u64, u64) {
         }
         (before, last) = (last, next);
         let left = rest - whole;
-        if left < 1e-9 || (last.0 / last.1 - fps).abs() <= 1e-9 * fps {
+        if left < 1e-9 || (last.0 / last.1 - fps).abs() <= 1e-12 * fps {
             break;
         }
         rest = 1.0 / left;

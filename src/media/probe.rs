@@ -381,7 +381,12 @@ impl Packets {
             .collect();
         let tick_s = ratio(text(&stream["time_base"]), '/').unwrap_or(0.001);
         let timeline = Timeline::of(&self.times_s, &claimed, tick_s)
-            .or_else(|| claimed.first().map(|&fps| Timeline::Constant { fps }))
+            .or_else(|| {
+                claimed.first().map(|&fps| Timeline::Constant {
+                    fps,
+                    ragged_s: Vec::new(),
+                })
+            })
             .ok_or(Error::TooFewFrames {
                 n_frames: self.n_shown,
             })?;
