@@ -28,7 +28,7 @@ pub struct VideoFormat {
 /// How well to encode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// x264's constant rate factor, 0 (lossless) ..= 51; 18 looks like the original.
+    /// x264's constant rate factor, 1 ..= 51; 18 looks like the original.
     pub crf: u8,
     /// Encoding threads. The bytes depend on them, so this is no automatic number.
     pub threads: u32,

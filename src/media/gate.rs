@@ -39,6 +39,13 @@ const FORMATS: &str = "mov,matroska,avi,mpegts,asf";
 const DECODERS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
                         ffv1,rawvideo,wmv2,wmv3,vc1";
 
+/// Decoders of sound and titles. Nothing of theirs is ever decoded to the end, but ffprobe gives up
+/// on a file when it may not open one of its streams.
+const OTHER_DECODERS: &str = "aac,mp3float,mp3,mp2float,mp2,ac3,eac3,dca,truehd,opus,libopus,vorbis,\
+    flac,alac,amrnb,amrwb,wmav1,wmav2,wmapro,adpcm_ms,adpcm_ima_wav,pcm_u8,pcm_s8,pcm_s16le,pcm_s16be,\
+    pcm_s24le,pcm_s24be,pcm_s32le,pcm_s32be,pcm_f32le,pcm_f32be,pcm_alaw,pcm_mulaw,pcm_dvd,pcm_bluray,\
+    mov_text,subrip,srt,ass,ssa,webvtt,dvbsub,pgssub";
+
 /// How much of a child's complaints is kept.
 const COMPLAINT_BYTES: usize = 8 << 10;
 
@@ -57,7 +64,7 @@ pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> 
     let mut args: Vec<OsString> = [
         ("-protocol_whitelist", "file".to_owned()),
         ("-format_whitelist", FORMATS.to_owned()),
-        ("-codec_whitelist", DECODERS.to_owned()),
+        ("-codec_whitelist", format!("{DECODERS},{OTHER_DECODERS}")),
         ("-max_streams", limits.max_streams.to_string()),
         ("-max_pixels", max_pixels.to_string()),
         ("-probesize", "5000000".to_owned()),
@@ -139,6 +146,12 @@ pub(super) struct End {
 impl End {
     /// What an end by failure means.
     pub(super) fn check(self) -> Result<End, Error> {
+        const OUT_OF_MEMORY: [&str; 4] = [
+            "Cannot allocate memory",
+            "get_buffer() failed",
+            "failed to map segment",
+            "cannot create thread",
+        ];
         const SIGKILL: i32 = 9;
         const SIGXCPU: i32 = 24;
         const SIGXFSZ: i32 = 25;
@@ -151,7 +164,7 @@ impl End {
                 Err(Error::StorageFull)
             }
             // A kill that is not ours is the kernel's, out of memory.
-            signal if signal == Some(SIGKILL) || says("Cannot allocate memory") => {
+            signal if signal == Some(SIGKILL) || OUT_OF_MEMORY.into_iter().any(says) => {
                 Err(Error::MemoryLimit {
                     complaint: self.complaint,
                 })

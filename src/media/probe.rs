@@ -163,6 +163,9 @@ fn read_header(container: Container, path: &Path, limits: &Limits) -> Result<Val
             unit: "index",
         });
     }
+    if let Some(codec) = refused_codec(&end.complaint) {
+        return Err(Error::CodecNotAllowed(codec.to_owned()));
+    }
     match end.check() {
         Ok(_) => serde_json::from_slice(&json[..n_read])
             .map_err(|error| Error::NotAVideo(error.to_string())),
@@ -171,6 +174,14 @@ fn read_header(container: Container, path: &Path, limits: &Limits) -> Result<Val
         }
         Err(error) => Err(error),
     }
+}
+
+/// The codec that ffprobe was not allowed to open, by its own words.
+fn refused_codec(complaint: &str) -> Option<&str> {
+    let line = complaint
+        .lines()
+        .find(|line| line.contains(") not on whitelist"))?;
+    Some(line.split_once("Codec (")?.1.split_once(')')?.0)
 }
 
 /// The video stream with the largest picture, the first of equals; cover pictures are none.
@@ -290,14 +301,17 @@ pub(super) fn is_rgb(pix_fmt: &str) -> bool {
 
 /// What the packets of a stream say.
 struct Packets {
+    container: Container,
     /// Presentation times of the packets to be shown, ascending; empty when the container has none.
     times_s: Vec<f64>,
     /// Packets to be shown.
     n_shown: usize,
     /// Where the last packet's time ends.
     end_s: f64,
-    /// What was said of a file that ends too early.
+    /// ffprobe complained of an end before its time.
     cut: bool,
+    /// Some packet is encrypted.
+    encrypted: bool,
 }
 
 impl Packets {
@@ -308,7 +322,7 @@ impl Packets {
         n_bytes: u64,
         limits: &Limits,
     ) -> Result<Packets, Error> {
-        let entries = "packet=pts_time,duration_time,flags";
+        let entries = "packet=pts_time,duration_time,flags:packet_side_data=side_data_type";
         let mut args = vec!["-select_streams".into(), stream_idx.to_string().into()];
         args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
         args.extend(input_args(container, path, limits));
@@ -316,10 +330,12 @@ impl Packets {
             .with_more_time(Duration::from_secs(n_bytes / SLOWEST_DISK));
         let mut child = Child::reading(order)?;
         let mut packets = Packets {
+            container,
             times_s: Vec::new(),
             n_shown: 0,
             end_s: f64::MIN,
             cut: false,
+            encrypted: false,
         };
         let (mut chunk, mut line) = (vec![0; 1 << 16], Vec::new());
         loop {
@@ -342,6 +358,9 @@ impl Packets {
             }
         }
         let end = child.finish()?.check()?;
+        if packets.encrypted {
+            return Err(Error::Encrypted);
+        }
         packets.cut = ["partial file", "File ended prematurely"]
             .iter()
             .any(|s| end.complaint.contains(s));
@@ -352,8 +371,13 @@ impl Packets {
         Ok(packets)
     }
 
-    /// One line: time, duration, flags, of which the first two may be missing.
+    /// One line: time, duration, flags, side data, of which the first two may be missing. Side data
+    /// may go on for further lines.
     fn add(&mut self, line: &str) {
+        self.encrypted |= line.contains("Encryption");
+        if !line.contains('_') {
+            return; // no flags: the rest of the packet before
+        }
         let mut cells = line.split(',');
         let (time_s, duration_s) = (cells.next(), cells.next());
         let flags = cells.next().unwrap_or_default();
@@ -421,8 +445,14 @@ impl Packets {
         timeline: &Timeline,
     ) -> Result<(), Error> {
         let step_s = 1.0 / timeline.fps();
-        let own_s =
-            number(&stream["duration"]).or_else(|| clock(text(&stream["tags"]["DURATION"])));
+        // An AVI's duration is mended by its reader to fit the file; its count of frames is not.
+        let counted_s = (self.container == Container::Avi).then(|| {
+            Some(number(&stream["nb_frames"])? / ratio(text(&stream["avg_frame_rate"]), '/')?)
+        });
+        let own_s = counted_s
+            .flatten()
+            .or_else(|| number(&stream["duration"]))
+            .or_else(|| clock(text(&stream["tags"]["DURATION"])));
         // The format's duration is that of its longest stream: sound may outlast the picture.
         let whole_s = number(&header["format"]["duration"]);
         let (promised_s, slack) = match (own_s, whole_s) {
