@@ -9,8 +9,9 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use super::allow_list::input_args;
 use super::error::Error;
-use super::gate::{Child, Order, Tool, input_args};
+use super::gate::{Child, Order, Tool};
 use super::limits::Limits;
 use super::probe::{Probe, Turn, is_rgb, probe};
 use super::timeline::Timeline;
@@ -60,7 +61,7 @@ impl Video {
             ]
             .map(Into::into),
         );
-        args.extend(["-vf", &filters, "-f", "rawvideo", "pipe:1"].map(Into::into));
+        args.extend(["-vf", &filters, "-threads", "1", "-f", "rawvideo", "pipe:1"].map(Into::into));
         args
     }
 

@@ -4,6 +4,7 @@
 mod bad;
 mod good;
 mod real;
+mod speed;
 mod traced;
 mod written;
 

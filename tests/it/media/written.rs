@@ -190,7 +190,7 @@ fn a_full_disk_is_storage_full_and_leaves_nothing() {
             .output();
         done.is_ok_and(|done| done.status.success())
     };
-    if !mount("mount", &["-t", "tmpfs", "-o", "size=64k", "none"]) {
+    if !mount("mount", &["-t", "tmpfs", "-o", "size=16k", "none"]) {
         println!("skipped: no small disk can be mounted here");
         return;
     }
@@ -198,7 +198,12 @@ fn a_full_disk_is_storage_full_and_leaves_nothing() {
         crf: 1,
         ..Quality::default()
     };
-    let code = write(&disk.join("film.mp4"), &FORMAT, large, 400);
+    let format = VideoFormat {
+        width: 640,
+        height: 480,
+        ..FORMAT
+    };
+    let code = write(&disk.join("film.mp4"), &format, large, 100);
     let n_left = std::fs::read_dir(&disk).expect("the disk").count();
     assert!(mount("umount", &[]), "the disk stays mounted");
     assert_eq!((code, n_left), (Err(Code::StorageFull), 0));
