@@ -61,7 +61,7 @@ impl Video {
             ]
             .map(Into::into),
         );
-        args.extend(["-vf", &filters, "-threads", "1", "-f", "rawvideo", "pipe:1"].map(Into::into));
+        args.extend(["-vf", &filters, "-f", "rawvideo", "pipe:1"].map(Into::into));
         args
     }
 

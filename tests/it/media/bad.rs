@@ -162,7 +162,8 @@ fn a_film_with_rubbish_inside_ends_well_or_is_refused() {
 fn each_limit_has_its_own_code() {
     let films = Films::new();
     let film = films.test_picture("64x48", 50, "-c:v libx264 -pix_fmt yuv420p film.mp4");
-    let cases: [(fn(&mut Limits), Code); 10] = [
+    type Lower = fn(&mut Limits);
+    let cases: [(Lower, Code); 10] = [
         (|limits| limits.max_frames = 49, Code::TooManyFrames),
         (|limits| limits.min_frames = 51, Code::TooFewFrames),
         (
