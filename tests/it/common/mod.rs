@@ -1,1 +1,3 @@
-//! To be written.
+//! What several doors' tests need.
+
+pub(crate) mod film;
