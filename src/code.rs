@@ -43,7 +43,7 @@ codes! {
     Truncated "truncated" "The file is cut off or damaged inside."
     Encrypted "encrypted" "The video is encrypted."
     NoVideoStream "no_video_stream" "The file holds no video stream."
-    TooFewFrames "too_few_frames" "The footage has too few frames to analyse."
+    TooFewFrames "too_few_frames" "The footage has too few frames to analyze."
     TimeLimit "time_limit" "The work took longer than its time limit."
     MemoryLimit "memory_limit" "The work needed more memory than its limit."
     DecoderCrashed "decoder_crashed" "The video decoder or encoder stopped unexpectedly."

@@ -5,8 +5,6 @@
 //! silhouettes found by the first plate leave a pixel free. An animal that slept in the first median
 //! is seen as a ghost wherever it is gone, and its pixels are taken from just those frames.
 
-use rayon::prelude::*;
-
 use super::silhouette::Blocks;
 use super::{Error, Params, refusal, shadow};
 use crate::footage::FrameSource;
@@ -17,6 +15,7 @@ use crate::raster::{Frame, RgbImage};
 
 mod fill;
 mod samples;
+mod scenery;
 
 use samples::Samples;
 
@@ -96,6 +95,8 @@ pub(super) struct Occupancy {
     pub(super) taken: Vec<u64>,
     /// The plate shows the animal, the sample does not.
     pub(super) ghost: Vec<u64>,
+    /// Something of the scene sways here.
+    pub(super) scenery: Vec<bool>,
 }
 
 impl Occupancy {
@@ -137,45 +138,45 @@ fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
     }
 }
 
-/// Marks the large components of every sample as the animal or as its ghost.
+/// Marks the large components of every sample as the animal, its ghost, or swaying scenery.
 fn occupancy(samples: &Samples, plate: &Plate) -> Occupancy {
-    let width = plate.frame.width as usize;
-    let n_px = samples.n_px();
-    let found: Vec<Vec<(bool, Component)>> = samples
-        .frames
-        .par_iter()
-        .zip(samples.components(plate))
-        .map(|(frame, components)| {
+    let found: Vec<Vec<Component>> = samples
+        .components(plate)
+        .into_iter()
+        .map(|components| {
             let largest = components.iter().map(|c| c.area).max().unwrap_or(0);
             let large = |c: &Component| c.area >= 12 && 10 * c.area >= 3 * largest;
-            let judged = components.into_iter().filter(large);
-            judged.map(|c| (is_ghost(frame, plate, &c), c)).collect()
+            components.into_iter().filter(large).collect()
         })
         .collect();
+    let n_px = samples.n_px();
     let mut seen = Occupancy {
         taken: vec![0; n_px],
         ghost: vec![0; n_px],
+        scenery: vec![false; n_px],
     };
     for (k, components) in found.iter().enumerate() {
-        for (ghost, component) in components {
+        for component in components {
             let rect = component
                 .rect
                 .inflated(3, plate.frame.width, plate.frame.height);
             let mask = component.mask(rect).dilated().dilated().dilated();
-            let bits = if *ghost {
-                &mut seen.ghost
-            } else {
-                &mut seen.taken
-            };
-            for (row, y) in mask
+            let width = plate.frame.width as usize;
+            let set = mask
                 .bits
-                .chunks_exact(rect.w as usize)
-                .zip(rect.y as usize..)
-            {
-                let start = y * width + rect.x as usize;
-                for (slot, &set) in bits[start..].iter_mut().zip(row) {
-                    *slot |= u64::from(set) << k;
-                }
+                .iter()
+                .enumerate()
+                .filter(|&(_, &bit)| bit == 1)
+                .map(|(at, _)| {
+                    let (x, y) = (at % mask.width(), at / mask.width());
+                    (rect.y as usize + y) * width + rect.x as usize + x
+                });
+            if scenery::is_scenery(&found, k, component) {
+                set.for_each(|px| seen.scenery[px] = true);
+            } else if is_ghost(&samples.frames[k], plate, component) {
+                set.for_each(|px| seen.ghost[px] |= 1 << k);
+            } else {
+                set.for_each(|px| seen.taken[px] |= 1 << k);
             }
         }
     }

@@ -153,7 +153,7 @@ impl<'a> Tracker<'a> {
     /// The last box where it should be now, widened by how far it may have gone besides.
     fn window(&self) -> Rect {
         let steps = f64::from(self.misses + 1);
-        let speed = self.velocity_px[0].hypot(self.velocity_px[1]);
+        let speed = libm::hypot(self.velocity_px[0], self.velocity_px[1]);
         let margin = (1.5 * speed + 8.0) * libm::pow(1.6, f64::from(self.misses));
         let (dx, dy) = (self.velocity_px[0] * steps, self.velocity_px[1] * steps);
         let last = self.box_px;
@@ -185,7 +185,7 @@ impl<'a> Tracker<'a> {
                 f64::from(rect.y) + f64::from(rect.h) / 2.0,
             ];
             let distance = (center[0] - predicted[0]).hypot(center[1] - predicted[1]);
-            distance / scale + (component.area as f64 / usual).ln().abs()
+            distance / scale + libm::log(component.area as f64 / usual).abs()
         };
         components
             .iter()
@@ -194,10 +194,12 @@ impl<'a> Tracker<'a> {
             .cloned()
     }
 
-    /// Whether a component may be the animal by its area.
+    /// Whether a component may be the animal by its area: near what it was last, or near what it
+    /// mostly is (an animal that turns toward the camera shrinks within a few frames).
     fn fits(&self, component: &Component) -> bool {
-        let ratio = component.area as f64 / self.usual_area();
-        component.area >= LEAST_AREA_PX && (0.4..=2.5).contains(&ratio)
+        let near = |area: f64| (0.4..=2.5).contains(&(component.area as f64 / area));
+        component.area >= LEAST_AREA_PX
+            && (near(self.usual_area()) || self.areas.last().copied().is_some_and(near))
     }
 
     /// The median area of the last silhouettes.
@@ -217,7 +219,7 @@ impl<'a> Tracker<'a> {
             return None;
         }
         let rect = component.rect;
-        let length_px = f64::from(rect.w).hypot(f64::from(rect.h));
+        let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let cutout = matte::cut_out(frame, self.plate, gain, &silhouette, length_px);
         let weights: Vec<u8> = cutout
             .image

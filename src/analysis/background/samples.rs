@@ -111,7 +111,9 @@ impl Samples {
     }
 
     /// The noise of each pixel over its free samples: 1.4826 times the median absolute deviation,
-    /// luma and chroma added as they add in RGB, at least the floor (ALGORITHMS.md 2.4).
+    /// luma and chroma added as they add in RGB, at least the floor (ALGORITHMS.md 2.4). Where scenery
+    /// sways the values gather at two places and the median says nothing: there it is what a normal
+    /// distribution with the same 90th percentile would have.
     pub(super) fn noise(&self, plate: &Frame, seen: &Occupancy) -> Vec<f32> {
         let all = self.all_bits();
         let deviation = self.each_value(|values, at| {
@@ -122,6 +124,10 @@ impl Samples {
             }
             kept.iter_mut()
                 .for_each(|value| *value = value.abs_diff(plate.planes[at]));
+            if self.sways(at, seen) {
+                let rank = kept.len() * 9 / 10;
+                return (f32::from(*kept.select_nth_unstable(rank).1) * 0.41).ceil() as u8;
+            }
             median(kept)
         });
         let (u, v) = deviation.chroma();
@@ -134,22 +140,33 @@ impl Samples {
         (0..self.n_px()).map(sigma).collect()
     }
 
-    /// The samples in which the value at `at` (of any plane) is free.
+    /// The samples in which the value at `at` (of any plane) is free; a chroma value stands for four
+    /// pixels and is free where all of them are.
     fn free_at(&self, at: usize, seen: &Occupancy, all: u64) -> u64 {
-        let n_px = self.n_px();
-        if at < n_px {
+        if at < self.n_px() {
             return seen.free(at, all);
         }
-        // A chroma value stands for four pixels and is free where all of them are.
+        self.pixels_of_chroma(at)
+            .iter()
+            .fold(all, |free, &px| free & seen.free(px, all))
+    }
+
+    /// Whether scenery sways at the value at `at` (of any plane).
+    fn sways(&self, at: usize, seen: &Occupancy) -> bool {
+        if at < self.n_px() {
+            return seen.scenery[at];
+        }
+        self.pixels_of_chroma(at).iter().any(|&px| seen.scenery[px])
+    }
+
+    fn pixels_of_chroma(&self, at: usize) -> [usize; 4] {
         let frame = &self.frames[0];
         let (w, h) = (frame.width as usize, frame.height as usize);
         let chroma_width = frame.chroma_width() as usize;
-        let at = (at - n_px) % (chroma_width * h.div_ceil(2));
+        let at = (at - self.n_px()) % (chroma_width * h.div_ceil(2));
         let (x, y) = (2 * (at % chroma_width), 2 * (at / chroma_width));
         let (x1, y1) = ((x + 1).min(w - 1), (y + 1).min(h - 1));
-        [(x, y), (x1, y), (x, y1), (x1, y1)]
-            .iter()
-            .fold(all, |free, &(x, y)| free & seen.free(y * w + x, all))
+        [y * w + x, y * w + x1, y1 * w + x, y1 * w + x1]
     }
 
     /// A frame each of whose values is made of the samples' values at the same place.

@@ -1,0 +1,30 @@
+# syntax=docker/dockerfile:1
+# Two stages on one Debian release, so that the C library is the same: `builder` makes the program with
+# the page inside, the second holds the program and ffmpeg alone. The packages come from
+# scripts/system-packages.sh, as for `make`.
+
+FROM rust:1.95-slim-bookworm AS builder
+SHELL ["/bin/sh", "-euc"]
+WORKDIR /src
+COPY scripts scripts
+RUN scripts/system-packages.sh build vendor && rm -rf /var/lib/apt/lists/*
+COPY web web
+RUN scripts/vendor.sh
+COPY . .
+RUN cargo build --release --locked --bin flockreel
+
+FROM debian:bookworm-slim
+COPY scripts/system-packages.sh /usr/local/sbin/system-packages
+RUN /usr/local/sbin/system-packages run health \
+    && rm -rf /var/lib/apt/lists/* \
+    && useradd --system --uid 10001 --user-group --no-create-home flockreel \
+    && install -d -o flockreel -g flockreel /data
+COPY --from=builder /src/target/release/flockreel /usr/local/bin/flockreel
+USER 10001:10001
+VOLUME /data
+EXPOSE 8080
+HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
+    CMD ["curl", "-fsS", "-o", "/dev/null", "http://127.0.0.1:8080/healthz"]
+STOPSIGNAL SIGTERM
+ENTRYPOINT ["flockreel"]
+CMD ["serve", "--bind", "0.0.0.0:8080", "--data", "/data"]

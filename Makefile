@@ -1,0 +1,73 @@
+# What can be done with flockreel. `make help` lists it; `make run` and `make test` are the two commands
+# that a fresh Debian with Rust, a C compiler and make needs.
+
+CARGO ?= cargo
+DATA ?= data
+BIND ?= 127.0.0.1:8080
+RELEASE = target/release/flockreel
+DEBUG = target/debug/flockreel
+
+.DEFAULT_GOAL := help
+.PHONY: help run test demo check fmt clippy unit page-test docs deny bench vendor clean-data build
+
+help: ## list the commands
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+run: build ## install what is missing, build, start the service and its page
+	$(RELEASE) serve --bind $(BIND) --data $(DATA)
+
+test: unit page-test ## install what the tests need and run them all
+	@echo "all tests passed"
+
+demo: build ## film -> library -> flock.mp4, without a server
+	@mkdir -p target/demo
+	$(RELEASE) sample -o target/demo/footage.mp4
+	$(RELEASE) analyze target/demo/footage.mp4 -o target/demo/library
+	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
+	@echo "the flock is in flock.mp4"
+
+check: fmt clippy unit page-test docs deny ## everything that CI checks
+	@echo "all checks passed"
+
+fmt: ## the formatting
+	$(CARGO) fmt --check
+
+clippy: target/vendor ## the lints, warnings as errors
+	$(CARGO) clippy --locked --all-targets -- -D warnings
+
+unit: target/vendor ## the tests in Rust
+	@scripts/system-packages.sh test
+	$(CARGO) test --locked
+
+# The program that the tests built: `cargo build` would build the dependencies anew, without the tests' features.
+page-test: vendor ## the page in a browser, against a really started service
+	$(CARGO) test --locked --no-run
+	@scripts/page-tests.sh $(DEBUG)
+
+docs: target/vendor ## the documentation, warnings as errors
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
+
+deny: ## licences, bans and sources of the dependencies, offline
+	@if $(CARGO) deny --version >/dev/null 2>&1; then \
+		$(CARGO) deny --offline check bans licenses sources; \
+	else \
+		echo "cargo deny: SKIPPED, not installed (cargo install --locked cargo-deny)"; \
+	fi
+
+bench: build ## the speed of the program against ffmpeg and SciPy
+	python3 bench/run.py $(RELEASE)
+	@if [ -f bench/distance.py ]; then python3 bench/distance.py $(RELEASE); fi
+
+vendor: ## the page's libraries, from web/package-lock.json
+	@scripts/vendor.sh
+
+clean-data: ## forget all footage, libraries and flocks
+	rm -rf $(DATA)
+
+build: vendor
+	@scripts/system-packages.sh build run
+	$(CARGO) build --release --locked
+
+# The program embeds this folder; checks do not need what is in it.
+target/vendor:
+	@mkdir -p $@

@@ -1,0 +1,76 @@
+#!/bin/sh
+# Installs the Debian packages that flockreel needs, and only those that are missing.
+# The same list for `make`, the Dockerfile and CI, so that they cannot drift apart.
+#
+#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | page-test
+#
+# Says what it does. Uses sudo when it is not root. Ends with 1 when something is still missing.
+set -eu
+
+# One line for each thing: group, the command that must exist, the package that has it.
+needs() {
+    cat <<'LIST'
+build     cc        gcc libc6-dev
+vendor    python3   python3-venv
+run       ffmpeg    ffmpeg
+run       ffprobe   ffmpeg
+health    curl      curl
+test      cc        gcc libc6-dev
+test      ffmpeg    ffmpeg
+test      ffprobe   ffmpeg
+page-test python3   python3-venv
+page-test chromium  chromium
+LIST
+}
+
+say() { printf 'system packages: %s\n' "$*"; }
+
+has() {
+    case $1 in
+        # Debian splits the module that makes virtual environments off the interpreter.
+        python3) command -v python3 >/dev/null && python3 -c 'import ensurepip, venv' 2>/dev/null ;;
+        *) command -v "$1" >/dev/null ;;
+    esac
+}
+
+# Prints the packages of the groups whose command is missing, each once.
+missing_packages() {
+    needs | while read -r group command package; do
+        for wanted in "$@"; do
+            if [ "$wanted" = "$group" ] && ! has "$command"; then echo "$package"; fi
+        done
+    done | sort -u | tr '\n' ' '
+}
+
+as_root() {
+    if [ "$(id -u)" -eq 0 ]; then "$@"; else sudo "$@"; fi
+}
+
+if [ $# -eq 0 ]; then
+    say "no group given; see the head of this script" >&2
+    exit 2
+fi
+
+packages=$(missing_packages "$@")
+if [ -z "$packages" ]; then exit 0; fi
+
+if ! command -v apt-get >/dev/null; then
+    say "this system has no apt-get; install by its own package manager: $packages" >&2
+    exit 1
+fi
+if [ "$(id -u)" -ne 0 ] && ! command -v sudo >/dev/null; then
+    say "neither root nor sudo here; ask an administrator to install: $packages" >&2
+    exit 1
+fi
+
+say "installing by apt-get: $packages"
+as_root env DEBIAN_FRONTEND=noninteractive apt-get update -q
+# shellcheck disable=SC2086 # a list of words on purpose
+as_root env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $packages
+
+packages=$(missing_packages "$@")
+if [ -n "$packages" ]; then
+    say "still missing after the installation: $packages" >&2
+    exit 1
+fi
+say "done"

@@ -1,0 +1,39 @@
+// What was measured in one film: numbers, heading, distances, background.
+// @ts-check
+import { getPoses } from "./api.js";
+import { byId, element, showProblem } from "./element.js";
+import { showHeading } from "./heading.js";
+import { count, percent, seconds } from "./words.js";
+
+/** @param {any} library */
+export async function showLibrary(library) {
+  const at = `/v1/libraries/${library.id}`;
+  byId("library-title").textContent = library.name || "What the film holds";
+  byId("library-numbers").replaceChildren(...numbersOf(library).map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
+  byId("library-distance").src = `${at}/distance.png`;
+  byId("library-background").src = `${at}/background.png`;
+  byId("library-table").href = `${at}/poses.csv`;
+  byId("library-poses").href = `${at}/poses.json`;
+  byId("library").hidden = false;
+  try {
+    await showHeading(await getPoses(library.id));
+    byId("heading").hidden = false;
+    byId("library-problem").replaceChildren();
+  } catch (problem) {
+    byId("heading").hidden = true;
+    showProblem(byId("library-problem"), problem);
+  }
+}
+
+/** Term and value; what is not known is left out. */
+function numbersOf(library) {
+  const view = { side: "side", top: "above" }[library.view];
+  const length_s = library.n_frames / library.fps;
+  return [
+    [`frames, ${seconds(length_s)} at ${count(library.fps)} a second`, library.n_frames, count],
+    ["of the frames show the animal", library.detected_share, percent],
+    ["seen from", view, String],
+    ["places where playback may jump", library.n_transitions, count],
+    ["of the film can be played for ever", library.component_share, percent],
+  ].filter(([, value]) => value !== undefined && value !== null).map(([term, value, say]) => [term, say(value)]);
+}

@@ -1,0 +1,30 @@
+// The stage: one flock, playing in a loop, with its downloads.
+// @ts-check
+import { byId } from "./element.js";
+import { count } from "./words.js";
+
+const calm = matchMedia("(prefers-reduced-motion: reduce)");
+
+/** @param {any} flock @param {string} filmName */
+export function showFlock(flock, filmName) {
+  const video = byId("stage-video");
+  const source = `/v1/flocks/${flock.id}/video.mp4`;
+  if (video.getAttribute("src") !== source) video.src = source;
+  video.hidden = false;
+  const origin = flock.sample ? "A sample, made of a film of a virtual fish" : filmName && `Made of “${filmName}”`;
+  video.onerror = () => { video.hidden = true; showEmptyStage("This video cannot be played here. It can still be downloaded."); };
+  video.setAttribute("aria-label", `${flock.count} individuals made of the film ${filmName}`);
+  if (!calm.matches) video.play().catch(() => {});
+  byId("stage-note").hidden = true;
+  byId("stage-title").textContent = `A flock of ${count(flock.count)}`;
+  byId("stage-facts").textContent = [origin, `${count(flock.frames)} frames`, `seed ${flock.seed}`].filter(Boolean).join(" · ");
+  byId("stage-video-link").href = source;
+  byId("stage-plan-link").href = `/v1/flocks/${flock.id}/flock.json`;
+  byId("stage-caption").hidden = false;
+}
+
+/** @param {string} text what is there instead of a flock */
+export function showEmptyStage(text) {
+  byId("stage-note").textContent = text;
+  byId("stage-note").hidden = false;
+}

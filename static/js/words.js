@@ -1,0 +1,39 @@
+// Numbers and stages in the words of the page. Angles are in degrees here and nowhere else.
+// @ts-check
+
+const number = new Intl.NumberFormat("en", { maximumFractionDigits: 1 });
+const date = new Intl.DateTimeFormat("en", { dateStyle: "medium", timeStyle: "short" });
+
+export const count = (value) => number.format(value);
+export const percent = (share) => `${number.format(100 * share)} %`;
+export const degrees = (rad) => (rad * 180) / Math.PI;
+export const seconds = (value) => `${number.format(value)} s`;
+export const megabytes = (bytes) => `${number.format(bytes / 1e6)} MB`;
+export const day = (time) => (time ? date.format(new Date(time)) : "");
+
+const DIRECTIONS = ["right", "down right", "down", "down left", "left", "up left", "up", "up right"];
+
+/** A heading in words, as "34° down right". */
+export function direction(heading_rad) {
+  const heading_deg = Math.round(degrees(heading_rad));
+  const eighth = ((Math.round(heading_deg / 45) % 8) + 8) % 8;
+  return `${heading_deg}° (${DIRECTIONS[eighth]})`;
+}
+
+const STAGES = {
+  background: "Finding the still scene",
+  tracking: "Following the animal",
+  distances: "Comparing its moments",
+  writing: "Putting it away",
+  loading: "Opening the film’s library",
+  simulating: "Letting the boids move",
+  planning: "Choosing frames for every individual",
+  rendering: "Painting the flock",
+};
+
+/** What a job does now. */
+export function stageOf(job) {
+  if (job.state === "queued") return "Waiting its turn";
+  const stage = job.stage ?? "";
+  return STAGES[stage] ?? (stage ? stage[0].toUpperCase() + stage.slice(1).replaceAll("_", " ") : "Working");
+}

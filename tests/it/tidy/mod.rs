@@ -1,0 +1,306 @@
+//! The rules of the house as tests: who may import whom, why every file exists, how large a thing may
+//! grow, which words have another word here, what the page may hold. Where a rule fails, its message
+//! names the file and the rule; the rule itself is argued in CONTRIBUTING.md and ARCHITECTURE.md.
+
+mod imports;
+mod reading;
+
+use std::fs;
+use std::path::Path;
+
+use imports::{ALGORITHMS, MIDDLE, VALUES, may_use, modules_used};
+use reading::{assert_no, code_of, files, folders, has_word, read, rust_files, stands_alone};
+
+#[test]
+fn a_module_imports_only_what_its_ring_may() {
+    let mut faults = Vec::new();
+    for file in rust_files("src") {
+        let name = file.strip_prefix("src/").unwrap_or(&file);
+        let module = name.split(['/', '.']).next().unwrap_or_default();
+        for used in modules_used(&code_of(&file)) {
+            if !may_use(name, module, &used) {
+                faults.push(format!("{file}: `{module}` may not use `crate::{used}`"));
+            }
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn the_outside_world_has_its_doors() {
+    let algorithms: Vec<&str> = [VALUES, MIDDLE, ALGORITHMS].concat();
+    let with = |more: &[&'static str]| [algorithms.as_slice(), more].concat();
+    // What is looked for, and the modules it may not stand in.
+    let rules: Vec<(&[&str], Vec<&str>)> = vec![
+        (
+            &["axum::", "tower_http::", "hyper::"],
+            with(&["formats", "config", "media", "store", "jobs"]),
+        ),
+        (
+            &["sqlx::"],
+            with(&["formats", "config", "media", "jobs", "api", "cli"]),
+        ),
+        (
+            &["tokio::", ".await", "async fn"],
+            with(&["formats", "config", "media"]),
+        ),
+        (
+            &["std::fs", "std::net", "std::env", "std::process"],
+            algorithms.clone(),
+        ),
+        (
+            &["tracing::", "image::", "png::", "SystemTime", "println!"],
+            algorithms.clone(),
+        ),
+    ];
+    let mut faults = Vec::new();
+    for file in rust_files("src") {
+        let module = file["src/".len()..]
+            .split(['/', '.'])
+            .next()
+            .unwrap_or_default()
+            .to_owned();
+        let code = code_of(&file);
+        for (needles, modules) in &rules {
+            for needle in needles.iter().filter(|needle| stands_alone(&code, needle)) {
+                if modules.contains(&module.as_str()) {
+                    faults.push(format!("{file}: `{needle}` has no place in `{module}`"));
+                }
+            }
+        }
+        if code.contains("Command::new(") && file != "src/media/gate.rs" {
+            faults.push(format!(
+                "{file}: child processes are started in media/gate.rs alone"
+            ));
+        }
+        if module == "formats" && code.contains("std::fs") && file != "src/formats/library_dir.rs" {
+            faults.push(format!(
+                "{file}: of formats, library_dir.rs alone touches files"
+            ));
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn every_source_file_says_why_it_exists() {
+    let mut faults = Vec::new();
+    for file in rust_files("src") {
+        let text = read(&file);
+        let header: Vec<&str> = text
+            .lines()
+            .take_while(|line| line.starts_with("//!"))
+            .collect();
+        let n_words: usize = header
+            .iter()
+            .map(|line| line.split_whitespace().count() - 1)
+            .sum();
+        if !(1..=15).contains(&header.len())
+            || n_words < 5
+            || header.concat().contains("To be written")
+        {
+            faults.push(format!(
+                "{file}: begins with {} lines of `//!`, wants 1 to 15 that say why",
+                header.len()
+            ));
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn files_and_folders_keep_their_sizes() {
+    let mut faults = Vec::new();
+    for (folder, extension, limit) in [
+        ("src", "rs", 400),
+        ("tests", "rs", 400),
+        ("tests", "py", 400),
+        ("static", "css", 300),
+        ("static", "js", 150),
+    ] {
+        for file in files(folder)
+            .iter()
+            .filter(|file| file.ends_with(&format!(".{extension}")))
+        {
+            let n_lines = read(file).lines().count();
+            if n_lines > limit {
+                faults.push(format!("{file}: {n_lines} lines, limit {limit}"));
+            }
+        }
+    }
+    for folder in folders(Path::new("src")) {
+        let n_entries = fs::read_dir(&folder).expect("a folder of ours").count();
+        if folder != Path::new("src") && n_entries > 20 {
+            faults.push(format!(
+                "{}: {n_entries} entries, limit 20",
+                folder.display()
+            ));
+        }
+        if folder.components().count() > 4 {
+            faults.push(format!(
+                "{}: more than three deep below src",
+                folder.display()
+            ));
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn every_thing_is_called_by_its_one_name() {
+    let not_a_name = [
+        "utils", "util", "helpers", "helper", "common", "misc", "types", "manager",
+    ];
+    let elsewhere = [
+        "succeeded",
+        "theta",
+        "cutout",
+        "retry_count",
+        "work_item",
+        "center_of_mass",
+        "reaper",
+    ];
+    let british = [
+        "centre",
+        "colour",
+        "neighbour",
+        "analyse",
+        "normalise",
+        "optimise",
+        "behaviour",
+        "grey",
+    ];
+    let mut faults = Vec::new();
+    for file in rust_files("src") {
+        let path = Path::new(&file);
+        let stem = path
+            .file_stem()
+            .and_then(|stem| stem.to_str())
+            .unwrap_or_default();
+        if not_a_name.contains(&stem)
+            || path
+                .iter()
+                .any(|part| not_a_name.iter().any(|word| part == *word))
+        {
+            faults.push(format!("{file}: has not been named yet"));
+        }
+        let code = code_of(&file).to_lowercase();
+        for word in elsewhere
+            .iter()
+            .chain(&british)
+            .filter(|word| has_word(&code, word))
+        {
+            faults.push(format!(
+                "{file}: `{word}` has another word here (CONTRIBUTING.md, Names)"
+            ));
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn nothing_is_left_for_later_without_an_issue() {
+    let mut faults = Vec::new();
+    for file in files("src")
+        .iter()
+        .chain(&files("tests"))
+        .chain(&files("static"))
+    {
+        for (index, line) in read(file).lines().enumerate() {
+            if line.contains(&["TO", "DO"].concat()) && !line.contains('#') {
+                faults.push(format!(
+                    "{file}:{}: a note for later without its issue",
+                    index + 1
+                ));
+            }
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn no_address_of_a_package_registry_is_kept() {
+    let hosts: Vec<String> = [
+        ["registry.npmjs", "org"],
+        ["pypi", "org"],
+        ["pythonhosted", "org"],
+        ["crates", "io"],
+    ]
+    .iter()
+    .map(|parts| parts.join("."))
+    .collect();
+    let mut faults = Vec::new();
+    for file in files(".") {
+        // Cargo names its default index so in every lock; it is no address that is fetched from.
+        let text = read(&file).replace(&format!("{}-index", hosts[3]), "");
+        for host in hosts.iter().filter(|host| text.contains(host.as_str())) {
+            faults.push(format!("{file}: names {host}"));
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn the_page_holds_to_its_content_security_policy() {
+    let mut faults = Vec::new();
+    let page = read("static/index.html");
+    for forbidden in [
+        " style=",
+        "<style",
+        "<script>",
+        " onclick=",
+        " onload=",
+        "javascript:",
+    ] {
+        if page.contains(forbidden) {
+            faults.push(format!(
+                "static/index.html: `{forbidden}` is refused by the policy"
+            ));
+        }
+    }
+    for file in files("static") {
+        let text = read(&file).replace("http://www.w3.org/", "");
+        for forbidden in ["http://", "https://", "innerHTML", "eval("] {
+            if text.contains(forbidden) {
+                faults.push(format!("{file}: `{forbidden}` has no place in the page"));
+            }
+        }
+    }
+    assert_no(faults);
+}
+
+#[test]
+fn the_page_stays_within_its_budget() {
+    let n_bytes: usize = files("static").iter().map(|file| read(file).len()).sum();
+    assert!(
+        n_bytes < 60_000,
+        "the page's own files take {n_bytes} bytes, limit 60,000"
+    );
+}
+
+#[test]
+fn the_readme_names_every_setting() {
+    let readme = read("README.md");
+    let config = read("src/config.rs");
+    let faults = (config.split("env = \"").skip(1))
+        .filter_map(|rest| rest.split('"').next())
+        .filter(|variable| !readme.contains(&format!("`{variable}`")))
+        .map(|variable| format!("README.md: says nothing of {variable}"));
+    assert_no(faults.collect());
+}
+
+#[test]
+fn every_code_is_raised_somewhere() {
+    let sources: Vec<String> = (rust_files("src").iter())
+        .filter(|file| !["src/code.rs", "src/api/problem.rs"].contains(&file.as_str()))
+        .map(|file| code_of(file))
+        .collect();
+    let faults = (flockreel::code::Code::ALL.iter())
+        .filter(|code| {
+            !sources
+                .iter()
+                .any(|source| source.contains(&format!("Code::{code:?}")))
+        })
+        .map(|code| format!("src/code.rs: nothing raises {code}"));
+    assert_no(faults.collect());
+}

@@ -1,0 +1,93 @@
+"""A really started service, a film made by the program, and Debian's chromium."""
+
+import os
+import re
+import socket
+import subprocess
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+PROGRAM = str(Path(os.environ["FLOCKREEL_PROGRAM"]).resolve())
+CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
+
+
+@pytest.fixture(scope="session")
+def film(tmp_path_factory):
+    """A short film of the virtual fish."""
+    path = tmp_path_factory.mktemp("film") / "goldfish <b>1</b>.mp4"
+    subprocess.run([PROGRAM, "sample", "-o", path, "--frames", "150", "--seed", "1"], check=True)
+    return path
+
+
+@pytest.fixture(scope="session")
+def service(tmp_path_factory):
+    """The address of a service that is filled by the tests in turn."""
+    yield from started(tmp_path_factory.mktemp("data"))
+
+
+@pytest.fixture
+def empty_service(tmp_path):
+    """The address of a service that holds nothing yet."""
+    yield from started(tmp_path / "data")
+
+
+@pytest.fixture(scope="session")
+def browser():
+    with sync_playwright() as playwright:
+        arguments = ["--no-sandbox", "--disable-gpu", "--autoplay-policy=no-user-gesture-required"]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=arguments)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(browser):
+    """A page that fails its test when a script fails or when anything is fetched from elsewhere."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    page = context.new_page()
+    faults = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("console", lambda message: faults.append(message.text) if is_fault(message) else None)
+    page.on("request", lambda request: faults.append(request.url) if is_elsewhere(request.url) else None)
+    yield page
+    context.close()
+    assert faults == []
+
+
+def is_fault(message):
+    # The browser logs every answer that is not a success; the page's own faults are others.
+    return message.type == "error" and "Failed to load resource" not in message.text
+
+
+def is_elsewhere(url):
+    return not re.match(r"http://127\.0\.0\.1:\d+/|blob:|data:", url)
+
+
+def started(data):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    address = f"http://127.0.0.1:{port}"
+    arguments = ["serve", "--bind", f"127.0.0.1:{port}", "--data", str(data), "--no-sample"]
+    service = subprocess.Popen([PROGRAM, *arguments], stdin=subprocess.DEVNULL)
+    try:
+        wait_until_ready(service, address)
+        yield address
+    finally:
+        service.terminate()
+        service.wait(timeout=30)
+
+
+def wait_until_ready(service, address):
+    for _ in range(300):
+        assert service.poll() is None, "the service ended by itself"
+        try:
+            urllib.request.urlopen(f"{address}/healthz", timeout=1).close()
+            return
+        except OSError:
+            time.sleep(0.1)
+    raise TimeoutError("the service did not answer within 30 s")

@@ -1,0 +1,130 @@
+"""What the page promises to a person: a film in, what was measured, a flock that plays."""
+
+import json
+import re
+import time
+import urllib.request
+
+from playwright.sync_api import expect
+
+LONG_MS = 240_000  # an unoptimized program on two shared cores
+
+
+def measure(page, film):
+    page.locator("#film-file").set_input_files(film)
+    expect(page.locator("#film-job .job")).to_be_visible()
+    expect(page.locator("#library")).to_be_visible(timeout=LONG_MS)
+
+
+def make_a_flock(page, individuals, frames):
+    page.get_by_label("Individuals").fill(str(individuals))
+    page.get_by_label("Frames", exact=True).fill(str(frames))
+    page.get_by_role("button", name="Make the flock").click()
+    expect(page.locator("#stage-title")).to_have_text(f"A flock of {individuals}", timeout=LONG_MS)
+
+
+def until(page, script, timeout_s=30):
+    """Waits for a truth; the page's policy forbids the browser's own way of waiting for scripts."""
+    end = time.monotonic() + timeout_s
+    while not page.evaluate(script):
+        assert time.monotonic() < end, f"never came true: {script}"
+        page.wait_for_timeout(100)
+
+
+def fetch(url):
+    with urllib.request.urlopen(url) as answer:
+        return answer.read()
+
+
+def test_a_chosen_film_becomes_a_flock_that_plays_and_downloads(page, service, film):
+    page.goto(service)
+    measure(page, film)
+    expect(page.locator("#library-numbers")).to_contain_text("150")
+    until(page, "[...document.querySelectorAll('#library img')].every((image) => image.naturalWidth > 0)")
+
+    make_a_flock(page, 6, 60)
+    until(page, "document.querySelector('#stage-video').currentTime > 0.2")
+    assert abs(page.evaluate("document.querySelector('#stage-video').duration") - 2.0) < 0.1
+
+    with page.expect_download() as download:
+        page.locator("#stage-video-link").click()
+    assert download.value.path().read_bytes()[4:8] == b"ftyp"
+    flock = json.loads(fetch(service + page.locator("#stage-plan-link").get_attribute("href")))
+    assert len(flock["individuals"]) == 6
+    assert all(len(one["source_frame"]) == 60 for one in flock["individuals"])
+
+
+def test_the_next_visit_shows_the_newest_flock_at_once(page, service):
+    page.goto(service)
+    expect(page.locator("#stage-title")).to_have_text("A flock of 6")
+    until(page, "document.querySelector('#stage-video').readyState >= 2")
+    expect(page.locator("#earlier-flocks li")).to_have_count(1)
+
+
+def test_the_slider_reads_the_heading_moment_by_moment(page, service):
+    page.goto(service)
+    slider = page.get_by_label("Moment")
+    expect(slider).to_have_attribute("max", "149")
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#heading-reading")).to_contain_text("frame 1")
+    expect(page.locator("#heading-reading")).to_contain_text("°")
+
+
+def test_the_heading_is_drawn_without_the_vendored_library(page, service):
+    page.route("**/vendor/**", lambda route: route.abort())
+    page.goto(service)
+    expect(page.locator("#heading-plot path.sure")).to_have_attribute("d", re.compile(r"^M[\d.]+ -?[\d.]+L"))
+
+
+def test_a_file_that_is_no_film_is_refused_in_words_where_it_was_dropped(page, service, tmp_path):
+    text = tmp_path / "holiday.mp4"
+    text.write_text("not a film at all\n" * 50)
+    page.goto(service)
+    page.locator("#film-file").set_input_files(text)
+    problem = page.locator("#film-job .problem")
+    expect(problem).to_be_visible(timeout=60_000)
+    expect(problem).to_contain_text("Reason code: not_a_video")
+    expect(page.locator("#film-form")).to_be_visible()
+
+
+def test_a_file_name_is_shown_as_text(page, service):
+    page.goto(service)
+    expect(page.locator("#earlier-libraries li").first).to_be_visible()
+    assert page.locator("#earlier-libraries b").count() == 0
+
+
+def test_a_job_goes_on_when_the_page_is_opened_again(page, service):
+    page.goto(service)
+    page.get_by_label("Individuals").fill("7")
+    page.get_by_label("Frames", exact=True).fill("300")
+    page.get_by_role("button", name="Make the flock").click()
+    expect(page.locator("#flock-job .job")).to_be_visible()
+    page.reload()
+    expect(page.locator("#stage-title")).to_have_text("A flock of 7", timeout=LONG_MS)
+
+
+def test_an_empty_service_says_what_to_do(page, empty_service):
+    page.goto(empty_service)
+    expect(page.locator("#stage-note")).to_contain_text("Choose a film of one animal")
+    expect(page.locator("#library")).to_be_hidden()
+    expect(page.locator("#make")).to_be_hidden()
+
+
+def test_every_field_has_a_name_and_the_page_fits_a_phone(page, service):
+    page.set_viewport_size({"width": 360, "height": 640})
+    page.goto(service)
+    expect(page.locator("#make")).to_be_visible()
+    unnamed = "[...document.querySelectorAll('input, select')].filter((field) => !field.labels?.length).length"
+    assert page.evaluate(unnamed) == 0
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def test_whoever_wants_no_motion_gets_none(browser, service):
+    context = browser.new_context(reduced_motion="reduce")
+    page = context.new_page()
+    page.goto(service)
+    until(page, "document.querySelector('#stage-video').readyState >= 1")
+    page.wait_for_timeout(300)
+    assert page.evaluate("document.querySelector('#stage-video').paused")
+    context.close()
