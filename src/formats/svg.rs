@@ -83,11 +83,9 @@ fn line(poses: &Poses, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String
                 write!(path, "L{to:.1} {:.1}", y(heading))
             }
             Some((from, before)) => {
-                let turn = 2.0 * PI * before.signum();
                 let (over, edge) = ((from + to) / 2.0, PI * before.signum());
-                write!(path, "L{to:.1} {:.1}", y(heading + turn)).and_then(|()| {
-                    write!(path, "M{over:.1} {:.1}L{to:.1} {:.1}", y(-edge), y(heading))
-                })
+                let (leave, enter) = (y(edge), y(-edge));
+                write!(path, "L{over:.1} {leave:.1}M{over:.1} {enter:.1}L{to:.1} {:.1}", y(heading))
             }
         }
         .expect("memory");
