@@ -1,1 +1,24 @@
-//! To be written.
+//! Poses to virtual fish: a goldfish of our own geometry, moved as the measured animal moved, and
+//! the film of it whose truth is known (ALGORITHMS.md 4, virtual fish; N 7).
+
+pub mod error;
+pub mod film;
+pub mod mesh;
+pub mod motion;
+pub mod params;
+pub mod render;
+pub mod sample;
+pub mod spine;
+pub mod swimmer;
+
+mod body;
+mod fins;
+mod light;
+mod paint;
+mod scenery;
+
+pub use error::Error;
+pub use film::Film;
+pub use motion::{Motion, Posture};
+pub use params::{Palette, Params};
+pub use render::Renderer;

@@ -1,0 +1,151 @@
+//! Trunk and eyes of the virtual fish: elliptical cross-sections along the spine, with the profile
+//! of a common goldfish: a blunt nose, the deepest place behind the head, a slender tail root.
+
+use std::f64::consts::{PI, TAU};
+
+use super::mesh::{Layer, Sketch, SketchPoint};
+use super::paint::Coat;
+
+/// Where the trunk ends and the tail fin begins, from the nose (0) to the tail tip (1).
+pub(super) const TRUNK_END_S: f64 = 0.76;
+/// Half of the greatest depth of the trunk, lengths.
+const HALF_DEPTH_BL: f64 = 0.152;
+
+const RINGS: usize = 88;
+const SPOKES: usize = 41;
+
+/// Knots of the profile over u = s / TRUNK_END_S: (u, above the spine, below it, half width), in
+/// half depths.
+const PROFILE: [[f64; 4]; 12] = [
+    [0.00, 0.00, 0.00, 0.00],
+    [0.012, 0.10, 0.13, 0.12],
+    [0.035, 0.22, 0.24, 0.23],
+    [0.09, 0.41, 0.38, 0.37],
+    [0.17, 0.64, 0.58, 0.50],
+    [0.28, 0.87, 0.83, 0.60],
+    [0.42, 1.00, 1.00, 0.63],
+    [0.56, 0.93, 0.97, 0.54],
+    [0.70, 0.72, 0.74, 0.38],
+    [0.82, 0.50, 0.47, 0.23],
+    [0.92, 0.38, 0.34, 0.14],
+    [1.00, 0.37, 0.34, 0.08],
+];
+
+/// How far the trunk reaches above the spine, below it and to each side at `s`, lengths.
+pub(super) fn profile_bl(s: f64) -> [f64; 3] {
+    let u = (s / TRUNK_END_S).clamp(0.0, 1.0);
+    let k = PROFILE
+        .partition_point(|knot| knot[0] <= u)
+        .clamp(1, PROFILE.len() - 1);
+    std::array::from_fn(|column| HALF_DEPTH_BL * hermite(k - 1, column + 1, u))
+}
+
+/// Where the middle of the trunk lies at `s`, lengths below the spine: the nose points a little down.
+fn sag_bl(s: f64) -> f64 {
+    let ahead = (0.2 - s).max(0.0);
+    0.55 * ahead * ahead
+}
+
+/// Adds the trunk.
+pub(super) fn add_trunk(sketch: &mut Sketch, coat: &Coat) {
+    sketch.add_grid(Layer::Body, RINGS + 1, SPOKES, |i, j| {
+        let s = TRUNK_END_S * ring_u(i);
+        let angle = TAU * j as f64 / (SPOKES - 1) as f64;
+        // The seam closes exactly: its last point is its first.
+        let (sin, cos) = match j {
+            j if j == SPOKES - 1 => (0.0, 1.0),
+            _ => (libm::sin(angle), libm::cos(angle)),
+        };
+        let [above, below, side] = profile_bl(s);
+        let (down, left) = (-sin * if sin > 0.0 { above } else { below }, cos * side);
+        // The last ring closes the tail root behind the fin's base.
+        let close = if i == RINGS { 0.0 } else { 1.0 };
+        SketchPoint {
+            at: [s, sag_bl(s) + close * down, close * left],
+            color: coat.skin(s, sin),
+            shine: 0.55,
+            grain: [(s * 44.0) as f32, (angle / TAU * 40.0) as f32],
+            grain_depth: 0.16 * (((s - 0.19) / 0.05).clamp(0.0, 1.0) as f32),
+        }
+    });
+}
+
+/// Adds an eye on either side.
+pub(super) fn add_eyes(sketch: &mut Sketch, coat: &Coat) {
+    const AT: [f64; 2] = [0.098, -0.016];
+    const RADIUS: f64 = 0.0235;
+    let [above, _, side] = profile_bl(AT[0]);
+    let height_share = (sag_bl(AT[0]) - AT[1]) / above;
+    let skin = side * (1.0 - height_share * height_share).sqrt();
+    for sign in [1.0, -1.0] {
+        sketch.add_grid(Layer::Body, 10, 21, |i, j| {
+            let polar = 0.5 * PI * i as f64 / 9.0;
+            let angle = if j == 20 { 0.0 } else { TAU * j as f64 / 20.0 };
+            let (sin, cos) = (libm::sin(polar), libm::cos(polar));
+            let rise = RADIUS * (0.62 * cos - 0.20);
+            let up = sin * libm::sin(angle);
+            let lean = -0.35 * RADIUS * up;
+            SketchPoint {
+                at: [
+                    AT[0] + RADIUS * sin * libm::cos(angle) * sign,
+                    AT[1] - RADIUS * up,
+                    sign * (skin + rise + lean),
+                ],
+                color: coat.eye(cos, up),
+                shine: 1.0,
+                grain: [0.0; 2],
+                grain_depth: 0.0,
+            }
+        });
+    }
+}
+
+/// Rings lie closer together toward the nose.
+fn ring_u(i: usize) -> f64 {
+    let t = (i.min(RINGS - 1)) as f64 / (RINGS - 1) as f64;
+    t * (0.35 + 0.65 * t)
+}
+
+/// Cubic between knots k and k + 1 of one column, with the slopes of their neighbors.
+fn hermite(k: usize, column: usize, u: f64) -> f64 {
+    let knot = |i: usize| (PROFILE[i][0], PROFILE[i][column]);
+    let slope = |i: usize| {
+        let ((u0, v0), (u1, v1)) = (
+            knot(i.saturating_sub(1)),
+            knot((i + 1).min(PROFILE.len() - 1)),
+        );
+        (v1 - v0) / (u1 - u0)
+    };
+    let ((u0, v0), (u1, v1)) = (knot(k), knot(k + 1));
+    let (h, t) = (u1 - u0, (u - u0) / (u1 - u0));
+    let (t2, t3) = (t * t, t * t * t);
+    let value = (2.0 * t3 - 3.0 * t2 + 1.0) * v0
+        + (t3 - 2.0 * t2 + t) * h * slope(k)
+        + (3.0 * t2 - 2.0 * t3) * v1
+        + (t3 - t2) * h * slope(k + 1);
+    value.max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_profile_passes_through_its_knots_and_never_dents() {
+        for knot in PROFILE {
+            let got = profile_bl(knot[0] * TRUNK_END_S);
+            for (g, want) in got.iter().zip(&knot[1..]) {
+                assert!((g - HALF_DEPTH_BL * want).abs() < 1e-12);
+            }
+        }
+        let above = |k: i32| profile_bl(f64::from(k) * 0.001)[0];
+        assert!(
+            (1..=319).all(|k| above(k) >= above(k - 1)),
+            "rises to the nape"
+        );
+        assert!(
+            (321..=740).all(|k| above(k) <= above(k - 1) + 1e-9),
+            "falls to the tail"
+        );
+    }
+}

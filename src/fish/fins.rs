@@ -1,0 +1,154 @@
+//! Fins of the virtual fish: sheets of rays from a base on the trunk to an edge. Tail forked, one
+//! dorsal and one anal fin, pairs of pelvic and pectoral fins.
+
+use super::body::{TRUNK_END_S, profile_bl};
+use super::mesh::{Layer, Sketch, SketchPoint};
+use super::paint::Coat;
+
+/// Adds every fin.
+pub(super) fn add_fins(sketch: &mut Sketch, coat: &Coat) {
+    add_fin(
+        sketch,
+        coat,
+        &FinShape {
+            across: 33,
+            out: 13,
+            rays: 20.0,
+        },
+        tail,
+    );
+    add_fin(
+        sketch,
+        coat,
+        &FinShape {
+            across: 25,
+            out: 9,
+            rays: 17.0,
+        },
+        dorsal,
+    );
+    add_fin(
+        sketch,
+        coat,
+        &FinShape {
+            across: 13,
+            out: 9,
+            rays: 8.0,
+        },
+        anal,
+    );
+    for sign in [1.0, -1.0] {
+        let shape = FinShape {
+            across: 11,
+            out: 9,
+            rays: 8.0,
+        };
+        add_fin(sketch, coat, &shape, |v, w| mirrored(pelvic(v, w), sign));
+        add_fin(sketch, coat, &shape, |v, w| mirrored(pectoral(v, w), sign));
+    }
+}
+
+struct FinShape {
+    across: usize,
+    out: usize,
+    rays: f64,
+}
+
+/// `point(v, w)`: v in 0..=1 from the first ray to the last, w in 0..=1 from base to edge.
+fn add_fin(
+    sketch: &mut Sketch,
+    coat: &Coat,
+    shape: &FinShape,
+    point: impl Fn(f64, f64) -> [f64; 3],
+) {
+    sketch.add_grid(Layer::Fins, shape.across, shape.out, |i, j| {
+        let v = i as f64 / (shape.across - 1) as f64;
+        // Rows lie closer toward the edge, where the fin turns translucent.
+        let t = j as f64 / (shape.out - 1) as f64;
+        let w = t * (1.35 - 0.35 * t);
+        SketchPoint {
+            at: point(v, w),
+            color: coat.fin(w),
+            shine: 0.25,
+            grain: [(v * shape.rays) as f32, w as f32],
+            grain_depth: -0.20,
+        }
+    });
+}
+
+/// Two rounded lobes with a notch between; v from the upper lobe to the lower.
+fn tail(v: f64, w: f64) -> [f64; 3] {
+    let side = 2.0 * v - 1.0;
+    let a = side.abs();
+    let [above, below, _] = profile_bl(TRUNK_END_S);
+    let base = [
+        TRUNK_END_S - 0.022,
+        side * if side < 0.0 { above } else { below } * 0.92,
+    ];
+    // The edge runs from the notch out to the lobe, rounds its tip and comes a little forward again.
+    let reach = 0.845 + 0.155 * smooth(a / 0.86) - 0.035 * smooth((a - 0.86) / 0.14);
+    let spread = 0.185 * libm::pow(a, 0.85) * side.signum();
+    // Rays leave the base along the body and fan out.
+    let fan = w * (0.72 + 0.28 * w);
+    [
+        base[0] + (reach - base[0]) * w,
+        base[1] + (spread - base[1]) * fan,
+        0.004 * libm::sin(9.0 * side) * w,
+    ]
+}
+
+/// Tall in front, falling off behind, swept back.
+fn dorsal(v: f64, w: f64) -> [f64; 3] {
+    let s = 0.275 + 0.32 * v;
+    let height = 0.128 * smooth(v / 0.16 + 0.22) * (1.0 - 0.52 * v);
+    let [above, ..] = profile_bl(s);
+    [
+        s + w * (0.062 + 0.035 * v),
+        -0.93 * above - height * w,
+        0.004 * libm::sin(8.0 * v) * w,
+    ]
+}
+
+/// Short, under the tail root.
+fn anal(v: f64, w: f64) -> [f64; 3] {
+    let s = 0.575 + 0.075 * v;
+    let height = 0.082 * smooth(v / 0.3 + 0.35) * (1.0 - 0.5 * v);
+    let [_, below, _] = profile_bl(s);
+    [s + w * (0.065 + 0.02 * v), 0.9 * below + height * w, 0.0]
+}
+
+/// The left one of the pair under the belly.
+fn pelvic(v: f64, w: f64) -> [f64; 3] {
+    let s = 0.365 + 0.035 * v;
+    let [_, below, side] = profile_bl(s);
+    let reach = 1.0 - 0.45 * v;
+    [
+        s + 0.098 * w * reach + 0.02 * w * v,
+        0.86 * below + 0.075 * w * reach,
+        0.40 * side + 0.035 * w * reach,
+    ]
+}
+
+/// The left one of the pair behind the gills.
+fn pectoral(v: f64, w: f64) -> [f64; 3] {
+    let s = 0.215 + 0.008 * v;
+    let [_, below, side] = profile_bl(s);
+    let start = (0.42 + 0.28 * v) * below;
+    let share = start / below;
+    // Rays of the middle are the longest.
+    let reach = 1.0 - 0.35 * (2.0 * v - 0.7) * (2.0 * v - 0.7);
+    [
+        s + 0.098 * w * reach,
+        start + w * reach * (0.012 + 0.052 * v),
+        0.94 * side * (1.0 - share * share).sqrt() + 0.052 * w * reach,
+    ]
+}
+
+fn mirrored([s, down, left]: [f64; 3], sign: f64) -> [f64; 3] {
+    [s, down, sign * left]
+}
+
+fn smooth(x: f64) -> f64 {
+    let t = x.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

@@ -1,0 +1,134 @@
+//! How the virtual fish is lit: one key light from above and in front, soft light from everywhere,
+//! more from above; a wet glint; scales and fin rays as a fine pattern. Encoded sRGB throughout, as
+//! the pictures that it is laid over.
+
+/// What a sample of the surface looks like before it is lit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surface {
+    /// Camera frame; any length.
+    pub(super) normal: [f32; 3],
+    /// Straight-alpha RGBA, 0..=1.
+    pub(super) color: [f32; 4],
+    pub(super) shine: f32,
+    pub(super) grain: [f32; 2],
+    pub(super) grain_depth: f32,
+}
+
+/// Toward the key light, camera frame: above, a little left, in front. Unit length.
+const KEY: [f32; 3] = [-0.34, -0.80, -0.495];
+/// Halfway between the key light and the camera. Unit length.
+const HALF: [f32; 3] = [-0.197, -0.463, -0.864];
+
+impl Surface {
+    /// The surface between three corners.
+    pub(super) fn between(corners: [&Surface; 3], weights: [f32; 3]) -> Surface {
+        let mix = |of: fn(&Surface) -> f32| -> f32 {
+            weights[0] * of(corners[0]) + weights[1] * of(corners[1]) + weights[2] * of(corners[2])
+        };
+        Surface {
+            normal: [
+                mix(|s| s.normal[0]),
+                mix(|s| s.normal[1]),
+                mix(|s| s.normal[2]),
+            ],
+            color: [
+                mix(|s| s.color[0]),
+                mix(|s| s.color[1]),
+                mix(|s| s.color[2]),
+                mix(|s| s.color[3]),
+            ],
+            shine: mix(|s| s.shine),
+            grain: [mix(|s| s.grain[0]), mix(|s| s.grain[1])],
+            grain_depth: mix(|s| s.grain_depth),
+        }
+    }
+}
+
+/// The color of a sample, 0..=1 a channel.
+pub(super) fn shade(surface: &Surface) -> [f32; 3] {
+    let mut n = surface.normal;
+    let length = dot(n, n).sqrt().max(1e-12);
+    // A fin is seen from both sides: its normal is turned toward the camera.
+    let turn = if n[2] > 0.0 && surface.grain_depth < 0.0 {
+        -1.0
+    } else {
+        1.0
+    };
+    n = n.map(|c| turn * c / length);
+    let wrapped = ((dot(n, KEY) + 0.35) / 1.35).max(0.0);
+    let sky = 0.5 - 0.5 * n[1];
+    let light = match surface.grain_depth < 0.0 {
+        // Light shines through a fin from either side.
+        true => 0.62 + 0.34 * wrapped.max(0.55),
+        false => 0.46 + 0.20 * sky + 0.46 * wrapped,
+    };
+    let grain = 1.0 + grain(surface);
+    let glint = surface.shine * (0.50 * power32(dot(n, HALF)) + 0.10 * power4(dot(n, HALF)));
+    // Toward its outline the wet skin mirrors the water around it.
+    let facing = (-n[2]).clamp(0.0, 1.0);
+    let rim = surface.shine * 0.22 * power4(1.0 - facing);
+    let water = [0.55, 0.78, 0.84];
+    std::array::from_fn(|c| {
+        let lit = surface.color[c] * light * grain;
+        (lit + glint * (0.55 + 0.45 * surface.color[c]) + rim * (water[c] - lit)).clamp(0.0, 1.0)
+    })
+}
+
+/// Scales: each a little brighter in its middle, rows offset by half. Fin rays: darker lines.
+fn grain(surface: &Surface) -> f32 {
+    let [u, v] = surface.grain;
+    if surface.grain_depth > 0.0 {
+        let row = u.floor();
+        let offset = if row.rem_euclid(2.0) < 0.5 { 0.0 } else { 0.5 };
+        let (x, y) = (u - row - 0.35, (v + offset).fract() - 0.5);
+        let rim = (1.7 * (x * x + y * y)).min(1.0);
+        return surface.grain_depth * (0.45 - rim);
+    }
+    let ray = (2.0 * (u - u.floor()) - 1.0).abs();
+    surface.grain_depth * (ray * ray - 0.33)
+}
+
+fn power4(x: f32) -> f32 {
+    let x2 = x.max(0.0) * x.max(0.0);
+    x2 * x2
+}
+
+fn power32(x: f32) -> f32 {
+    let x4 = power4(x);
+    let x8 = x4 * x4;
+    x8 * x8 * x8 * x8
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_two_directions_of_light_have_unit_length() {
+        for direction in [KEY, HALF] {
+            assert!(
+                (dot(direction, direction) - 1.0).abs() < 2e-2,
+                "{direction:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_faces_up_is_brighter_than_what_faces_down() {
+        let facing = |normal| {
+            shade(&Surface {
+                normal,
+                color: [0.5, 0.5, 0.5, 1.0],
+                shine: 0.0,
+                grain: [0.0; 2],
+                grain_depth: 0.0,
+            })[0]
+        };
+        assert!(facing([0.0, -1.0, 0.0]) > facing([0.0, 0.0, -1.0]));
+        assert!(facing([0.0, 0.0, -1.0]) > facing([0.0, 1.0, 0.0]) + 0.1);
+    }
+}

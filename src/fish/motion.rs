@@ -1,0 +1,141 @@
+//! The motion of a virtual fish: where it is, how it lies and how it bends, frame by frame. What the
+//! renderer draws and what a GLB file holds.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::spine::N_JOINTS;
+use crate::geometry::Camera;
+use crate::library::Animal;
+
+/// A virtual fish over time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Motion {
+    /// Frames a second, > 0.
+    pub fps: f64,
+    /// Width and height of the footage, pixels.
+    pub image_size_px: [u32; 2],
+    /// The camera that films it: the footage's, or an assumed one.
+    pub camera: Camera,
+    /// The size of the fish.
+    pub size: Animal,
+    /// One entry a frame, in order.
+    pub frames: Vec<Posture>,
+}
+
+/// The fish in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Posture {
+    /// Where the middle of its silhouette is, camera frame, metres.
+    pub position_m: DVec3,
+    /// From the fish's own frame (x forward, y down, z left) to the camera frame, unit length.
+    pub rotation: DQuat,
+    /// How each joint of the spine is turned, radians (see `spine`).
+    pub joint_angles_rad: [f64; N_JOINTS],
+    /// False where nothing is known of the animal.
+    pub visible: bool,
+}
+
+impl Posture {
+    /// A straight fish at a place.
+    pub fn at(position_m: DVec3, rotation: DQuat) -> Posture {
+        Posture {
+            position_m,
+            rotation,
+            joint_angles_rad: [0.0; N_JOINTS],
+            visible: true,
+        }
+    }
+
+    /// The direction in which it points, camera frame, unit length.
+    pub fn forward(&self) -> DVec3 {
+        self.rotation * DVec3::X
+    }
+}
+
+/// The upright rotation of a fish pointing along yaw and pitch (DESIGN.md), leaning by `roll_rad`
+/// about its own axis: positive brings the back over to its right.
+pub fn rotation_of(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> DQuat {
+    let (sy, cy) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
+    let (sp, cp) = (libm::sin(pitch_rad), libm::cos(pitch_rad));
+    let forward = DVec3::new(cy * cp, sp, sy * cp);
+    let left = DVec3::new(-sy, 0.0, cy);
+    let upright = DQuat::from_mat3(&DMat3::from_cols(forward, left.cross(forward), left));
+    let half = 0.5 * roll_rad;
+    upright * DQuat::from_xyzw(libm::sin(half), 0.0, 0.0, libm::cos(half))
+}
+
+/// The lean of a fish that turns at `turn_rad_per_s` (positive: to its left) while swimming at
+/// `speed_m_per_s`: into the turn as a banked flier would, a few times more as fish do, at most
+/// `limit_rad`.
+pub fn bank_rad(turn_rad_per_s: f64, speed_m_per_s: f64, limit_rad: f64) -> f64 {
+    const GRAVITY_M_PER_S2: f64 = 9.81;
+    const EXAGGERATION: f64 = 6.0;
+    let lean = EXAGGERATION * libm::atan(turn_rad_per_s * speed_m_per_s / GRAVITY_M_PER_S2);
+    -lean.clamp(-limit_rad, limit_rad)
+}
+
+/// The quaternion on the same side as `previous`: both signs mean the same rotation, but only one
+/// can be reached by going straight.
+pub fn same_side(previous: DQuat, rotation: DQuat) -> DQuat {
+    if previous.dot(rotation) < 0.0 {
+        -rotation
+    } else {
+        rotation
+    }
+}
+
+/// The rotation `share` of the way from `a` to `b`, at constant rate, the short way round.
+pub fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
+    let b = same_side(a, b);
+    let angle = libm::acos(a.dot(b).clamp(-1.0, 1.0));
+    if angle < 1e-6 {
+        return (a * (1.0 - share) + b * share).normalize();
+    }
+    let weight = |part: f64| libm::sin(part * angle) / libm::sin(angle);
+    (a * weight(1.0 - share) + b * weight(share)).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn yaw_turns_from_right_to_away_and_pitch_points_the_nose_down() {
+        let close = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-12, "{a} {b}");
+        close(rotation_of(0.0, 0.0, 0.0) * DVec3::X, DVec3::X);
+        close(
+            rotation_of(std::f64::consts::FRAC_PI_2, 0.0, 0.0) * DVec3::X,
+            DVec3::Z,
+        );
+        assert!((rotation_of(0.3, 0.4, 0.0) * DVec3::X).y > 0.3);
+    }
+
+    #[test]
+    fn the_belly_stays_below_whichever_way_it_swims() {
+        for k in 0..24 {
+            let yaw = f64::from(k) * 0.27 - 3.1;
+            assert!((rotation_of(yaw, 0.5, 0.15) * DVec3::Y).y > 0.8);
+        }
+    }
+
+    #[test]
+    fn a_fish_leans_into_its_turn() {
+        let lean = bank_rad(2.0, 0.2, 0.3);
+        let back = rotation_of(0.0, 0.0, lean) * -DVec3::Y;
+        assert!(
+            back.z > 0.05,
+            "turning left, toward +z, the back leans to +z: {back}"
+        );
+        assert_eq!(bank_rad(100.0, 1.0, 0.2), -0.2);
+    }
+
+    #[test]
+    fn slerp_goes_the_short_way_at_constant_rate() {
+        let (a, b) = (rotation_of(0.0, 0.0, 0.0), -rotation_of(1.0, 0.0, 0.0));
+        for k in 0..=4 {
+            let share = f64::from(k) / 4.0;
+            let forward = slerp(a, b, share) * DVec3::X;
+            assert!((libm::atan2(forward.z, forward.x) - share).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,299 @@
+//! Draws one posture of the virtual fish: skins the mesh, projects it by the camera, shades every
+//! sample by its own normal, and averages 3 x 3 samples a pixel for soft edges (ALGORITHMS.md 4,
+//! virtual fish). Body first with a depth buffer, then the translucent fins from far to near.
+
+use glam::DVec3;
+
+use super::light::{Surface, shade};
+use super::mesh::{Mesh, Vertex};
+use super::motion::Posture;
+use super::params::Palette;
+use super::spine::{joint_at_rest_m, joint_frames};
+use crate::geometry::{Camera, Rect};
+use crate::library::Animal;
+use crate::raster::{RgbImage, RgbaImage};
+
+/// Samples along each side of a pixel.
+const SAMPLES: usize = 3;
+/// Nothing nearer to the camera than this is drawn, metres.
+const NEAREST_M: f64 = 0.02;
+
+/// A fish ready to be drawn.
+pub struct Renderer {
+    mesh: Mesh,
+}
+
+/// A drawn fish: only the box that it covers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawing {
+    /// Where the box lies in the image; empty when the fish is out of sight.
+    pub rect: Rect,
+    /// Premultiplied RGBA of the box, 0..=1, row by row.
+    pub pixels: Vec<[f32; 4]>,
+}
+
+impl Renderer {
+    /// A renderer of fish of one size and coat.
+    pub fn new(size: Animal, palette: Palette) -> Renderer {
+        Renderer {
+            mesh: Mesh::goldfish(size, palette),
+        }
+    }
+
+    /// The mesh that is drawn.
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
+    }
+
+    /// Draws one posture as the camera sees it; invisible ones give an empty box.
+    pub fn draw(&self, camera: &Camera, image_size_px: [u32; 2], posture: &Posture) -> Drawing {
+        let points = match posture.visible {
+            true => self.project(camera, posture),
+            false => Vec::new(),
+        };
+        let rect = bounds(&points, image_size_px);
+        let mut samples = Samples::new(rect);
+        if !rect.is_empty() {
+            for triangle in &self.mesh.body {
+                samples.fill(&points, triangle, Samples::cover);
+            }
+            for triangle in far_to_near(&self.mesh.fins, &points) {
+                samples.fill(&points, &triangle, Samples::glaze);
+            }
+        }
+        samples.average()
+    }
+
+    /// Every vertex where the posture puts it: in the image, in sample units, and in space.
+    fn project(&self, camera: &Camera, posture: &Posture) -> Vec<Point> {
+        let length_m = self.mesh.size.length_m;
+        let joints = joint_frames(length_m, &posture.joint_angles_rad);
+        let place = |vertex: &Vertex| {
+            let (at, normal) = (DVec3::from(vertex.position_m), DVec3::from(vertex.normal));
+            let moved = |k: usize| {
+                let j = usize::from(vertex.joints[k]);
+                let (pivot, turn) = joints[j];
+                (
+                    pivot + turn * (at - joint_at_rest_m(length_m, j)),
+                    turn * normal,
+                )
+            };
+            let ((at_a, normal_a), (at_b, normal_b)) = (moved(0), moved(1));
+            let share = f64::from(vertex.share);
+            let at = posture.position_m + posture.rotation * at_a.lerp(at_b, share);
+            let normal = posture.rotation * normal_a.lerp(normal_b, share).normalize();
+            let [x, y] = camera.image_from_camera([at.x, at.y, at.z.max(NEAREST_M)]);
+            Point {
+                x: (x * SAMPLES as f64) as f32,
+                y: (y * SAMPLES as f64) as f32,
+                z: at.z as f32,
+                surface: Surface {
+                    normal: [normal.x as f32, normal.y as f32, normal.z as f32],
+                    color: vertex.color,
+                    shine: vertex.shine,
+                    grain: vertex.grain,
+                    grain_depth: vertex.grain_depth,
+                },
+            }
+        };
+        self.mesh.vertices.iter().map(place).collect()
+    }
+}
+
+impl Drawing {
+    /// Opacity of pixel (x, y) of the box, 0..=1. Panics outside the box.
+    pub fn alpha(&self, x: u32, y: u32) -> f32 {
+        self.pixels[(y * self.rect.w + x) as usize][3]
+    }
+
+    /// Lays the fish over an image of the size that it was drawn for. Panics on a smaller one.
+    pub fn over(&self, image: &mut RgbImage) {
+        for y in 0..self.rect.h {
+            for x in 0..self.rect.w {
+                let [r, g, b, a] = self.pixels[(y * self.rect.w + x) as usize];
+                let (px, py) = (self.rect.x + x, self.rect.y + y);
+                let under = image.pixel(px, py);
+                let mut rgb = [r, g, b];
+                for (over, below) in rgb.iter_mut().zip(under) {
+                    *over = *over * 255.0 + (1.0 - a) * f32::from(below);
+                }
+                image.set_pixel(px, py, rgb.map(byte));
+            }
+        }
+    }
+
+    /// The box as a straight-alpha image.
+    pub fn to_rgba(&self) -> RgbaImage {
+        let straight = |&[r, g, b, a]: &[f32; 4]| {
+            let scale = if a > 0.0 { 255.0 / a } else { 0.0 };
+            [
+                byte(r * scale),
+                byte(g * scale),
+                byte(b * scale),
+                byte(a * 255.0),
+            ]
+        };
+        RgbaImage {
+            width: self.rect.w,
+            height: self.rect.h,
+            pixels: self.pixels.iter().flat_map(straight).collect(),
+        }
+    }
+}
+
+/// One vertex in the image.
+struct Point {
+    x: f32,
+    y: f32,
+    z: f32,
+    surface: Surface,
+}
+
+/// The box around the points, clipped to the image; empty when some are behind the camera.
+fn bounds(points: &[Point], [width, height]: [u32; 2]) -> Rect {
+    let mut lo = [f32::MAX; 2];
+    let mut hi = [f32::MIN; 2];
+    for point in points {
+        if f64::from(point.z) <= NEAREST_M {
+            return Rect::default();
+        }
+        lo = [lo[0].min(point.x), lo[1].min(point.y)];
+        hi = [hi[0].max(point.x), hi[1].max(point.y)];
+    }
+    if points.is_empty() {
+        return Rect::default();
+    }
+    let pixel = |v: f32| (v / SAMPLES as f32).floor() as i64;
+    Rect::clipped(
+        pixel(lo[0]) - 1,
+        pixel(lo[1]) - 1,
+        pixel(hi[0]) + 2,
+        pixel(hi[1]) + 2,
+        width,
+        height,
+    )
+}
+
+/// Triangles by falling depth, ties in their own order.
+fn far_to_near(triangles: &[[u32; 3]], points: &[Point]) -> Vec<[u32; 3]> {
+    let depth = |t: &[u32; 3]| t.iter().map(|&v| points[v as usize].z).sum::<f32>();
+    let mut sorted: Vec<(f32, [u32; 3])> = triangles.iter().map(|t| (depth(t), *t)).collect();
+    sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
+    sorted.into_iter().map(|(_, t)| t).collect()
+}
+
+/// The samples of a box: 3 x 3 to the pixel.
+struct Samples {
+    rect: Rect,
+    width: usize,
+    height: usize,
+    color: Vec<[f32; 4]>,
+    depth: Vec<f32>,
+}
+
+impl Samples {
+    fn new(rect: Rect) -> Samples {
+        let (width, height) = (rect.w as usize * SAMPLES, rect.h as usize * SAMPLES);
+        Samples {
+            rect,
+            width,
+            height,
+            color: vec![[0.0; 4]; width * height],
+            depth: vec![f32::MAX; width * height],
+        }
+    }
+
+    /// Visits every sample whose middle lies in the triangle.
+    fn fill(
+        &mut self,
+        points: &[Point],
+        triangle: &[u32; 3],
+        put: fn(&mut Samples, usize, f32, Surface),
+    ) {
+        let [a, b, c] = triangle.map(|v| &points[v as usize]);
+        let origin = [
+            (self.rect.x as usize * SAMPLES) as f32 + 0.0,
+            (self.rect.y as usize * SAMPLES) as f32,
+        ];
+        let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+        if area == 0.0 {
+            return;
+        }
+        let span = |lo: f32, hi: f32, origin: f32, limit: usize| {
+            let first = (lo - origin - 0.5).ceil().max(0.0) as usize;
+            let end = ((hi - origin - 0.5).floor() + 1.0).clamp(0.0, limit as f32) as usize;
+            first..end
+        };
+        let (x_lo, x_hi) = (a.x.min(b.x).min(c.x), a.x.max(b.x).max(c.x));
+        let (y_lo, y_hi) = (a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y));
+        for row in span(y_lo, y_hi, origin[1], self.height) {
+            let y = origin[1] + row as f32 + 0.5;
+            for column in span(x_lo, x_hi, origin[0], self.width) {
+                let x = origin[0] + column as f32 + 0.5;
+                let u = ((b.x - x) * (c.y - y) - (b.y - y) * (c.x - x)) / area;
+                let v = ((c.x - x) * (a.y - y) - (c.y - y) * (a.x - x)) / area;
+                let w = 1.0 - u - v;
+                if u < 0.0 || v < 0.0 || w < 0.0 {
+                    continue;
+                }
+                let at = row * self.width + column;
+                let z = u * a.z + v * b.z + w * c.z;
+                if z < self.depth[at] {
+                    put(
+                        self,
+                        at,
+                        z,
+                        Surface::between([&a.surface, &b.surface, &c.surface], [u, v, w]),
+                    );
+                }
+            }
+        }
+    }
+
+    /// An opaque sample hides what is behind it.
+    fn cover(&mut self, at: usize, z: f32, surface: Surface) {
+        let [r, g, b] = shade(&surface);
+        self.depth[at] = z;
+        self.color[at] = [r, g, b, 1.0];
+    }
+
+    /// A translucent one is laid over what is there.
+    fn glaze(&mut self, at: usize, _z: f32, surface: Surface) {
+        let alpha = surface.color[3];
+        let [r, g, b] = shade(&surface);
+        let under = self.color[at];
+        let over = [r * alpha, g * alpha, b * alpha, alpha];
+        self.color[at] = std::array::from_fn(|k| over[k] + (1.0 - alpha) * under[k]);
+    }
+
+    /// The mean over each pixel's samples.
+    fn average(self) -> Drawing {
+        let mut pixels = vec![[0.0f32; 4]; self.rect.area() as usize];
+        for (row, samples) in self.color.chunks_exact(self.width.max(1)).enumerate() {
+            let start = row / SAMPLES * self.rect.w as usize;
+            for (pixel, group) in pixels[start..]
+                .iter_mut()
+                .zip(samples.chunks_exact(SAMPLES))
+            {
+                for (k, sum) in pixel.iter_mut().enumerate() {
+                    *sum += group.iter().map(|sample| sample[k]).sum::<f32>();
+                }
+            }
+        }
+        let share = 1.0 / (SAMPLES * SAMPLES) as f32;
+        for pixel in &mut pixels {
+            *pixel = pixel.map(|sum| sum * share);
+        }
+        Drawing {
+            rect: self.rect,
+            pixels,
+        }
+    }
+}
+
+fn byte(value: f32) -> u8 {
+    (value + 0.5).clamp(0.0, 255.0) as u8
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,108 @@
+//! What the renderer promises: the right place, the right size, the right way up, soft edges.
+
+use glam::DVec3;
+
+use super::*;
+use crate::fish::motion::rotation_of;
+
+const SIZE: Animal = Animal {
+    length_m: 0.1,
+    height_m: 0.048,
+};
+const IMAGE_PX: [u32; 2] = [320, 240];
+
+fn camera() -> Camera {
+    Camera {
+        z_min_m: 0.7,
+        pane_px_per_m: 1000.0,
+        center_px: [160.0, 120.0],
+        medium_index: 1.0,
+    }
+}
+
+fn draw(yaw_rad: f64, pitch_rad: f64) -> Drawing {
+    let posture = Posture::at(
+        DVec3::new(0.0, 0.0, 0.7),
+        rotation_of(yaw_rad, pitch_rad, 0.0),
+    );
+    Renderer::new(SIZE, Palette::Goldfish).draw(&camera(), IMAGE_PX, &posture)
+}
+
+/// (left, top, right, bottom) of what is more opaque than not, and its centroid.
+fn silhouette(drawing: &Drawing) -> ([f64; 4], [f64; 2]) {
+    let mut edges = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
+    let (mut sum, mut n) = ([0.0, 0.0], 0.0);
+    for y in 0..drawing.rect.h {
+        for x in (0..drawing.rect.w).filter(|&x| drawing.alpha(x, y) > 0.5) {
+            let at = [f64::from(drawing.rect.x + x), f64::from(drawing.rect.y + y)];
+            edges = [
+                edges[0].min(at[0]),
+                edges[1].min(at[1]),
+                edges[2].max(at[0] + 1.0),
+                edges[3].max(at[1] + 1.0),
+            ];
+            sum = [sum[0] + at[0] + 0.5, sum[1] + at[1] + 0.5];
+            n += 1.0;
+        }
+    }
+    (edges, [sum[0] / n, sum[1] / n])
+}
+
+#[test]
+fn at_the_pane_it_is_as_long_and_as_tall_in_pixels_as_the_camera_says() {
+    let ([left, top, right, bottom], centroid) = silhouette(&draw(0.0, 0.0));
+    assert!((right - left - 100.0).abs() < 3.5, "{}", right - left);
+    assert!((bottom - top - 48.0).abs() < 2.0, "{}", bottom - top);
+    assert!((centroid[0] - 160.0).abs() < 2.5, "{centroid:?}");
+}
+
+#[test]
+fn it_is_bounded_by_its_box_and_stays_the_same_when_drawn_again() {
+    let drawing = draw(0.7, 0.2);
+    let ([left, top, right, bottom], _) = silhouette(&drawing);
+    let rect = drawing.rect;
+    assert!(f64::from(rect.x) <= left && f64::from(rect.y) <= top);
+    assert!(f64::from(rect.right()) >= right && f64::from(rect.bottom()) >= bottom);
+    assert_eq!(drawing, draw(0.7, 0.2));
+}
+
+#[test]
+fn its_back_is_above_its_belly_whether_it_swims_left_or_right() {
+    for yaw in [0.0, std::f64::consts::PI] {
+        let drawing = draw(yaw, 0.0);
+        let column = drawing.rect.w / 2;
+        let blue = |y: u32| drawing.pixels[(y * drawing.rect.w + column) as usize][2];
+        let rows: Vec<u32> = (0..drawing.rect.h)
+            .filter(|&y| drawing.alpha(column, y) > 0.99)
+            .collect();
+        let (upper, lower) = (rows[rows.len() / 4], rows[rows.len() * 7 / 8]);
+        assert!(blue(upper) + 0.1 < blue(lower), "the pale belly is below");
+    }
+}
+
+#[test]
+fn its_edges_are_soft() {
+    let drawing = draw(0.3, 0.1);
+    let partly = drawing
+        .pixels
+        .iter()
+        .filter(|p| (0.05..0.95).contains(&p[3]))
+        .count();
+    let fully = drawing.pixels.iter().filter(|p| p[3] > 0.999).count();
+    assert!(partly > 100 && fully > 1000, "{partly} {fully}");
+}
+
+#[test]
+fn out_of_sight_or_unseen_it_covers_nothing() {
+    let renderer = Renderer::new(SIZE, Palette::Silver);
+    let upright = rotation_of(0.0, 0.0, 0.0);
+    let behind = Posture::at(DVec3::new(0.0, 0.0, -0.5), upright);
+    let aside = Posture::at(DVec3::new(2.0, 0.0, 0.7), upright);
+    let unseen = Posture {
+        visible: false,
+        ..Posture::at(DVec3::new(0.0, 0.0, 0.7), upright)
+    };
+    for posture in [behind, aside, unseen] {
+        assert!(renderer.draw(&camera(), IMAGE_PX, &posture).rect.is_empty());
+    }
+}

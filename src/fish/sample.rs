@@ -1,0 +1,314 @@
+//! Footage of the virtual fish whose truth is known in every frame: a goldfish wandering in a planted
+//! tank, filmed from the side with a little sensor noise. What a first visit shows, and what the
+//! analysis is tested against (ALGORITHMS.md 4 and 9). Any frame can be made by itself.
+
+use rayon::prelude::*;
+
+use super::error::Error;
+use super::film::Film;
+use super::motion::{Motion, Posture, bank_rad, rotation_of};
+use super::params::{Palette, Params};
+use super::render::Drawing;
+use super::scenery::tank_scene;
+use super::spine::{Swimming, effort_at};
+use super::swimmer::{PANE_Z_M, Stroke, wander};
+use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use crate::geometry::{Camera, Rect};
+use crate::library::{Animal, Pose, Poses, View};
+use crate::random;
+use crate::raster::{Frame, RgbImage};
+
+/// What the sample shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleParams {
+    /// How many frames, at least 1.
+    pub n_frames: usize,
+    /// Decides the path, the scene and the noise.
+    pub seed: u64,
+    /// Frames a second, 1..=240.
+    pub fps: f64,
+    /// Columns, 64..=7680.
+    pub width: u32,
+    /// Rows, 64..=4320.
+    pub height: u32,
+    /// The coat of the fish.
+    pub palette: Palette,
+    /// Standard deviation of the luma noise, of 255, 0..=20.
+    pub noise: f64,
+}
+
+impl Default for SampleParams {
+    fn default() -> SampleParams {
+        SampleParams {
+            n_frames: 1200,
+            seed: 1,
+            fps: 30.0,
+            width: 640,
+            height: 480,
+            palette: Palette::Goldfish,
+            noise: 1.7,
+        }
+    }
+}
+
+/// The sample footage.
+pub struct SampleFilm {
+    params: SampleParams,
+    strokes: Vec<Stroke>,
+    film: Film,
+    noise: Vec<i8>,
+}
+
+/// Width of the scene on the tank's front pane, metres: the tank with a little around it.
+const PANE_WIDTH_M: f64 = 0.64;
+
+impl SampleFilm {
+    /// Prepares the film; refuses sizes and rates out of range.
+    pub fn new(params: SampleParams) -> Result<SampleFilm, Error> {
+        check(&params)?;
+        let size = Params::default().size(None);
+        let strokes = wander(params.seed, params.n_frames, params.fps, size.length_m);
+        let (width, height) = (params.width, params.height);
+        let motion = Motion {
+            fps: params.fps,
+            image_size_px: [width, height],
+            camera: Camera {
+                z_min_m: PANE_Z_M,
+                pane_px_per_m: f64::from(width) / PANE_WIDTH_M,
+                center_px: [f64::from(width) / 2.0, f64::from(height) / 2.0],
+                medium_index: 1.0,
+            },
+            size,
+            frames: strokes.iter().map(|s| posture(s, size)).collect(),
+        };
+        let scene = tank_scene(width, height, params.seed);
+        Ok(SampleFilm {
+            film: Film::new(motion, params.palette, scene),
+            noise: noise_table(params.seed, params.noise, width),
+            strokes,
+            params,
+        })
+    }
+
+    /// The motion that is filmed.
+    pub fn motion(&self) -> &Motion {
+        self.film.motion()
+    }
+
+    /// The scene without the fish, and without noise.
+    pub fn background(&self) -> &RgbImage {
+        self.film.background()
+    }
+
+    /// The size of the silhouette as it is drawn, translucent edges left out.
+    pub fn animal(&self) -> Animal {
+        let mesh = self.film.renderer().mesh();
+        let extent = |axis| {
+            let [lo, hi] = mesh.extent_m(axis);
+            hi - lo
+        };
+        Animal {
+            length_m: extent(0),
+            height_m: extent(1),
+        }
+    }
+
+    /// What an analysis should measure, exactly: the silhouette is where the fish covers more than
+    /// half of a pixel. Axis, extents and midline are left out: they have no truth but a definition.
+    pub fn truth(&self) -> Poses {
+        let frames = (0..self.params.n_frames).into_par_iter();
+        Poses {
+            fps: self.params.fps,
+            image_size_px: [self.params.width, self.params.height],
+            view: View::Side,
+            camera: Some(self.motion().camera),
+            animal: Some(self.animal()),
+            frames: frames.map(|k| self.true_pose(k)).collect(),
+        }
+    }
+
+    /// The truth of one frame. Panics beyond the last.
+    pub fn true_pose(&self, frame_idx: usize) -> Pose {
+        let stroke = &self.strokes[frame_idx];
+        let (position, forward) = (stroke.position_m, stroke.forward());
+        // The direction in which the image of a point moves that moves along `forward`.
+        let toward = forward * position.z - position * forward.z;
+        Pose {
+            time_s: frame_idx as f64 / self.params.fps,
+            confidence: Some(1.0),
+            head_confidence: Some(1.0),
+            depth_sign_confidence: Some(1.0),
+            heading_rad: Some(libm::atan2(toward.y, toward.x)),
+            position_m: Some(position.to_array()),
+            forward: Some(forward.to_array()),
+            yaw_rad: Some(stroke.yaw_rad),
+            pitch_rad: Some(stroke.pitch_rad),
+            gamma_rad: Some(libm::asin(forward.z.abs().min(1.0))),
+            ..silhouette(&self.film.draw(frame_idx), &self.params)
+        }
+    }
+
+    /// One frame, noise included. Panics beyond the last.
+    pub fn render(&self, frame_idx: usize, frame: &mut Frame) {
+        self.film.render(frame_idx, frame);
+        let (width, chroma_width) = (frame.width as usize, frame.chroma_width() as usize);
+        let n_luma = width * frame.height as usize;
+        let (luma, chroma) = frame.planes.split_at_mut(n_luma);
+        for (row, line) in luma.chunks_exact_mut(width).enumerate() {
+            add_noise(line, self.noise_of(frame_idx, row), 1);
+        }
+        for (row, line) in chroma.chunks_exact_mut(chroma_width).enumerate() {
+            add_noise(line, self.noise_of(frame_idx, n_luma + row), 2);
+        }
+    }
+
+    /// The stretch of the noise table that falls on one row of one plane.
+    fn noise_of(&self, frame_idx: usize, row: usize) -> &[i8] {
+        let word = random::bits(self.params.seed, &[NOISE, frame_idx as u64, row as u64]);
+        &self.noise[word as usize % NOISE_STARTS..]
+    }
+}
+
+impl FrameSource for SampleFilm {
+    fn format(&self) -> FootageFormat {
+        FootageFormat {
+            width: self.params.width,
+            height: self.params.height,
+            fps: self.params.fps,
+            n_frames_hint: self.params.n_frames,
+            color: Default::default(),
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(SampleStream {
+            film: self,
+            next: 0,
+            ready: Vec::new(),
+        }))
+    }
+}
+
+/// Frames are made some at a time, on every thread there is.
+struct SampleStream<'a> {
+    film: &'a SampleFilm,
+    next: usize,
+    ready: Vec<Frame>,
+}
+
+/// Frames made at a time.
+const BATCH: usize = 16;
+
+impl FrameStream for SampleStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        let n_frames = self.film.params.n_frames;
+        if self.next == n_frames {
+            return Ok(None);
+        }
+        let at = self.next % BATCH;
+        if at == 0 {
+            let batch = self.next..(self.next + BATCH).min(n_frames);
+            self.ready.resize(BATCH, Frame::default());
+            self.ready
+                .par_iter_mut()
+                .zip(batch)
+                .for_each(|(frame, k)| self.film.render(k, frame));
+        }
+        frame.clone_from(&self.ready[at]);
+        let time_s = self.next as f64 / self.film.params.fps;
+        self.next += 1;
+        Ok(Some(time_s))
+    }
+}
+
+fn check(params: &SampleParams) -> Result<(), Error> {
+    let within = |name: &str, value: f64, lo: f64, hi: f64| match (lo..=hi).contains(&value) {
+        true => Ok(()),
+        false => Err(Error::InvalidParams(format!(
+            "{name} must lie in {lo}..={hi}: {value}"
+        ))),
+    };
+    within("frames", params.n_frames as f64, 1.0, 1e6)?;
+    within("fps", params.fps, 1.0, 240.0)?;
+    within("width", f64::from(params.width), 64.0, 7680.0)?;
+    within("height", f64::from(params.height), 64.0, 4320.0)?;
+    within("noise", params.noise, 0.0, 20.0)
+}
+
+fn posture(stroke: &Stroke, size: Animal) -> Posture {
+    let speed_bl_per_s = stroke.speed_m_per_s / size.length_m;
+    let swimming = Swimming {
+        phase_turns: stroke.phase_turns,
+        effort: effort_at(speed_bl_per_s),
+        turn_rad_per_s: stroke.turn_rad_per_s,
+    };
+    let limit_rad = Params::default().bank_rad;
+    let roll = bank_rad(stroke.turn_rad_per_s, stroke.speed_m_per_s, limit_rad);
+    Posture {
+        joint_angles_rad: swimming.joint_angles_rad(),
+        ..Posture::at(
+            stroke.position_m,
+            rotation_of(stroke.yaw_rad, stroke.pitch_rad, roll),
+        )
+    }
+}
+
+/// Centroid, box and area of what is more covered than not; nothing when out of sight.
+fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
+    let rect = drawing.rect;
+    let (mut n, mut sum) = (0u64, [0u64; 2]);
+    let mut edges = [u32::MAX, u32::MAX, 0, 0];
+    for y in 0..rect.h {
+        for x in (0..rect.w).filter(|&x| drawing.alpha(x, y) > 0.5) {
+            let (px, py) = (rect.x + x, rect.y + y);
+            edges = [
+                edges[0].min(px),
+                edges[1].min(py),
+                edges[2].max(px + 1),
+                edges[3].max(py + 1),
+            ];
+            sum = [sum[0] + u64::from(px), sum[1] + u64::from(py)];
+            n += 1;
+        }
+    }
+    if n == 0 {
+        return Pose::default();
+    }
+    let [x, y, right, bottom] = edges;
+    Pose {
+        cut: x == 0 || y == 0 || right == params.width || bottom == params.height,
+        centroid_px: Some(sum.map(|s| s as f64 / n as f64 + 0.5)),
+        box_px: Some(Rect {
+            x,
+            y,
+            w: right - x,
+            h: bottom - y,
+        }),
+        area_px: Some(n as f64),
+        ..Pose::default()
+    }
+}
+
+/// Keys of the noise among the seed's random numbers.
+const NOISE: u64 = 0x6e6f_6973_65;
+/// Different places at which a row of noise may start.
+const NOISE_STARTS: usize = 1 << 17;
+
+/// Normal numbers, long enough for a row of `width` from any start.
+fn noise_table(seed: u64, sigma: f64, width: u32) -> Vec<i8> {
+    let draw = |k: u64| (sigma * random::normal(seed, &[NOISE, k])).round() as i8;
+    (0..NOISE_STARTS as u64 + u64::from(width))
+        .into_par_iter()
+        .map(draw)
+        .collect()
+}
+
+/// Adds noise; chroma, which averages over a block, takes half of it.
+fn add_noise(line: &mut [u8], noise: &[i8], divisor: i16) {
+    for (value, &n) in line.iter_mut().zip(noise) {
+        *value = (i16::from(*value) + i16::from(n) / divisor).clamp(0, 255) as u8;
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,249 @@
+//! The spine of 8 joints, and how it bends: by the measured midline or by the swimming wave
+//! A(s) sin(2 pi (f t - s / 0.95)), A(s) = a0 + a2 s^2 (ALGORITHMS.md 4, virtual fish).
+//!
+//! The fish's own frame: x forward, y down (toward the belly), z to its left; origin at the middle
+//! of its silhouette. `s` runs from the nose (0) to the tip of the tail (1). A joint angle turns what
+//! lies behind the joint about the y axis; positive swings the tail to the fish's left.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DQuat, DVec3};
+
+use crate::geometry::wrap_rad;
+
+/// Joints of the spine.
+pub const N_JOINTS: usize = 8;
+
+/// Where the joints lie, from nose (0) to tail tip (1). The first carries the head, which is stiff.
+pub const JOINT_S: [f64; N_JOINTS] = [0.27, 0.36, 0.45, 0.54, 0.63, 0.72, 0.81, 0.90];
+
+/// Where the origin of the fish's own frame lies: the middle of the silhouette.
+pub const ORIGIN_S: f64 = 0.46;
+
+/// Wavelength of the swimming wave, lengths.
+const WAVELENGTH_BL: f64 = 0.95;
+/// Amplitude of the wave at the nose, lengths.
+const A0_BL: f64 = 0.012;
+/// Growth of the amplitude with s squared, lengths: the tail tip swings by a0 + a2.
+const A2_BL: f64 = 0.085;
+/// Sideways bend of the tail tip in a turn, lengths per radian a second.
+const TURN_BEND_BL: f64 = 0.055;
+
+/// How the fish swims at one moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Swimming {
+    /// f t: where in the tail beat, turns.
+    pub phase_turns: f64,
+    /// Share of the full amplitude, 0..=1.5: small when gliding.
+    pub effort: f64,
+    /// Rate of turn to the left, radians a second.
+    pub turn_rad_per_s: f64,
+}
+
+impl Swimming {
+    /// Sideways offset of the spine at `s`, lengths, positive to the fish's left.
+    pub fn lateral_bl(&self, s: f64) -> f64 {
+        let amplitude = self.effort * (A0_BL + A2_BL * s * s);
+        let wave = amplitude * libm::sin(TAU * (self.phase_turns - s / WAVELENGTH_BL));
+        let behind = (s - 0.2).max(0.0);
+        wave + TURN_BEND_BL * self.turn_rad_per_s.clamp(-3.0, 3.0) * behind * behind
+    }
+
+    /// The joint angles that lay the spine on this curve, radians.
+    pub fn joint_angles_rad(&self) -> [f64; N_JOINTS] {
+        let slope = |from: f64, to: f64| {
+            libm::atan2(self.lateral_bl(to) - self.lateral_bl(from), to - from)
+        };
+        let mut tangents = [0.0; N_JOINTS];
+        for (j, tangent) in tangents.iter_mut().enumerate() {
+            let from = if j == 0 { 0.0 } else { JOINT_S[j] };
+            *tangent = slope(from, segment_end(j));
+        }
+        differences(tangents)
+    }
+}
+
+/// Tail beats a second at a speed in lengths a second, after Bainbridge (1958): v = (3 f - 4) / 4.
+pub fn tail_beat_hz(speed_bl_per_s: f64) -> f64 {
+    (4.0 / 3.0 * (1.0 + speed_bl_per_s.max(0.0))).min(12.0)
+}
+
+/// How far the tail swings at a speed in lengths a second: a glide keeps half of the amplitude.
+pub fn effort_at(speed_bl_per_s: f64) -> f64 {
+    0.5 + 0.6 * (speed_bl_per_s / 1.5).clamp(0.0, 1.0)
+}
+
+/// The joint angles of a midline seen from above, head first, for a fish heading `heading_rad`
+/// (image axes). `None` when the midline has fewer than two points or no length.
+pub fn joint_angles_of_midline_rad(
+    midline_px: &[[f64; 2]],
+    heading_rad: f64,
+) -> Option<[f64; N_JOINTS]> {
+    let mut along_px = vec![0.0];
+    for pair in midline_px.windows(2) {
+        let step = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+        along_px.push(along_px[along_px.len() - 1] + step);
+    }
+    let total_px = *along_px.last()?;
+    if midline_px.len() < 2 || total_px <= 0.0 || !total_px.is_finite() {
+        return None;
+    }
+    let at = |s: f64| point_at(midline_px, &along_px, s * total_px);
+    let mut tangents = [0.0; N_JOINTS];
+    for (j, tangent) in tangents.iter_mut().enumerate() {
+        let from = at(if j == 0 { 0.0 } else { JOINT_S[j] });
+        let to = at(segment_end(j));
+        let tailward = libm::atan2(to[1] - from[1], to[0] - from[0]);
+        *tangent = wrap_rad(tailward - heading_rad - PI);
+    }
+    Some(differences(tangents).map(wrap_rad))
+}
+
+/// Where each joint is and how it is turned in the fish's own frame, for a fish of `length_m`.
+pub fn joint_frames(length_m: f64, angles_rad: &[f64; N_JOINTS]) -> [(DVec3, DQuat); N_JOINTS] {
+    let mut pivot = joint_at_rest_m(length_m, 0);
+    let mut turned_rad = 0.0;
+    std::array::from_fn(|j| {
+        turned_rad += angles_rad[j];
+        let rotation = about_y(turned_rad);
+        let frame = (pivot, rotation);
+        pivot += rotation * DVec3::new((JOINT_S[j] - segment_end(j)) * length_m, 0.0, 0.0);
+        frame
+    })
+}
+
+/// Where joint `j` lies in the fish's own frame when the body is straight, metres.
+pub fn joint_at_rest_m(length_m: f64, j: usize) -> DVec3 {
+    DVec3::new((ORIGIN_S - JOINT_S[j]) * length_m, 0.0, 0.0)
+}
+
+/// The rotation about the y axis by `angle_rad`.
+pub fn about_y(angle_rad: f64) -> DQuat {
+    let half = 0.5 * angle_rad;
+    DQuat::from_xyzw(0.0, libm::sin(half), 0.0, libm::cos(half))
+}
+
+/// The two joints that move a point at `s`, and the share of the second, 0..=1.
+pub fn joints_at(s: f64) -> (usize, usize, f64) {
+    let middle = |j: usize| 0.5 * (JOINT_S[j] + segment_end(j));
+    let next = (0..N_JOINTS).find(|&j| s < middle(j)).unwrap_or(N_JOINTS);
+    match next {
+        0 => (0, 0, 0.0),
+        N_JOINTS => (N_JOINTS - 1, N_JOINTS - 1, 0.0),
+        j => {
+            let share = (s - middle(j - 1)) / (middle(j) - middle(j - 1));
+            (j - 1, j, share)
+        }
+    }
+}
+
+fn segment_end(j: usize) -> f64 {
+    JOINT_S.get(j + 1).copied().unwrap_or(1.0)
+}
+
+fn differences(tangents: [f64; N_JOINTS]) -> [f64; N_JOINTS] {
+    std::array::from_fn(|j| tangents[j] - if j == 0 { 0.0 } else { tangents[j - 1] })
+}
+
+fn point_at(points: &[[f64; 2]], along: &[f64], target: f64) -> [f64; 2] {
+    let k = along
+        .partition_point(|&a| a < target)
+        .clamp(1, points.len() - 1);
+    let span = along[k] - along[k - 1];
+    let share = if span > 0.0 {
+        ((target - along[k - 1]) / span).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    std::array::from_fn(|c| points[k - 1][c] + share * (points[k][c] - points[k - 1][c]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cruising(phase_turns: f64) -> Swimming {
+        Swimming {
+            phase_turns,
+            effort: 1.0,
+            turn_rad_per_s: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_wave_travels_from_head_to_tail_and_grows_on_its_way() {
+        let phase_of_crest = |s: f64| {
+            (0..1000)
+                .map(|k| f64::from(k) / 1000.0)
+                .max_by(|a, b| {
+                    let at = |p: &f64| cruising(*p).lateral_bl(s);
+                    at(a).total_cmp(&at(b))
+                })
+                .expect("a thousand phases")
+        };
+        let (at_half, at_seven) = (phase_of_crest(0.5), phase_of_crest(0.7));
+        let delay = (at_seven - at_half).rem_euclid(1.0);
+        assert!((delay - 0.2 / WAVELENGTH_BL).abs() < 3e-3, "{delay}");
+        let swing = |s| cruising(phase_of_crest(s)).lateral_bl(s);
+        assert!(swing(0.0) < swing(0.5) && swing(0.5) < swing(1.0));
+        assert!((swing(1.0) - 0.097).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_joints_lie_on_the_wave() {
+        let swimming = cruising(0.3);
+        let frames = joint_frames(1.0, &swimming.joint_angles_rad());
+        let at_root = swimming.lateral_bl(JOINT_S[0]);
+        for (j, (pivot, _)) in frames.iter().enumerate().skip(2) {
+            let want = swimming.lateral_bl(JOINT_S[j]) - at_root;
+            assert!(
+                (pivot.z - want).abs() < 0.02,
+                "joint {j}: {} {want}",
+                pivot.z
+            );
+        }
+    }
+
+    #[test]
+    fn a_left_turn_bends_the_tail_to_the_left() {
+        let turning = Swimming {
+            phase_turns: 0.0,
+            effort: 0.0,
+            turn_rad_per_s: 2.0,
+        };
+        let frames = joint_frames(0.1, &turning.joint_angles_rad());
+        assert!(frames[N_JOINTS - 1].0.z > 0.002);
+    }
+
+    #[test]
+    fn a_straight_midline_gives_a_straight_spine_and_a_curved_one_its_own_turn() {
+        let heading: f64 = 2.5;
+        let straight: Vec<[f64; 2]> = (0..11)
+            .map(|k| {
+                [
+                    -10.0 * f64::from(k) * heading.cos(),
+                    -10.0 * f64::from(k) * heading.sin(),
+                ]
+            })
+            .collect();
+        let angles = joint_angles_of_midline_rad(&straight, heading).expect("it has a length");
+        assert!(angles.iter().all(|a| a.abs() < 1e-9), "{angles:?}");
+        // A quarter circle, heading along +x at the head, the tail curving up the picture: to the left.
+        let arc: Vec<[f64; 2]> = (0..=40)
+            .map(|k| f64::from(k) / 40.0 * PI / 2.0)
+            .map(|t| [-100.0 * t.sin(), -100.0 * (1.0 - t.cos())])
+            .collect();
+        let angles = joint_angles_of_midline_rad(&arc, 0.0).expect("it has a length");
+        assert!(angles.iter().all(|a| *a > 0.0), "{angles:?}");
+        assert!((angles.iter().sum::<f64>() - 0.95 * PI / 2.0).abs() < 0.03);
+        assert_eq!(joint_angles_of_midline_rad(&[[1.0, 1.0]], 0.0), None);
+    }
+
+    #[test]
+    fn weights_change_gradually_from_joint_to_joint() {
+        assert_eq!(joints_at(0.0), (0, 0, 0.0));
+        assert_eq!(joints_at(1.0), (7, 7, 0.0));
+        let (a, b, share) = joints_at(0.45);
+        assert!((a, b) == (1, 2) && (share - 0.5).abs() < 1e-9);
+    }
+}
