@@ -25,8 +25,11 @@ mod page;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::DefaultBodyLimit;
+use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
 use axum::{Router, middleware};
+use tokio_util::sync::CancellationToken;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::timeout::RequestBodyTimeoutLayer;
@@ -83,6 +86,7 @@ impl AppState {
 /// The whole service over a state: the same for the program and for tests.
 pub fn router(state: AppState) -> Router {
     let (routes, document) = table().split_for_parts();
+    let stop = state.context.draining.clone();
     routes
         .merge(openapi::route(&document))
         .merge(page::routes())
@@ -92,6 +96,7 @@ pub fn router(state: AppState) -> Router {
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
         .layer(CatchPanicLayer::custom(panicked))
+        .layer(middleware::from_fn_with_state(stop, refuse_while_stopping))
         .layer(middleware::from_fn(guard::guard))
         .layer(PropagateRequestIdLayer::x_request_id())
         .layer(TraceLayer::new_for_http())
@@ -118,9 +123,21 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(health::readyz))
 }
 
-fn panicked(_: Box<dyn std::any::Any + Send>) -> axum::response::Response {
+/// Nothing new is begun once the service stops; what is there can still be read.
+async fn refuse_while_stopping(
+    State(draining): State<CancellationToken>,
+    request: Request,
+    next: Next,
+) -> Response {
+    match draining.is_cancelled() && !request.method().is_safe() {
+        true => Problem::from(Code::Stopping).into_response(),
+        false => next.run(request).await,
+    }
+}
+
+fn panicked(_: Box<dyn std::any::Any + Send>) -> Response {
     tracing::error!("a handler panicked");
-    axum::response::IntoResponse::into_response(Problem::from(Code::Internal))
+    Problem::from(Code::Internal).into_response()
 }
 
 /// JSON of a row of ours.

@@ -9,6 +9,7 @@ use super::{Error, Summary, say};
 use crate::api::{self, AppState};
 use crate::config::Config;
 use crate::jobs::supervisor::Supervisor;
+use crate::jobs::{self, Context, sample};
 use crate::store;
 
 /// Arguments of `serve`.
@@ -35,12 +36,16 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 
 async fn serve(config: Config) -> Result<(), Error> {
     let (bind, n_workers) = (config.bind, config.workers.get());
+    let with_sample = !config.no_sample;
     let state = AppState::open(config).await.map_err(from_store)?;
     let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
     let listener = TcpListener::bind(bind).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     let context = state.context.clone();
     let supervisor = Supervisor::start(context.clone(), n_workers);
+    if with_sample {
+        tokio::spawn(fill(context.clone()));
+    }
     let stop = CancellationToken::new();
     let server = tokio::spawn(api::server::serve(
         listener,
@@ -57,6 +62,13 @@ async fn serve(config: Config) -> Result<(), Error> {
     }
     context.store.close().await;
     Ok(())
+}
+
+async fn fill(context: Context) {
+    match sample::fill(&context).await {
+        Ok(()) | Err(jobs::Error::Cancelled) => {}
+        Err(error) => tracing::error!(%error, "the sample could not be made"),
+    }
 }
 
 async fn wait_for_signal() -> Result<(), Error> {

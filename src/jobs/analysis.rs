@@ -6,12 +6,14 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{Attempt, Context, Error, Product, Stages, clock};
+use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{Params, analyze};
 use crate::formats::library_json::FootageSummary;
-use crate::formats::{csv, library_dir};
+use crate::formats::{csv, distance_map, library_dir, svg};
 use crate::ids::{FootageId, JobId, LibraryId};
 use crate::library::{Library, View};
 use crate::media::{Limits, Video, read_image};
+use crate::progress::Progress;
 use crate::store::footage::{BACKGROUND, Footage, VIDEO};
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
@@ -100,7 +102,6 @@ impl Input {
     }
 
     fn write(&self, attempt: &Attempt, library: &Library, footage: &Footage) -> Result<(), Error> {
-        use crate::progress::Progress;
         attempt.listener.report("writing", 0.0);
         let folder = attempt.folder();
         let source = FootageSummary {
@@ -109,8 +110,25 @@ impl Input {
         };
         library_dir::write(folder, library, &self.params, &source)?;
         std::fs::write(folder.join("poses.csv"), csv::write_poses(&library.poses))?;
-        attempt.listener.report("writing", 1.0);
+        std::fs::write(folder.join("headings.svg"), svg::headings(&library.poses))?;
+        std::fs::write(
+            folder.join("distance.png"),
+            self.distance_map(attempt, library)?,
+        )?;
         Ok(())
+    }
+}
+
+impl Input {
+    fn distance_map(&self, attempt: &Attempt, library: &Library) -> Result<Vec<u8>, Error> {
+        let pixels = ComparedSprites::new(&library.sprites, &library.poses, self.params.planes);
+        let distances = Distances {
+            pixels: &pixels,
+            clip_frames: library.clip_frames,
+            side: Side::Plain,
+            cpu: cpu::Level::detect(),
+        };
+        distance_map::draw(&distances, attempt.listener).map_err(|_cancelled| Error::Cancelled)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::code::Code;
 use crate::footage::SourceError;
-use crate::{analysis, flock, formats, media, store};
+use crate::{analysis, fish, flock, formats, media, store};
 
 /// The reasons, one variant for each part that can refuse or fail.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +25,9 @@ pub enum Error {
     /// The flock could not be made.
     #[error(transparent)]
     Flock(#[from] flock::Error),
+    /// The virtual fish could not be made.
+    #[error(transparent)]
+    Fish(#[from] fish::Error),
     /// A library's folder could not be written or read.
     #[error(transparent)]
     LibraryDir(#[from] formats::library_dir::Error),
@@ -52,6 +55,7 @@ impl Error {
             Error::Source(error) => error.code,
             Error::Analysis(error) => error.code(),
             Error::Flock(error) => error.code(),
+            Error::Fish(error) => error.code(),
             Error::LibraryDir(error) => of_library_dir(error),
             Error::Store(error) => error.code(),
             Error::Io(error) => of_io(error),

@@ -11,6 +11,7 @@ pub mod clock;
 pub mod error;
 pub mod flock;
 pub mod listener; // progress out, cancellation in
+pub mod sample;
 pub mod supervisor; // the pool, rescue, drain
 pub mod worker; // claim, run, finish
 
