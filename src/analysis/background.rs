@@ -6,7 +6,7 @@
 //! is seen as a ghost wherever it is gone, and its pixels are taken from just those frames.
 
 use super::silhouette::Blocks;
-use super::{Error, Params, refusal, shadow};
+use super::{Error, Params, light, refusal, shadow, silhouette};
 use crate::footage::FrameSource;
 use crate::geometry::Rect;
 use crate::progress::Progress;
@@ -78,7 +78,41 @@ pub fn estimate(
         plate.blocks.measure_noise(&samples.frames);
     }
     refuse(&samples, &plate, params)?;
+    raise_thresholds(&mut plate, &samples);
     Ok(plate)
+}
+
+/// Raises the core threshold of an animal that stands out starkly to a share of its contrast: what
+/// differs by less than that beside a black mouse on white paper is its shadow and its reflection.
+fn raise_thresholds(plate: &mut Plate, samples: &Samples) {
+    const SHARE: f64 = 0.25;
+    let largest = |found: Vec<Component>| found.into_iter().max_by_key(|c| c.area);
+    let mut contrasts: Vec<u8> = samples
+        .components(plate)
+        .into_iter()
+        .zip(&samples.frames)
+        .filter_map(|(found, frame)| {
+            let component = largest(found)?;
+            let difference =
+                silhouette::difference(frame, plate, &light::Gain::ONE, component.rect);
+            let mask = component.mask(component.rect);
+            let levels = difference.levels.iter().zip(&mask.bits);
+            let mut levels: Vec<u8> = levels
+                .filter(|(_, bit)| **bit == 1)
+                .map(|(l, _)| *l)
+                .collect();
+            let middle = levels.len() / 2;
+            Some(*levels.select_nth_unstable(middle).1)
+        })
+        .collect();
+    if contrasts.is_empty() {
+        return;
+    }
+    let middle = contrasts.len() / 2;
+    let least = (SHARE * f64::from(*contrasts.select_nth_unstable(middle).1)) as u8;
+    for threshold in &mut plate.core_threshold {
+        *threshold = (*threshold).max(least);
+    }
 }
 
 /// Refuses a footage that shows nothing, too much, or more than one animal.

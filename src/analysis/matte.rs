@@ -49,6 +49,7 @@ pub fn cut_out(
         solid: &solid,
         inside: &inside,
         nearest_inside: nearest_set(&inside),
+        nearest_solid: nearest_set(&solid),
         band_px,
     };
     let mut image = RgbaImage::new(rect.w, rect.h);
@@ -156,6 +157,8 @@ struct Matte<'a> {
     inside: &'a Mask,
     /// For each pixel an inside pixel near it.
     nearest_inside: Vec<Option<usize>>,
+    /// For each pixel a solid pixel near it.
+    nearest_solid: Vec<Option<usize>>,
     band_px: u32,
 }
 
@@ -198,20 +201,23 @@ impl Matte<'_> {
     }
 
     /// The animal's color near a band pixel: the mean of the inside pixels around the nearest one.
-    /// Where the animal is too thin to have an inside nearby, the pixel close by that differs most
-    /// from the plate; but a shadow takes its color from the animal however far that is.
+    /// Where the animal is too thin to have an inside nearby, the solid pixel close by that differs
+    /// most from the plate; but a shadow takes its color from the animal however far that is.
     fn color_nearby(&self, x: usize, y: usize) -> Option<[f32; 3]> {
-        let k = y * self.mask.width() + x;
-        let nearest = self.nearest_inside[k].map(|at| {
+        let near = |found: Option<usize>| {
+            let at = found?;
             let (nx, ny) = (at % self.mask.width(), at / self.mask.width());
-            (nx.abs_diff(x).max(ny.abs_diff(y)), nx as i64, ny as i64)
-        });
-        let is_shadow = self.mask.bits[k] == 1 && self.solid.bits[k] == 0;
-        match nearest {
-            Some((distance, nx, ny)) if distance <= 2 * self.band_px as usize + 1 || is_shadow => {
-                Some(self.mean_inside(nx, ny))
-            }
-            _ => self.starkest(x as i64, y as i64),
+            let is_near = nx.abs_diff(x).max(ny.abs_diff(y)) <= 2 * self.band_px as usize + 1;
+            Some((is_near, nx as i64, ny as i64))
+        };
+        let k = y * self.mask.width() + x;
+        let inside = near(self.nearest_inside[k]);
+        let solid = near(self.nearest_solid[k]);
+        match (inside, solid) {
+            (Some((true, nx, ny)), _) => Some(self.mean_inside(nx, ny)),
+            (_, Some((true, nx, ny))) => self.starkest(nx, ny),
+            (Some((_, nx, ny)), _) => Some(self.mean_inside(nx, ny)),
+            (None, _) => solid.and_then(|(_, nx, ny)| self.starkest(nx, ny)),
         }
     }
 
@@ -232,12 +238,12 @@ impl Matte<'_> {
         sum.map(|s| s / n)
     }
 
-    /// The color of the silhouette's pixel within 2 pixels that differs most from the plate.
+    /// The color of the solid pixel within 2 pixels that differs most from the plate.
     fn starkest(&self, x: i64, y: i64) -> Option<[f32; 3]> {
         let around = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dx, dy)));
         around
             .filter_map(|(dx, dy)| self.at(x + dx, y + dy))
-            .filter(|&at| self.mask.bits[at] == 1)
+            .filter(|&at| self.solid.bits[at] == 1)
             .max_by_key(|&at| (self.difference.levels[at], std::cmp::Reverse(at)))
             .map(|at| self.frame_color(at).map(f32::from))
     }
