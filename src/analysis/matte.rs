@@ -95,7 +95,7 @@ fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate) -> Mask {
     for k in 0..solid.bits.len() {
         if solid.bits[k] == 1
             && f64::from(difference.levels[k]) < faint
-            && shadow::has_shadow_color(difference, plate, k % width, k / width)
+            && shadow::has_darker_color(difference, plate, k % width, k / width, 0.45..=1.0)
         {
             solid.bits[k] = 0;
         }

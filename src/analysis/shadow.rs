@@ -4,6 +4,8 @@
 //! Only weak pixels are ever taken out; and none when the animal is much darker than the scene,
 //! because a black mouse looks like its own shadow.
 
+use std::ops::RangeInclusive;
+
 use super::background::Plate;
 use super::light::Gain;
 use super::silhouette::{self, Difference};
@@ -11,7 +13,7 @@ use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask};
 
 /// Brightness ratios that a shadow may have.
-const RATIO: std::ops::RangeInclusive<f32> = 0.45..=0.95;
+const RATIO: RangeInclusive<f32> = 0.45..=0.95;
 /// Half side of the patch whose texture is compared.
 const RADIUS: i64 = 2;
 /// Least correlation of the patch with the plate's.
@@ -70,7 +72,18 @@ fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool
 }
 
 /// Darker than the plate within the range of a shadow, and of the same color.
-pub(super) fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
+fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
+    has_darker_color(difference, plate, x, y, RATIO)
+}
+
+/// Of the plate's color, with a share of its brightness that lies in `ratios`.
+pub(super) fn has_darker_color(
+    difference: &Difference,
+    plate: &Plate,
+    x: usize,
+    y: usize,
+    ratios: RangeInclusive<f32>,
+) -> bool {
     let rect = difference.rect;
     let (px, py) = (rect.x + x as u32, rect.y + y as u32);
     let color = |rgb: [u8; 3]| rgb.map(f32::from);
@@ -78,7 +91,7 @@ pub(super) fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize,
     let b = color(plate.rgb.pixel(px, py));
     let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let ratio = dot(i, b) / dot(b, b).max(1.0);
-    if !RATIO.contains(&ratio) {
+    if !ratios.contains(&ratio) {
         return false;
     }
     let gap = [
