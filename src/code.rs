@@ -57,8 +57,23 @@ codes! {
     // The flock.
     NoTransitions "no_transitions" "The library has too few moments that look alike: film longer."
     // Anything.
+    InputFailed "input_failed" "The job whose result this one needs ended without a result."
+    CrashedWorker "crashed_worker" "The work crashed its worker twice and is not tried again."
     InvalidParams "invalid_params" "A parameter is unknown, malformed or out of its range."
     Cancelled "cancelled" "The work was cancelled."
+    // The door.
+    NotFound "not_found" "There is nothing at this address."
+    NotReady "not_ready" "The result is not there yet: its job has not finished."
+    MethodNotAllowed "method_not_allowed" "The address does not take this method."
+    MalformedRequest "malformed_request" "The request cannot be read."
+    UnsupportedMediaType "unsupported_media_type" "The body is of a type that is not taken here."
+    TooLarge "too_large" "The body is larger than the limit."
+    BodyTimeout "body_timeout" "The body came too slowly."
+    BodyCutOff "body_cut_off" "The body ended before it was complete."
+    RangeNotSatisfiable "range_not_satisfiable" "The file is shorter than the range asked for."
+    AlreadyFinished "already_finished" "The job has ended and cannot be cancelled."
+    CrossSite "cross_site" "Another site may not ask for this."
+    Stopping "stopping" "The service is stopping: ask again soon."
     Internal "internal" "Something failed inside flockreel."
 }
 

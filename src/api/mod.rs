@@ -1,1 +1,149 @@
-//! To be written.
+//! HTTP: the table of routes and what they share (DESIGN.md, REST API; RELIABILITY.md, S4 to S7).
+//!
+//! Handlers are thin: extract, one call, answer. What an error means to HTTP is `problem`'s alone.
+
+mod guard; // who may ask, and the headers of every answer
+mod problem;
+pub mod server; // the accept loop
+
+mod download;
+mod extract; // ids, JSON, conditions
+mod paging;
+mod range;
+mod receive; // bodies to disk
+mod timestamp;
+
+mod analyses;
+mod flocks;
+mod footage;
+mod health;
+mod jobs;
+mod libraries;
+mod openapi;
+mod page;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::{DefaultBodyLimit, Request, State};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use axum::{Router, middleware};
+use tokio_util::sync::CancellationToken;
+use tower_http::catch_panic::CatchPanicLayer;
+use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
+use tower_http::timeout::RequestBodyTimeoutLayer;
+use tower_http::trace::TraceLayer;
+use utoipa::OpenApi;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
+
+pub use problem::Problem;
+
+use crate::code::Code;
+use crate::config::Config;
+use crate::jobs::Context;
+use crate::jobs::supervisor::recover;
+use crate::store::Store;
+use crate::{media, store};
+
+/// The largest JSON body.
+const MAX_JSON_BYTES: usize = 1 << 20;
+/// The longest wait for the next piece of a body.
+const BODY_PIECE: Duration = Duration::from_secs(30);
+
+/// What handlers share.
+#[derive(Clone)]
+pub struct AppState {
+    /// The settings.
+    pub config: Arc<Config>,
+    /// The store, and the way to wake the workers.
+    pub context: Context,
+    /// The version of the media tool, or why there is none; asked for at the start.
+    pub media_tool: Arc<Result<String, String>>,
+}
+
+impl AppState {
+    /// Opens the data folder, mends what a crash left, and looks for the media tool.
+    pub async fn open(config: Config) -> Result<AppState, store::Error> {
+        let store = Store::open(&config.data).await?;
+        let context = Context::new(store, config.threads_per_worker());
+        recover(&context).await?;
+        let tool = tokio::task::spawn_blocking(media::tool_version).await;
+        let tool = tool.map_err(std::io::Error::other)?;
+        match &tool {
+            Ok(version) => tracing::info!(version, "media tool found"),
+            Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
+        }
+        Ok(AppState {
+            config: Arc::new(config),
+            context,
+            media_tool: Arc::new(tool.map_err(|error| error.to_string())),
+        })
+    }
+}
+
+/// The whole service over a state: the same for the program and for tests.
+pub fn router(state: AppState) -> Router {
+    let (routes, document) = table().split_for_parts();
+    let stop = state.context.draining.clone();
+    routes
+        .merge(openapi::route(&document))
+        .merge(page::routes())
+        .fallback(|| async { Problem::not_found() })
+        .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
+        .with_state(state)
+        .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
+        .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
+        .layer(CatchPanicLayer::custom(panicked))
+        .layer(middleware::from_fn_with_state(stop, refuse_while_stopping))
+        .layer(middleware::from_fn(guard::guard))
+        .layer(PropagateRequestIdLayer::x_request_id())
+        .layer(TraceLayer::new_for_http())
+        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
+}
+
+/// Every route with its entry in the OpenAPI document.
+fn table() -> OpenApiRouter<AppState> {
+    OpenApiRouter::with_openapi(openapi::Document::openapi())
+        .routes(routes!(footage::create_footage, footage::list_footage))
+        .routes(routes!(footage::get_footage))
+        .routes(routes!(footage::get_footage_file))
+        .routes(routes!(analyses::create_analysis))
+        .routes(routes!(libraries::list_libraries))
+        .routes(routes!(libraries::get_library))
+        .routes(routes!(libraries::get_library_file))
+        .routes(routes!(flocks::create_flock, flocks::list_flocks))
+        .routes(routes!(flocks::get_flock))
+        .routes(routes!(flocks::get_flock_file))
+        .routes(routes!(jobs::list_jobs))
+        .routes(routes!(jobs::get_job, jobs::cancel_job))
+        .routes(routes!(jobs::get_job_events))
+        .routes(routes!(health::healthz))
+        .routes(routes!(health::readyz))
+}
+
+/// Nothing new is begun once the service stops; what is there can still be read.
+async fn refuse_while_stopping(
+    State(draining): State<CancellationToken>,
+    request: Request,
+    next: Next,
+) -> Response {
+    match draining.is_cancelled() && !request.method().is_safe() {
+        true => Problem::from(Code::Stopping).into_response(),
+        false => next.run(request).await,
+    }
+}
+
+fn panicked(_: Box<dyn std::any::Any + Send>) -> Response {
+    tracing::error!("a handler panicked");
+    Problem::from(Code::Internal).into_response()
+}
+
+/// JSON of a row of ours.
+fn stored<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, Problem> {
+    serde_json::from_str(json).map_err(|error| {
+        tracing::error!(%error, "a stored row cannot be read");
+        Code::Internal.into()
+    })
+}

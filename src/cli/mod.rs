@@ -1,9 +1,112 @@
-//! The command line: one file a command.
+//! The command line: one file a command (DESIGN.md, Command line).
+//!
+//! Results go to files, progress and errors to stderr, and with `--json` one line of JSON to
+//! stdout. Exit codes: 0; 2 for bad usage or input; 1 for a failure inside.
 
 pub mod analyze;
+pub mod error;
 pub mod fish;
 pub mod flock;
 pub mod matrix;
+pub mod progress;
 pub mod sample;
 pub mod serve;
 pub mod sprites;
+
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use serde_json::Value;
+use tracing_subscriber::EnvFilter;
+
+pub use error::Error;
+pub use progress::Listener;
+
+/// flockreel: film one animal, get a flock of it.
+#[derive(Debug, Parser)]
+#[command(name = "flockreel", version, about, propagate_version = true)]
+pub struct Cli {
+    /// Print a one-line JSON summary to stdout when done.
+    #[arg(long, global = true)]
+    json: bool,
+    /// What to log to stderr, for example `debug` or `flockreel::jobs=debug`.
+    #[arg(long, global = true, env = "FLOCKREEL_LOG", value_name = "FILTER")]
+    log: Option<String>,
+    /// What to do.
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// The commands, in the order in which a newcomer meets them.
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Start the service: API, page and workers in one process.
+    Serve(serve::Args),
+    /// Measure the animal in a video: footage to library.
+    Analyze(analyze::Args),
+    /// Make a flock out of a library, as a video.
+    Flock(flock::Args),
+    /// Let the virtual fish swim as the animal swam, as a video or a model.
+    Fish(fish::Args),
+    /// Write the distance matrix of a library, as numbers or as a picture.
+    Matrix(matrix::Args),
+    /// Write the animal of every frame as a picture with transparency.
+    Sprites(sprites::Args),
+    /// Film the virtual fish: footage whose truth is known.
+    Sample(sample::Args),
+}
+
+/// What a command did: the one line of JSON that `--json` prints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary(pub Value);
+
+/// Runs the command and says how it went; never panics on a user's input.
+pub fn main(cli: Cli) -> ExitCode {
+    start_logging(cli.log.as_deref(), matches!(cli.command, Command::Serve(_)));
+    match run(cli.command) {
+        Ok(summary) => print(cli.json, &summary),
+        Err(error) => {
+            say(&format!("flockreel: {error}"));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(command: Command) -> Result<Option<Summary>, Error> {
+    match command {
+        Command::Serve(args) => serve::run(args),
+        Command::Analyze(args) => analyze::run(args),
+        Command::Flock(args) => flock::run(args),
+        Command::Fish(args) => fish::run(args),
+        Command::Matrix(args) => matrix::run(args),
+        Command::Sprites(args) => sprites::run(args),
+        Command::Sample(args) => sample::run(args),
+    }
+}
+
+/// Logs go to stderr: everything worth knowing of a service, only warnings of the other commands.
+fn start_logging(filter: Option<&str>, serves: bool) {
+    let default = if serves { "info" } else { "warn" };
+    tracing_subscriber::fmt()
+        .with_env_filter(EnvFilter::new(filter.unwrap_or(default)))
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_target(false)
+        .init();
+}
+
+fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
+    let Some(Summary(value)) = summary.as_ref().filter(|_| json) else {
+        return ExitCode::SUCCESS;
+    };
+    match writeln!(std::io::stdout(), "{value}") {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) => ExitCode::FAILURE,
+    }
+}
+
+/// Writes one line to stderr. A closed stderr is nobody's loss: there is nowhere left to say so.
+fn say(line: &str) {
+    writeln!(std::io::stderr(), "{line}").ok();
+}

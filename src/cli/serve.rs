@@ -1,1 +1,90 @@
-//! To be written.
+//! `flockreel serve`: API, page and workers in one process (RELIABILITY.md, R4 for its end).
+
+use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio_util::sync::CancellationToken;
+
+use super::{Error, Summary, say};
+use crate::api::{self, AppState};
+use crate::config::Config;
+use crate::jobs::supervisor::Supervisor;
+use crate::jobs::{self, Context, sample};
+use crate::store;
+
+/// Arguments of `serve`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    config: Config,
+}
+
+/// Serves until it is told to stop.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let config = args.config;
+    if !config.bind.ip().is_loopback() {
+        let advice = "listening beyond this machine needs authentication, which is not there yet; \
+                      bind to 127.0.0.1 and put a proxy that authenticates before it";
+        return Err(Error::Usage(format!("{advice}: {}", config.bind)));
+    }
+    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    let served = runtime.block_on(serve(config));
+    // A job that does not let go must not hold the process: it is rescued at the next start.
+    runtime.shutdown_background();
+    served.map(|()| None)
+}
+
+async fn serve(config: Config) -> Result<(), Error> {
+    let (bind, n_workers) = (config.bind, config.workers.get());
+    let with_sample = !config.no_sample;
+    let state = AppState::open(config).await.map_err(from_store)?;
+    let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
+    let listener = TcpListener::bind(bind).await.map_err(cannot)?;
+    let address = listener.local_addr().map_err(cannot)?;
+    let context = state.context.clone();
+    let supervisor = Supervisor::start(context.clone(), n_workers);
+    if with_sample {
+        tokio::spawn(fill(context.clone()));
+    }
+    let stop = CancellationToken::new();
+    let server = tokio::spawn(api::server::serve(
+        listener,
+        api::router(state),
+        stop.clone(),
+    ));
+    say(&format!("flockreel: the page is at http://{address}/"));
+    wait_for_signal().await?;
+    tracing::info!("stopping");
+    stop.cancel();
+    let (served, ()) = tokio::join!(server, supervisor.drain());
+    if let Err(error) = served {
+        tracing::error!(%error, "the server ended unexpectedly");
+    }
+    context.store.close().await;
+    Ok(())
+}
+
+async fn fill(context: Context) {
+    match sample::fill(&context).await {
+        Ok(()) | Err(jobs::Error::Cancelled) => {}
+        Err(error) => tracing::error!(%error, "the sample could not be made"),
+    }
+}
+
+async fn wait_for_signal() -> Result<(), Error> {
+    let listen = |kind| signal(kind).map_err(Error::io("waiting for signals"));
+    let mut terminate = listen(SignalKind::terminate())?;
+    let mut interrupt = listen(SignalKind::interrupt())?;
+    tokio::select! {
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
+    }
+    Ok(())
+}
+
+fn from_store(error: store::Error) -> Error {
+    match error {
+        store::Error::InUse(_) => Error::Usage(error.to_string()),
+        _ => Error::work(error.code(), &error),
+    }
+}

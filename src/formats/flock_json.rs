@@ -1,1 +1,272 @@
-//! To be written.
+//! flock.json: everything about a flock but its pixels (DESIGN.md, a library on disk).
+//!
+//! A flock holds its numbers rounded already, so reading gives back exactly what was written, and
+//! anyone can recompute each plan's cost from this file and the library (ALGORITHMS.md 6, proof c).
+
+use serde::{Deserialize, Serialize};
+
+use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost, Stats};
+
+/// The schema's name and version.
+pub const SCHEMA: &str = "flockreel/flock@1";
+
+/// The flock as JSON, one line an individual.
+pub fn write(flock: &Flock) -> Vec<u8> {
+    let file = FlockFile {
+        schema: SCHEMA.into(),
+        version: env!("CARGO_PKG_VERSION").into(),
+        params: flock.params.clone(),
+        seed: flock.params.seed,
+        fps: flock.fps,
+        image_size_px: flock.image_size_px,
+        length_px: flock.length_px,
+        stats: StatsFile::of(&flock.stats),
+        individuals: (), // written line by line below
+    };
+    let head = serde_json::to_string(&file).expect("plain values serialise");
+    let mut bytes = head
+        .strip_suffix("null}")
+        .expect("individuals come last")
+        .as_bytes()
+        .to_vec();
+    for (idx, individual) in flock.individuals.iter().enumerate() {
+        bytes.extend(if idx == 0 { &b"[\n"[..] } else { b",\n" });
+        serde_json::to_writer(&mut bytes, &IndividualFile::of(individual))
+            .expect("plain values serialise");
+    }
+    bytes.extend(b"\n]}\n");
+    bytes
+}
+
+/// Reads what `write` wrote.
+pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
+    let file: FlockFile<Vec<IndividualFile>> = serde_json::from_slice(bytes)?;
+    Ok(Flock {
+        fps: file.fps,
+        image_size_px: file.image_size_px,
+        length_px: file.length_px,
+        params: file.params,
+        individuals: file
+            .individuals
+            .into_iter()
+            .map(IndividualFile::into_individual)
+            .collect(),
+        stats: file.stats.into_stats(),
+    })
+}
+
+#[derive(Serialize, Deserialize)]
+struct FlockFile<Individuals> {
+    schema: String,
+    version: String,
+    params: Params,
+    seed: u64,
+    fps: f64,
+    image_size_px: [u32; 2],
+    length_px: f64,
+    stats: StatsFile,
+    individuals: Individuals,
+}
+
+#[derive(Serialize, Deserialize)]
+struct IndividualFile {
+    id: u32,
+    source_frame: Vec<u32>,
+    mirrored: Vec<bool>,
+    rotation_rad: Vec<f64>,
+    fade: Vec<FadeFile>,
+    centroid_px: Vec<[f64; 2]>,
+    heading_rad: Vec<f64>,
+    scale: Vec<f64>,
+    depth_m: Option<Vec<f64>>,
+    boid: BoidFile,
+    cost: CostFile,
+}
+
+#[derive(Serialize, Deserialize)]
+struct FadeFile {
+    start: u32,
+    source_frame: Vec<u32>,
+    mirrored: bool,
+    rotation_rad: Vec<f64>,
+    weight: Vec<f64>,
+}
+
+/// `position`: x, y and depth behind the picture, pixels; `speed`: body lengths a second.
+#[derive(Serialize, Deserialize)]
+struct BoidFile {
+    position: Vec<[f64; 3]>,
+    heading_rad: Vec<f64>,
+    speed: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct CostFile {
+    total: f64,
+    heading: f64,
+    speed: f64,
+    transition: f64,
+    crowd: f64,
+    lower_bound: f64,
+    exact: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct StatsFile {
+    heading_error_median_rad: f64,
+    heading_error_p90_rad: f64,
+    jumps_per_100_frames: f64,
+    path_deviation_p95_bl: f64,
+    slip_median_rad: f64,
+    clone_share: f64,
+    variety: f64,
+    polarization: f64,
+    milling: f64,
+    nearest_neighbor_bl: f64,
+}
+
+impl IndividualFile {
+    fn of(individual: &Individual) -> IndividualFile {
+        let individual = individual.clone();
+        IndividualFile {
+            id: individual.id,
+            source_frame: individual.source_frame,
+            mirrored: individual.mirrored,
+            rotation_rad: individual.rotation_rad,
+            fade: individual.fades.into_iter().map(FadeFile::of).collect(),
+            centroid_px: individual.centroid_px,
+            heading_rad: individual.heading_rad,
+            scale: individual.scale,
+            depth_m: individual.depth_m,
+            boid: BoidFile {
+                position: individual.boid.position_px,
+                heading_rad: individual.boid.heading_rad,
+                speed: individual.boid.speed_bl_per_s,
+            },
+            cost: CostFile::of(individual.cost),
+        }
+    }
+
+    fn into_individual(self) -> Individual {
+        Individual {
+            id: self.id,
+            source_frame: self.source_frame,
+            mirrored: self.mirrored,
+            rotation_rad: self.rotation_rad,
+            fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
+            centroid_px: self.centroid_px,
+            heading_rad: self.heading_rad,
+            scale: self.scale,
+            depth_m: self.depth_m,
+            boid: BoidTrack {
+                position_px: self.boid.position,
+                heading_rad: self.boid.heading_rad,
+                speed_bl_per_s: self.boid.speed,
+            },
+            cost: self.cost.into_cost(),
+        }
+    }
+}
+
+impl FadeFile {
+    fn of(fade: Fade) -> FadeFile {
+        FadeFile {
+            start: fade.start,
+            source_frame: fade.source_frame,
+            mirrored: fade.mirrored,
+            rotation_rad: fade.rotation_rad,
+            weight: fade.weight,
+        }
+    }
+
+    fn into_fade(self) -> Fade {
+        Fade {
+            start: self.start,
+            source_frame: self.source_frame,
+            mirrored: self.mirrored,
+            rotation_rad: self.rotation_rad,
+            weight: self.weight,
+        }
+    }
+}
+
+impl CostFile {
+    fn of(cost: PlanCost) -> CostFile {
+        CostFile {
+            total: cost.total,
+            heading: cost.heading,
+            speed: cost.speed,
+            transition: cost.transition,
+            crowd: cost.crowd,
+            lower_bound: cost.lower_bound,
+            exact: cost.exact,
+        }
+    }
+
+    fn into_cost(self) -> PlanCost {
+        PlanCost {
+            total: self.total,
+            heading: self.heading,
+            speed: self.speed,
+            transition: self.transition,
+            crowd: self.crowd,
+            lower_bound: self.lower_bound,
+            exact: self.exact,
+        }
+    }
+}
+
+impl StatsFile {
+    fn of(stats: &Stats) -> StatsFile {
+        StatsFile {
+            heading_error_median_rad: stats.heading_error_median_rad,
+            heading_error_p90_rad: stats.heading_error_p90_rad,
+            jumps_per_100_frames: stats.jumps_per_100_frames,
+            path_deviation_p95_bl: stats.path_deviation_p95_bl,
+            slip_median_rad: stats.slip_median_rad,
+            clone_share: stats.clone_share,
+            variety: stats.variety,
+            polarization: stats.polarization,
+            milling: stats.milling,
+            nearest_neighbor_bl: stats.nearest_neighbor_bl,
+        }
+    }
+
+    fn into_stats(self) -> Stats {
+        Stats {
+            heading_error_median_rad: self.heading_error_median_rad,
+            heading_error_p90_rad: self.heading_error_p90_rad,
+            jumps_per_100_frames: self.jumps_per_100_frames,
+            path_deviation_p95_bl: self.path_deviation_p95_bl,
+            slip_median_rad: self.slip_median_rad,
+            clone_share: self.clone_share,
+            variety: self.variety,
+            polarization: self.polarization,
+            milling: self.milling,
+            nearest_neighbor_bl: self.nearest_neighbor_bl,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::{plan_flock, synthetic};
+    use crate::library::View;
+    use crate::progress::Silent;
+
+    #[test]
+    fn reading_a_flock_returns_what_was_written() {
+        let library = synthetic::library(View::Side);
+        let params = Params {
+            count: 3,
+            frames: 40,
+            ..Params::default()
+        };
+        let flock = plan_flock(&library, &params, &Silent).unwrap();
+        let bytes = write(&flock);
+        assert_eq!(read(&bytes).unwrap(), flock);
+        let head = String::from_utf8_lossy(&bytes[..60]).into_owned();
+        assert!(head.starts_with(r#"{"schema":"flockreel/flock@1","version":""#));
+    }
+}

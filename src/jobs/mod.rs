@@ -1,1 +1,94 @@
-//! To be written.
+//! Jobs: what the queue holds and who works on it (DESIGN.md, names; RELIABILITY.md, R2 to R5, R8).
+//!
+//! The three kinds are a closed enum. A job's `run` is a plain function on a blocking thread: it
+//! loads, computes by ring 2 and leaves files in its draft; the worker stores them. A job may be run
+//! twice, and only one of the runs is kept.
+
+pub mod admit; // received bytes -> footage
+pub mod analysis;
+pub mod attempt; // what one run of a job is given
+pub mod clock;
+pub mod error;
+pub mod flock;
+pub mod listener; // progress out, cancellation in
+pub mod sample;
+pub mod supervisor; // the pool, rescue, drain
+pub mod worker; // claim, run, finish
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::Notify;
+use tokio_util::sync::CancellationToken;
+
+pub use attempt::{Attempt, Product};
+pub use error::Error;
+pub use listener::{Listener, Stages};
+
+use crate::store::Store;
+use crate::store::jobs::{Kind, Lease};
+
+/// What workers share: smaller than the API's state.
+#[derive(Clone)]
+pub struct Context {
+    /// Rows and files.
+    pub store: Store,
+    /// Wakes one idle worker when a job was queued.
+    pub wake: Arc<Notify>,
+    /// Cancelled when the process stops: no more claims, running jobs go back.
+    pub draining: CancellationToken,
+    /// Threads that one job may use.
+    pub threads: usize,
+    /// How long a claim holds without a heartbeat.
+    pub lease: Duration,
+}
+
+impl Context {
+    /// The usual lease, over a store.
+    pub fn new(store: Store, threads: usize) -> Context {
+        Context {
+            store,
+            wake: Arc::new(Notify::new()),
+            draining: CancellationToken::new(),
+            threads,
+            lease: Duration::from_secs(15),
+        }
+    }
+}
+
+/// A job with its input, decoded.
+#[derive(Clone, Debug)]
+pub enum Job {
+    /// Footage to library.
+    Analysis(analysis::Input),
+    /// Library to flock.
+    Flock(flock::Input),
+}
+
+impl Job {
+    /// Reads the input of a claimed job.
+    pub fn decode(lease: &Lease) -> Result<Job, Error> {
+        Ok(match lease.kind {
+            Kind::Analysis => Job::Analysis(serde_json::from_str(&lease.input)?),
+            Kind::Flock => Job::Flock(serde_json::from_str(&lease.input)?),
+            Kind::Fish => return Err(Error::Panicked),
+        })
+    }
+
+    /// Does the work, on the thread that calls.
+    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+        match self {
+            Job::Analysis(input) => input.run(attempt),
+            Job::Flock(input) => input.run(attempt),
+        }
+    }
+}
+
+/// The stages of a kind of job.
+pub fn stages(kind: Kind) -> Stages {
+    match kind {
+        Kind::Analysis => analysis::STAGES,
+        Kind::Flock => flock::STAGES,
+        Kind::Fish => &[],
+    }
+}

@@ -1,9 +1,11 @@
 //! Pictures as values: frames as they are decoded, RGB and RGBA images, masks.
 
+pub mod blend;
 pub mod color;
 pub mod frame;
 pub mod image;
 pub mod mask;
+pub mod resample;
 pub mod runs;
 
 pub use color::{ColorSpec, Matrix, Range};

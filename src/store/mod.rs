@@ -1,1 +1,117 @@
-//! To be written.
+//! What outlives the process: rows in SQLite, files in a folder (RELIABILITY.md, store and queue
+//! rules). SQL exists in this folder only, a file per table.
+//!
+//! One writer connection and a pool of readers: with one writer nobody upgrades a read snapshot, so
+//! nobody meets `database is locked`. No transaction awaits anything but SQL. Times come in as
+//! arguments, milliseconds since 1970 (UTC).
+
+pub mod blobs;
+pub mod check;
+pub mod error;
+pub mod fish;
+pub mod flocks;
+pub mod footage;
+pub mod intake;
+pub mod jobs;
+pub mod libraries;
+pub mod sweep;
+
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::SqlitePool;
+use sqlx::migrate::Migrator;
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous,
+};
+
+pub use blobs::{BlobFile, Blobs, Draft};
+pub use error::Error;
+
+static MIGRATIONS: Migrator = sqlx::migrate!("migrations/sqlite");
+const READERS: u32 = 4;
+
+/// The open store: cheap to clone, one per process and folder.
+#[derive(Clone)]
+pub struct Store {
+    writer: SqlitePool,
+    reader: SqlitePool,
+    blobs: Blobs,
+    /// Held while the store is open: whoever holds it knows that every other process is gone.
+    _lock: Arc<File>,
+}
+
+impl Store {
+    /// Opens the folder, made if absent, and brings the database to this version's form. Fails with
+    /// [`Error::InUse`] when another process has it open.
+    pub async fn open(data: &Path) -> Result<Store, Error> {
+        std::fs::create_dir_all(data)?;
+        let lock = lock(data)?;
+        let blobs = Blobs::open(data)?;
+        let options = options(data.join("flockreel.db"));
+        let writer = SqlitePoolOptions::new()
+            .max_connections(1)
+            .connect_with(options.clone())
+            .await?;
+        MIGRATIONS.run(&writer).await?;
+        let reader = SqlitePoolOptions::new()
+            .max_connections(READERS)
+            .connect_with(options.read_only(true))
+            .await?;
+        Ok(Store {
+            writer,
+            reader,
+            blobs,
+            _lock: Arc::new(lock),
+        })
+    }
+
+    /// The files.
+    pub fn blobs(&self) -> &Blobs {
+        &self.blobs
+    }
+
+    /// Whether the database can be written now: for readiness.
+    pub async fn is_writable(&self) -> bool {
+        let probe = async { self.begin().await?.rollback().await };
+        matches!(
+            tokio::time::timeout(Duration::from_secs(2), probe).await,
+            Ok(Ok(()))
+        )
+    }
+
+    /// Closes the connections in order, so that the write-ahead log is folded in.
+    pub async fn close(&self) {
+        self.reader.close().await;
+        self.writer.close().await;
+    }
+
+    /// A write transaction that holds the writer's lock from its first statement.
+    async fn begin(&self) -> Result<sqlx::Transaction<'static, sqlx::Sqlite>, sqlx::Error> {
+        self.writer.begin_with("BEGIN IMMEDIATE").await
+    }
+}
+
+fn lock(data: &Path) -> Result<File, Error> {
+    let file = File::create(data.join("lock"))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(Error::InUse(data.to_owned())),
+        Err(TryLockError::Error(error)) => Err(error.into()),
+    }
+}
+
+fn options(database: PathBuf) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(database)
+        .create_if_missing(true)
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .foreign_keys(true)
+        .busy_timeout(Duration::from_secs(5))
+}
+
+/// Where a statement that may be part of a transaction runs.
+type Connection = SqliteConnection;

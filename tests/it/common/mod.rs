@@ -1,1 +1,7 @@
-//! To be written.
+//! What tests arrange with: a real service on a port of its own, films, a service as a process.
+
+pub mod app;
+pub mod clip;
+pub mod process;
+
+pub use app::TestApp;

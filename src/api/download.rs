@@ -1,0 +1,157 @@
+//! A file of the store as an answer: Range, ETag, HEAD, 304, 416 (RELIABILITY.md, H4, S4, S5). Files
+//! never change under their address, so they may be kept for ever; the tag is the content's hash.
+
+use std::io::SeekFrom;
+
+use axum::body::Body;
+use axum::http::{HeaderValue, Method, Response, StatusCode, header};
+use axum::response::IntoResponse;
+use tokio::fs::File;
+use tokio::io::{AsyncReadExt, AsyncSeekExt};
+use tokio_util::io::ReaderStream;
+
+use super::Problem;
+use super::extract::Conditions;
+use super::range::{Wanted, wanted};
+use crate::code::Code;
+use crate::store::Store;
+use crate::store::blobs::hex;
+
+/// Bytes read at a time: each read is a hop to the blocking pool.
+const CHUNK_BYTES: usize = 1 << 20;
+
+/// A file to be sent.
+#[derive(Clone, Debug)]
+pub(super) struct Download<'a> {
+    /// Its folder in the store.
+    pub folder: &'a str,
+    /// Its name there.
+    pub name: &'a str,
+    /// Its media type.
+    pub media_type: &'static str,
+    /// Content-Disposition.
+    pub disposition: String,
+}
+
+/// Files of a noun that may be asked for: name and media type.
+pub(super) type Files = &'static [(&'static str, &'static str)];
+
+/// The entry of a file's name, or 404.
+pub(super) fn find(files: Files, name: &str) -> Result<(&'static str, &'static str), Problem> {
+    let found = files.iter().find(|(known, _)| *known == name);
+    found.copied().ok_or_else(Problem::not_found)
+}
+
+impl Download<'_> {
+    /// The answer to a GET or HEAD with these conditions.
+    pub(super) async fn answer(
+        self,
+        store: &Store,
+        conditions: &Conditions,
+    ) -> Result<Response<Body>, Problem> {
+        let blob = store.blob(self.folder, self.name).await?;
+        let blob = blob.ok_or_else(Problem::not_found)?;
+        let size_bytes = blob.size_bytes.unsigned_abs();
+        let etag = format!("\"{}\"", hex(&blob.sha256));
+        let wanted = wanted(&conditions.method, &conditions.headers, &etag, size_bytes);
+        let (first, last, status) = match wanted {
+            Wanted::Whole => (0, size_bytes, StatusCode::OK),
+            Wanted::Part { first, last } => (first, last + 1, StatusCode::PARTIAL_CONTENT),
+            Wanted::NotModified => (0, 0, StatusCode::NOT_MODIFIED),
+            Wanted::Unsatisfiable => return Ok(unsatisfiable(size_bytes)),
+        };
+        let mut answer = Response::builder()
+            .status(status)
+            .header(header::ETAG, etag)
+            .header(header::ACCEPT_RANGES, "bytes")
+            .header(
+                header::CACHE_CONTROL,
+                "private, max-age=31536000, immutable",
+            );
+        if status == StatusCode::NOT_MODIFIED {
+            return built(answer.body(Body::empty()));
+        }
+        if status == StatusCode::PARTIAL_CONTENT {
+            let range = format!("bytes {first}-{}/{size_bytes}", last - 1);
+            answer = answer.header(header::CONTENT_RANGE, range);
+        }
+        let body = match conditions.method == Method::HEAD {
+            true => Body::empty(),
+            false => self.bytes(store, first, last - first).await?,
+        };
+        built(
+            answer
+                .header(header::CONTENT_TYPE, self.media_type)
+                .header(header::CONTENT_LENGTH, last - first)
+                .header(header::CONTENT_DISPOSITION, self.disposition)
+                .body(body),
+        )
+    }
+
+    async fn bytes(&self, store: &Store, first: u64, n_bytes: u64) -> Result<Body, Problem> {
+        let open = async {
+            let mut file = File::open(store.blobs().path(self.folder, self.name)).await?;
+            file.set_max_buf_size(CHUNK_BYTES);
+            file.seek(SeekFrom::Start(first)).await?;
+            Ok(file.take(n_bytes))
+        };
+        let part = open.await.map_err(crate::store::Error::Io)?;
+        Ok(Body::from_stream(ReaderStream::with_capacity(
+            part,
+            CHUNK_BYTES,
+        )))
+    }
+}
+
+/// `attachment` or `inline`, with a name that any label survives in (RFC 6266, RFC 8187).
+pub(super) fn disposition(kind: &str, label: &str) -> String {
+    let plain: String = label
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || "._- ".contains(c) {
+                c
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    let mut encoded = String::new();
+    for byte in label.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'.' | b'_' | b'-' => {
+                encoded.push(char::from(byte));
+            }
+            _ => encoded.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    format!("{kind}; filename=\"{plain}\"; filename*=UTF-8''{encoded}")
+}
+
+fn unsatisfiable(size_bytes: u64) -> Response<Body> {
+    let mut answer = Problem::from(Code::RangeNotSatisfiable).into_response();
+    if let Ok(range) = HeaderValue::from_str(&format!("bytes */{size_bytes}")) {
+        answer.headers_mut().insert(header::CONTENT_RANGE, range);
+    }
+    answer
+}
+
+fn built(answer: Result<Response<Body>, axum::http::Error>) -> Result<Response<Body>, Problem> {
+    answer.map_err(|error| {
+        tracing::error!(%error, "an answer could not be built");
+        Code::Internal.into()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_label_of_any_kind_stays_a_label() {
+        assert_eq!(
+            disposition("attachment", "a\"\r\nSet-Cookie: x.mp4"),
+            "attachment; filename=\"a___Set-Cookie_ x.mp4\"; \
+             filename*=UTF-8''a%22%0D%0ASet-Cookie%3A%20x.mp4"
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! What handlers take from a request, parsed at the door: every failure is a problem with a code.
+
+use std::convert::Infallible;
+
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, Method};
+use serde::de::DeserializeOwned;
+use uuid::Uuid;
+
+use super::Problem;
+use crate::code::Code;
+
+/// An id in the path; what is no id names nothing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Id(pub Uuid);
+
+impl<S: Send + Sync> FromRequestParts<S> for Id {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Id, Problem> {
+        let path = Path::<Uuid>::from_request_parts(parts, state).await;
+        path.map(|Path(id)| Id(id))
+            .map_err(|_rejection| Problem::not_found())
+    }
+}
+
+/// An id and a file's name in the path.
+#[derive(Clone, Debug)]
+pub(super) struct FileOf(pub Uuid, pub String);
+
+impl<S: Send + Sync> FromRequestParts<S> for FileOf {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<FileOf, Problem> {
+        let path = Path::<(Uuid, String)>::from_request_parts(parts, state).await;
+        let path = path.map_err(|_rejection| Problem::not_found());
+        path.map(|Path((id, name))| FileOf(id, name))
+    }
+}
+
+/// A JSON body.
+#[derive(Clone, Debug)]
+pub(super) struct Json<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
+    type Rejection = Problem;
+
+    async fn from_request(request: Request, state: &S) -> Result<Json<T>, Problem> {
+        match axum::Json::from_request(request, state).await {
+            Ok(axum::Json(body)) => Ok(Json(body)),
+            Err(rejection) => Err(Problem::new(code_of(&rejection), rejection.body_text())),
+        }
+    }
+}
+
+/// Method and headers, for conditional requests.
+#[derive(Clone, Debug)]
+pub(super) struct Conditions {
+    /// GET or HEAD.
+    pub method: Method,
+    /// All headers.
+    pub headers: HeaderMap,
+}
+
+impl<S: Send + Sync> FromRequestParts<S> for Conditions {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Conditions, Infallible> {
+        Ok(Conditions {
+            method: parts.method.clone(),
+            headers: parts.headers.clone(),
+        })
+    }
+}
+
+fn code_of(rejection: &JsonRejection) -> Code {
+    match rejection {
+        JsonRejection::JsonDataError(_) => Code::InvalidParams,
+        JsonRejection::MissingJsonContentType(_) => Code::UnsupportedMediaType,
+        JsonRejection::BytesRejection(error) if error.status() == 413 => Code::TooLarge,
+        _ => Code::MalformedRequest,
+    }
+}

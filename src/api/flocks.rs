@@ -1,0 +1,162 @@
+//! Flocks: made of a library, as a job.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::Response;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::AppState;
+use super::download::{Download, Files, disposition, find as find_file};
+use super::extract::{Conditions, FileOf, Id, Json};
+use super::jobs::{absent_result, accepted, job_to_follow};
+use super::paging::{Page, Paging};
+use super::problem::{Problem, ProblemBody};
+use super::timestamp::rfc3339;
+use crate::flock::Params;
+use crate::formats::params;
+use crate::ids::{FlockId, JobId, LibraryId};
+use crate::jobs::flock::{Input, Summary, enqueue};
+use crate::store::flocks::Flock;
+
+const FILES: Files = &[
+    ("flock.json", "application/json"),
+    ("video.mp4", "video/mp4"),
+];
+
+/// What to make it of, and how: overrides of the defaults, or of `preset` (`papers`).
+#[derive(Debug, Deserialize, ToSchema)]
+pub(super) struct FlockRequest {
+    #[schema(value_type = Uuid)]
+    library_id: LibraryId,
+    #[serde(flatten)]
+    #[schema(value_type = Params)]
+    params: Map<String, Value>,
+}
+
+/// The job, and the flock that it will make.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct FlockAccepted {
+    #[schema(value_type = Uuid)]
+    job_id: JobId,
+    #[schema(value_type = Uuid)]
+    flock_id: FlockId,
+}
+
+/// One flock.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct FlockView {
+    id: Uuid,
+    job_id: Uuid,
+    library_id: Uuid,
+    /// Whether it came of the sample that the program made itself.
+    sample: bool,
+    size_bytes: i64,
+    created_at: String,
+    /// The parameters it was made with.
+    #[schema(value_type = Params)]
+    params: Value,
+    #[serde(flatten)]
+    summary: Summary,
+}
+
+/// Make a flock of a library, or of one that is still being made.
+#[utoipa::path(post, path = "/v1/flocks", request_body = FlockRequest, responses(
+    (status = 202, body = FlockAccepted, headers(("location" = String), ("link" = String))),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn create_flock(
+    State(state): State<AppState>,
+    Json(request): Json<FlockRequest>,
+) -> Result<Response<Body>, Problem> {
+    let params: Params = params::read(request.params)?;
+    let library_id = request.library_id;
+    let after_job = job_to_follow(&state, library_id).await?;
+    let input = Input { library_id, params };
+    let (job_id, flock_id) = enqueue(&state.context, &input, after_job).await?;
+    let result = format!("/v1/flocks/{flock_id}");
+    Ok(accepted(
+        job_id,
+        &result,
+        FlockAccepted { job_id, flock_id },
+    ))
+}
+
+/// Every flock, newest first.
+#[utoipa::path(get, path = "/v1/flocks", params(Paging), responses(
+    (status = 200, body = Page<FlockView>),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn list_flocks(
+    State(state): State<AppState>,
+    paging: Paging,
+) -> Result<axum::Json<Page<FlockView>>, Problem> {
+    let store = &state.context.store;
+    let rows = store.list_flocks(paging.limit + 1, paging.cursor).await?;
+    Page::of(rows, paging, |row| row.id, FlockView::of)
+}
+
+/// One flock at a glance.
+#[utoipa::path(get, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, body = FlockView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_flock(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<axum::Json<FlockView>, Problem> {
+    Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
+}
+
+/// A file of a flock: flock.json, video.mp4.
+#[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
+    params(("id" = Uuid, Path), ("file" = String, Path)), responses(
+    (status = 200, description = "the file"),
+    (status = 206, description = "a part of the file"),
+    (status = 304, description = "the client has it already"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_flock_file(
+    State(state): State<AppState>,
+    FileOf(id, name): FileOf,
+    conditions: Conditions,
+) -> Result<Response<Body>, Problem> {
+    let (name, media_type) = find_file(FILES, &name)?;
+    let flock = find(&state, id).await?;
+    let label = match name {
+        "video.mp4" => format!("flock-{id}.mp4"),
+        _ => format!("flock-{id}.json"),
+    };
+    let download = Download {
+        folder: &flock.folder,
+        name,
+        media_type,
+        disposition: disposition("inline", &label),
+    };
+    download.answer(&state.context.store, &conditions).await
+}
+
+async fn find(state: &AppState, id: Uuid) -> Result<Flock, Problem> {
+    match state.context.store.flock(id).await? {
+        Some(flock) => Ok(flock),
+        None => Err(absent_result(state, id).await?),
+    }
+}
+
+impl FlockView {
+    fn of(row: Flock) -> Result<FlockView, Problem> {
+        Ok(FlockView {
+            id: row.id,
+            job_id: row.job_id,
+            library_id: row.library_id,
+            sample: row.sample,
+            size_bytes: row.size_bytes,
+            created_at: rfc3339(row.created_ms),
+            params: super::stored(&row.params)?,
+            summary: super::stored(&row.summary)?,
+        })
+    }
+}

@@ -1,0 +1,162 @@
+//! Footage: uploaded videos.
+
+use axum::body::Body;
+use axum::extract::{Query, Request, State};
+use axum::http::{Response, StatusCode, header};
+use axum::response::IntoResponse;
+use serde::{Deserialize, Serialize};
+use utoipa::{IntoParams, ToSchema};
+use uuid::Uuid;
+
+use super::AppState;
+use super::download::{Download, disposition};
+use super::extract::{Conditions, Id};
+use super::paging::{Page, Paging};
+use super::problem::{Problem, ProblemBody};
+use super::receive::receive;
+use super::timestamp::rfc3339;
+use crate::jobs::{Error, admit};
+use crate::store::blobs::hex;
+use crate::store::footage::{Added, Footage, VIDEO};
+
+/// An uploaded video.
+#[derive(Clone, Debug, Serialize, ToSchema)]
+pub(super) struct FootageView {
+    id: Uuid,
+    /// What the sender called it.
+    name: String,
+    /// SHA-256 of the video, hexadecimal.
+    sha256: String,
+    size_bytes: i64,
+    /// Width and height, square pixels.
+    image_size_px: [i64; 2],
+    /// Frames a second.
+    fps: f64,
+    /// How many frames there seem to be.
+    n_frames_hint: i64,
+    /// Whether a picture of the empty scene came with it.
+    has_background: bool,
+    /// Made by the program itself.
+    sample: bool,
+    created_at: String,
+}
+
+/// What is said of a raw upload.
+#[derive(Debug, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+pub(super) struct Naming {
+    /// What to call it: a label for people.
+    name: Option<String>,
+}
+
+/// The form of a multipart upload.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the form in the OpenAPI document"
+)]
+pub(super) struct FootageForm {
+    #[schema(value_type = String, format = Binary)]
+    video: Vec<u8>,
+    #[schema(value_type = Option<String>, format = Binary)]
+    background: Option<Vec<u8>>,
+}
+
+/// Upload a video: as the raw body, or as a form with `video` and, if there is one, `background`.
+#[utoipa::path(post, path = "/v1/footage", params(Naming),
+    request_body(content(([u8] = "application/octet-stream"), (FootageForm = "multipart/form-data"))),
+    responses(
+        (status = 201, body = FootageView, headers(("location" = String))),
+        (status = 200, body = FootageView, description = "the same bytes were there already"),
+        (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+    ))]
+pub(super) async fn create_footage(
+    State(state): State<AppState>,
+    Query(naming): Query<Naming>,
+    request: Request,
+) -> Result<Response<Body>, Problem> {
+    let arrival = receive(&state, request, naming.name).await?;
+    // In a task of its own, so that a sender who hangs up now leaves no half of it behind.
+    let admitted = tokio::spawn(async move { admit::admit(&state.context.store, arrival).await });
+    let (status, footage) = match admitted.await.unwrap_or(Err(Error::Panicked))? {
+        Added::New(footage) => (StatusCode::CREATED, footage),
+        Added::Known(footage) => (StatusCode::OK, footage),
+    };
+    let location = [(header::LOCATION, format!("/v1/footage/{}", footage.id))];
+    Ok((status, location, axum::Json(FootageView::of(footage))).into_response())
+}
+
+/// Every footage, newest first.
+#[utoipa::path(get, path = "/v1/footage", params(Paging), responses(
+    (status = 200, body = Page<FootageView>),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn list_footage(
+    State(state): State<AppState>,
+    paging: Paging,
+) -> Result<axum::Json<Page<FootageView>>, Problem> {
+    let store = &state.context.store;
+    let rows = store.list_footage(paging.limit + 1, paging.cursor).await?;
+    Page::of(rows, paging, |row| row.id, |row| Ok(FootageView::of(row)))
+}
+
+/// One footage.
+#[utoipa::path(get, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, body = FootageView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_footage(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<axum::Json<FootageView>, Problem> {
+    Ok(axum::Json(FootageView::of(find(&state, id).await?)))
+}
+
+/// The video as it was uploaded, to keep: never shown in place.
+#[utoipa::path(get, path = "/v1/footage/{id}/file", params(("id" = Uuid, Path)), responses(
+    (status = 200, content_type = "application/octet-stream"),
+    (status = 206, content_type = "application/octet-stream"),
+    (status = 304, description = "the client has it already"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_footage_file(
+    State(state): State<AppState>,
+    Id(id): Id,
+    conditions: Conditions,
+) -> Result<Response<Body>, Problem> {
+    let footage = find(&state, id).await?;
+    let label = match footage.name.as_str() {
+        "" => "footage",
+        name => name,
+    };
+    let download = Download {
+        folder: &footage.folder,
+        name: VIDEO,
+        media_type: "application/octet-stream",
+        disposition: disposition("attachment", label),
+    };
+    download.answer(&state.context.store, &conditions).await
+}
+
+pub(super) async fn find(state: &AppState, id: Uuid) -> Result<Footage, Problem> {
+    let footage = state.context.store.footage(id).await?;
+    footage.ok_or_else(Problem::not_found)
+}
+
+impl FootageView {
+    fn of(footage: Footage) -> FootageView {
+        FootageView {
+            id: footage.id,
+            sha256: hex(&footage.sha256),
+            name: footage.name,
+            size_bytes: footage.size_bytes,
+            image_size_px: [footage.width, footage.height],
+            fps: footage.fps,
+            n_frames_hint: footage.n_frames_hint,
+            has_background: !footage.background_sha256.is_empty(),
+            sample: footage.sample,
+            created_at: rfc3339(footage.created_ms),
+        }
+    }
+}

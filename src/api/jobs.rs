@@ -1,0 +1,241 @@
+//! Jobs: their state, their events, the wish to cancel them; and what other nouns say of jobs.
+
+use std::convert::Infallible;
+use std::time::Duration;
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{Response, StatusCode, header};
+use axum::response::IntoResponse;
+use axum::response::sse::{Event, KeepAlive, Sse};
+use futures_util::stream::{Stream, unfold};
+use serde::Serialize;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::AppState;
+use super::extract::Id;
+use super::paging::{Page, Paging};
+use super::problem::{Problem, ProblemBody};
+use super::timestamp::rfc3339;
+use crate::code::Code;
+use crate::ids::{JobId, LibraryId};
+use crate::jobs::clock::now_ms;
+use crate::store::jobs::cancel::Cancel;
+use crate::store::jobs::read::JobRow;
+use crate::store::jobs::{JobState, Kind};
+
+/// How often a stream of events looks at its job: as often as workers note progress.
+const LOOK: Duration = Duration::from_millis(500);
+
+/// A unit of queued work.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub(super) struct JobView {
+    #[schema(value_type = Uuid)]
+    id: JobId,
+    /// `analysis`, `flock` or `fish`.
+    kind: &'static str,
+    /// `queued`, `running`, `done`, `failed` or `cancelled`.
+    state: &'static str,
+    /// The stage under way, while running.
+    stage: Option<String>,
+    /// How much of the whole is done, 0..=1.
+    progress: f64,
+    /// How often it has been tried.
+    attempt: i64,
+    cancel_requested: bool,
+    /// Why it failed.
+    error: Option<JobFailure>,
+    created_at: String,
+    started_at: Option<String>,
+    finished_at: Option<String>,
+    links: JobLinks,
+}
+
+/// Why a job failed.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub(super) struct JobFailure {
+    code: &'static str,
+    title: &'static str,
+    detail: String,
+}
+
+/// Where to look next.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub(super) struct JobLinks {
+    #[serde(rename = "self")]
+    this: String,
+    events: String,
+    /// What it makes; there once it is done.
+    result: String,
+}
+
+/// Every job, newest first.
+#[utoipa::path(get, path = "/v1/jobs", params(Paging), responses(
+    (status = 200, body = Page<JobView>),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn list_jobs(
+    State(state): State<AppState>,
+    paging: Paging,
+) -> Result<axum::Json<Page<JobView>>, Problem> {
+    let store = &state.context.store;
+    let rows = store.list_jobs(paging.limit + 1, paging.cursor).await?;
+    Page::of(rows, paging, |row| row.id.0, |row| Ok(JobView::of(row)))
+}
+
+/// One job.
+#[utoipa::path(get, path = "/v1/jobs/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, body = JobView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_job(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<axum::Json<JobView>, Problem> {
+    Ok(axum::Json(find(&state, JobId(id)).await?))
+}
+
+/// Cancel a job: at once where it is queued (200), soon where it runs (202).
+#[utoipa::path(delete, path = "/v1/jobs/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, body = JobView),
+    (status = 202, body = JobView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn cancel_job(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<Response<Body>, Problem> {
+    let status = match state.context.store.cancel(JobId(id), now_ms()).await? {
+        Cancel::Cancelled => StatusCode::OK,
+        Cancel::Requested => StatusCode::ACCEPTED,
+        Cancel::Final(_) => return Err(Code::AlreadyFinished.into()),
+        Cancel::Absent => return Err(Problem::not_found()),
+    };
+    let job = find(&state, JobId(id)).await?;
+    Ok((status, axum::Json(job)).into_response())
+}
+
+/// The job's states as server-sent events named `job`, until the last one.
+#[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = Uuid, Path)), responses(
+    (status = 200, content_type = "text/event-stream", body = JobView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_job_events(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<Response<Body>, Problem> {
+    let job = find(&state, JobId(id)).await?;
+    let events = Sse::new(events(state, job)).keep_alive(KeepAlive::default());
+    // A proxy that gathers answers would hold events back.
+    Ok(([("x-accel-buffering", "no")], events).into_response())
+}
+
+/// The first state at once, then each that differs from the one before.
+fn events(state: AppState, first: JobView) -> impl Stream<Item = Result<Event, Infallible>> {
+    unfold((state, None, Some(first)), async |(state, last, first)| {
+        let job = match first {
+            Some(first) => first,
+            None => next_change(&state, last.as_ref()?).await?,
+        };
+        let event = Event::default().event("job").json_data(&job).ok()?;
+        Some((Ok(event), (state, Some(job), None)))
+    })
+}
+
+/// Waits for another state; none after a final one, or when the service stops.
+async fn next_change(state: &AppState, last: &JobView) -> Option<JobView> {
+    while !is_final(last) && !state.context.draining.is_cancelled() {
+        tokio::select! {
+            () = tokio::time::sleep(LOOK) => {}
+            () = state.context.draining.cancelled() => {}
+        }
+        let job = find(state, last.id).await.ok()?;
+        if job != *last {
+            return Some(job);
+        }
+    }
+    None
+}
+
+async fn find(state: &AppState, id: JobId) -> Result<JobView, Problem> {
+    let job = state.context.store.job(id).await?;
+    job.map(JobView::of).ok_or_else(Problem::not_found)
+}
+
+/// 202: the job is where Location says, its result will be where Link says.
+pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Response<Body> {
+    let headers = [
+        (header::LOCATION, format!("/v1/jobs/{job}")),
+        (header::LINK, format!("<{result}>; rel=\"related\"")),
+        (header::RETRY_AFTER, "1".to_owned()),
+    ];
+    (StatusCode::ACCEPTED, headers, axum::Json(body)).into_response()
+}
+
+/// Why a result is not there: its job has not finished, or there never was one.
+pub(super) async fn absent_result(state: &AppState, result: Uuid) -> Result<Problem, Problem> {
+    let Some(job) = state.context.store.job_of_result(result).await? else {
+        return Ok(Problem::not_found());
+    };
+    let sentence = format!("its job is {}: /v1/jobs/{}", job.state.name(), job.id);
+    Ok(Problem::new(Code::NotReady, sentence))
+}
+
+/// The job to wait for before a library can be used: none when it is there already.
+pub(super) async fn job_to_follow(
+    state: &AppState,
+    library_id: LibraryId,
+) -> Result<Option<JobId>, Problem> {
+    let store = &state.context.store;
+    if store.library(library_id.0).await?.is_some() {
+        return Ok(None);
+    }
+    match store.job_of_result(library_id.0).await? {
+        Some(job) if job.kind == Kind::Analysis && !is_lost(job.state) => Ok(Some(job.id)),
+        _ => {
+            let sentence = format!("there is no such library: {library_id}");
+            Err(Problem::new(Code::InvalidParams, sentence))
+        }
+    }
+}
+
+fn is_lost(state: JobState) -> bool {
+    matches!(state, JobState::Failed | JobState::Cancelled)
+}
+
+fn is_final(job: &JobView) -> bool {
+    job.finished_at.is_some()
+}
+
+impl JobView {
+    fn of(row: JobRow) -> JobView {
+        let result = match row.kind {
+            Kind::Analysis => "libraries",
+            Kind::Flock => "flocks",
+            Kind::Fish => "fish",
+        };
+        JobView {
+            id: row.id,
+            kind: row.kind.name(),
+            state: row.state.name(),
+            stage: row.stage,
+            progress: row.progress,
+            attempt: row.attempt,
+            cancel_requested: row.cancel_requested,
+            error: row.failure.map(|(code, detail)| JobFailure {
+                code: code.name(),
+                title: code.meaning(),
+                detail,
+            }),
+            created_at: rfc3339(row.created_ms),
+            started_at: row.started_ms.map(rfc3339),
+            finished_at: row.finished_ms.map(rfc3339),
+            links: JobLinks {
+                this: format!("/v1/jobs/{}", row.id),
+                events: format!("/v1/jobs/{}/events", row.id),
+                result: format!("/v1/{result}/{}", row.result_id),
+            },
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! Libraries: what was measured, with pictures.
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::Response;
+use serde::Serialize;
+use serde_json::Value;
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::AppState;
+use super::download::{Download, Files, disposition, find as find_file};
+use super::extract::{Conditions, FileOf, Id};
+use super::jobs::absent_result;
+use super::paging::{Page, Paging};
+use super::problem::{Problem, ProblemBody};
+use super::timestamp::rfc3339;
+use crate::jobs::analysis::Summary;
+use crate::store::libraries::Library;
+
+const FILES: Files = &[
+    ("library.json", "application/json"),
+    ("poses.json", "application/json"),
+    ("poses.csv", "text/csv; charset=utf-8"),
+    ("background.png", "image/png"),
+    ("distance.png", "image/png"),
+    ("headings.svg", "image/svg+xml"),
+    ("sprites.zip", "application/zip"),
+];
+
+/// What one analysis yielded.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct LibraryView {
+    id: Uuid,
+    job_id: Uuid,
+    footage_id: Uuid,
+    /// What the footage is called.
+    name: String,
+    /// Whether it came of the sample that the program made itself.
+    sample: bool,
+    size_bytes: i64,
+    created_at: String,
+    /// The parameters it was made with.
+    #[schema(value_type = crate::analysis::Params)]
+    params: Value,
+    #[serde(flatten)]
+    summary: Summary,
+}
+
+/// Every library, newest first.
+#[utoipa::path(get, path = "/v1/libraries", params(Paging), responses(
+    (status = 200, body = Page<LibraryView>),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn list_libraries(
+    State(state): State<AppState>,
+    paging: Paging,
+) -> Result<axum::Json<Page<LibraryView>>, Problem> {
+    let store = &state.context.store;
+    let rows = store
+        .list_libraries(paging.limit + 1, paging.cursor)
+        .await?;
+    Page::of(rows, paging, |row| row.id, LibraryView::of)
+}
+
+/// One library at a glance.
+#[utoipa::path(get, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, body = LibraryView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_library(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<axum::Json<LibraryView>, Problem> {
+    Ok(axum::Json(LibraryView::of(find(&state, id).await?)?))
+}
+
+/// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,
+/// headings.svg, sprites.zip.
+#[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
+    params(("id" = Uuid, Path), ("file" = String, Path)), responses(
+    (status = 200, description = "the file"),
+    (status = 206, description = "a part of the file"),
+    (status = 304, description = "the client has it already"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_library_file(
+    State(state): State<AppState>,
+    FileOf(id, name): FileOf,
+    conditions: Conditions,
+) -> Result<Response<Body>, Problem> {
+    let (name, media_type) = find_file(FILES, &name)?;
+    let library = find(&state, id).await?;
+    let download = Download {
+        folder: &library.folder,
+        name,
+        media_type,
+        disposition: disposition("inline", name),
+    };
+    download.answer(&state.context.store, &conditions).await
+}
+
+async fn find(state: &AppState, id: Uuid) -> Result<Library, Problem> {
+    match state.context.store.library(id).await? {
+        Some(library) => Ok(library),
+        None => Err(absent_result(state, id).await?),
+    }
+}
+
+impl LibraryView {
+    fn of(row: Library) -> Result<LibraryView, Problem> {
+        Ok(LibraryView {
+            id: row.id,
+            job_id: row.job_id,
+            footage_id: row.footage_id,
+            name: row.name,
+            sample: row.sample,
+            size_bytes: row.size_bytes,
+            created_at: rfc3339(row.created_ms),
+            params: super::stored(&row.params)?,
+            summary: super::stored(&row.summary)?,
+        })
+    }
+}

@@ -1,0 +1,66 @@
+//! The page: files of `static/` inside the program (read from disk in a debug build), each with the
+//! hash of its content as its tag.
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::Path;
+use axum::http::{HeaderMap, Response, StatusCode, header};
+use axum::response::IntoResponse;
+use axum::routing::get;
+use rust_embed::{EmbeddedFile, RustEmbed};
+
+use super::{AppState, Problem};
+use crate::store::blobs::hex;
+
+#[derive(RustEmbed)]
+#[folder = "static/"]
+struct Static;
+
+/// `/` and everything under `/static/`.
+pub(super) fn routes() -> Router<AppState> {
+    Router::new()
+        .route(
+            "/",
+            get(|headers: HeaderMap| async move { answer("index.html", &headers) }),
+        )
+        .route("/static/{*path}", get(get_static))
+}
+
+async fn get_static(
+    Path(path): Path<String>,
+    headers: HeaderMap,
+) -> Result<Response<Body>, Problem> {
+    answer(&path, &headers)
+}
+
+fn answer(path: &str, headers: &HeaderMap) -> Result<Response<Body>, Problem> {
+    let file = Static::get(path).ok_or_else(Problem::not_found)?;
+    let etag = etag(&file);
+    let known = headers.get(header::IF_NONE_MATCH);
+    let tags = [
+        (header::ETAG, etag.clone()),
+        (header::CACHE_CONTROL, "no-cache".to_owned()),
+    ];
+    if known.is_some_and(|tag| tag.as_bytes() == etag.as_bytes()) {
+        return Ok((StatusCode::NOT_MODIFIED, tags).into_response());
+    }
+    let media_type = [(header::CONTENT_TYPE, media_type(path))];
+    Ok((tags, media_type, file.data.into_owned()).into_response())
+}
+
+fn etag(file: &EmbeddedFile) -> String {
+    format!("\"{}\"", hex(&file.metadata.sha256_hash()))
+}
+
+fn media_type(path: &str) -> &'static str {
+    match path.rsplit('.').next().unwrap_or_default() {
+        "html" => "text/html; charset=utf-8",
+        "css" => "text/css; charset=utf-8",
+        "js" => "text/javascript; charset=utf-8",
+        "json" => "application/json",
+        "svg" => "image/svg+xml",
+        "png" => "image/png",
+        "woff2" => "font/woff2",
+        _ => "application/octet-stream",
+    }
+}

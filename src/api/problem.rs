@@ -1,0 +1,154 @@
+//! Errors as application/problem+json (RFC 9457). The only place that knows which status a code has.
+
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::Serialize;
+use utoipa::ToSchema;
+
+use crate::code::Code;
+use crate::formats::params;
+use crate::{jobs, store};
+
+/// Seconds after which it makes sense to ask again.
+const RETRY_AFTER_S: u64 = 5;
+
+/// An answer that is not what was asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// The stable reason.
+    pub code: Code,
+    /// What happened this time, for people.
+    pub detail: String,
+}
+
+/// The body of every answer that is not a success.
+#[derive(Serialize, ToSchema)]
+pub(super) struct ProblemBody {
+    /// Where the code is explained.
+    #[serde(rename = "type")]
+    type_url: String,
+    /// What the code means.
+    title: &'static str,
+    /// The HTTP status.
+    status: u16,
+    /// What happened this time.
+    detail: String,
+    /// The stable code.
+    code: &'static str,
+}
+
+impl Problem {
+    /// A problem with its own sentence.
+    pub fn new(code: Code, detail: impl Into<String>) -> Problem {
+        Problem {
+            code,
+            detail: detail.into(),
+        }
+    }
+
+    /// There is nothing of that id: the same answer as for an id of somebody else.
+    pub fn not_found() -> Problem {
+        Code::NotFound.into()
+    }
+}
+
+impl From<Code> for Problem {
+    fn from(code: Code) -> Problem {
+        Problem::new(code, code.meaning())
+    }
+}
+
+impl From<store::Error> for Problem {
+    fn from(error: store::Error) -> Problem {
+        from_error(error.code(), &error)
+    }
+}
+
+impl From<jobs::Error> for Problem {
+    fn from(error: jobs::Error) -> Problem {
+        from_error(error.code(), &error)
+    }
+}
+
+impl From<params::Error> for Problem {
+    fn from(error: params::Error) -> Problem {
+        Problem::new(Code::InvalidParams, error.to_string())
+    }
+}
+
+/// An internal error is logged here and its cause stays here.
+fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
+    match code {
+        Code::Internal | Code::DecoderCrashed => {
+            tracing::error!(%error, "a request failed inside");
+            code.into()
+        }
+        _ => Problem::new(code, error.to_string()),
+    }
+}
+
+impl IntoResponse for Problem {
+    fn into_response(self) -> Response {
+        let status = status_of(self.code);
+        let body = ProblemBody {
+            type_url: format!("/docs/errors#{}", self.code),
+            title: self.code.meaning(),
+            status: status.as_u16(),
+            detail: self.detail,
+            code: self.code.name(),
+        };
+        let mut response = (status, axum::Json(body)).into_response();
+        let headers = response.headers_mut();
+        let media_type = HeaderValue::from_static("application/problem+json");
+        headers.insert(header::CONTENT_TYPE, media_type);
+        if matches!(
+            self.code,
+            Code::Stopping | Code::NotReady | Code::StorageFull
+        ) {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+        }
+        response
+    }
+}
+
+/// The status of each code.
+pub(super) fn status_of(code: Code) -> StatusCode {
+    match code {
+        Code::NotAVideo
+        | Code::ContainerNotAllowed
+        | Code::CodecNotAllowed
+        | Code::TooManyPixels
+        | Code::TooFewPixels
+        | Code::TooManyFrames
+        | Code::TooManyStreams
+        | Code::TooLong
+        | Code::TooFast
+        | Code::Truncated
+        | Code::Encrypted
+        | Code::NoVideoStream
+        | Code::TooFewFrames
+        | Code::TimeLimit
+        | Code::MemoryLimit
+        | Code::DecoderCrashed
+        | Code::NothingMoves
+        | Code::BackgroundNotStatic
+        | Code::SeveralAnimals
+        | Code::AnimalTooSmall
+        | Code::BackgroundSizeDiffers
+        | Code::NoTransitions
+        | Code::InputFailed
+        | Code::InvalidParams => StatusCode::UNPROCESSABLE_ENTITY,
+        Code::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
+        Code::NotFound | Code::NotReady => StatusCode::NOT_FOUND,
+        Code::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
+        Code::MalformedRequest | Code::BodyCutOff => StatusCode::BAD_REQUEST,
+        Code::UnsupportedMediaType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
+        Code::TooLarge => StatusCode::PAYLOAD_TOO_LARGE,
+        Code::BodyTimeout => StatusCode::REQUEST_TIMEOUT,
+        Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
+        Code::AlreadyFinished => StatusCode::CONFLICT,
+        Code::CrossSite => StatusCode::FORBIDDEN,
+        Code::Stopping => StatusCode::SERVICE_UNAVAILABLE,
+        Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+    }
+}

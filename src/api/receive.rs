@@ -1,0 +1,166 @@
+//! Bodies to disk: one way for raw bodies and multipart fields (RELIABILITY.md, store rules, H2).
+
+use std::time::Duration;
+
+use axum::extract::multipart::{Field, MultipartError};
+use axum::extract::{FromRequest, Multipart, Request};
+use axum::http::header;
+use bytes::Bytes;
+use futures_util::{Stream, StreamExt};
+use tokio::time::timeout;
+
+use super::{AppState, Problem};
+use crate::code::Code;
+use crate::jobs::admit::Arrival;
+use crate::store;
+use crate::store::footage::{BACKGROUND, VIDEO};
+use crate::store::intake::Intake;
+use crate::store::{BlobFile, Draft};
+
+/// The longest wait for the next piece of a body.
+const PIECE: Duration = Duration::from_secs(30);
+/// The largest given background.
+const MAX_BACKGROUND_BYTES: u64 = 64 << 20;
+
+/// Receives a footage, raw or as a form with `video` and, if given, `background`.
+pub(super) async fn receive(
+    state: &AppState,
+    request: Request,
+    name: Option<String>,
+) -> Result<Arrival, Problem> {
+    check_headers(&request, state.config.max_upload_bytes)?;
+    let draft_name = uuid::Uuid::now_v7().to_string();
+    let draft = state.context.store.blobs().draft(&draft_name);
+    let draft = draft.map_err(store::Error::Io)?;
+    if is_form(&request) {
+        return receive_form(state, request, draft, name).await;
+    }
+    let body = request.into_body().into_data_stream();
+    let limit_bytes = state.config.max_upload_bytes;
+    let video = receive_file(body, &draft, VIDEO, limit_bytes).await?;
+    Ok(Arrival {
+        draft,
+        video,
+        background: None,
+        name: label(name.as_deref().unwrap_or_default()),
+        sample: false,
+    })
+}
+
+async fn receive_form(
+    state: &AppState,
+    request: Request,
+    draft: Draft,
+    name: Option<String>,
+) -> Result<Arrival, Problem> {
+    let malformed = |sentence: &str| Problem::new(Code::MalformedRequest, sentence);
+    let mut form = Multipart::from_request(request, state)
+        .await
+        .map_err(|rejection| malformed(&rejection.body_text()))?;
+    let (mut video, mut background, mut file_name) = (None, None, None);
+    while let Some(field) = next_field(&mut form).await? {
+        match field.name() {
+            Some("video") if video.is_none() => {
+                file_name = field.file_name().map(str::to_owned);
+                let limit_bytes = state.config.max_upload_bytes;
+                video = Some(receive_file(field, &draft, VIDEO, limit_bytes).await?);
+            }
+            Some("background") if background.is_none() => {
+                let file = receive_file(field, &draft, BACKGROUND, MAX_BACKGROUND_BYTES).await?;
+                background = Some(file);
+            }
+            _ => {
+                return Err(malformed(
+                    "the form has fields besides one video and one background",
+                ));
+            }
+        }
+    }
+    Ok(Arrival {
+        draft,
+        video: video.ok_or_else(|| malformed("the form has no field: video"))?,
+        background,
+        name: label(&name.or(file_name).unwrap_or_default()),
+        sample: false,
+    })
+}
+
+async fn next_field(form: &mut Multipart) -> Result<Option<Field<'_>>, Problem> {
+    match timeout(PIECE, form.next_field()).await {
+        Ok(field) => field.map_err(|error| from_multipart(&error)),
+        Err(_) => Err(Code::BodyTimeout.into()),
+    }
+}
+
+/// Takes a stream to its end: counted, hashed, synced.
+async fn receive_file<S, E>(
+    mut stream: S,
+    draft: &Draft,
+    name: &'static str,
+    limit_bytes: u64,
+) -> Result<BlobFile, Problem>
+where
+    S: Stream<Item = Result<Bytes, E>> + Unpin,
+    E: std::error::Error,
+{
+    let mut intake = Intake::create(draft, name, limit_bytes).await?;
+    loop {
+        match timeout(PIECE, stream.next()).await {
+            Ok(Some(Ok(bytes))) => intake.take(&bytes).await?,
+            Ok(Some(Err(error))) => {
+                tracing::debug!(%error, "a body was cut off");
+                return Err(Code::BodyCutOff.into());
+            }
+            Ok(None) => return Ok(intake.finish().await?),
+            Err(_) => return Err(Code::BodyTimeout.into()),
+        }
+    }
+}
+
+/// What can be refused before the body is read.
+fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
+    let headers = request.headers();
+    if headers.contains_key(header::CONTENT_ENCODING) {
+        let sentence = "a video is sent as it is, without Content-Encoding";
+        return Err(Problem::new(Code::UnsupportedMediaType, sentence));
+    }
+    let length = headers.get(header::CONTENT_LENGTH);
+    let length = length.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
+    if !is_form(request) && length.is_some_and(|bytes| bytes > limit_bytes) {
+        return Err(store::Error::TooLarge { limit_bytes }.into());
+    }
+    Ok(())
+}
+
+fn is_form(request: &Request) -> bool {
+    let media_type = request.headers().get(header::CONTENT_TYPE);
+    let media_type = media_type.and_then(|value| value.to_str().ok());
+    media_type.is_some_and(|text| text.to_ascii_lowercase().starts_with("multipart/"))
+}
+
+fn from_multipart(error: &MultipartError) -> Problem {
+    Problem::new(Code::MalformedRequest, error.body_text())
+}
+
+/// A name as a label: its last part, without what controls a terminal or turns text around
+/// (RELIABILITY.md, S4); at most 200 characters.
+fn label(name: &str) -> String {
+    let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    let turns_text = |c: char| matches!(c, '\u{200e}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let kept = last.chars().filter(|c| !c.is_control() && !turns_text(*c));
+    kept.take(200).collect::<String>().trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::label;
+
+    #[test]
+    fn a_name_becomes_a_plain_label() {
+        assert_eq!(label("../../etc/passwd"), "passwd");
+        assert_eq!(label("C:\\films\\fish.mp4"), "fish.mp4");
+        assert_eq!(label("a\r\nb\0\u{202e}4pm.exe"), "ab4pm.exe");
+        assert_eq!(label(&"x".repeat(300)).len(), 200);
+        assert_eq!(label("<b>-i</b>"), "b>");
+    }
+}

@@ -1,0 +1,275 @@
+//! Boids: simulated individuals that move as a flock and never ask for what the animal was not seen
+//! to do (O 4; Reynolds 1987; ALGORITHMS.md 7).
+//!
+//! In top view they swim in the plane of the picture. In side view they swim in a shallow tank behind
+//! it, so that they turn round as the animal does: through the depth, not through the vertical.
+//! One step an output frame, less where a step would be long; every number is the same for any
+//! number of threads.
+
+pub mod calibration;
+pub mod grid;
+pub mod leadership;
+pub mod measures;
+pub mod rules;
+pub mod tank;
+pub mod vector;
+
+use rayon::prelude::*;
+
+use self::calibration::Calibration;
+use self::grid::{Grid, Neighbor};
+use self::rules::{Moment, Steering};
+use self::tank::Tank;
+use self::vector::{Vec3, add_scaled, norm, scaled, turned_at_most, unit};
+use super::params::Params;
+use crate::random;
+
+/// The longest way in one step, body lengths.
+const LONGEST_STEP_BL: f64 = 0.2;
+/// Boids nearer than this are pushed apart after each step.
+const OVERLAP_BL: f64 = 0.5;
+/// How long they swim before the first frame, so that the flock has formed.
+const WARM_UP_S: f64 = 6.0;
+/// Time constant of the wandering turn rate.
+const WANDER_S: f64 = 1.0;
+/// Boids of one unit of parallel work.
+const CHUNK: usize = 64;
+
+/// What a random number is for.
+mod draw {
+    pub(super) const START: u64 = 1;
+    pub(super) const WANDER: u64 = 2;
+    pub(super) const LEAD: u64 = 3;
+}
+
+/// Boids in their tank.
+pub struct Boids<'a> {
+    params: &'a Params,
+    calibration: &'a Calibration,
+    tank: &'a Tank,
+    step_s: f64,
+    n_substeps: u32,
+    step_idx: u64,
+    /// Positions, body lengths.
+    pub positions: Vec<Vec3>,
+    /// Velocities, body lengths a second.
+    pub velocities: Vec<Vec3>,
+    wander: Vec<[f64; 2]>,
+    leads_for_s: Vec<f64>,
+}
+
+impl<'a> Boids<'a> {
+    /// Boids at random places with random directions, then left to swim until they have formed.
+    pub fn new(params: &'a Params, calibration: &'a Calibration, tank: &'a Tank, fps: f64) -> Self {
+        let longest_s = LONGEST_STEP_BL / calibration.speed_limits_bl_per_s[1];
+        let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
+        let n = params.count as usize;
+        let mut boids = Boids {
+            params,
+            calibration,
+            tank,
+            step_s: 1.0 / (fps * f64::from(n_substeps)),
+            n_substeps,
+            step_idx: 0,
+            positions: vec![[0.0; 3]; n],
+            velocities: vec![[0.0; 3]; n],
+            wander: vec![[0.0; 2]; n],
+            leads_for_s: vec![0.0; n],
+        };
+        boids.start();
+        for _ in 0..(WARM_UP_S * fps).ceil() as u64 {
+            boids.advance();
+        }
+        boids
+    }
+
+    /// One output frame.
+    pub fn advance(&mut self) {
+        for _ in 0..self.n_substeps {
+            self.step();
+        }
+    }
+
+    fn start(&mut self) {
+        let [least, greatest] = self.tank.corners;
+        for id in 0..self.positions.len() {
+            let key = |word| [draw::START, id as u64, word];
+            let at = |word| random::unit(self.params.seed, &key(word));
+            let angle = std::f64::consts::TAU * at(3);
+            let (cos, sin) = (libm::cos(angle), libm::sin(angle));
+            let direction = match self.tank.is_flat() {
+                true => [cos, sin, 0.0],
+                false => [cos, 0.0, sin],
+            };
+            self.positions[id] = std::array::from_fn(|axis| {
+                least[axis] + at(axis as u64) * (greatest[axis] - least[axis])
+            });
+            self.velocities[id] = scaled(self.calibration.cruise_bl_per_s, direction);
+            self.tank
+                .keep_inside(&mut self.positions[id], &mut self.velocities[id]);
+        }
+    }
+
+    fn step(&mut self) {
+        let rules = &self.params.rules;
+        let reach = rules
+            .separation_bl
+            .max(rules.alignment_bl)
+            .max(rules.cohesion_bl);
+        let grid = Grid::new(&self.positions, reach);
+        let half_view_rad = rules.view_deg.to_radians() / 2.0;
+        let steering = Steering {
+            params: self.params,
+            calibration: self.calibration,
+            tank: self.tank,
+            cos_half_view: libm::cos(half_view_rad.min(std::f64::consts::PI)),
+            velocities: &self.velocities,
+        };
+        let cos_sin = {
+            let turn_rad = self.calibration.turn_rad_per_s * self.step_s;
+            (libm::cos(turn_rad), libm::sin(turn_rad))
+        };
+        let ids: Vec<u32> = (0..self.positions.len() as u32).collect();
+        let next: Vec<Next> = ids
+            .par_chunks(CHUNK)
+            .flat_map_iter(|chunk| {
+                let mut neighbors = Vec::new();
+                let mut next = Vec::with_capacity(chunk.len());
+                for &id in chunk {
+                    let limit = rules.neighbors as usize;
+                    grid.nearest(
+                        id,
+                        self.positions[id as usize],
+                        reach,
+                        limit,
+                        &mut neighbors,
+                    );
+                    next.push(self.next(id as usize, &neighbors, &steering, cos_sin));
+                }
+                next
+            })
+            .collect();
+        for (id, next) in next.into_iter().enumerate() {
+            self.positions[id] = next.position;
+            self.velocities[id] = next.velocity;
+            self.wander[id] = next.wander;
+            self.leads_for_s[id] = next.leads_for_s;
+        }
+        self.push_apart();
+        self.step_idx += 1;
+    }
+
+    fn next(
+        &self,
+        id: usize,
+        neighbors: &[Neighbor],
+        steering: &Steering,
+        cos_sin: (f64, f64),
+    ) -> Next {
+        let (position, velocity) = (self.positions[id], self.velocities[id]);
+        let wander = self.next_wander(id);
+        let leads_for_s = self.next_lead(id, neighbors);
+        let acceleration = steering.acceleration(&Moment {
+            position,
+            velocity,
+            neighbors,
+            wander_rad_per_s: wander,
+            leads: leads_for_s > 0.0,
+        });
+        let wished = add_scaled(velocity, self.step_s, acceleration);
+        let aside = match self.tank.is_flat() {
+            true => [-velocity[1], velocity[0], 0.0],
+            false => [-velocity[2], 0.0, velocity[0]],
+        };
+        let turned = turned_at_most(velocity, wished, cos_sin, aside);
+        let mut next = Next {
+            position,
+            velocity: self.within_limits(turned, velocity),
+            wander,
+            leads_for_s,
+        };
+        next.position = add_scaled(position, self.step_s, next.velocity);
+        let met = self
+            .tank
+            .keep_inside(&mut next.position, &mut next.velocity);
+        if met {
+            // Along the wall, or aside where it was met head-on.
+            next.velocity = self.within_limits(next.velocity, aside);
+        }
+        next
+    }
+
+    /// Speed and slope as the animal was seen to have them; the direction of `before` when it stands.
+    fn within_limits(&self, mut velocity: Vec3, before: Vec3) -> Vec3 {
+        if let Some([up, down]) = self.calibration.slopes {
+            let level = velocity[0].hypot(velocity[2]);
+            velocity[1] = velocity[1].clamp(-up * level, down * level);
+        }
+        let [least, most] = self.calibration.speed_limits_bl_per_s;
+        let speed = norm(velocity);
+        let direction = if speed > 1e-9 {
+            unit(velocity)
+        } else {
+            unit(before)
+        };
+        scaled(speed.clamp(least, most), direction)
+    }
+
+    /// Ornstein-Uhlenbeck turn rates; the level one as varied as half the animal's greatest.
+    fn next_wander(&self, id: usize) -> [f64; 2] {
+        let keep = libm::exp(-self.step_s / WANDER_S);
+        let spread = 0.5 * self.params.rules.wander * self.calibration.turn_rad_per_s;
+        let fresh = spread * (1.0 - keep * keep).sqrt();
+        std::array::from_fn(|k| {
+            let key = [draw::WANDER, id as u64, self.step_idx, k as u64];
+            let share = [1.0, 0.3][k];
+            keep * self.wander[id][k] + share * fresh * random::normal(self.params.seed, &key)
+        })
+    }
+
+    fn next_lead(&self, id: usize, neighbors: &[Neighbor]) -> f64 {
+        let left = self.leads_for_s[id] - self.step_s;
+        if left > 0.0 || !self.params.leaders {
+            return left.max(0.0);
+        }
+        let key = [draw::LEAD, id as u64, self.step_idx];
+        let scale = (self.params.rules.cohesion_bl, self.step_s);
+        leadership::taken(self.params.seed, key, self.velocities[id], neighbors, scale)
+            .unwrap_or(0.0)
+    }
+
+    /// One relaxation: each pair that overlaps moves apart by half of what is missing.
+    fn push_apart(&mut self) {
+        let grid = Grid::new(&self.positions, OVERLAP_BL);
+        let mut neighbors = Vec::new();
+        let mut moved = self.positions.clone();
+        for (id, position) in moved.iter_mut().enumerate() {
+            grid.nearest(id as u32, *position, OVERLAP_BL, 16, &mut neighbors);
+            let from = *position;
+            for neighbor in &neighbors {
+                let distance = neighbor.square_bl2.sqrt();
+                let away = match distance > 1e-9 {
+                    true => scaled(-1.0 / distance, neighbor.offset),
+                    // In one place: apart along x, by id.
+                    false => [if (id as u32) < neighbor.id { -1.0 } else { 1.0 }, 0.0, 0.0],
+                };
+                *position = add_scaled(*position, 0.5 * (OVERLAP_BL - distance), away);
+            }
+            if *position != from {
+                self.tank.keep_inside(position, &mut self.velocities[id]);
+            }
+        }
+        self.positions = moved;
+    }
+}
+
+/// What a boid is after a step.
+struct Next {
+    position: Vec3,
+    velocity: Vec3,
+    wander: [f64; 2],
+    leads_for_s: f64,
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,224 @@
+//! What a boid asks of itself: separation, alignment, cohesion, walls, circling and wander, granted
+//! in order of priority (Reynolds 1987; O 4; ALGORITHMS.md 7).
+//!
+//! Requests are measured against the greatest acceleration that the animal was seen to make, so that
+//! one set of weights serves a slow animal and a fast one.
+
+use super::calibration::Calibration;
+use super::grid::Neighbor;
+use super::tank::Tank;
+use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
+use crate::flock::params::{Params, Rules, Separation};
+
+/// A wall is steered from when the path over this time meets it.
+const WALL_HORIZON_S: f64 = 1.0;
+
+/// One boid's moment.
+pub struct Moment<'a> {
+    /// Where it is.
+    pub position: Vec3,
+    /// Its velocity, body lengths a second.
+    pub velocity: Vec3,
+    /// Nearest first; all that its rules may need.
+    pub neighbors: &'a [Neighbor],
+    /// The wandering turn rates: in the plane of swimming, and up or down.
+    pub wander_rad_per_s: [f64; 2],
+    /// It leads: alignment and cohesion are off.
+    pub leads: bool,
+}
+
+/// Everything that steering depends on besides the moment.
+pub struct Steering<'a> {
+    /// Weights and radii.
+    pub params: &'a Params,
+    /// The animal's limits.
+    pub calibration: &'a Calibration,
+    /// Where the walls are.
+    pub tank: &'a Tank,
+    /// cos of half the field of view.
+    pub cos_half_view: f64,
+    /// The velocity of every boid.
+    pub velocities: &'a [Vec3],
+}
+
+impl Steering<'_> {
+    /// The acceleration granted, at most the calibration's, BL/s^2.
+    pub fn acceleration(&self, moment: &Moment) -> Vec3 {
+        let rules = &self.params.rules;
+        let most = self.calibration.acceleration_bl_per_s2();
+        let seen: Vec<&Neighbor> = moment
+            .neighbors
+            .iter()
+            .filter(|n| self.sees(moment.velocity, n))
+            .collect();
+        let walls = self
+            .tank
+            .push(moment.position, moment.velocity, WALL_HORIZON_S);
+        let apart = match self.params.separation {
+            Separation::Repulsion => separation(&seen, rules),
+            Separation::Papers => self.rule_a_of_the_papers(&seen, moment),
+        };
+        let together = if moment.leads { 0.0 } else { 1.0 };
+        let urgent = add_scaled(scaled(rules.separation, apart), rules.walls, walls);
+        let requests = [
+            scaled(most, urgent),
+            scaled(
+                most * together * rules.alignment,
+                self.alignment(&seen, moment),
+            ),
+            scaled(most * rules.circling, self.circling(moment)),
+            scaled(most * together * rules.cohesion, cohesion(&seen, rules)),
+            self.wander(moment),
+            self.cruise(moment),
+        ];
+        granted(&requests, most)
+    }
+
+    fn sees(&self, velocity: Vec3, neighbor: &Neighbor) -> bool {
+        let cos = dot(unit(velocity), neighbor.offset);
+        cos >= self.cos_half_view * neighbor.square_bl2.sqrt()
+    }
+
+    /// mean v_j - v_i, in cruising speeds.
+    fn alignment(&self, seen: &[&Neighbor], moment: &Moment) -> Vec3 {
+        let reach = self.params.rules.alignment_bl;
+        let mut sum = [0.0; 3];
+        let mut n = 0.0;
+        for neighbor in seen.iter().filter(|n| n.square_bl2 < reach * reach) {
+            sum = add_scaled(sum, 1.0, self.velocities[neighbor.id as usize]);
+            n += 1.0;
+        }
+        if n == 0.0 {
+            return [0.0; 3];
+        }
+        let gap = minus(scaled(1.0 / n, sum), moment.velocity);
+        scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
+    }
+
+    /// O 4, rule A: slower when ahead of the neighbors, faster when behind, and their direction.
+    fn rule_a_of_the_papers(&self, seen: &[&Neighbor], moment: &Moment) -> Vec3 {
+        if seen.is_empty() {
+            return [0.0; 3];
+        }
+        let ahead = unit(moment.velocity);
+        let lead: f64 = seen.iter().map(|n| -dot(ahead, unit(n.offset))).sum();
+        let pace = -lead / seen.len() as f64;
+        add_scaled(scaled(pace, ahead), 0.5, self.alignment(seen, moment))
+    }
+
+    /// Toward swimming round the middle: sideways to the line from it, in the plane of swimming.
+    fn circling(&self, moment: &Moment) -> Vec3 {
+        if self.params.rules.circling == 0.0 {
+            return [0.0; 3];
+        }
+        let up = self.up();
+        let mut from_middle = minus(moment.position, self.tank.middle());
+        from_middle = add_scaled(from_middle, -dot(from_middle, up), up);
+        let around = scaled(
+            self.calibration.cruise_bl_per_s,
+            unit(cross(up, from_middle)),
+        );
+        let gap = minus(around, moment.velocity);
+        scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
+    }
+
+    /// The wandering turn, as the acceleration that makes it.
+    fn wander(&self, moment: &Moment) -> Vec3 {
+        let up = self.up();
+        let sideways = cross(up, moment.velocity);
+        let turn = scaled(moment.wander_rad_per_s[0], sideways);
+        if self.tank.is_flat() {
+            return turn;
+        }
+        add_scaled(turn, moment.wander_rad_per_s[1] * norm(moment.velocity), up)
+    }
+
+    /// Back to cruising speed; leaders are faster.
+    fn cruise(&self, moment: &Moment) -> Vec3 {
+        let speed = norm(moment.velocity);
+        let pace = if moment.leads { 1.4 } else { 1.0 };
+        let gap = pace * self.calibration.cruise_bl_per_s - speed;
+        scaled(gap * self.calibration.turn_rad_per_s, unit(moment.velocity))
+    }
+
+    /// The axis about which boids turn: out of the picture when flat, the vertical otherwise.
+    fn up(&self) -> Vec3 {
+        match self.tank.is_flat() {
+            true => [0.0, 0.0, 1.0],
+            false => [0.0, 1.0, 0.0],
+        }
+    }
+}
+
+/// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
+fn separation(seen: &[&Neighbor], rules: &Rules) -> Vec3 {
+    let reach = rules.separation_bl;
+    let mut push = [0.0; 3];
+    for neighbor in seen.iter().filter(|n| n.square_bl2 < reach * reach) {
+        let distance = neighbor.square_bl2.sqrt().max(0.05);
+        let strength = (reach / distance - 1.0) / distance;
+        push = add_scaled(push, -strength, neighbor.offset);
+    }
+    push
+}
+
+/// mean p_j - p_i over those nearer than r_c, in r_c.
+fn cohesion(seen: &[&Neighbor], rules: &Rules) -> Vec3 {
+    let reach = rules.cohesion_bl;
+    let mut sum = [0.0; 3];
+    let mut n = 0.0;
+    for neighbor in seen.iter().filter(|n| n.square_bl2 < reach * reach) {
+        sum = add_scaled(sum, 1.0, neighbor.offset);
+        n += 1.0;
+    }
+    if n == 0.0 {
+        sum
+    } else {
+        scaled(1.0 / (n * reach), sum)
+    }
+}
+
+/// Requests in order, until the sum of their sizes reaches `most`; the last one is cut.
+fn granted(requests: &[Vec3], most: f64) -> Vec3 {
+    let mut left = most;
+    let mut sum = [0.0; 3];
+    for &request in requests {
+        let size = norm(request);
+        let share = if size > left { left / size } else { 1.0 };
+        sum = add_scaled(sum, share, request);
+        left -= size.min(left);
+        if left <= 0.0 {
+            break;
+        }
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn neighbor(offset: Vec3) -> Neighbor {
+        Neighbor {
+            id: 1,
+            offset,
+            square_bl2: dot(offset, offset),
+        }
+    }
+
+    #[test]
+    fn a_near_neighbor_pushes_away_and_a_farther_one_attracts() {
+        let (near, far) = (neighbor([0.5, 0.0, 0.0]), neighbor([3.0, 0.0, 0.0]));
+        let rules = Rules::default();
+        assert_eq!(separation(&[&near], &rules), [-1.0, 0.0, 0.0]);
+        assert_eq!(separation(&[&far], &rules), [0.0; 3]);
+        assert_eq!(cohesion(&[&far], &rules), [0.5, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn urgent_requests_leave_what_they_do_not_use_to_the_others() {
+        let requests = [[3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 9.0]];
+        assert_eq!(granted(&requests, 5.0), [3.0, 2.0, 0.0]);
+        assert_eq!(granted(&requests, 2.0), [2.0, 0.0, 0.0]);
+    }
+}

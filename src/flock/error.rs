@@ -1,0 +1,31 @@
+//! Why a flock is not made.
+
+use crate::code::Code;
+
+/// The reasons, one variant each.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// Playback of the library would end: nothing leads back.
+    #[error(
+        "no two moments of the footage look alike enough to play on without an end; \
+         film longer, and let the animal come back to the same poses"
+    )]
+    NoTransitions,
+    /// The sentence says which parameter is out of which range.
+    #[error("{0}")]
+    InvalidParams(String),
+    /// Somebody cancelled.
+    #[error("the flock was cancelled")]
+    Cancelled,
+}
+
+impl Error {
+    /// The stable code.
+    pub fn code(&self) -> Code {
+        match self {
+            Error::NoTransitions => Code::NoTransitions,
+            Error::InvalidParams(_) => Code::InvalidParams,
+            Error::Cancelled => Code::Cancelled,
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! The value that a flock is: per individual its boid, the frames of its plan, and where and how each
+//! is shown (DESIGN.md, flock.json). Numbers are rounded when they are made, so that the file holds
+//! exactly what was computed with.
+
+/// One simulated animal with its sprites.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Individual {
+    /// Its number, from 0.
+    pub id: u32,
+    /// The source frame shown at each output frame.
+    pub source_frame: Vec<u32>,
+    /// Whether that is shown left-right mirrored.
+    pub mirrored: Vec<bool>,
+    /// How far the sprite (mirrored first) is rotated, clockwise positive.
+    pub rotation_rad: Vec<f64>,
+    /// The second sprites shown around jumps.
+    pub fades: Vec<Fade>,
+    /// Where the centroid is drawn.
+    pub centroid_px: Vec<[f64; 2]>,
+    /// The direction of the head as shown.
+    pub heading_rad: Vec<f64>,
+    /// Size relative to the footage.
+    pub scale: Vec<f64>,
+    /// Depth in the camera's frame; only with a camera.
+    pub depth_m: Option<Vec<f64>>,
+    /// The target that the plan was matched with.
+    pub boid: BoidTrack,
+    /// What the plan costs.
+    pub cost: PlanCost,
+}
+
+/// Where a boid was and what it did.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct BoidTrack {
+    /// x, y in the picture, and z away from the viewer, all in pixels.
+    pub position_px: Vec<[f64; 3]>,
+    /// Direction of its motion in the picture.
+    pub heading_rad: Vec<f64>,
+    /// Speed in the picture, body lengths a second.
+    pub speed_bl_per_s: Vec<f64>,
+}
+
+/// A second sprite shown for some frames around a jump: what was shown goes on under what comes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fade {
+    /// The first output frame concerned.
+    pub start: u32,
+    /// The second sprite's source frame at each.
+    pub source_frame: Vec<u32>,
+    /// Whether the second sprite is mirrored.
+    pub mirrored: bool,
+    /// Its rotation.
+    pub rotation_rad: Vec<f64>,
+    /// Its weight at each frame, 0..=1; the main sprite has the rest.
+    pub weight: Vec<f64>,
+}
+
+/// The plan's cost, radians: sums of integers times 2 pi / 65536, to 6 decimals (ALGORITHMS.md 6).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct PlanCost {
+    /// The sum of the four below.
+    pub total: f64,
+    /// Headings and rotations.
+    pub heading: f64,
+    /// Speeds.
+    pub speed: f64,
+    /// Jumps.
+    pub transition: f64,
+    /// Looking like a neighbor of smaller id.
+    pub crowd: f64,
+    /// No plan costs less, crowd or not.
+    pub lower_bound: f64,
+    /// The plan is the cheapest of all, not just of those tried.
+    pub exact: bool,
+}
+
+/// `value` to so many decimals, as files hold it.
+pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
+    let unit = 10f64.powi(decimals);
+    // + 0.0 turns -0 into 0.
+    (value * unit).round() / unit + 0.0
+}

@@ -1,0 +1,322 @@
+//! What a person may set about a flock. Every default is the value of ALGORITHMS.md 6 to 8;
+//! `papers` is O's plain objective.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+/// Parameters of a flock; all have defaults.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Params {
+    /// Individuals, 1..=2000.
+    pub count: u32,
+    /// Frames of the film, 1..=10000.
+    pub frames: u32,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// How the boids steer.
+    pub rules: Rules,
+    /// How real frames are matched with boids.
+    pub matching: Matching,
+    /// Least frames between two jumps, 1..=120; null = the clips' length, 1 = no least.
+    pub dwell_frames: Option<u32>,
+    /// Frames of the cross-fade at a jump, 0..=16, even; 0 = a hard cut.
+    pub fade_frames: u32,
+    /// Whether an individual may be shown left-right mirrored.
+    pub mirror: bool,
+    /// What rule A is: repulsion, or O's wording.
+    pub separation: Separation,
+    /// How an individual follows its boid.
+    pub position: Position,
+    /// Whether boids at the rim may lead for a while (Hartman & Benes 2006).
+    pub leaders: bool,
+    /// Where the flock may go.
+    pub tank: TankExtent,
+    /// Depth of the tank in side view, body lengths, 0..=100; null = half its width, at most 3. Top
+    /// view has none.
+    pub depth_bl: Option<f64>,
+}
+
+/// How the boids steer (ALGORITHMS.md 7). Weights 0..=20, radii in body lengths 0.1..=50.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Rules {
+    /// Weight of separation.
+    pub separation: f64,
+    /// Weight of alignment.
+    pub alignment: f64,
+    /// Weight of cohesion.
+    pub cohesion: f64,
+    /// Weight of the walls.
+    pub walls: f64,
+    /// Weight of the wander: 1 = turn rates as varied as the animal's own.
+    pub wander: f64,
+    /// Weight of circling about the middle of the tank.
+    pub circling: f64,
+    /// Neighbors nearer than this push apart.
+    pub separation_bl: f64,
+    /// Neighbors nearer than this are aligned with.
+    pub alignment_bl: f64,
+    /// Neighbors nearer than this attract.
+    pub cohesion_bl: f64,
+    /// Field of view, degrees, 1..=360.
+    pub view_deg: f64,
+    /// At most this many nearest neighbors count, 1..=64.
+    pub neighbors: u32,
+}
+
+/// How real frames are matched with boids (ALGORITHMS.md 6). Weights 0..=4.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Matching {
+    /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
+    pub w_h: f64,
+    /// Cost of a radian that rotating the sprite must make up for.
+    pub w_r: f64,
+    /// How far a sprite may be rotated in side view, degrees, 0..=45.
+    pub rho_deg: f64,
+    /// Cost of a unit of log speed.
+    pub w_v: f64,
+    /// Cost of a jump at D = epsilon, radians.
+    pub wx: f64,
+    /// Cost of looking like a neighbor, radians for each at no distance.
+    pub w_c: f64,
+}
+
+/// What rule A is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Separation {
+    /// Push apart.
+    Repulsion,
+    /// O 4, rule A: slow down when ahead, speed up when behind, align.
+    Papers,
+}
+
+/// How an individual follows its boid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Position {
+    /// Along its own heading, drawn gently to the boid.
+    Leash,
+    /// Where the boid is.
+    Boid,
+    /// O 5.2: the boid's speed along the shown heading, summed.
+    Papers,
+}
+
+/// Where the flock may go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TankExtent {
+    /// Where the animal was seen, when that is a good part of the picture.
+    Seen,
+    /// The whole picture.
+    Picture,
+}
+
+impl Default for Rules {
+    fn default() -> Rules {
+        Rules {
+            separation: 1.5,
+            alignment: 1.0,
+            cohesion: 0.8,
+            walls: 4.0,
+            wander: 0.5,
+            circling: 0.0,
+            separation_bl: 1.0,
+            alignment_bl: 3.0,
+            cohesion_bl: 6.0,
+            view_deg: 300.0,
+            neighbors: 16,
+        }
+    }
+}
+
+impl Default for Matching {
+    fn default() -> Matching {
+        Matching {
+            w_h: 1.0,
+            w_r: 0.1,
+            rho_deg: 10.0,
+            w_v: 0.1,
+            wx: 0.8,
+            w_c: 0.3,
+        }
+    }
+}
+
+impl Default for Params {
+    fn default() -> Params {
+        Params {
+            count: 20,
+            frames: 400,
+            seed: 1,
+            rules: Rules::default(),
+            matching: Matching::default(),
+            dwell_frames: None,
+            fade_frames: 4,
+            mirror: true,
+            separation: Separation::Repulsion,
+            position: Position::Leash,
+            leaders: true,
+            tank: TankExtent::Seen,
+            depth_bl: None,
+        }
+    }
+}
+
+impl Params {
+    /// The names that `preset` knows.
+    pub const PRESETS: [&'static str; 5] = ["school", "swarm", "mill", "scatter", "papers"];
+
+    /// The parameters of a named preset; `None` for an unknown name. `school` is the default.
+    pub fn preset(name: &str) -> Option<Params> {
+        let with_rules = |rules| Params {
+            rules,
+            ..Params::default()
+        };
+        match name {
+            "school" => Some(Params::default()),
+            "swarm" => Some(with_rules(Rules {
+                alignment: 0.0,
+                cohesion: 1.2,
+                wander: 2.0,
+                ..Rules::default()
+            })),
+            "mill" => Some(with_rules(Rules {
+                circling: 1.5,
+                cohesion: 0.4,
+                ..Rules::default()
+            })),
+            "scatter" => Some(with_rules(Rules {
+                separation: 2.5,
+                alignment: 0.0,
+                cohesion: 0.0,
+                wander: 1.0,
+                separation_bl: 3.0,
+                ..Rules::default()
+            })),
+            "papers" => Some(Params::papers()),
+            _ => None,
+        }
+    }
+
+    /// O's plain objective: headings only, no mirror, no rotation, hard cuts, its wording of rule A
+    /// and its sum of speeds as position, in the plane of the picture.
+    pub fn papers() -> Params {
+        Params {
+            matching: Matching {
+                w_h: 1.0,
+                w_r: 0.0,
+                rho_deg: 0.0,
+                w_v: 0.0,
+                wx: 0.0,
+                w_c: 0.0,
+            },
+            dwell_frames: Some(1),
+            fade_frames: 0,
+            mirror: false,
+            separation: Separation::Papers,
+            position: Position::Papers,
+            leaders: false,
+            tank: TankExtent::Picture,
+            depth_bl: Some(0.0),
+            ..Params::default()
+        }
+    }
+
+    /// Checks every range; the sentence says which parameter is out of which range.
+    pub fn check(&self) -> Result<(), String> {
+        within("count", f64::from(self.count), 1.0, 2000.0)?;
+        within("frames", f64::from(self.frames), 1.0, 10_000.0)?;
+        if let Some(dwell) = self.dwell_frames {
+            within("dwell_frames", f64::from(dwell), 1.0, 120.0)?;
+        }
+        within("fade_frames", f64::from(self.fade_frames), 0.0, 16.0)?;
+        if self.fade_frames % 2 == 1 {
+            return Err(format!("fade_frames must be even: {}", self.fade_frames));
+        }
+        if let Some(depth_bl) = self.depth_bl {
+            within("depth_bl", depth_bl, 0.0, 100.0)?;
+        }
+        self.rules.check()?;
+        self.matching.check()
+    }
+}
+
+impl Rules {
+    fn check(&self) -> Result<(), String> {
+        let weights = [
+            ("rules.separation", self.separation),
+            ("rules.alignment", self.alignment),
+            ("rules.cohesion", self.cohesion),
+            ("rules.walls", self.walls),
+            ("rules.wander", self.wander),
+            ("rules.circling", self.circling),
+        ];
+        let radii = [
+            ("rules.separation_bl", self.separation_bl),
+            ("rules.alignment_bl", self.alignment_bl),
+            ("rules.cohesion_bl", self.cohesion_bl),
+        ];
+        for (name, value) in weights {
+            within(name, value, 0.0, 20.0)?;
+        }
+        for (name, value) in radii {
+            within(name, value, 0.1, 50.0)?;
+        }
+        within("rules.view_deg", self.view_deg, 1.0, 360.0)?;
+        within("rules.neighbors", f64::from(self.neighbors), 1.0, 64.0)
+    }
+}
+
+impl Matching {
+    fn check(&self) -> Result<(), String> {
+        let weights = [
+            ("matching.w_h", self.w_h),
+            ("matching.w_r", self.w_r),
+            ("matching.w_v", self.w_v),
+            ("matching.wx", self.wx),
+            ("matching.w_c", self.w_c),
+        ];
+        for (name, value) in weights {
+            within(name, value, 0.0, 4.0)?;
+        }
+        within("matching.rho_deg", self.rho_deg, 0.0, 45.0)
+    }
+}
+
+fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
+    (least..=most)
+        .contains(&value)
+        .then_some(())
+        .ok_or(format!("{name} must lie in {least}..={most}: {value}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_preset_passes_its_own_check() {
+        for name in Params::PRESETS {
+            let params = Params::preset(name).expect("a listed preset exists");
+            assert_eq!(params.check(), Ok(()), "{name}");
+        }
+        assert_eq!(Params::preset("herd"), None);
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named() {
+        let no_one = Params {
+            count: 0,
+            ..Params::default()
+        };
+        assert_eq!(no_one.check(), Err("count must lie in 1..=2000: 0".into()));
+        let mut params = Params::default();
+        params.matching.wx = f64::NAN;
+        let sentence = params.check().expect_err("NaN lies in no range");
+        assert!(sentence.starts_with("matching.wx"), "{sentence}");
+    }
+}

@@ -1,0 +1,175 @@
+//! What it costs to show a state at a moment, in whole turns (65536 to the circle), so that the same
+//! plan comes out on any machine (ALGORITHMS.md 6).
+//!
+//! In side view headings are compared; in top view the sprite is turned to any heading, so what is
+//! compared is how far animal and boid turn in a quarter of a second.
+
+use super::trellis::Trellis;
+use crate::flock::params::Matching;
+use crate::geometry::Turns;
+use crate::library::{Library, View};
+
+/// Every cost of a state at a frame stays below.
+pub const CEILING: u32 = 1 << 17;
+
+/// Turn rates are compared over this time.
+const TURN_SPAN_S: f64 = 0.25;
+
+/// What is compared: of a state, or wanted by a boid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Feature {
+    /// Heading; in top view the turn in a quarter second.
+    pub turns: u16,
+    /// ln(speed + v0) in turns, shifted to be positive.
+    pub log_speed: u16,
+}
+
+/// The weights as integers: 256ths, and turns.
+#[derive(Clone, Copy, Debug)]
+pub struct Weights {
+    heading: u32,
+    rotation: u32,
+    speed: u32,
+    rho_turns: u16,
+    jump_turns: f64,
+    view: View,
+    v0_bl_per_s: f64,
+}
+
+impl Weights {
+    /// The weights of a library's view; `rho` is no matter in top view.
+    pub fn new(matching: &Matching, library: &Library) -> Weights {
+        let fixed = |w: f64| (w * 256.0).round() as u32;
+        let view = library.poses.view;
+        let cruise = library.stats.speed_bl_per_s.map_or(1.0, |speeds| speeds[1]);
+        Weights {
+            heading: fixed(matching.w_h),
+            rotation: fixed(matching.w_r),
+            speed: fixed(matching.w_v),
+            rho_turns: match view {
+                View::Side => Turns::from_rad(matching.rho_deg.to_radians()).0,
+                View::Top => 0,
+            },
+            jump_turns: matching.wx * Turns::PER_RAD,
+            view,
+            v0_bl_per_s: (0.25 * cruise).max(0.05),
+        }
+    }
+
+    /// What a jump between clips at distance `distance` costs, turns below 2^16.
+    pub fn of_jump(&self, distance: u64, epsilon: u64) -> u32 {
+        let share = distance as f64 / epsilon.max(1) as f64;
+        (self.jump_turns * share).round().min(65535.0) as u32
+    }
+
+    /// What showing `state` costs who wants `wanted`, turns, without the ceiling: heading (with
+    /// rotation), and speed.
+    pub fn of_state(&self, wanted: Feature, state: Feature) -> [u32; 2] {
+        let gap = (wanted.turns.wrapping_sub(state.turns) as i16).unsigned_abs();
+        let within = u32::from(gap.min(self.rho_turns));
+        let beyond = u32::from(gap) - within;
+        let speed_gap = u32::from(wanted.log_speed.abs_diff(state.log_speed));
+        [
+            (self.heading * beyond + self.rotation * within) >> 8,
+            (self.speed * speed_gap) >> 8,
+        ]
+    }
+
+    /// The sum of `of_state`, below the ceiling.
+    #[inline(always)]
+    pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
+        let [heading, speed] = self.of_state(wanted, state);
+        (heading + speed).min(CEILING - 1)
+    }
+
+    /// What a boid wants: its heading, how fast that turns, and its speed.
+    pub fn wanted(&self, heading_rad: f64, turn_rad_per_s: f64, speed_bl_per_s: f64) -> Feature {
+        Feature {
+            turns: match self.view {
+                View::Side => Turns::from_rad(heading_rad).0,
+                View::Top => turn_of_rate(turn_rad_per_s),
+            },
+            log_speed: log_speed(speed_bl_per_s, self.v0_bl_per_s),
+        }
+    }
+
+    /// The features of every state of the trellis; barriers get zeros.
+    pub fn features(&self, trellis: &Trellis, motion: &[FrameMotion]) -> Vec<Feature> {
+        let feature = |state| {
+            let Some((frame, mirrored)) = trellis.shown(state) else {
+                return Feature::default();
+            };
+            let moved = &motion[frame as usize];
+            let (heading, turn) = match mirrored {
+                false => (Turns::from_rad(moved.heading_rad), moved.turn_rad_per_s),
+                true => (
+                    Turns::from_rad(moved.heading_rad).mirrored(),
+                    -moved.turn_rad_per_s,
+                ),
+            };
+            Feature {
+                turns: match self.view {
+                    View::Side => heading.0,
+                    View::Top => turn_of_rate(turn),
+                },
+                log_speed: log_speed(moved.speed_bl_per_s, self.v0_bl_per_s),
+            }
+        };
+        (0..trellis.n_states()).map(feature).collect()
+    }
+}
+
+/// Clamped to half a circle either way, so that differences never wrap.
+fn turn_of_rate(turn_rad_per_s: f64) -> u16 {
+    let turns = turn_rad_per_s * TURN_SPAN_S * Turns::PER_RAD;
+    turns.round().clamp(-16383.0, 16383.0) as i16 as u16
+}
+
+fn log_speed(speed_bl_per_s: f64, v0_bl_per_s: f64) -> u16 {
+    // From 0.05 to 100 BL/s the logarithm spans -3 to 5: 2 radians to the 65536 would not hold it.
+    let log = libm::log(speed_bl_per_s.clamp(0.0, 100.0) + v0_bl_per_s);
+    ((log + 3.0).clamp(0.0, 6.2) * Turns::PER_RAD).round() as u16
+}
+
+/// How the animal itself moved at a frame of the footage.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameMotion {
+    /// Direction of the head, image axes.
+    pub heading_rad: f64,
+    /// How fast the heading changed.
+    pub turn_rad_per_s: f64,
+    /// Speed of the centroid in the image, body lengths a second.
+    pub speed_bl_per_s: f64,
+}
+
+/// The motion at every frame: central differences over two frames either way where the animal was
+/// found; zero speed and turn where its neighbors in time were not.
+pub fn motion_of(library: &Library) -> Vec<FrameMotion> {
+    let poses = &library.poses;
+    let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
+    let at = |frame: usize| {
+        let pose = poses.frames.get(frame)?;
+        Some((pose.centroid_px?, pose.heading_rad?))
+    };
+    let motion = |frame: usize| {
+        let heading_rad = at(frame).map_or(0.0, |pose| pose.1);
+        let ends = (1..=2).rev().find_map(|reach| {
+            let before = at(frame.checked_sub(reach)?)?;
+            let after = at(frame + reach)?;
+            Some((before, after, 2.0 * reach as f64 / poses.fps))
+        });
+        let Some((before, after, span_s)) = ends else {
+            return FrameMotion {
+                heading_rad,
+                ..FrameMotion::default()
+            };
+        };
+        let (dx, dy) = (after.0[0] - before.0[0], after.0[1] - before.0[1]);
+        FrameMotion {
+            heading_rad,
+            turn_rad_per_s: crate::geometry::wrap_rad(after.1 - before.1) / span_s,
+            speed_bl_per_s: (dx * dx + dy * dy).sqrt() / length_px / span_s,
+        }
+    };
+    (0..poses.frames.len()).map(motion).collect()
+}

@@ -1,0 +1,127 @@
+//! Plans of whole flocks: their certificates, and their cost told from the outside.
+
+use super::*;
+use crate::flock::synthetic;
+use crate::flock::{Flock, plan_flock};
+use crate::library::View;
+use crate::progress::Silent;
+
+fn flock(view: View, name: &str) -> (Library, Flock) {
+    let library = synthetic::library(view);
+    let params = Params {
+        count: 10,
+        frames: 120,
+        ..Params::preset(name).expect("a known preset")
+    };
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    (library, flock)
+}
+
+/// J of one individual by the words of ALGORITHMS.md 6, in turns, from what the files hold.
+fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
+    let motion = cost::motion_of(library);
+    let weights = Weights::new(&flock.params.matching, library);
+    let crowd = Crowd::new(flock.params.matching.w_c, flock.fps, flock.length_px);
+    let trellis = Trellis::new(&library.playback, flock.params.mirror, |_| 0);
+    let features = weights.features(&trellis, &motion);
+    let individual = &flock.individuals[id];
+    let boid = &individual.boid;
+    let turns = turn_rates(&boid.heading_rad, flock.fps);
+    let state = |i: usize, t: usize| {
+        let other = &flock.individuals[i];
+        trellis
+            .state(other.source_frame[t], other.mirrored[t])
+            .expect("a frame of the component")
+    };
+    let states: Vec<Vec<u32>> = (0..id)
+        .map(|i| (0..turns.len()).map(|t| state(i, t)).collect())
+        .collect();
+    let mut total = 0;
+    for t in 0..turns.len() {
+        let wanted = weights.wanted(boid.heading_rad[t], turns[t], boid.speed_bl_per_s[t]);
+        let here = state(id, t);
+        total += weights.total(wanted, features[here as usize]);
+        let others = flock.individuals.iter().map(|i| &i.boid);
+        let others = others.zip(states.iter().map(Vec::as_slice));
+        let near = crowd.lookalikes(boid, others, t);
+        total += crowd.cost_of(&trellis, &near, here);
+        if t > 0 && state(id, t - 1) + 1 != here {
+            let (from, to) = (individual.source_frame[t - 1], individual.source_frame[t]);
+            let turned = individual.mirrored[t - 1] != individual.mirrored[t];
+            let jumps = library.playback.jumps.iter();
+            let mut jumps = jumps.filter(|j| (j.from, j.to, j.mirrored) == (from, to, turned));
+            let jump = jumps.next().expect("a jump of the library");
+            total += weights.of_jump(jump.cost, library.epsilon);
+        }
+    }
+    total
+}
+
+#[test]
+fn the_cost_recomputed_from_the_file_and_the_library_is_the_one_told() {
+    for (view, name) in [
+        (View::Side, "school"),
+        (View::Top, "swarm"),
+        (View::Side, "papers"),
+    ] {
+        let (library, flock) = flock(view, name);
+        let bytes = crate::formats::flock_json::write(&flock);
+        let flock = crate::formats::flock_json::read(&bytes).unwrap();
+        for (id, individual) in flock.individuals.iter().enumerate() {
+            let cost = individual.cost;
+            let told = (cost.total * Turns::PER_RAD).round() as u32;
+            assert_eq!(cost_from_outside(&library, &flock, id), told, "{name} {id}");
+            let parts = cost.heading + cost.speed + cost.transition + cost.crowd;
+            assert!((parts - cost.total).abs() < 1e-5);
+            assert!(cost.lower_bound <= cost.total);
+        }
+    }
+}
+
+#[test]
+fn the_plans_of_a_flock_hold_their_certificates() {
+    let (library, flock) = flock(View::Side, "school");
+    let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
+    let motion = cost::motion_of(&library);
+    let planner = Planner::new(&library, &motion, &boids, &flock.params);
+    let mut states: Vec<Vec<u32>> = Vec::new();
+    for (id, boid) in boids.iter().enumerate() {
+        let (wanted, crowd) = (planner.wanted(boid), planner.crowd_of(id, &states));
+        let path = planner.plan_in_crowd(&wanted, &crowd).unwrap();
+        let row = |t: usize, row: &mut [[u32; 1]]| planner.row_in_crowd(t, &wanted, &crowd, row);
+        let columns = viterbi::potentials(&planner.trellis, wanted.len(), planner.dwell, row);
+        let rows: Vec<Vec<[u32; 1]>> = (0..wanted.len())
+            .map(|t| {
+                let mut costs = vec![[0]; planner.trellis.n_states()];
+                row(t, &mut costs);
+                costs
+            })
+            .collect();
+        let cost_at = |t: usize, state: usize| rows[t][state][0];
+        let checked =
+            certificate::check(&planner.trellis, planner.dwell, &cost_at, &columns, &path);
+        assert_eq!(checked, Ok(()), "individual {id}");
+        states.push(path.states);
+    }
+}
+
+#[test]
+fn after_a_jump_at_least_the_dwell_is_played() {
+    let (library, flock) = flock(View::Side, "swarm");
+    for individual in &flock.individuals {
+        let shown: Vec<(u32, bool)> = individual
+            .source_frame
+            .iter()
+            .copied()
+            .zip(individual.mirrored.iter().copied())
+            .collect();
+        let jumps: Vec<usize> = (1..shown.len())
+            .filter(|&t| shown[t] != (shown[t - 1].0 + 1, shown[t - 1].1))
+            .collect();
+        let dwell = library.clip_frames;
+        assert!(
+            jumps.windows(2).all(|pair| pair[1] - pair[0] >= dwell),
+            "{jumps:?}"
+        );
+    }
+}

@@ -1,0 +1,238 @@
+//! The states of playback laid out for the plan (ALGORITHMS.md 6): every frame of the component on
+//! every allowed mirror side, in runs of consecutive frames, and the jumps sorted by their target.
+//!
+//! A barrier state stands before each run, so that "continue" is always "from the state before":
+//! nothing ever leaves a barrier.
+
+use crate::library::Playback;
+
+/// Stands for the frame of a barrier.
+const NO_FRAME: u32 = u32::MAX;
+
+/// States, the jumps between them, and where each state's frame is.
+#[derive(Clone, Debug)]
+pub struct Trellis {
+    frames: Vec<u32>,
+    mirrored: Vec<bool>,
+    barriers: Vec<u32>,
+    /// Which run a state belongs to.
+    runs: Vec<u32>,
+    /// States that some jump leads to, rising.
+    targets: Vec<u32>,
+    /// `sources[first_source[k]..first_source[k + 1]]` lead to target k.
+    first_source: Vec<u32>,
+    /// (state, cost in turns) of each jump, by target, then source.
+    sources: Vec<(u32, u32)>,
+}
+
+impl Trellis {
+    /// The trellis of a playback graph. `mirror` makes both sides of every frame states; `cost_of`
+    /// turns a jump's D into the plan's unit.
+    pub fn new(playback: &Playback, mirror: bool, cost_of: impl Fn(u64) -> u32) -> Trellis {
+        let mut trellis = Trellis {
+            frames: Vec::new(),
+            mirrored: Vec::new(),
+            barriers: Vec::new(),
+            runs: Vec::new(),
+            targets: Vec::new(),
+            first_source: vec![0],
+            sources: Vec::new(),
+        };
+        let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
+        for &side in sides {
+            trellis.lay_side(&playback.component, side);
+        }
+        let mut jumps: Vec<(u32, u32, u32)> = Vec::new();
+        for jump in &playback.jumps {
+            for &side in sides {
+                let source = trellis.state(jump.from, side);
+                let target = trellis.state(jump.to, side != jump.mirrored);
+                if let (Some(source), Some(target)) = (source, target) {
+                    jumps.push((target, source, cost_of(jump.cost)));
+                }
+            }
+        }
+        trellis.lay_jumps(jumps);
+        trellis
+    }
+
+    /// Number of states, barriers included.
+    pub fn n_states(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// The frame and mirror side of a state; `None` for a barrier.
+    pub fn shown(&self, state: usize) -> Option<(u32, bool)> {
+        let frame = self.frames[state];
+        (frame != NO_FRAME).then_some((frame, self.mirrored[state]))
+    }
+
+    /// The state that shows a frame on a mirror side, if there is one.
+    pub fn state(&self, frame: u32, mirrored: bool) -> Option<u32> {
+        let half = match self.mirrored.last() {
+            Some(true) => self.frames.len() / 2,
+            _ => self.frames.len(),
+        };
+        let start = if mirrored { half } else { 0 };
+        if start >= self.frames.len() {
+            return None;
+        }
+        // Barriers sort just before the frame that follows them.
+        let side = &self.frames[start..start + half];
+        let at = side.partition_point_with_barriers(frame);
+        (at < half && side[at] == frame).then_some((start + at) as u32)
+    }
+
+    /// The states that stand before runs and show nothing, rising.
+    pub fn barriers(&self) -> &[u32] {
+        &self.barriers
+    }
+
+    /// The states that jumps lead to, rising.
+    pub fn targets(&self) -> &[u32] {
+        &self.targets
+    }
+
+    /// The jumps to the `k`th target: (source state, cost in turns), sources rising.
+    pub fn sources(&self, k: usize) -> &[(u32, u32)] {
+        let range = self.first_source[k] as usize..self.first_source[k + 1] as usize;
+        &self.sources[range]
+    }
+
+    /// Whether `state + ahead` is reached from `state` by continuing alone.
+    pub fn continues(&self, state: usize, ahead: usize) -> bool {
+        let end = state + ahead;
+        self.frames[state] != NO_FRAME && self.runs.get(end) == Some(&self.runs[state])
+    }
+
+    fn lay_side(&mut self, component: &[u32], side: bool) {
+        let mut last = None;
+        for &frame in component {
+            if last.is_none_or(|last: u32| last + 1 != frame) {
+                self.barriers.push(self.frames.len() as u32);
+                self.frames.push(NO_FRAME);
+                self.mirrored.push(side);
+                self.runs.push(self.barriers.len() as u32);
+            }
+            self.frames.push(frame);
+            self.mirrored.push(side);
+            self.runs.push(self.barriers.len() as u32);
+            last = Some(frame);
+        }
+    }
+
+    fn lay_jumps(&mut self, mut jumps: Vec<(u32, u32, u32)>) {
+        jumps.sort_unstable();
+        jumps.dedup_by_key(|jump| (jump.0, jump.1));
+        for (target, source, cost) in jumps {
+            if self.targets.last() != Some(&target) {
+                self.targets.push(target);
+                self.first_source.push(self.sources.len() as u32);
+            }
+            self.sources.push((source, cost));
+            if let Some(end) = self.first_source.last_mut() {
+                *end = self.sources.len() as u32;
+            }
+        }
+    }
+}
+
+/// Binary search in frames that rise but for barriers.
+trait FramesWithBarriers {
+    fn partition_point_with_barriers(&self, frame: u32) -> usize;
+}
+
+impl FramesWithBarriers for [u32] {
+    fn partition_point_with_barriers(&self, frame: u32) -> usize {
+        let (mut low, mut high) = (0, self.len());
+        while low < high {
+            let middle = low + (high - low) / 2;
+            // A barrier is never last: judge it by the frame after it.
+            let (judged, at) = match self[middle] {
+                NO_FRAME => (self[middle + 1], middle + 1),
+                found => (found, middle),
+            };
+            if judged < frame {
+                low = at + 1;
+            } else {
+                high = middle;
+            }
+        }
+        // A barrier may be what is left: the frame stands after it.
+        low + usize::from(self.get(low) == Some(&NO_FRAME))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::Jump;
+
+    fn playback() -> Playback {
+        let jump = |from, to, mirrored| Jump {
+            from,
+            to,
+            cost: 7,
+            mirrored,
+        };
+        Playback {
+            jumps: vec![jump(4, 11, false), jump(6, 4, true), jump(12, 4, false)],
+            component: vec![4, 5, 6, 10, 11, 12],
+        }
+    }
+
+    #[test]
+    fn every_frame_leads_to_its_state_and_back() {
+        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        for side in [false, true] {
+            for frame in 0..20 {
+                let state = trellis.state(frame, side);
+                assert_eq!(
+                    state.is_some(),
+                    playback().component.contains(&frame),
+                    "{frame}"
+                );
+                if let Some(state) = state {
+                    assert_eq!(trellis.shown(state as usize), Some((frame, side)));
+                }
+            }
+        }
+        assert_eq!(
+            Trellis::new(&playback(), false, |d| d as u32).state(4, true),
+            None
+        );
+    }
+
+    #[test]
+    fn a_mirrored_jump_changes_sides_and_others_keep_them() {
+        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        let at = |frame, side| {
+            trellis
+                .state(frame, side)
+                .expect("a frame of the component")
+        };
+        let into = |state| {
+            let k = trellis.targets().iter().position(|&t| t == state);
+            trellis.sources(k.expect("a target"))
+        };
+        assert_eq!(into(at(11, true)), [(at(4, true), 7)]);
+        assert_eq!(into(at(4, true)), [(at(6, false), 7), (at(12, true), 7)]);
+    }
+
+    #[test]
+    fn runs_end_at_gaps_and_at_sides() {
+        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        let at = |frame| trellis.state(frame, false).expect("a frame") as usize;
+        assert!(trellis.continues(at(4), 2));
+        assert!(!trellis.continues(at(4), 3));
+        assert!(!trellis.continues(at(12), 1));
+        let gap_of_one = Playback {
+            component: vec![0, 2],
+            ..playback()
+        };
+        let trellis = Trellis::new(&gap_of_one, false, |d| d as u32);
+        assert!(!trellis.continues(1, 2), "a barrier stands between");
+        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        assert!(!trellis.continues(at(12), 2));
+    }
+}

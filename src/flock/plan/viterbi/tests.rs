@@ -1,0 +1,158 @@
+//! The exact plan against all paths of small graphs, and against its certificate.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::flock::plan::certificate;
+use crate::library::{Jump, Playback};
+
+/// A small playback graph, the costs of its states at every frame, and a dwell.
+#[derive(Clone, Debug)]
+struct Case {
+    playback: Playback,
+    mirror: bool,
+    n_frames: usize,
+    dwell: usize,
+    costs: Vec<u32>,
+}
+
+impl Case {
+    fn trellis(&self) -> Trellis {
+        Trellis::new(&self.playback, self.mirror, |d| d as u32)
+    }
+
+    /// What showing a state costs lane `lane`.
+    fn cost(&self, t: usize, state: usize, lane: usize) -> u32 {
+        self.costs[(t * 31 + state * 7 + lane * 3) % self.costs.len()]
+    }
+
+    fn plan<const LANES: usize>(&self) -> Option<[Path; LANES]> {
+        self.plan_by_segments(self.n_frames)
+    }
+
+    fn plan_by_segments<const LANES: usize>(&self, segment: usize) -> Option<[Path; LANES]> {
+        let row = |t: usize, row: &mut [[u32; LANES]]| {
+            for (state, out) in row.iter_mut().enumerate() {
+                *out = std::array::from_fn(|lane| self.cost(t, state, lane));
+            }
+        };
+        cheapest_paths_by_segments(&self.trellis(), self.n_frames, self.dwell, segment, row)
+    }
+
+    fn check(&self, path: &Path) -> Result<(), certificate::Violation> {
+        let trellis = self.trellis();
+        let cost_at = |t: usize, state: usize| self.cost(t, state, 0);
+        let columns = potentials(&trellis, self.n_frames, self.dwell, |t, row| {
+            for (state, out) in row.iter_mut().enumerate() {
+                out[0] = cost_at(t, state);
+            }
+        });
+        certificate::check(&trellis, self.dwell, &cost_at, &columns, path)
+    }
+
+    /// The least cost over all paths, by trying them all.
+    fn by_brute_force(&self) -> Option<u64> {
+        let trellis = self.trellis();
+        let states = 0..trellis.n_states();
+        states
+            .filter(|&state| trellis.shown(state).is_some())
+            .filter_map(|state| self.cheapest_from(&trellis, 0, state, self.dwell))
+            .min()
+    }
+
+    fn cheapest_from(&self, trellis: &Trellis, t: usize, state: usize, run: usize) -> Option<u64> {
+        let here = u64::from(self.cost(t, state, 0));
+        if t + 1 == self.n_frames {
+            return Some(here);
+        }
+        let mut best = None;
+        let mut offer = |rest: Option<u64>, step: u32| {
+            let cost = rest.map(|rest| here + rest + u64::from(step));
+            best = [best, cost].into_iter().flatten().min();
+        };
+        if trellis.continues(state, 1) {
+            offer(self.cheapest_from(trellis, t + 1, state + 1, run + 1), 0);
+        }
+        if run >= self.dwell {
+            for (k, &target) in trellis.targets().iter().enumerate() {
+                for &(source, cost) in trellis.sources(k) {
+                    if source as usize == state {
+                        offer(self.cheapest_from(trellis, t + 1, target as usize, 1), cost);
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+prop_compose! {
+    fn case(most_frames: u32)(
+        n_states in 1u32..=most_frames,
+        gap in prop::option::of(0u32..8),
+        jumps in prop::collection::vec((0u32..8, 0u32..8, 0u64..60, any::<bool>()), 0..9),
+        mirror in any::<bool>(),
+        n_frames in 1usize..=7,
+        dwell in 1usize..=4,
+        costs in prop::collection::vec(0u32..100, 1..60),
+    ) -> Case {
+        let component: Vec<u32> = (0..n_states).filter(|&f| Some(f) != gap).collect();
+        let mut jumps: Vec<Jump> = jumps
+            .into_iter()
+            .map(|(from, to, cost, mirrored)| Jump { from, to, cost, mirrored })
+            .filter(|jump| jump.mirrored || jump.to != jump.from + 1)
+            .collect();
+        jumps.sort_unstable();
+        Case { playback: Playback { jumps, component }, mirror, n_frames, dwell, costs }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 10_000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_path_of_a_small_graph_is_cheaper(case in case(7)) {
+        let found = case.plan::<1>().map(|[path]| u64::from(path.cost));
+        prop_assert_eq!(found, case.by_brute_force());
+    }
+
+    #[test]
+    fn the_certificate_holds_for_the_plan(case in case(8)) {
+        if let Some([path]) = case.plan::<1>() {
+            prop_assert_eq!(case.check(&path), Ok(()));
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn lanes_do_not_touch_each_other_and_segments_change_nothing(
+        case in case(8), segment in 1usize..4
+    ) {
+        let whole = case.plan::<8>();
+        prop_assert_eq!(&case.plan_by_segments::<8>(segment), &whole);
+        let alone = case.plan::<1>();
+        prop_assert_eq!(whole.map(|paths| paths[0].clone()), alone.map(|[path]| path));
+    }
+
+    #[test]
+    fn another_jump_never_raises_the_cost(
+        case in case(8), from in 0u32..8, to in 0u32..8, cost in 0u64..60
+    ) {
+        prop_assume!(to != from + 1);
+        let mut more = case.clone();
+        more.playback.jumps.push(Jump { from, to, cost, mirrored: false });
+        more.playback.jumps.sort_unstable();
+        if let (Some([before]), Some([after])) = (case.plan::<1>(), more.plan::<1>()) {
+            prop_assert!(after.cost <= before.cost);
+        }
+    }
+
+    #[test]
+    fn the_certificate_sees_a_plan_that_is_too_dear(case in case(8)) {
+        if let Some([mut path]) = case.plan::<1>() {
+            path.cost += 1;
+            prop_assert!(case.check(&path).is_err());
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! How good a flock is: the measures of ALGORITHMS.md 9 that need no pixels.
+
+use super::boids::measures::Order;
+use super::individual::{Individual, rounded};
+use super::placement::is_jump;
+use crate::geometry::wrap_rad;
+use crate::library::Library;
+
+/// Two neighbors this near that show frames this near in the footage are clones.
+const CLONE_BL: f64 = 4.0;
+const CLONE_S: f64 = 0.3;
+/// Slip is measured on steps of at least this share of a body length a second.
+const MOVING_BL_PER_S: f64 = 0.1;
+
+/// Measures of a whole flock.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Stats {
+    /// Median of |shown heading - boid's heading|, radians.
+    pub heading_error_median_rad: f64,
+    /// Its 90th percentile.
+    pub heading_error_p90_rad: f64,
+    /// Jumps in 100 frames of one individual.
+    pub jumps_per_100_frames: f64,
+    /// 95th percentile of the distance from individual to boid, body lengths.
+    pub path_deviation_p95_bl: f64,
+    /// Median angle between the way moved and the shown heading, radians.
+    pub slip_median_rad: f64,
+    /// Share of the pair-frames within 4 BL in which both show nearly the same source frame.
+    pub clone_share: f64,
+    /// Share of the component's frames that are shown.
+    pub variety: f64,
+    /// Mean over the frames.
+    pub polarization: f64,
+    /// Mean over the frames.
+    pub milling: f64,
+    /// Mean over the frames, body lengths.
+    pub nearest_neighbor_bl: f64,
+}
+
+/// Measures a flock; rounded as files hold it.
+pub fn measure(
+    individuals: &[Individual],
+    orders: &[Order],
+    library: &Library,
+    length_px: f64,
+) -> Stats {
+    let fps = library.poses.fps;
+    let headings = sorted(individuals.iter().flat_map(heading_errors).collect());
+    let deviations = individuals.iter().flat_map(deviations_px).collect();
+    let least_step_px = MOVING_BL_PER_S * length_px / fps;
+    let slips = individuals.iter().flat_map(|i| slips(i, least_step_px));
+    let mean = |of: fn(&Order) -> f64| orders.iter().map(of).sum::<f64>() / orders.len() as f64;
+    let stats = Stats {
+        heading_error_median_rad: quantile(&headings, 0.5),
+        heading_error_p90_rad: quantile(&headings, 0.9),
+        jumps_per_100_frames: jumps_per_100_frames(individuals),
+        path_deviation_p95_bl: quantile(&sorted(deviations), 0.95) / length_px,
+        slip_median_rad: quantile(&sorted(slips.collect()), 0.5),
+        clone_share: clone_share(individuals, CLONE_BL * length_px, CLONE_S * fps),
+        variety: variety(individuals, library),
+        polarization: mean(|order| order.polarization),
+        milling: mean(|order| order.milling),
+        nearest_neighbor_bl: mean(|order| order.nearest_bl),
+    };
+    stats.rounded()
+}
+
+impl Stats {
+    fn rounded(self) -> Stats {
+        let r = |value| rounded(value, 4);
+        Stats {
+            heading_error_median_rad: r(self.heading_error_median_rad),
+            heading_error_p90_rad: r(self.heading_error_p90_rad),
+            jumps_per_100_frames: r(self.jumps_per_100_frames),
+            path_deviation_p95_bl: r(self.path_deviation_p95_bl),
+            slip_median_rad: r(self.slip_median_rad),
+            clone_share: r(self.clone_share),
+            variety: r(self.variety),
+            polarization: r(self.polarization),
+            milling: r(self.milling),
+            nearest_neighbor_bl: r(self.nearest_neighbor_bl),
+        }
+    }
+}
+
+fn heading_errors(individual: &Individual) -> impl Iterator<Item = f64> {
+    let pairs = individual
+        .heading_rad
+        .iter()
+        .zip(&individual.boid.heading_rad);
+    pairs.map(|(shown, wanted)| wrap_rad(shown - wanted).abs())
+}
+
+fn deviations_px(individual: &Individual) -> impl Iterator<Item = f64> {
+    let pairs = individual
+        .centroid_px
+        .iter()
+        .zip(&individual.boid.position_px);
+    pairs.map(|(shown, boid)| (shown[0] - boid[0]).hypot(shown[1] - boid[1]))
+}
+
+fn slips(individual: &Individual, least_step_px: f64) -> impl Iterator<Item = f64> {
+    let steps = individual
+        .centroid_px
+        .windows(2)
+        .zip(&individual.heading_rad[1..]);
+    steps.filter_map(move |(step, heading)| {
+        let (dx, dy) = (step[1][0] - step[0][0], step[1][1] - step[0][1]);
+        (dx.hypot(dy) > least_step_px).then(|| wrap_rad(libm::atan2(dy, dx) - heading).abs())
+    })
+}
+
+fn shown(individual: &Individual, t: usize) -> (u32, bool) {
+    (individual.source_frame[t], individual.mirrored[t])
+}
+
+fn jumps_per_100_frames(individuals: &[Individual]) -> f64 {
+    let n_frames: usize = individuals.iter().map(|i| i.source_frame.len()).sum();
+    let jumps = |i: &Individual| {
+        let steps = 1..i.source_frame.len();
+        steps
+            .filter(|&t| is_jump(shown(i, t - 1), shown(i, t)))
+            .count()
+    };
+    let n_jumps: usize = individuals.iter().map(jumps).sum();
+    100.0 * n_jumps as f64 / n_frames.max(1) as f64
+}
+
+fn clone_share(individuals: &[Individual], within_px: f64, within_frames: f64) -> f64 {
+    let (mut near, mut clones) = (0u64, 0u64);
+    for (k, a) in individuals.iter().enumerate() {
+        for b in &individuals[k + 1..] {
+            for t in 0..a.source_frame.len() {
+                let (p, q) = (a.boid.position_px[t], b.boid.position_px[t]);
+                let square: f64 = p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum();
+                if square > within_px * within_px {
+                    continue;
+                }
+                let (one, other) = (shown(a, t), shown(b, t));
+                let apart = f64::from(one.0.abs_diff(other.0));
+                near += 1;
+                clones += u64::from(one.1 == other.1 && apart < within_frames);
+            }
+        }
+    }
+    clones as f64 / near.max(1) as f64
+}
+
+fn variety(individuals: &[Individual], library: &Library) -> f64 {
+    let mut used = vec![false; library.poses.frames.len()];
+    for frame in individuals.iter().flat_map(|i| &i.source_frame) {
+        used[*frame as usize] = true;
+    }
+    let n_used = used.iter().filter(|&&used| used).count();
+    n_used as f64 / library.playback.component.len().max(1) as f64
+}
+
+fn sorted(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values
+}
+
+/// 0 of nothing.
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    match sorted.len() {
+        0 => 0.0,
+        n => sorted[((n - 1) as f64 * share).round() as usize],
+    }
+}

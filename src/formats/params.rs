@@ -1,0 +1,119 @@
+//! Parameters from JSON: `{"preset": "papers", "kappa": 3}` starts from a preset and overrides it;
+//! without a preset it starts from the defaults. One way for every kind of parameters.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
+
+use crate::{analysis, flock};
+
+/// Parameters that have presets and ranges.
+pub trait Preset: Serialize + DeserializeOwned + Default {
+    /// The parameters of a preset's name, if there is one.
+    fn preset(name: &str) -> Option<Self>;
+
+    /// Checks every range; the sentence says which parameter is out of which range.
+    fn check(&self) -> Result<(), String>;
+}
+
+/// Why a JSON object is not a set of parameters.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The preset is unknown.
+    #[error("there is no such preset: {0}")]
+    UnknownPreset(String),
+    /// A parameter is unknown, of the wrong type, or out of its range.
+    #[error("{0}")]
+    Invalid(String),
+}
+
+/// The parameters that an object of overrides, with or without a `preset`, asks for.
+///
+/// Fails with a sentence that names the parameter.
+pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
+    let start = match overrides.remove("preset") {
+        None | Some(Value::Null) => P::default(),
+        Some(name) => {
+            let found = name.as_str().and_then(P::preset);
+            found.ok_or_else(|| Error::UnknownPreset(name.to_string()))?
+        }
+    };
+    let mut merged = serde_json::to_value(start).map_err(invalid)?;
+    override_with(&mut merged, Value::Object(overrides));
+    let params: P = serde_json::from_value(merged).map_err(invalid)?;
+    params.check().map_err(Error::Invalid)?;
+    Ok(params)
+}
+
+/// Objects are overridden field by field, everything else whole.
+fn override_with(value: &mut Value, overrides: Value) {
+    match (value, overrides) {
+        (Value::Object(fields), Value::Object(overrides)) => {
+            for (name, value) in overrides {
+                override_with(fields.entry(name).or_insert(Value::Null), value);
+            }
+        }
+        (value, overrides) => *value = overrides,
+    }
+}
+
+impl Preset for analysis::Params {
+    fn preset(name: &str) -> Option<Self> {
+        (name == "papers").then(analysis::Params::papers)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        analysis::Params::check(self)
+    }
+}
+
+impl Preset for flock::Params {
+    fn preset(name: &str) -> Option<Self> {
+        (name == "papers").then(flock::Params::papers)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        flock::Params::check(self)
+    }
+}
+
+fn invalid(error: serde_json::Error) -> Error {
+    Error::Invalid(error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn analysis(json: &str) -> Result<analysis::Params, Error> {
+        read(serde_json::from_str(json).unwrap())
+    }
+
+    #[test]
+    fn nothing_asked_for_gives_the_defaults() {
+        assert_eq!(analysis("{}"), Ok(analysis::Params::default()));
+    }
+
+    #[test]
+    fn a_preset_is_the_start_and_the_rest_overrides_it() {
+        let papers = analysis::Params::papers();
+        assert_eq!(
+            analysis(r#"{"preset": "papers", "mirror": true}"#),
+            Ok(analysis::Params {
+                mirror: true,
+                ..papers
+            })
+        );
+    }
+
+    #[test]
+    fn what_is_unknown_or_out_of_range_is_named() {
+        let said = |json| analysis(json).unwrap_err().to_string();
+        assert_eq!(said(r#"{"preset": "p"}"#), "there is no such preset: \"p\"");
+        assert!(said(r#"{"colour": 1}"#).contains("colour"));
+        assert_eq!(
+            said(r#"{"threshold": 0}"#),
+            "threshold must lie in 1..=254: 0"
+        );
+    }
+}

@@ -1,0 +1,72 @@
+//! Admission: received bytes become a footage, or are refused with the gate's reason and leave
+//! nothing behind (RELIABILITY.md, store rules and gate). One way in, for uploads and the sample.
+
+use uuid::Uuid;
+
+use super::Error;
+use super::clock::now_ms;
+use crate::footage::{FootageFormat, FrameSource};
+use crate::media::{Limits, Video, read_image};
+use crate::store::footage::{Added, BACKGROUND, Footage, VIDEO};
+use crate::store::{BlobFile, Draft, Store};
+
+/// Files received into a draft, synced and hashed, and what the sender calls them.
+pub struct Arrival {
+    /// Holds the files.
+    pub draft: Draft,
+    /// The video.
+    pub video: BlobFile,
+    /// The given background, if there is one.
+    pub background: Option<BlobFile>,
+    /// A label for people.
+    pub name: String,
+    /// Made by the program itself.
+    pub sample: bool,
+}
+
+/// Looks at the files and stores them; the same bytes as before give the footage of then.
+pub async fn admit(store: &Store, arrival: Arrival) -> Result<Added, Error> {
+    let (arrival, format) = tokio::task::spawn_blocking(move || {
+        let format = inspect(&arrival)?;
+        Ok::<_, Error>((arrival, format))
+    })
+    .await
+    .unwrap_or(Err(Error::Panicked))?;
+    let footage = row(&arrival, &format);
+    let mut files = vec![arrival.video];
+    files.extend(arrival.background);
+    Ok(store.add_footage(footage, arrival.draft, &files).await?)
+}
+
+/// Everything that can be said of the files without decoding the video.
+fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
+    let limits = Limits::default();
+    let format = Video::open(&arrival.draft.path().join(VIDEO), &limits)?.format();
+    if arrival.background.is_some() {
+        let image = read_image(&arrival.draft.path().join(BACKGROUND), &limits)?;
+        let (found, wanted) = ([image.width, image.height], [format.width, format.height]);
+        if found != wanted {
+            return Err(crate::analysis::Error::BackgroundSizeDiffers { found, wanted }.into());
+        }
+    }
+    Ok(format)
+}
+
+fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
+    let background = arrival.background.as_ref();
+    let background_bytes = background.map_or(0, |file| file.size_bytes);
+    Footage {
+        id: Uuid::now_v7(),
+        folder: String::new(),
+        sha256: arrival.video.sha256.clone(),
+        background_sha256: background.map_or(Vec::new(), |file| file.sha256.clone()),
+        name: arrival.name.clone(),
+        size_bytes: arrival.video.size_bytes + background_bytes,
+        width: i64::from(format.width),
+        height: i64::from(format.height),
+        fps: format.fps,
+        n_frames_hint: i64::try_from(format.n_frames_hint).unwrap_or(i64::MAX),
+        sample: arrival.sample,
+        created_ms: now_ms(),
+    }
+}

@@ -1,0 +1,153 @@
+//! The analysis job: footage to library (ALGORITHMS.md 2 to 5), left as the folder of DESIGN.md
+//! with the pictures that the page shows beside it.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::{Attempt, Context, Error, Product, Stages, clock};
+use crate::analysis::distance::{ComparedSprites, Distances, Side};
+use crate::analysis::{Params, analyze};
+use crate::formats::library_json::FootageSummary;
+use crate::formats::{csv, distance_map, library_dir, svg};
+use crate::ids::{FootageId, JobId, LibraryId};
+use crate::library::{Library, View};
+use crate::media::{Limits, Video, read_image};
+use crate::progress::Progress;
+use crate::store::footage::{BACKGROUND, Footage, VIDEO};
+use crate::store::jobs::Kind;
+use crate::store::jobs::enqueue::NewJob;
+use crate::store::jobs::finish::Made;
+use crate::{cpu, store};
+
+/// The stages, with their measured shares.
+pub const STAGES: Stages = &[
+    ("background", 0.2),
+    ("tracking", 0.45),
+    ("distances", 0.25),
+    ("writing", 0.1),
+];
+
+/// What an analysis needs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Input {
+    /// The footage to measure.
+    pub footage_id: FootageId,
+    /// How.
+    pub params: Params,
+}
+
+/// What is worth knowing of a library at a glance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Summary {
+    /// Frames a second.
+    pub fps: f64,
+    /// Width and height of the picture, pixels.
+    pub image_size_px: [u32; 2],
+    /// From where the animal is seen: `side` or `top`.
+    pub view: String,
+    /// Frames of the footage.
+    pub n_frames: usize,
+    /// Share of the frames in which the animal was found, 0..=1.
+    pub detected_share: f64,
+    /// Pairs of moments that look alike.
+    pub n_transitions: usize,
+    /// Share of the frames that playback can use for ever, 0..=1.
+    pub component_share: f64,
+    /// Frames in a clip.
+    pub clip_frames: usize,
+    /// Median length of the animal, pixels.
+    pub length_px: Option<f64>,
+}
+
+/// Queues an analysis; the library will have the id given back.
+pub async fn enqueue(context: &Context, input: &Input) -> Result<(JobId, LibraryId), store::Error> {
+    let (job_id, library_id) = (JobId(Uuid::now_v7()), LibraryId(Uuid::now_v7()));
+    let job = NewJob {
+        job_id,
+        kind: Kind::Analysis,
+        input: serde_json::json!(input).to_string(),
+        result_id: library_id.0,
+        after_job: None,
+        priority: 0,
+    };
+    context.store.enqueue(&job, clock::now_ms()).await?;
+    context.wake.notify_one();
+    Ok((job_id, library_id))
+}
+
+impl Input {
+    /// Measures the footage and writes the library.
+    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+        let footage = attempt.footage(self.footage_id)?;
+        let limits = Limits {
+            threads: u32::try_from(attempt.threads).unwrap_or(0),
+            ..Limits::default()
+        };
+        let path_of = |name| attempt.blobs().path(&footage.folder, name);
+        let video = Video::open(&path_of(VIDEO), &limits)?;
+        let background = match footage.background_sha256.is_empty() {
+            true => None,
+            false => Some(read_image(&path_of(BACKGROUND), &limits)?),
+        };
+        let level = cpu::Level::detect();
+        let progress = attempt.listener;
+        let library = analyze(&video, background.as_ref(), &self.params, level, progress)?;
+        self.write(attempt, &library, &footage)?;
+        Ok(Product {
+            made: Made::Library(self.footage_id.0),
+            params: serde_json::to_string(&self.params)?,
+            summary: serde_json::to_string(&Summary::of(&library))?,
+        })
+    }
+
+    fn write(&self, attempt: &Attempt, library: &Library, footage: &Footage) -> Result<(), Error> {
+        attempt.listener.report("writing", 0.0);
+        let folder = attempt.folder();
+        let source = FootageSummary {
+            sha256: store::blobs::hex(&footage.sha256),
+            n_bytes: footage.size_bytes.unsigned_abs(),
+        };
+        library_dir::write(folder, library, &self.params, &source)?;
+        std::fs::write(folder.join("poses.csv"), csv::write_poses(&library.poses))?;
+        std::fs::write(folder.join("headings.svg"), svg::headings(&library.poses))?;
+        std::fs::write(
+            folder.join("distance.png"),
+            self.distance_map(attempt, library)?,
+        )?;
+        Ok(())
+    }
+}
+
+impl Input {
+    fn distance_map(&self, attempt: &Attempt, library: &Library) -> Result<Vec<u8>, Error> {
+        let pixels = ComparedSprites::new(&library.sprites, &library.poses, self.params.planes);
+        let distances = Distances {
+            pixels: &pixels,
+            clip_frames: library.clip_frames,
+            side: Side::Plain,
+            cpu: cpu::Level::detect(),
+        };
+        distance_map::draw(&distances, attempt.listener).map_err(|_cancelled| Error::Cancelled)
+    }
+}
+
+impl Summary {
+    fn of(library: &Library) -> Summary {
+        let stats = &library.stats;
+        Summary {
+            fps: library.poses.fps,
+            image_size_px: library.poses.image_size_px,
+            view: match library.poses.view {
+                View::Side => "side".to_owned(),
+                View::Top => "top".to_owned(),
+            },
+            n_frames: stats.n_frames,
+            detected_share: stats.n_detected as f64 / stats.n_frames.max(1) as f64,
+            n_transitions: library.transitions.len(),
+            component_share: stats.component_share,
+            clip_frames: library.clip_frames,
+            length_px: stats.length_px,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! What one run of a job is given, and what it gives back.
+
+use std::path::{Path, PathBuf};
+
+use tokio::runtime::Handle;
+use uuid::Uuid;
+
+use super::{Error, Listener};
+use crate::ids::{FootageId, LibraryId};
+use crate::store::jobs::finish::Made;
+use crate::store::{Blobs, Draft, Store, footage, libraries};
+
+/// One run of a job: where to write, how to load, whom to report to.
+pub struct Attempt<'a> {
+    /// Progress out, cancellation in.
+    pub listener: &'a Listener,
+    /// Threads to use, at least 1.
+    pub threads: usize,
+    draft: &'a Draft,
+    store: &'a Store,
+    runtime: &'a Handle,
+}
+
+/// What a run made; the files lie in its draft.
+#[derive(Clone, Debug)]
+pub struct Product {
+    /// What was made, and of what.
+    pub made: Made,
+    /// The parameters in full, JSON.
+    pub params: String,
+    /// What is worth knowing at a glance, JSON.
+    pub summary: String,
+}
+
+impl<'a> Attempt<'a> {
+    pub(super) fn new(
+        store: &'a Store,
+        draft: &'a Draft,
+        listener: &'a Listener,
+        threads: usize,
+        runtime: &'a Handle,
+    ) -> Attempt<'a> {
+        Attempt {
+            listener,
+            threads,
+            draft,
+            store,
+            runtime,
+        }
+    }
+
+    /// The folder that this run's files go to; fresh, and thrown away unless the run is finished.
+    pub fn folder(&self) -> &Path {
+        self.draft.path()
+    }
+
+    /// A footage's row; must be called on a blocking thread.
+    pub fn footage(&self, id: FootageId) -> Result<footage::Footage, Error> {
+        let row = self.runtime.block_on(self.store.footage(id.0))?;
+        row.ok_or(Error::InputAbsent(id.0))
+    }
+
+    /// A library's row and folder; must be called on a blocking thread.
+    pub fn library(&self, id: LibraryId) -> Result<(libraries::Library, PathBuf), Error> {
+        let row = self.runtime.block_on(self.store.library(id.0))?;
+        let row = row.ok_or(Error::InputAbsent(id.0))?;
+        let folder = self.blobs().folder(&row.folder);
+        Ok((row, folder))
+    }
+
+    /// The files of the store.
+    pub fn blobs(&self) -> &Blobs {
+        self.store.blobs()
+    }
+}
+
+/// Where the files of a result lie in the store: the fence keeps two runs apart.
+pub(super) fn folder_of(made: Made, result: Uuid, fence: i64) -> String {
+    let kind = match made {
+        Made::Library(_) => "libraries",
+        Made::Flock(_) => "flocks",
+        Made::Fish(_) => "fish",
+    };
+    format!("{kind}/{result}.{fence}")
+}

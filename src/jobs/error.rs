@@ -1,0 +1,92 @@
+//! Why a job did not finish.
+
+use crate::code::Code;
+use crate::footage::SourceError;
+use crate::{analysis, fish, flock, formats, media, store};
+
+/// The reasons, one variant for each part that can refuse or fail.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The input, as it was stored, cannot be read by this version.
+    #[error("the job's input cannot be read: {0}")]
+    Input(#[from] serde_json::Error),
+    /// The footage or library is no longer there.
+    #[error("what the job was to be made of is not there: {0}")]
+    InputAbsent(uuid::Uuid),
+    /// The footage could not be opened, or the video not written.
+    #[error(transparent)]
+    Media(#[from] media::Error),
+    /// A video could not be read to its end.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The analysis ended without a library.
+    #[error(transparent)]
+    Analysis(#[from] analysis::Error),
+    /// The flock could not be made.
+    #[error(transparent)]
+    Flock(#[from] flock::Error),
+    /// The virtual fish could not be made.
+    #[error(transparent)]
+    Fish(#[from] fish::Error),
+    /// A library's folder could not be written or read.
+    #[error(transparent)]
+    LibraryDir(#[from] formats::library_dir::Error),
+    /// The store said no.
+    #[error(transparent)]
+    Store(#[from] store::Error),
+    /// A file of the job's own folder failed.
+    #[error("a file of the job failed: {0}")]
+    Io(#[from] std::io::Error),
+    /// The computation panicked.
+    #[error("the computation stopped unexpectedly")]
+    Panicked,
+    /// Somebody cancelled, or the worker drains.
+    #[error("the job was cancelled")]
+    Cancelled,
+}
+
+impl Error {
+    /// The stable code.
+    pub fn code(&self) -> Code {
+        match self {
+            Error::Input(_) => Code::InvalidParams,
+            Error::InputAbsent(_) => Code::InputFailed,
+            Error::Media(error) => error.code(),
+            Error::Source(error) => error.code,
+            Error::Analysis(error) => error.code(),
+            Error::Flock(error) => error.code(),
+            Error::Fish(error) => error.code(),
+            Error::LibraryDir(error) => of_library_dir(error),
+            Error::Store(error) => error.code(),
+            Error::Io(error) => of_io(error),
+            Error::Panicked => Code::Internal,
+            Error::Cancelled => Code::Cancelled,
+        }
+    }
+
+    /// Whether another attempt may succeed: a file system or database that failed for a moment, but
+    /// never bad input and never a panic.
+    pub fn may_pass(&self) -> bool {
+        match self {
+            Error::Store(_) | Error::Io(_) => self.code() == Code::Internal,
+            Error::LibraryDir(formats::library_dir::Error::Io { .. }) => {
+                self.code() == Code::Internal
+            }
+            _ => false,
+        }
+    }
+}
+
+fn of_library_dir(error: &formats::library_dir::Error) -> Code {
+    match error {
+        formats::library_dir::Error::Io { cause, .. } => of_io(cause),
+        _ => Code::Internal,
+    }
+}
+
+fn of_io(error: &std::io::Error) -> Code {
+    match error.kind() {
+        std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => Code::StorageFull,
+        _ => Code::Internal,
+    }
+}

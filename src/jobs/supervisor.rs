@@ -1,0 +1,86 @@
+//! The supervisor: a pool of workers, the rescue of jobs whose workers fell silent, and the drain
+//! at the end (RELIABILITY.md, R2 and R4).
+
+use std::time::Duration;
+
+use tokio::task::JoinSet;
+use tokio::time::{sleep, timeout};
+
+use super::clock::now_ms;
+use super::worker::{Step, Worker};
+use super::{Context, clock};
+
+/// Idle workers look for jobs this often even if nobody wakes them.
+const POLL: Duration = Duration::from_secs(1);
+/// The longest wait for running jobs to let go.
+const DRAIN: Duration = Duration::from_secs(15);
+
+/// The running pool.
+pub struct Supervisor {
+    context: Context,
+    tasks: JoinSet<()>,
+}
+
+impl Supervisor {
+    /// Starts `n_workers` workers and the rescue.
+    pub fn start(context: Context, n_workers: usize) -> Supervisor {
+        let mut tasks = JoinSet::new();
+        for _ in 0..n_workers {
+            tasks.spawn(work(context.clone()));
+        }
+        tasks.spawn(rescue(context.clone()));
+        Supervisor { context, tasks }
+    }
+
+    /// Stops claiming, sends running jobs back to the queue, and returns when all have let go or
+    /// time is up; whatever still runs then is rescued at the next start.
+    pub async fn drain(mut self) {
+        self.context.draining.cancel();
+        let all = async { while self.tasks.join_next().await.is_some() {} };
+        if timeout(DRAIN, all).await.is_err() {
+            tracing::warn!("a job did not let go in time; it is rescued at the next start");
+        }
+    }
+}
+
+async fn work(context: Context) {
+    let worker = Worker::new(context.clone());
+    while !context.draining.is_cancelled() {
+        match worker.step().await {
+            Ok(Step::Idle) => {
+                tokio::select! {
+                    () = context.wake.notified() => {}
+                    () = sleep(POLL) => {}
+                    () = context.draining.cancelled() => {}
+                }
+            }
+            // A job that ended may be what others waited for.
+            Ok(_) => context.wake.notify_one(),
+            Err(error) => {
+                tracing::error!(%error, "a worker could not reach its queue");
+                sleep(POLL).await;
+            }
+        }
+    }
+}
+
+async fn rescue(context: Context) {
+    while !context.draining.is_cancelled() {
+        match context.store.rescue(now_ms()).await {
+            Ok(rescued) if rescued.is_empty() => {}
+            Ok(_) => context.wake.notify_one(),
+            Err(error) => tracing::error!(%error, "silent workers could not be looked for"),
+        }
+        tokio::select! {
+            () = sleep(POLL) => {}
+            () = context.draining.cancelled() => {}
+        }
+    }
+}
+
+/// Mends what a crash left, before the first worker starts: leases of the dead, drafts, strays.
+pub async fn recover(context: &Context) -> Result<(), crate::store::Error> {
+    context.store.rescue_all(clock::now_ms()).await?;
+    context.store.sweep(std::time::SystemTime::now()).await?;
+    Ok(())
+}

@@ -1,0 +1,235 @@
+//! A worker: claims one job, runs it, ends it (STYLE.md, habit 8). [`Worker::step`] does that once
+//! and says what happened; the loop around it is the supervisor's.
+//!
+//! The computation runs on a blocking thread with a pool of its own; beside it, this task beats
+//! every third of the lease, and at most twice a second when there is progress to note.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::runtime::Handle;
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, MissedTickBehavior, interval};
+use uuid::Uuid;
+
+use super::attempt::folder_of;
+use super::clock::now_ms;
+use super::listener::Position;
+use super::{Attempt, Context, Error, Job, Listener, Product, stages};
+use crate::code::Code;
+use crate::ids::JobId;
+use crate::store;
+use crate::store::Store;
+use crate::store::jobs::finish::Outcome;
+use crate::store::jobs::heartbeat::Beat;
+use crate::store::jobs::{Change, Lease};
+
+const TICK: Duration = Duration::from_millis(500);
+const MAX_ATTEMPTS: i64 = 3;
+/// The wait before the second attempt; each further one waits four times as long.
+const BACKOFF_MS: i64 = 2_000;
+
+/// What one step did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// There was nothing to do.
+    Idle,
+    /// A job is done, its result linked.
+    Done(JobId),
+    /// A job failed for good.
+    Failed(JobId, Code),
+    /// A job failed and will be tried again.
+    Retried(JobId),
+    /// A job was cancelled while it ran.
+    Cancelled(JobId),
+    /// A job went back to the queue because the process stops.
+    Released(JobId),
+    /// A job was no longer ours when it ended: nothing of this run was kept.
+    Lost(JobId),
+}
+
+/// Works on one job at a time.
+pub struct Worker {
+    context: Context,
+    /// Random per process and worker: a restarted worker is never taken for its predecessor.
+    id: Uuid,
+}
+
+impl Worker {
+    /// A worker with an identity of its own.
+    pub fn new(context: Context) -> Worker {
+        Worker {
+            context,
+            id: Uuid::now_v7(),
+        }
+    }
+
+    /// Claims the next job, runs it and ends it.
+    pub async fn step(&self) -> Result<Step, store::Error> {
+        self.step_by(|lease, attempt| Job::decode(lease)?.run(attempt))
+            .await
+    }
+
+    /// The same with another way to do the work, for tests of the queue.
+    pub async fn step_by<Run>(&self, run: Run) -> Result<Step, store::Error>
+    where
+        Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
+    {
+        let lease_ms = self.lease_ms();
+        let claimed = self
+            .context
+            .store
+            .claim(self.id, now_ms(), lease_ms)
+            .await?;
+        let Some(lease) = claimed else {
+            return Ok(Step::Idle);
+        };
+        let listener = Arc::new(Listener::new(stages(lease.kind)));
+        let work = spawn(&self.context, lease.clone(), listener.clone(), run);
+        let result = self.beat_until_done(&lease, &listener, work).await;
+        self.end(&lease, &listener, result).await
+    }
+
+    /// Keeps the lease, notes progress, and passes on the wish to stop, until the work ends.
+    async fn beat_until_done(
+        &self,
+        lease: &Lease,
+        listener: &Listener,
+        mut work: JoinHandle<Result<Outcome, Error>>,
+    ) -> Result<Outcome, Error> {
+        let mut tick = interval(TICK.min(self.context.lease / 3));
+        tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut last_beat = Instant::now();
+        let mut noted = listener.position();
+        loop {
+            tokio::select! {
+                joined = &mut work => return joined.unwrap_or(Err(Error::Panicked)),
+                _ = tick.tick() => {}
+            }
+            if self.context.draining.is_cancelled() {
+                listener.cancel();
+            }
+            let position = listener.position();
+            if position != noted || last_beat.elapsed() >= self.context.lease / 3 {
+                self.beat(lease, listener, position).await;
+                (noted, last_beat) = (position, Instant::now());
+            }
+        }
+    }
+
+    async fn beat(&self, lease: &Lease, listener: &Listener, at: Position) {
+        let until_ms = now_ms() + self.lease_ms();
+        let beat = self
+            .context
+            .store
+            .heartbeat(lease, until_ms, at.stage, at.progress);
+        match beat.await {
+            Ok(Beat::Held) => {}
+            Ok(Beat::CancelRequested | Beat::Lost) => listener.cancel(),
+            // The lease may run out; the fence keeps the books right whatever happens then.
+            Err(error) => tracing::warn!(job.id = %lease.job_id, %error, "a heartbeat failed"),
+        }
+    }
+
+    async fn end(
+        &self,
+        lease: &Lease,
+        listener: &Listener,
+        result: Result<Outcome, Error>,
+    ) -> Result<Step, store::Error> {
+        let (store, job) = (&self.context.store, lease.job_id);
+        let result = match result {
+            Ok(outcome) => finish(store, lease, &outcome).await.map_err(Error::from),
+            Err(error) => Err(error),
+        };
+        let (change, step) = match result {
+            Ok(change) => (change, Step::Done(job)),
+            Err(error) if crate::progress::Progress::cancelled(listener) => {
+                tracing::debug!(job.id = %job, %error, "the work let go");
+                if self.context.draining.is_cancelled() {
+                    (store.release(lease).await?, Step::Released(job))
+                } else {
+                    (store.stop(lease, now_ms()).await?, Step::Cancelled(job))
+                }
+            }
+            Err(error) if error.may_pass() && lease.attempt < MAX_ATTEMPTS => {
+                tracing::warn!(job.id = %job, %error, "the work failed, perhaps for a moment");
+                let wait_ms = BACKOFF_MS << (2 * (lease.attempt - 1));
+                let change = store.retry(lease, now_ms() + wait_ms).await?;
+                (change, Step::Retried(job))
+            }
+            Err(error) => {
+                let code = error.code();
+                let change = store.fail(lease, code, &said(&error), now_ms()).await?;
+                (change, Step::Failed(job, code))
+            }
+        };
+        Ok(match change {
+            Change::Made => step,
+            Change::Lost => Step::Lost(job),
+        })
+    }
+
+    fn lease_ms(&self) -> i64 {
+        i64::try_from(self.context.lease.as_millis()).unwrap_or(i64::MAX)
+    }
+}
+
+/// Runs the work and moves what it made into place, all on a blocking thread.
+fn spawn<Run>(
+    context: &Context,
+    lease: Lease,
+    listener: Arc<Listener>,
+    run: Run,
+) -> JoinHandle<Result<Outcome, Error>>
+where
+    Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
+{
+    let (store, threads, runtime) = (context.store.clone(), context.threads, Handle::current());
+    tokio::task::spawn_blocking(move || {
+        let draft = store
+            .blobs()
+            .draft(&format!("{}.{}", lease.job_id, lease.fence))?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(std::io::Error::other)?;
+        let attempt = Attempt::new(&store, &draft, &listener, threads, &runtime);
+        let product = pool.install(|| run(&lease, &attempt))?;
+        let files = store.blobs().seal(&draft)?;
+        let folder = folder_of(product.made, lease.result_id, lease.fence);
+        store.blobs().adopt(draft, &folder)?;
+        Ok(Outcome {
+            made: product.made,
+            folder,
+            files,
+            params: product.params,
+            summary: product.summary,
+        })
+    })
+}
+
+/// Links the result; one that came too late is thrown away. After an error the row decides: where
+/// none names the folder, nothing was linked.
+async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Change, store::Error> {
+    let change = store.finish(lease, outcome, now_ms()).await;
+    let is_linked = match &change {
+        Ok(change) => *change == Change::Made,
+        Err(_) => store.is_folder_known(&outcome.folder).await?,
+    };
+    if !is_linked {
+        store.blobs().discard(&outcome.folder)?;
+    }
+    change
+}
+
+/// What a person is told: the reason, where it is one of theirs; what failed inside stays in the log.
+fn said(error: &Error) -> String {
+    match error.code() {
+        Code::Internal | Code::DecoderCrashed => {
+            tracing::error!(%error, "a job failed inside");
+            error.code().meaning().to_owned()
+        }
+        _ => error.to_string(),
+    }
+}

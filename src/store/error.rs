@@ -1,0 +1,69 @@
+//! Why the store could not do what was asked (RELIABILITY.md, R7: a full disk is a clean no).
+
+use std::io::ErrorKind;
+use std::path::PathBuf;
+
+use crate::code::Code;
+
+/// The reasons, one variant each.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The database said no.
+    #[error("the database failed: {0}")]
+    Sql(#[from] sqlx::Error),
+    /// The database could not be brought to this version's form.
+    #[error("the database could not be migrated: {0}")]
+    Migrate(#[from] sqlx::migrate::MigrateError),
+    /// A file could not be read or written.
+    #[error("a file of the store failed: {0}")]
+    Io(#[from] std::io::Error),
+    /// Another process serves the same folder.
+    #[error("the data folder is in use by another flockreel: {}", .0.display())]
+    InUse(PathBuf),
+    /// More bytes than an upload may have.
+    #[error("the upload is larger than {limit_bytes} bytes")]
+    TooLarge {
+        /// The limit.
+        limit_bytes: u64,
+    },
+    /// A row holds what this version does not know.
+    #[error("a row of {table} cannot be read: {value}")]
+    UnknownValue {
+        /// The table.
+        table: &'static str,
+        /// The value.
+        value: String,
+    },
+}
+
+impl Error {
+    /// The stable code.
+    pub fn code(&self) -> Code {
+        match self {
+            Error::TooLarge { .. } => Code::TooLarge,
+            Error::Io(error) if is_full(error) => Code::StorageFull,
+            Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
+            Error::Sql(sqlx::Error::Database(error)) if is_sqlite_full(error.code()) => {
+                Code::StorageFull
+            }
+            Error::Sql(_)
+            | Error::Migrate(_)
+            | Error::Io(_)
+            | Error::InUse(_)
+            | Error::UnknownValue { .. } => Code::Internal,
+        }
+    }
+}
+
+fn is_full(error: &std::io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded
+    )
+}
+
+/// SQLITE_FULL is 13, and so are the lowest eight bits of its extended forms.
+fn is_sqlite_full(code: Option<std::borrow::Cow<'_, str>>) -> bool {
+    code.and_then(|code| code.parse::<u32>().ok())
+        .is_some_and(|code| code & 0xff == 13)
+}

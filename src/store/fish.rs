@@ -1,0 +1,79 @@
+//! The table of fish: what each finished fish job left.
+
+use sqlx::types::Uuid;
+
+use super::jobs::Lease;
+use super::jobs::finish::Outcome;
+use super::{Connection, Error, Store};
+
+/// One fish as stored; its files lie in `folder`.
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct Fish {
+    /// Its id.
+    pub id: Uuid,
+    /// The job that made it.
+    pub job_id: Uuid,
+    /// The library it was made of.
+    pub library_id: Uuid,
+    /// Its folder in the blob store.
+    pub folder: String,
+    /// The parameters it was made with, JSON.
+    pub params: String,
+    /// What is worth knowing at a glance, JSON.
+    pub summary: String,
+    /// Whether it came of the sample that the program made itself.
+    pub sample: bool,
+    /// Size of all its files, bytes.
+    pub size_bytes: i64,
+    /// When it was finished, milliseconds since 1970.
+    pub created_ms: i64,
+}
+
+impl Store {
+    /// One fish, if it is finished and there.
+    pub async fn fish(&self, id: Uuid) -> Result<Option<Fish>, Error> {
+        let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
+                   r.size_bytes, r.created_ms \
+                   from fish r join libraries l on l.id = library_id \
+                   join footage f on f.id = footage_id where r.id = $1";
+        let row = sqlx::query_as(sql).bind(id);
+        Ok(row.fetch_optional(&self.reader).await?)
+    }
+
+    /// The newest fish, at most `limit`, older than `before`.
+    pub async fn list_fish(&self, limit: i64, before: Option<Uuid>) -> Result<Vec<Fish>, Error> {
+        let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
+                   r.size_bytes, r.created_ms \
+                   from fish r join libraries l on l.id = library_id \
+                   join footage f on f.id = footage_id \
+                   where $1 is null or r.id < $1 order by r.id desc limit $2";
+        let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        Ok(rows.fetch_all(&self.reader).await?)
+    }
+}
+
+/// Adds the row, in the transaction that finishes the job.
+pub(super) async fn insert(
+    connection: &mut Connection,
+    lease: &Lease,
+    library_id: Uuid,
+    outcome: &Outcome,
+    now_ms: i64,
+) -> Result<(), sqlx::Error> {
+    sqlx::query(
+        "insert into fish (id, job_id, fence, library_id, folder, params, summary, \
+         size_bytes, created_ms) values ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+    )
+    .bind(lease.result_id)
+    .bind(lease.job_id.0)
+    .bind(lease.fence)
+    .bind(library_id)
+    .bind(&outcome.folder)
+    .bind(&outcome.params)
+    .bind(&outcome.summary)
+    .bind(outcome.size_bytes())
+    .bind(now_ms)
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! The table of footage: one row per uploaded video and given background.
+
+use sqlx::types::Uuid;
+
+use super::{BlobFile, Draft, Error, Store, blobs};
+
+/// The name of the video's file in its folder.
+pub const VIDEO: &str = "video";
+/// The name of the given background's file in its folder.
+pub const BACKGROUND: &str = "background";
+
+/// One footage as stored.
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct Footage {
+    /// Its id.
+    pub id: Uuid,
+    /// Its folder in the blob store.
+    pub folder: String,
+    /// SHA-256 of the video's bytes.
+    pub sha256: Vec<u8>,
+    /// SHA-256 of the given background; empty when none was given.
+    pub background_sha256: Vec<u8>,
+    /// What the user called it: a label, never a path.
+    pub name: String,
+    /// Size of the video and background, bytes.
+    pub size_bytes: i64,
+    /// Columns, square pixels.
+    pub width: i64,
+    /// Rows, square pixels.
+    pub height: i64,
+    /// Frames a second.
+    pub fps: f64,
+    /// How many frames there seem to be.
+    pub n_frames_hint: i64,
+    /// Made by the program itself at its first start.
+    pub sample: bool,
+    /// When it was stored, milliseconds since 1970.
+    pub created_ms: i64,
+}
+
+/// Whether the bytes were new.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Added {
+    /// They were, and are now stored.
+    New(Footage),
+    /// The same bytes had been stored before; the new copy is gone.
+    Known(Footage),
+}
+
+impl Store {
+    /// Moves the received files into place and adds the row. `footage.folder` is made here.
+    pub async fn add_footage(
+        &self,
+        mut footage: Footage,
+        draft: Draft,
+        files: &[BlobFile],
+    ) -> Result<Added, Error> {
+        if let Some(known) = self.footage_of_bytes(&footage).await? {
+            return Ok(Added::Known(known));
+        }
+        footage.folder = format!("footage/{}", footage.id);
+        self.adopt(draft, &footage.folder).await?;
+        match self.insert_footage(&footage, files).await {
+            Ok(()) => {
+                tracing::info!(footage.id = %footage.id, size_bytes = footage.size_bytes, "footage stored");
+                Ok(Added::New(footage))
+            }
+            Err(error) => {
+                self.blobs.discard(&footage.folder)?;
+                // Two uploads of the same bytes at once: the other one came first.
+                match self.footage_of_bytes(&footage).await? {
+                    Some(known) => Ok(Added::Known(known)),
+                    None => Err(error.into()),
+                }
+            }
+        }
+    }
+
+    /// One footage, if it is there.
+    pub async fn footage(&self, id: Uuid) -> Result<Option<Footage>, Error> {
+        let row = sqlx::query_as("select * from footage where id = $1").bind(id);
+        Ok(row.fetch_optional(&self.reader).await?)
+    }
+
+    /// The newest footage, at most `limit`, older than `before`.
+    pub async fn list_footage(
+        &self,
+        limit: i64,
+        before: Option<Uuid>,
+    ) -> Result<Vec<Footage>, Error> {
+        let sql = "select * from footage where $1 is null or id < $1 order by id desc limit $2";
+        let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        Ok(rows.fetch_all(&self.reader).await?)
+    }
+
+    async fn footage_of_bytes(&self, footage: &Footage) -> Result<Option<Footage>, Error> {
+        let sql = "select * from footage where sha256 = $1 and background_sha256 = $2";
+        let row = sqlx::query_as(sql)
+            .bind(&footage.sha256)
+            .bind(&footage.background_sha256);
+        Ok(row.fetch_optional(&self.reader).await?)
+    }
+
+    async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
+        let (blobs, folder) = (self.blobs.clone(), folder.to_owned());
+        let adopted = tokio::task::spawn_blocking(move || blobs.adopt(draft, &folder)).await;
+        Ok(adopted.map_err(std::io::Error::other)??)
+    }
+
+    async fn insert_footage(
+        &self,
+        footage: &Footage,
+        files: &[BlobFile],
+    ) -> Result<(), sqlx::Error> {
+        let mut transaction = self.begin().await?;
+        sqlx::query(
+            "insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, \
+             height, fps, n_frames_hint, sample, created_ms) \
+             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)",
+        )
+        .bind(footage.id)
+        .bind(&footage.folder)
+        .bind(&footage.sha256)
+        .bind(&footage.background_sha256)
+        .bind(&footage.name)
+        .bind(footage.size_bytes)
+        .bind(footage.width)
+        .bind(footage.height)
+        .bind(footage.fps)
+        .bind(footage.n_frames_hint)
+        .bind(footage.sample)
+        .bind(footage.created_ms)
+        .execute(&mut *transaction)
+        .await?;
+        blobs::insert(&mut transaction, &footage.folder, files).await?;
+        transaction.commit().await
+    }
+}

@@ -1,0 +1,51 @@
+//! Cancel: somebody no longer wants the job.
+
+use super::JobState;
+use super::follow::cancel_followers;
+use crate::ids::JobId;
+use crate::store::{Error, Store};
+
+/// What a wish to cancel met.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cancel {
+    /// The job was queued and is cancelled, with all that followed it.
+    Cancelled,
+    /// The job is running: its worker will learn of it with the next heartbeat.
+    Requested,
+    /// The job had ended already.
+    Final(JobState),
+    /// There is no such job.
+    Absent,
+}
+
+impl Store {
+    /// Cancels a queued job at once, asks the worker of a running one to stop.
+    pub async fn cancel(&self, job: JobId, now_ms: i64) -> Result<Cancel, Error> {
+        let mut transaction = self.begin().await?;
+        let state: Option<String> = sqlx::query_scalar("select state from jobs where id = $1")
+            .bind(job.0)
+            .fetch_optional(&mut *transaction)
+            .await?;
+        let Some(state) = state else {
+            return Ok(Cancel::Absent);
+        };
+        let met = match JobState::from_name(&state)? {
+            JobState::Queued => {
+                let sql = "update jobs set state = 'cancelled', finished_ms = $2 where id = $1";
+                let update = sqlx::query(sql).bind(job.0).bind(now_ms);
+                update.execute(&mut *transaction).await?;
+                cancel_followers(&mut transaction, job.0, now_ms).await?;
+                Cancel::Cancelled
+            }
+            JobState::Running => {
+                let update = sqlx::query("update jobs set cancel_requested = 1 where id = $1");
+                update.bind(job.0).execute(&mut *transaction).await?;
+                Cancel::Requested
+            }
+            ended => Cancel::Final(ended),
+        };
+        transaction.commit().await?;
+        tracing::info!(job.id = %job, ?met, "job cancel asked for");
+        Ok(met)
+    }
+}

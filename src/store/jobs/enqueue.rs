@@ -1,0 +1,45 @@
+//! Enqueue: a job comes to be, queued.
+
+use sqlx::types::Uuid;
+
+use super::Kind;
+use crate::ids::JobId;
+use crate::store::{Error, Store};
+
+/// A job to be queued.
+#[derive(Clone, Debug)]
+pub struct NewJob {
+    /// Its id.
+    pub job_id: JobId,
+    /// What it is.
+    pub kind: Kind,
+    /// What it needs to run, JSON.
+    pub input: String,
+    /// The id that its result will have.
+    pub result_id: Uuid,
+    /// The job whose result it needs, if that is not there yet.
+    pub after_job: Option<JobId>,
+    /// Higher runs first; 0 is usual.
+    pub priority: i64,
+}
+
+impl Store {
+    /// Adds the job to the queue.
+    pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
+        sqlx::query(
+            "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
+             created_ms) values ($1, $2, 'queued', $3, $4, $5, $6, $7, $7)",
+        )
+        .bind(job.job_id.0)
+        .bind(job.kind.name())
+        .bind(&job.input)
+        .bind(job.result_id)
+        .bind(job.after_job.map(|id| id.0))
+        .bind(job.priority)
+        .bind(now_ms)
+        .execute(&self.writer)
+        .await?;
+        tracing::info!(job.id = %job.job_id, job.kind = job.kind.name(), "job queued");
+        Ok(())
+    }
+}

@@ -1,0 +1,59 @@
+//! Fail and stop: the job ends without a result, for a reason or because somebody asked.
+
+use super::follow::{cancel_followers, fail_followers};
+use super::{Change, Lease};
+use crate::code::Code;
+use crate::store::{Error, Store};
+
+impl Store {
+    /// Ends the job as failed, for a reason that another attempt would meet again.
+    pub async fn fail(
+        &self,
+        lease: &Lease,
+        code: Code,
+        detail: &str,
+        now_ms: i64,
+    ) -> Result<Change, Error> {
+        let mut transaction = self.begin().await?;
+        let n_rows = sqlx::query(
+            "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
+             code = $3, detail = $4, finished_ms = $5 \
+             where id = $1 and fence = $2 and state = 'running'",
+        )
+        .bind(lease.job_id.0)
+        .bind(lease.fence)
+        .bind(code.name())
+        .bind(detail)
+        .bind(now_ms)
+        .execute(&mut *transaction)
+        .await?
+        .rows_affected();
+        if Change::of_rows(n_rows) == Change::Made {
+            fail_followers(&mut transaction, lease.job_id.0, now_ms).await?;
+        }
+        transaction.commit().await?;
+        tracing::info!(job.id = %lease.job_id, %code, n_rows, "job failed");
+        Ok(Change::of_rows(n_rows))
+    }
+
+    /// Ends a running job as cancelled: its worker has let go of it.
+    pub async fn stop(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
+        let mut transaction = self.begin().await?;
+        let n_rows = sqlx::query(
+            "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, \
+             finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
+        )
+        .bind(lease.job_id.0)
+        .bind(lease.fence)
+        .bind(now_ms)
+        .execute(&mut *transaction)
+        .await?
+        .rows_affected();
+        if Change::of_rows(n_rows) == Change::Made {
+            cancel_followers(&mut transaction, lease.job_id.0, now_ms).await?;
+        }
+        transaction.commit().await?;
+        tracing::info!(job.id = %lease.job_id, n_rows, "job stopped");
+        Ok(Change::of_rows(n_rows))
+    }
+}

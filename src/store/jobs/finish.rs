@@ -1,0 +1,82 @@
+//! Finish: the job is done, and its one result set is linked in the same transaction
+//! (RELIABILITY.md, R2 and R3).
+
+use sqlx::types::Uuid;
+
+use super::{Change, Lease};
+use crate::store::{BlobFile, Error, Store, blobs, fish, flocks, libraries};
+
+/// What a finished job leaves: files already in place, and the row that names them.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// What was made, and of what.
+    pub made: Made,
+    /// The folder in the blob store.
+    pub folder: String,
+    /// The files in it.
+    pub files: Vec<BlobFile>,
+    /// The parameters in full, JSON.
+    pub params: String,
+    /// What is worth knowing at a glance, JSON.
+    pub summary: String,
+}
+
+/// What was made, and of what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Made {
+    /// A library of this footage.
+    Library(Uuid),
+    /// A flock of this library.
+    Flock(Uuid),
+    /// A virtual fish of this library.
+    Fish(Uuid),
+}
+
+impl Store {
+    /// Links the result and ends the job, if the fence still stands; [`Change::Lost`] means that the
+    /// caller must throw its output away. A cancel that comes too late loses against finishing.
+    pub async fn finish(
+        &self,
+        lease: &Lease,
+        outcome: &Outcome,
+        now_ms: i64,
+    ) -> Result<Change, Error> {
+        let mut transaction = self.begin().await?;
+        let n_rows = sqlx::query(
+            "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
+             progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
+        )
+        .bind(lease.job_id.0)
+        .bind(lease.fence)
+        .bind(now_ms)
+        .execute(&mut *transaction)
+        .await?
+        .rows_affected();
+        if Change::of_rows(n_rows) == Change::Lost {
+            tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job finished too late");
+            return Ok(Change::Lost);
+        }
+        blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
+        match outcome.made {
+            Made::Library(footage_id) => {
+                libraries::insert(&mut transaction, lease, footage_id, outcome, now_ms).await?;
+            }
+            Made::Flock(library_id) => {
+                flocks::insert(&mut transaction, lease, library_id, outcome, now_ms).await?;
+            }
+            Made::Fish(library_id) => {
+                fish::insert(&mut transaction, lease, library_id, outcome, now_ms).await?;
+            }
+        }
+        transaction.commit().await?;
+        tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
+        Ok(Change::Made)
+    }
+}
+
+impl Outcome {
+    /// Size of all files, bytes.
+    pub fn size_bytes(&self) -> i64 {
+        self.files.iter().map(|file| file.size_bytes).sum()
+    }
+}

@@ -1,0 +1,49 @@
+//! What becomes of the jobs that wait for one that will never be done: they end with it, in the
+//! same transaction, so that no job waits for ever.
+
+use sqlx::types::Uuid;
+
+use crate::code::Code;
+use crate::store::Connection;
+
+/// Cancels every job that follows a cancelled one, however far.
+pub(super) async fn cancel_followers(
+    connection: &mut Connection,
+    job: Uuid,
+    now_ms: i64,
+) -> Result<(), sqlx::Error> {
+    sqlx::query(
+        "with recursive followers (id) as ( \
+             select id from jobs where after_job = $1 \
+             union select j.id from jobs j join followers f on j.after_job = f.id) \
+         update jobs set state = 'cancelled', finished_ms = $2 \
+         where id in (select id from followers) and state = 'queued'",
+    )
+    .bind(job)
+    .bind(now_ms)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
+
+/// Fails every job that follows a failed one, however far.
+pub(super) async fn fail_followers(
+    connection: &mut Connection,
+    job: Uuid,
+    now_ms: i64,
+) -> Result<(), sqlx::Error> {
+    sqlx::query(
+        "with recursive followers (id) as ( \
+             select id from jobs where after_job = $1 \
+             union select j.id from jobs j join followers f on j.after_job = f.id) \
+         update jobs set state = 'failed', finished_ms = $2, code = $3, detail = $4 \
+         where id in (select id from followers) and state = 'queued'",
+    )
+    .bind(job)
+    .bind(now_ms)
+    .bind(Code::InputFailed.name())
+    .bind(Code::InputFailed.meaning())
+    .execute(connection)
+    .await?;
+    Ok(())
+}

@@ -1,0 +1,44 @@
+//! Heartbeat: the worker is alive, its lease goes on, and this is how far it is.
+
+use super::Lease;
+use crate::store::{Error, Store};
+
+/// What a heartbeat learned.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beat {
+    /// The lease goes on.
+    Held,
+    /// The lease goes on, but somebody wants the job cancelled.
+    CancelRequested,
+    /// The job is no longer this worker's: its output is to be thrown away.
+    Lost,
+}
+
+impl Store {
+    /// Renews the lease and notes stage and progress (0..=1).
+    pub async fn heartbeat(
+        &self,
+        lease: &Lease,
+        lease_until_ms: i64,
+        stage: &str,
+        progress: f64,
+    ) -> Result<Beat, Error> {
+        let cancel_requested: Option<bool> = sqlx::query_scalar(
+            "update jobs set lease_until_ms = $3, stage = $4, progress = $5 \
+             where id = $1 and fence = $2 and state = 'running' returning cancel_requested",
+        )
+        .bind(lease.job_id.0)
+        .bind(lease.fence)
+        .bind(lease_until_ms)
+        .bind(stage)
+        .bind(progress.clamp(0.0, 1.0))
+        .fetch_optional(&self.writer)
+        .await?;
+        tracing::debug!(job.id = %lease.job_id, stage, progress, "job heartbeat");
+        Ok(match cancel_requested {
+            Some(false) => Beat::Held,
+            Some(true) => Beat::CancelRequested,
+            None => Beat::Lost,
+        })
+    }
+}

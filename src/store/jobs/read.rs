@@ -1,0 +1,110 @@
+//! Reading jobs: one, a page, the one that makes a given result.
+
+use sqlx::types::Uuid;
+
+use super::{JobState, Kind};
+use crate::code::Code;
+use crate::ids::JobId;
+use crate::store::{Error, Store};
+
+/// One job as people see it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobRow {
+    /// Its id.
+    pub id: JobId,
+    /// What it is.
+    pub kind: Kind,
+    /// Where it stands.
+    pub state: JobState,
+    /// The id of the result that it makes.
+    pub result_id: Uuid,
+    /// Whether somebody asked to cancel it.
+    pub cancel_requested: bool,
+    /// How often it has been tried.
+    pub attempt: i64,
+    /// The stage under way, while running.
+    pub stage: Option<String>,
+    /// How much of the whole is done, 0..=1.
+    pub progress: f64,
+    /// Why it failed.
+    pub failure: Option<(Code, String)>,
+    /// When it was queued, first claimed and ended, milliseconds since 1970.
+    pub created_ms: i64,
+    /// See `created_ms`.
+    pub started_ms: Option<i64>,
+    /// See `created_ms`.
+    pub finished_ms: Option<i64>,
+}
+
+#[derive(sqlx::FromRow)]
+struct Row {
+    id: Uuid,
+    kind: String,
+    state: String,
+    result_id: Uuid,
+    cancel_requested: bool,
+    attempt: i64,
+    stage: Option<String>,
+    progress: f64,
+    code: Option<String>,
+    detail: Option<String>,
+    created_ms: i64,
+    started_ms: Option<i64>,
+    finished_ms: Option<i64>,
+}
+
+impl Store {
+    /// One job, if it is there.
+    pub async fn job(&self, id: JobId) -> Result<Option<JobRow>, Error> {
+        let row: Option<Row> = sqlx::query_as("select * from jobs where id = $1")
+            .bind(id.0)
+            .fetch_optional(&self.reader)
+            .await?;
+        row.map(JobRow::try_from).transpose()
+    }
+
+    /// The job that makes, or made, the result of that id.
+    pub async fn job_of_result(&self, result: Uuid) -> Result<Option<JobRow>, Error> {
+        let row: Option<Row> = sqlx::query_as("select * from jobs where result_id = $1")
+            .bind(result)
+            .fetch_optional(&self.reader)
+            .await?;
+        row.map(JobRow::try_from).transpose()
+    }
+
+    /// The newest jobs, at most `limit`, older than `before`.
+    pub async fn list_jobs(&self, limit: i64, before: Option<Uuid>) -> Result<Vec<JobRow>, Error> {
+        let sql = "select * from jobs where $1 is null or id < $1 order by id desc limit $2";
+        let rows: Vec<Row> = sqlx::query_as(sql)
+            .bind(before)
+            .bind(limit)
+            .fetch_all(&self.reader)
+            .await?;
+        rows.into_iter().map(JobRow::try_from).collect()
+    }
+}
+
+impl TryFrom<Row> for JobRow {
+    type Error = Error;
+
+    fn try_from(row: Row) -> Result<JobRow, Error> {
+        let failure = row.code.map(|name| {
+            let code = Code::from_name(&name).unwrap_or(Code::Internal);
+            (code, row.detail.unwrap_or_default())
+        });
+        Ok(JobRow {
+            id: JobId(row.id),
+            kind: Kind::from_name(&row.kind)?,
+            state: JobState::from_name(&row.state)?,
+            result_id: row.result_id,
+            cancel_requested: row.cancel_requested,
+            attempt: row.attempt,
+            stage: row.stage,
+            progress: row.progress,
+            failure,
+            created_ms: row.created_ms,
+            started_ms: row.started_ms,
+            finished_ms: row.finished_ms,
+        })
+    }
+}

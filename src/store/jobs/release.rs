@@ -1,0 +1,23 @@
+//! Release: the worker stops and gives its job back; the attempt does not count
+//! (RELIABILITY.md, R4).
+
+use super::{Change, Lease};
+use crate::store::{Error, Store};
+
+impl Store {
+    /// Puts the job back in the queue as if it had not been claimed, its fence apart.
+    pub async fn release(&self, lease: &Lease) -> Result<Change, Error> {
+        let n_rows = sqlx::query(
+            "update jobs set state = 'queued', worker = null, lease_until_ms = null, \
+             stage = null, progress = 0, attempt = attempt - 1 \
+             where id = $1 and fence = $2 and state = 'running'",
+        )
+        .bind(lease.job_id.0)
+        .bind(lease.fence)
+        .execute(&self.writer)
+        .await?
+        .rows_affected();
+        tracing::info!(job.id = %lease.job_id, n_rows, "job released");
+        Ok(Change::of_rows(n_rows))
+    }
+}

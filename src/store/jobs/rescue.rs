@@ -1,0 +1,84 @@
+//! Rescue: jobs whose workers fell silent get another worker, or an end (RELIABILITY.md, R2, R8).
+//! By the lease, never by the age of the job: a job may run for hours as long as its worker beats.
+
+use sqlx::types::Uuid;
+
+use super::JobState;
+use super::follow::{cancel_followers, fail_followers};
+use crate::code::Code;
+use crate::ids::JobId;
+use crate::store::{Connection, Error, Store};
+
+/// A job that kills its worker this often is quarantined.
+const MAX_CRASHES: i64 = 2;
+
+impl Store {
+    /// Rescues every job whose lease ended before `now_ms`: back to the queue; cancelled, where that
+    /// had been asked for; failed as `crashed_worker` at its second crash. Returns where each went.
+    pub async fn rescue(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
+        self.rescue_leases_before(now_ms, now_ms).await
+    }
+
+    /// The same at the start of the process, whatever the leases say. Sound because the store's lock
+    /// on the data folder is held: whoever gave those leases is gone.
+    pub async fn rescue_all(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
+        self.rescue_leases_before(i64::MAX, now_ms).await
+    }
+
+    async fn rescue_leases_before(
+        &self,
+        lease_end_ms: i64,
+        now_ms: i64,
+    ) -> Result<Vec<(JobId, JobState)>, Error> {
+        let mut transaction = self.begin().await?;
+        let silent: Vec<(Uuid, i64, bool)> = sqlx::query_as(
+            "select id, crashes + 1, cancel_requested from jobs \
+             where state = 'running' and lease_until_ms < $1 order by id",
+        )
+        .bind(lease_end_ms)
+        .fetch_all(&mut *transaction)
+        .await?;
+        let mut rescued = Vec::with_capacity(silent.len());
+        for (job, crashes, cancel_requested) in silent {
+            let state = if cancel_requested {
+                JobState::Cancelled
+            } else if crashes >= MAX_CRASHES {
+                JobState::Failed
+            } else {
+                JobState::Queued
+            };
+            settle(&mut transaction, job, state, now_ms).await?;
+            rescued.push((JobId(job), state));
+        }
+        transaction.commit().await?;
+        for (job, state) in &rescued {
+            tracing::warn!(job.id = %job, state = state.name(), "job rescued from a silent worker");
+        }
+        Ok(rescued)
+    }
+}
+
+async fn settle(
+    connection: &mut Connection,
+    job: Uuid,
+    state: JobState,
+    now_ms: i64,
+) -> Result<(), sqlx::Error> {
+    let failed = state == JobState::Failed;
+    sqlx::query(
+        "update jobs set state = $2, worker = null, lease_until_ms = null, crashes = crashes + 1, \
+         stage = null, progress = 0, finished_ms = $3, code = $4, detail = $5 where id = $1",
+    )
+    .bind(job)
+    .bind(state.name())
+    .bind(state.is_final().then_some(now_ms))
+    .bind(failed.then_some(Code::CrashedWorker.name()))
+    .bind(failed.then_some(Code::CrashedWorker.meaning()))
+    .execute(&mut *connection)
+    .await?;
+    match state {
+        JobState::Cancelled => cancel_followers(connection, job, now_ms).await,
+        JobState::Failed => fail_followers(connection, job, now_ms).await,
+        _ => Ok(()),
+    }
+}

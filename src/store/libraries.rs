@@ -1,0 +1,83 @@
+//! The table of libraries: what each finished analysis left.
+
+use sqlx::types::Uuid;
+
+use super::jobs::Lease;
+use super::jobs::finish::Outcome;
+use super::{Connection, Error, Store};
+
+/// One library as stored; its files lie in `folder`.
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct Library {
+    /// Its id.
+    pub id: Uuid,
+    /// The job that made it.
+    pub job_id: Uuid,
+    /// The footage it was measured in.
+    pub footage_id: Uuid,
+    /// Its folder in the blob store.
+    pub folder: String,
+    /// What the footage is called.
+    pub name: String,
+    /// The parameters it was made with, JSON.
+    pub params: String,
+    /// What is worth knowing at a glance, JSON.
+    pub summary: String,
+    /// Whether it came of the sample that the program made itself.
+    pub sample: bool,
+    /// Size of all its files, bytes.
+    pub size_bytes: i64,
+    /// When it was finished, milliseconds since 1970.
+    pub created_ms: i64,
+}
+
+impl Store {
+    /// One library, if it is finished and there.
+    pub async fn library(&self, id: Uuid) -> Result<Option<Library>, Error> {
+        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
+                   l.size_bytes, l.created_ms \
+                   from libraries l join footage f on f.id = footage_id where l.id = $1";
+        let row = sqlx::query_as(sql).bind(id);
+        Ok(row.fetch_optional(&self.reader).await?)
+    }
+
+    /// The newest libraries, at most `limit`, older than `before`.
+    pub async fn list_libraries(
+        &self,
+        limit: i64,
+        before: Option<Uuid>,
+    ) -> Result<Vec<Library>, Error> {
+        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
+                   l.size_bytes, l.created_ms \
+                   from libraries l join footage f on f.id = footage_id \
+                   where $1 is null or l.id < $1 order by l.id desc limit $2";
+        let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        Ok(rows.fetch_all(&self.reader).await?)
+    }
+}
+
+/// Adds the row, in the transaction that finishes the job.
+pub(super) async fn insert(
+    connection: &mut Connection,
+    lease: &Lease,
+    footage_id: Uuid,
+    outcome: &Outcome,
+    now_ms: i64,
+) -> Result<(), sqlx::Error> {
+    sqlx::query(
+        "insert into libraries (id, job_id, fence, footage_id, folder, params, summary, \
+         size_bytes, created_ms) values ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+    )
+    .bind(lease.result_id)
+    .bind(lease.job_id.0)
+    .bind(lease.fence)
+    .bind(footage_id)
+    .bind(&outcome.folder)
+    .bind(&outcome.params)
+    .bind(&outcome.summary)
+    .bind(outcome.size_bytes())
+    .bind(now_ms)
+    .execute(connection)
+    .await?;
+    Ok(())
+}
