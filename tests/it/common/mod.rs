@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod clip;
+pub(crate) mod film;
 pub mod process;
 
 pub use app::TestApp;
