@@ -18,17 +18,17 @@ const SPOKES: usize = 41;
 /// half depths.
 const PROFILE: [[f64; 4]; 12] = [
     [0.00, 0.00, 0.00, 0.00],
-    [0.012, 0.10, 0.13, 0.12],
-    [0.035, 0.22, 0.24, 0.23],
-    [0.09, 0.41, 0.38, 0.37],
-    [0.17, 0.64, 0.58, 0.50],
-    [0.28, 0.87, 0.83, 0.60],
+    [0.012, 0.15, 0.17, 0.15],
+    [0.035, 0.28, 0.29, 0.27],
+    [0.09, 0.48, 0.44, 0.41],
+    [0.17, 0.70, 0.64, 0.53],
+    [0.28, 0.89, 0.87, 0.60],
     [0.42, 1.00, 1.00, 0.63],
     [0.56, 0.93, 0.97, 0.54],
     [0.70, 0.72, 0.74, 0.38],
     [0.82, 0.50, 0.47, 0.23],
     [0.92, 0.38, 0.34, 0.14],
-    [1.00, 0.37, 0.34, 0.08],
+    [1.00, 0.37, 0.34, 0.00],
 ];
 
 /// How far the trunk reaches above the spine, below it and to each side at `s`, lengths.
@@ -48,7 +48,7 @@ fn sag_bl(s: f64) -> f64 {
 
 /// Adds the trunk.
 pub(super) fn add_trunk(sketch: &mut Sketch, coat: &Coat) {
-    sketch.add_grid(Layer::Body, RINGS + 1, SPOKES, |i, j| {
+    sketch.add_grid(Layer::Body, RINGS, SPOKES, |i, j| {
         let s = TRUNK_END_S * ring_u(i);
         let angle = TAU * j as f64 / (SPOKES - 1) as f64;
         // The seam closes exactly: its last point is its first.
@@ -58,10 +58,8 @@ pub(super) fn add_trunk(sketch: &mut Sketch, coat: &Coat) {
         };
         let [above, below, side] = profile_bl(s);
         let (down, left) = (-sin * if sin > 0.0 { above } else { below }, cos * side);
-        // The last ring closes the tail root behind the fin's base.
-        let close = if i == RINGS { 0.0 } else { 1.0 };
         SketchPoint {
-            at: [s, sag_bl(s) + close * down, close * left],
+            at: [s, sag_bl(s) + down, left],
             color: coat.skin(s, sin),
             shine: 0.55,
             grain: [(s * 44.0) as f32, (angle / TAU * 40.0) as f32],
@@ -102,7 +100,7 @@ pub(super) fn add_eyes(sketch: &mut Sketch, coat: &Coat) {
 
 /// Rings lie closer together toward the nose.
 fn ring_u(i: usize) -> f64 {
-    let t = (i.min(RINGS - 1)) as f64 / (RINGS - 1) as f64;
+    let t = i as f64 / (RINGS - 1) as f64;
     t * (0.35 + 0.65 * t)
 }
 

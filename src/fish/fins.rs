@@ -86,10 +86,10 @@ fn tail(v: f64, w: f64) -> [f64; 3] {
         side * if side < 0.0 { above } else { below } * 0.92,
     ];
     // The edge runs from the notch out to the lobe, rounds its tip and comes a little forward again.
-    let reach = 0.845 + 0.155 * smooth(a / 0.86) - 0.035 * smooth((a - 0.86) / 0.14);
-    let spread = 0.185 * libm::pow(a, 0.85) * side.signum();
+    let reach = 0.880 + 0.120 * smooth(a / 0.86) - 0.035 * smooth((a - 0.86) / 0.14);
+    let spread = 0.192 * libm::pow(a, 0.80) * side.signum();
     // Rays leave the base along the body and fan out.
-    let fan = w * (0.72 + 0.28 * w);
+    let fan = w * (0.85 + 0.15 * w);
     [
         base[0] + (reach - base[0]) * w,
         base[1] + (spread - base[1]) * fan,

@@ -59,8 +59,8 @@ pub(super) fn shade(surface: &Surface) -> [f32; 3] {
     let sky = 0.5 - 0.5 * n[1];
     let light = match surface.grain_depth < 0.0 {
         // Light shines through a fin from either side.
-        true => 0.62 + 0.34 * wrapped.max(0.55),
-        false => 0.46 + 0.20 * sky + 0.46 * wrapped,
+        true => 0.72 + 0.30 * wrapped.max(0.55),
+        false => 0.54 + 0.16 * sky + 0.40 * wrapped,
     };
     let grain = 1.0 + grain(surface);
     let glint = surface.shine * (0.50 * power32(dot(n, HALF)) + 0.10 * power4(dot(n, HALF)));

@@ -23,8 +23,8 @@ impl Coat {
                 back: [0.78, 0.24, 0.03],
                 flank: [0.97, 0.46, 0.07],
                 belly: [1.0, 0.86, 0.62],
-                fin_base: [0.94, 0.42, 0.08],
-                fin_edge: [1.0, 0.78, 0.50],
+                fin_base: [0.96, 0.44, 0.08],
+                fin_edge: [1.0, 0.76, 0.42],
                 iris: [0.88, 0.70, 0.30],
             },
             Palette::Silver => Coat {
@@ -73,7 +73,7 @@ impl Coat {
     pub(super) fn fin(&self, out: f64) -> [f32; 4] {
         let out = out as f32;
         let color = mix(self.fin_base, self.fin_edge, smoothstep(0.1, 1.0, out));
-        let alpha = 0.96 - 0.34 * smoothstep(0.0, 0.9, out) - 0.30 * smoothstep(0.93, 1.0, out);
+        let alpha = 0.97 - 0.25 * smoothstep(0.0, 0.9, out) - 0.34 * smoothstep(0.93, 1.0, out);
         [color[0], color[1], color[2], alpha]
     }
 

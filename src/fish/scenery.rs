@@ -97,7 +97,7 @@ impl Scene {
 
     /// Random number `k` of a plant or stone, in [0, 1).
     fn unit(&self, key: u64, item: u64, k: u64) -> f64 {
-        random::unit(self.seed, &[0x7363_656e_65, key, item, k])
+        random::unit(self.seed, &[0x73_6365_6e65, key, item, k])
     }
 
     /// Leaves like ribbons, each swaying its own way and narrowing to its tip.

@@ -15,7 +15,7 @@ pub const TANK_M: [f64; 3] = [0.60, 0.36, 0.30];
 pub const PANE_Z_M: f64 = 0.70;
 
 /// How far ahead it looks for a wall, metres.
-const LOOK_AHEAD_M: f64 = 0.10;
+const LOOK_AHEAD_M: f64 = 0.11;
 /// How near its middle may come to a wall: ahead and behind it is half a fish.
 const CLEARANCE_M: [f64; 3] = [0.055, 0.045, 0.055];
 
@@ -91,13 +91,21 @@ fn avoid_walls(now: &mut Stroke, dt_s: f64) {
     let into = inward(ahead);
     let depth_m = into.x.hypot(into.z);
     if depth_m > 0.0 {
-        let gap = wrap_rad(libm::atan2(into.z, into.x) - now.yaw_rad);
-        let urgency = (0.35 + depth_m / 0.04).min(1.5);
-        now.turn_rad_per_s += 15.0 * urgency * gap.clamp(-1.0, 1.0) * dt_s;
+        let mut gap = wrap_rad(libm::atan2(into.z, into.x) - now.yaw_rad);
+        if gap.abs() > 2.0 {
+            // Head-on either side will do: it keeps to the one it has begun with.
+            gap = gap.abs().copysign(now.turn_rad_per_s);
+        }
+        let urgency = (0.3 + depth_m / 0.04).min(1.6);
+        now.turn_rad_per_s += 8.0 * urgency * gap.clamp(-1.0, 1.0) * dt_s;
         now.speed_m_per_s += 1.6 * urgency * (0.06 - now.speed_m_per_s) * dt_s;
     }
     now.turn_rad_per_s = now.turn_rad_per_s.clamp(-4.0, 4.0);
-    now.pitch_rad = (now.pitch_rad + 70.0 * into.y * dt_s).clamp(-0.5, 0.5);
+    if into.y != 0.0 {
+        let away_rad = (12.0 * into.y).clamp(-0.4, 0.4);
+        now.pitch_rad += 7.0 * (away_rad - now.pitch_rad) * dt_s;
+    }
+    now.pitch_rad = now.pitch_rad.clamp(-0.5, 0.5);
 }
 
 /// How far the point would have to move to be clear of every wall, metres.

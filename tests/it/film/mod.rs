@@ -1,1 +1,3 @@
-//! To be written.
+//! Accuracy against known truth, on generated films (ALGORITHMS.md 9).
+
+mod sample;

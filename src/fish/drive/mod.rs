@@ -218,7 +218,7 @@ fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<P
                 continue;
             };
             position += weight * near.position_m;
-            turn = turn + same_side(middle.rotation, near.rotation) * weight;
+            turn += same_side(middle.rotation, near.rotation) * weight;
             total += weight;
         }
         Some(Placement {

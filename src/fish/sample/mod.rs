@@ -291,7 +291,7 @@ fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
 }
 
 /// Keys of the noise among the seed's random numbers.
-const NOISE: u64 = 0x6e6f_6973_65;
+const NOISE: u64 = 0x6e_6f69_7365;
 /// Different places at which a row of noise may start.
 const NOISE_STARTS: usize = 1 << 17;
 

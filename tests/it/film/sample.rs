@@ -1,0 +1,142 @@
+//! The whole way of the virtual fish: the sample is filmed, analysed with its camera, and the virtual
+//! fish driven by what was measured swims where the filmed one swam (ALGORITHMS.md 4 and 9).
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use flockreel::analysis::params::{AnimalParams, CameraParams};
+use flockreel::analysis::{self, analyze};
+use flockreel::cpu::Level;
+use flockreel::fish::sample::{SampleFilm, SampleParams};
+use flockreel::fish::{Params, drive};
+use flockreel::footage::FrameSource;
+use flockreel::formats::library_dir;
+use flockreel::formats::library_json::FootageSummary;
+use flockreel::library::Library;
+use flockreel::media::{Limits, Video};
+use flockreel::progress::Silent;
+
+const N_FRAMES: usize = 180;
+
+/// The sample and what the analysis made of it, once for all tests.
+fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
+    static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
+    FILMED.get_or_init(|| {
+        let params = SampleParams {
+            n_frames: N_FRAMES,
+            ..SampleParams::default()
+        };
+        let film = SampleFilm::new(params).unwrap();
+        let (camera, animal) = (film.motion().camera, film.animal());
+        let params = analysis::Params {
+            camera: Some(CameraParams {
+                z_min_m: camera.z_min_m,
+                pane_px_per_m: camera.pane_px_per_m,
+                center_px: None,
+                medium_index: camera.medium_index,
+            }),
+            animal: Some(AnimalParams {
+                length_m: animal.length_m,
+                height_m: animal.height_m,
+            }),
+            ..analysis::Params::default()
+        };
+        let library = analyze(&film, None, &params, Level::detect(), &Silent).unwrap();
+        (film, library, params)
+    })
+}
+
+fn library_on_disk(dir: &Path) {
+    let (_, library, params) = filmed();
+    let footage = FootageSummary {
+        sha256: "0".repeat(64),
+        n_bytes: 1,
+    };
+    library_dir::write(dir, library, params, &footage).unwrap();
+}
+
+fn flockreel(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_flockreel"))
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+#[test]
+fn the_virtual_fish_swims_where_the_filmed_one_swam() {
+    let (film, library, _) = filmed();
+    let motion = drive(&library.poses, &Params::default()).unwrap();
+    let both = motion.frames.iter().zip(&film.motion().frames);
+    let seen: Vec<_> = both.filter(|(got, _)| got.visible).collect();
+    assert!(seen.len() > N_FRAMES * 9 / 10, "visible in {}", seen.len());
+    let camera = &film.motion().camera;
+    let gap_px = |(got, want): &(&flockreel::fish::Posture, &flockreel::fish::Posture)| {
+        let [a, b] = [got, want].map(|p| camera.image_from_camera(p.position_m.to_array()));
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    };
+    let gap_m = median(
+        seen.iter()
+            .map(|(a, b)| (a.position_m - b.position_m).length())
+            .collect(),
+    );
+    let gap_px = median(seen.iter().map(gap_px).collect());
+    let turn = median(
+        seen.iter()
+            .map(|(a, b)| a.forward().angle_between(b.forward()))
+            .collect(),
+    );
+    assert!(
+        gap_px < 4.0 && gap_m < 0.05 && turn < 0.5,
+        "{gap_px} px, {gap_m} m, {turn} rad"
+    );
+}
+
+#[test]
+fn the_commands_write_a_film_of_both_fish_and_a_model() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    library_on_disk(&dir.path().join("library"));
+    let (library, film, model) = (at("library"), at("fish.mp4"), at("fish.glb"));
+    let made = flockreel(&["fish", &library, "-o", &film, "--side-by-side"]);
+    assert!(made.status.success(), "{made:?}");
+    let format = Video::open(Path::new(&film), &Limits::default())
+        .unwrap()
+        .format();
+    assert_eq!(
+        (format.width, format.height, format.n_frames_hint),
+        (1280, 480, N_FRAMES)
+    );
+    let made = flockreel(&["fish", &library, "-o", &model, "--json"]);
+    assert!(made.status.success(), "{made:?}");
+    assert!(String::from_utf8_lossy(&made.stdout).contains("\"visible_frames\":1"));
+    assert_eq!(&std::fs::read(&model).unwrap()[..4], b"glTF");
+    let refused = flockreel(&["fish", &library, "-o", &at("fish.avi")]);
+    assert_eq!(refused.status.code(), Some(2));
+}
+
+#[test]
+fn the_sample_command_writes_footage_with_a_true_pose_for_every_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let (film, truth) = (at("sample.mp4"), at("truth.json"));
+    let made = flockreel(&[
+        "sample", "-o", &film, "--truth", &truth, "--frames", "12", "--size", "320x240",
+    ]);
+    assert!(made.status.success(), "{made:?}");
+    let format = Video::open(Path::new(&film), &Limits::default())
+        .unwrap()
+        .format();
+    assert_eq!(
+        (format.width, format.height, format.n_frames_hint),
+        (320, 240, 12)
+    );
+    let poses = flockreel::formats::poses_json::read(&std::fs::read(&truth).unwrap()).unwrap();
+    assert_eq!(poses.frames.len(), 12);
+    assert!(poses.frames.iter().all(|pose| pose.position_m.is_some()));
+}
