@@ -119,10 +119,3 @@ fn another_seed_gives_another_flock() {
     assert_ne!(seeded(1), seeded(2));
     assert_eq!(seeded(1), seeded(1));
 }
-
-#[test]
-fn probe() {
-    for seed in 1..5 {
-        println!("probe {seed} {:?}", swim(View::Side, &Params { seed, ..preset("school") }, 600).2);
-    }
-}
