@@ -1,1 +1,283 @@
+//! The transitions, one by one, on a real database (RELIABILITY.md, R2, R3, R8). Time is given, so
+//! nothing sleeps.
 
+use tempfile::TempDir;
+
+use super::cancel::Cancel;
+use super::enqueue::NewJob;
+use super::finish::{Made, Outcome};
+use super::heartbeat::Beat;
+use super::*;
+use crate::code::Code;
+use crate::store::Store;
+
+const LEASE_MS: i64 = 15_000;
+
+struct Queue {
+    store: Store,
+    _data: TempDir,
+}
+
+impl Queue {
+    async fn open() -> Queue {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        Queue { store, _data: data }
+    }
+
+    async fn enqueue(&self, after_job: Option<JobId>) -> JobId {
+        self.enqueue_at(after_job, 0).await
+    }
+
+    async fn enqueue_at(&self, after_job: Option<JobId>, priority: i64) -> JobId {
+        let job_id = JobId(Uuid::now_v7());
+        let job = NewJob {
+            job_id,
+            kind: Kind::Fish,
+            input: "{}".into(),
+            result_id: Uuid::now_v7(),
+            after_job,
+            priority,
+        };
+        self.store.enqueue(&job, 0).await.unwrap();
+        job_id
+    }
+
+    async fn claim(&self, now_ms: i64) -> Option<Lease> {
+        let worker = Uuid::now_v7();
+        self.store.claim(worker, now_ms, LEASE_MS).await.unwrap()
+    }
+
+    async fn state(&self, job: JobId) -> JobState {
+        self.store.job(job).await.unwrap().unwrap().state
+    }
+
+    /// Finishes with a result of no files over a library made for it.
+    async fn finish(&self, lease: &Lease) -> Change {
+        let library = self.library().await;
+        let outcome = Outcome {
+            made: Made::Fish(library),
+            folder: format!("fish/{}.{}", lease.result_id, lease.fence),
+            files: Vec::new(),
+            params: "{}".into(),
+            summary: "{}".into(),
+        };
+        self.store.finish(lease, &outcome, 5).await.unwrap()
+    }
+
+    async fn library(&self) -> Uuid {
+        let (footage, job, library) = (Uuid::now_v7(), Uuid::now_v7(), Uuid::now_v7());
+        let rows = format!(
+            "insert into footage values (x'{f}', '{f}', randomblob(32), x'', '', 0, 1, 1, 1.0, 1, 0, 0); \
+             insert into jobs (id, kind, state, input, result_id, priority, run_at_ms, created_ms, finished_ms) \
+             values (x'{j}', 'analysis', 'done', '', x'{l}', 0, 0, 0, 0); \
+             insert into libraries values (x'{l}', x'{j}', 0, '{l}', x'{f}', '{{}}', '{{}}', 0, 0);",
+            f = footage.simple(),
+            j = job.simple(),
+            l = library.simple(),
+        );
+        let rows = sqlx::raw_sql(sqlx::AssertSqlSafe(rows));
+        rows.execute(&self.store.writer).await.unwrap();
+        library
+    }
+
+    async fn n_fish(&self) -> i64 {
+        let count = sqlx::query_scalar("select count(*) from fish");
+        count.fetch_one(&self.store.reader).await.unwrap()
+    }
+}
+
+#[tokio::test]
+async fn jobs_are_claimed_by_priority_and_then_in_turn_each_once() {
+    let queue = Queue::open().await;
+    let first = queue.enqueue(None).await;
+    let second = queue.enqueue(None).await;
+    let urgent = queue.enqueue_at(None, 1).await;
+    let mut turns = Vec::new();
+    while let Some(lease) = queue.claim(0).await {
+        turns.push(lease.job_id);
+    }
+    assert_eq!(turns, [urgent, first, second]);
+}
+
+#[tokio::test]
+async fn a_heartbeat_keeps_the_job_from_being_rescued() {
+    let queue = Queue::open().await;
+    queue.enqueue(None).await;
+    let lease = queue.claim(0).await.unwrap();
+    let beat = queue.store.heartbeat(&lease, 40_000, "tracking", 0.5).await;
+    assert_eq!(beat.unwrap(), Beat::Held);
+    assert_eq!(queue.store.rescue(39_000).await.unwrap(), []);
+    let rescued = queue.store.rescue(40_001).await.unwrap();
+    assert_eq!(rescued, [(lease.job_id, JobState::Queued)]);
+}
+
+#[tokio::test]
+async fn finishing_links_the_result_in_the_same_step() {
+    let queue = Queue::open().await;
+    let job = queue.enqueue(None).await;
+    let lease = queue.claim(0).await.unwrap();
+    assert_eq!(queue.finish(&lease).await, Change::Made);
+    assert_eq!(queue.state(job).await, JobState::Done);
+    let fish = queue.store.fish(lease.result_id).await.unwrap().unwrap();
+    assert_eq!(fish.job_id, job.0);
+}
+
+#[tokio::test]
+async fn a_worker_that_was_given_up_changes_nothing() {
+    let queue = Queue::open().await;
+    let job = queue.enqueue(None).await;
+    let stale = queue.claim(0).await.unwrap();
+    queue.store.rescue(LEASE_MS + 1).await.unwrap();
+    let fresh = queue.claim(LEASE_MS + 1).await.unwrap();
+
+    assert_eq!(queue.finish(&stale).await, Change::Lost);
+    let failed = queue.store.fail(&stale, Code::Internal, "", 0).await;
+    assert_eq!(failed.unwrap(), Change::Lost);
+    assert_eq!(queue.store.stop(&stale, 0).await.unwrap(), Change::Lost);
+    assert_eq!(queue.store.retry(&stale, 0).await.unwrap(), Change::Lost);
+    assert_eq!(queue.store.release(&stale).await.unwrap(), Change::Lost);
+    let beat = queue.store.heartbeat(&stale, i64::MAX, "", 0.0).await;
+    assert_eq!(beat.unwrap(), Beat::Lost);
+
+    assert_eq!(queue.state(job).await, JobState::Running);
+    assert_eq!(queue.finish(&fresh).await, Change::Made);
+    assert_eq!(queue.finish(&fresh).await, Change::Lost);
+    assert_eq!(queue.n_fish().await, 1);
+}
+
+#[tokio::test]
+async fn a_rescued_job_keeps_its_attempt_count() {
+    let queue = Queue::open().await;
+    queue.enqueue(None).await;
+    queue.claim(0).await.unwrap();
+    queue.store.rescue_all(1).await.unwrap();
+    assert_eq!(queue.claim(1).await.unwrap().attempt, 2);
+}
+
+#[tokio::test]
+async fn a_job_that_kills_its_worker_twice_is_quarantined() {
+    let queue = Queue::open().await;
+    let job = queue.enqueue(None).await;
+    for _ in 0..2 {
+        queue.claim(0).await.unwrap();
+        queue.store.rescue_all(1).await.unwrap();
+    }
+    let row = queue.store.job(job).await.unwrap().unwrap();
+    assert_eq!(row.state, JobState::Failed);
+    assert_eq!(row.failure.unwrap().0, Code::CrashedWorker);
+    assert_eq!(queue.claim(i64::MAX - LEASE_MS).await, None);
+}
+
+#[tokio::test]
+async fn a_retried_job_waits_for_its_time_and_counts_the_attempt() {
+    let queue = Queue::open().await;
+    queue.enqueue(None).await;
+    let lease = queue.claim(0).await.unwrap();
+    let retried = queue.store.retry(&lease, 2_000).await.unwrap();
+    assert_eq!(retried, Change::Made);
+    assert_eq!(queue.claim(1_999).await, None);
+    assert_eq!(queue.claim(2_000).await.unwrap().attempt, 2);
+}
+
+#[tokio::test]
+async fn a_released_job_has_not_used_its_attempt() {
+    let queue = Queue::open().await;
+    queue.enqueue(None).await;
+    let lease = queue.claim(0).await.unwrap();
+    assert_eq!(queue.store.release(&lease).await.unwrap(), Change::Made);
+    let again = queue.claim(0).await.unwrap();
+    assert_eq!((again.attempt, again.fence), (1, 2));
+}
+
+#[tokio::test]
+async fn a_queued_job_is_cancelled_at_once_with_what_follows_it() {
+    let queue = Queue::open().await;
+    let first = queue.enqueue(None).await;
+    let second = queue.enqueue(Some(first)).await;
+    let third = queue.enqueue(Some(second)).await;
+    let met = queue.store.cancel(first, 1).await.unwrap();
+    assert_eq!(met, Cancel::Cancelled);
+    assert_eq!(queue.state(third).await, JobState::Cancelled);
+    let met = queue.store.cancel(first, 2).await.unwrap();
+    assert_eq!(met, Cancel::Final(JobState::Cancelled));
+}
+
+#[tokio::test]
+async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
+    let queue = Queue::open().await;
+    let job = queue.enqueue(None).await;
+    let lease = queue.claim(0).await.unwrap();
+    assert_eq!(queue.store.cancel(job, 1).await.unwrap(), Cancel::Requested);
+    let beat = queue.store.heartbeat(&lease, 1, "", 0.0).await.unwrap();
+    assert_eq!(beat, Beat::CancelRequested);
+    assert_eq!(queue.store.stop(&lease, 2).await.unwrap(), Change::Made);
+    assert_eq!(queue.state(job).await, JobState::Cancelled);
+}
+
+#[tokio::test]
+async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
+    let queue = Queue::open().await;
+    let job = queue.enqueue(None).await;
+    queue.claim(0).await.unwrap();
+    assert_eq!(queue.store.cancel(job, 1).await.unwrap(), Cancel::Requested);
+    queue.store.rescue_all(2).await.unwrap();
+    assert_eq!(queue.state(job).await, JobState::Cancelled);
+}
+
+#[tokio::test]
+async fn a_job_that_follows_waits_until_the_first_is_done() {
+    let queue = Queue::open().await;
+    let first = queue.enqueue(None).await;
+    let second = queue.enqueue_at(Some(first), 9).await;
+    let lease = queue.claim(0).await.unwrap();
+    assert_eq!(lease.job_id, first);
+    assert_eq!(queue.claim(0).await, None);
+    assert_eq!(queue.finish(&lease).await, Change::Made);
+    assert_eq!(queue.claim(0).await.unwrap().job_id, second);
+}
+
+#[tokio::test]
+async fn a_job_that_follows_a_failed_one_fails_with_it() {
+    let queue = Queue::open().await;
+    let first = queue.enqueue(None).await;
+    let second = queue.enqueue(Some(first)).await;
+    let lease = queue.claim(0).await.unwrap();
+    let failed = queue.store.fail(&lease, Code::NothingMoves, "still", 1);
+    assert_eq!(failed.await.unwrap(), Change::Made);
+    let row = queue.store.job(second).await.unwrap().unwrap();
+    assert_eq!(row.failure.unwrap().0, Code::InputFailed);
+}
+
+#[tokio::test]
+async fn claims_that_race_give_each_job_to_one_worker() {
+    let queue = Queue::open().await;
+    for _ in 0..100 {
+        queue.enqueue(None).await;
+    }
+    let mut workers = tokio::task::JoinSet::new();
+    for _ in 0..8 {
+        let store = queue.store.clone();
+        workers.spawn(async move {
+            let mut claimed = Vec::new();
+            while let Some(lease) = store.claim(Uuid::now_v7(), 0, LEASE_MS).await.unwrap() {
+                claimed.push(lease.job_id);
+            }
+            claimed
+        });
+    }
+    let mut claimed = workers.join_all().await.concat();
+    claimed.sort();
+    claimed.dedup();
+    assert_eq!(claimed.len(), 100);
+}
+
+#[tokio::test]
+async fn a_folder_is_served_by_one_process_at_a_time() {
+    let data = tempfile::tempdir().unwrap();
+    let first = Store::open(data.path()).await.unwrap();
+    let second = Store::open(data.path()).await;
+    assert!(matches!(second.err(), Some(Error::InUse(_))));
+    drop(first);
+    assert!(Store::open(data.path()).await.is_ok());
+}

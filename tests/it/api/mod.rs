@@ -1,1 +1,6 @@
-//! To be written.
+//! The API, through the real router over a real connection; a file per noun.
+
+mod contract;
+mod downloads;
+mod footage;
+mod jobs;

@@ -1,1 +1,8 @@
-//! To be written.
+//! What tests arrange with: a real service on a port of its own, films, a service as a process.
+
+pub mod app;
+pub mod clip;
+pub(crate) mod film;
+pub mod process;
+
+pub use app::TestApp;

@@ -1,0 +1,144 @@
+//! What holds on every route: error form, headers, who may ask from a browser, the document.
+
+use reqwest::Method;
+use serde_json::json;
+use uuid::Uuid;
+
+use crate::common::TestApp;
+use crate::common::app::code_of;
+
+#[tokio::test]
+async fn what_is_not_there_is_said_in_one_form() {
+    let app = TestApp::idle().await;
+    let id = Uuid::now_v7();
+    for path in [
+        "/nowhere".to_owned(),
+        "/v1/jobs/not-an-id".to_owned(),
+        format!("/v1/jobs/{id}"),
+        format!("/v1/jobs/{id}/events"),
+        format!("/v1/footage/{id}"),
+        format!("/v1/footage/{id}/file"),
+        format!("/v1/libraries/{id}"),
+        format!("/v1/libraries/{id}/poses.json"),
+        format!("/v1/flocks/{id}"),
+        format!("/v1/flocks/{id}/video.mp4"),
+        format!("/v1/flocks/{id}/..%2f..%2flock"),
+        "/static/..%2fCargo.toml".to_owned(),
+    ] {
+        let answer = app.get(&path).send().await.unwrap();
+        assert_eq!(code_of(answer, 404).await, "not_found", "{path}");
+    }
+    let answer = app.delete("/v1/footage").send().await.unwrap();
+    assert_eq!(code_of(answer, 405).await, "method_not_allowed");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_body_that_is_wrong_is_told_what_is_wrong() {
+    let app = TestApp::idle().await;
+    let (id, path) = (Uuid::now_v7(), "/v1/analyses");
+    for (body, status, code) in [
+        ("{", 400, "malformed_request"),
+        ("[]", 422, "invalid_params"),
+        ("{}", 422, "invalid_params"),
+        (r#"{"footage_id": 7}"#, 422, "invalid_params"),
+    ] {
+        let answer = app.post(path).header("content-type", "application/json");
+        let answer = answer.body(body).send().await.unwrap();
+        assert_eq!(code_of(answer, status).await, code, "{body}");
+    }
+    for params in [
+        json!({"colour": 1}),
+        json!({"threshold": 0}),
+        json!({"preset": "p"}),
+        json!({}),
+    ] {
+        let body = json!({"footage_id": id, "params": params});
+        let answer = app.post(path).json(&body).send().await.unwrap();
+        assert_eq!(code_of(answer, 422).await, "invalid_params", "{params}");
+    }
+    let answer = app.post(path).body("{}").send().await.unwrap();
+    assert_eq!(code_of(answer, 415).await, "unsupported_media_type");
+    let large = format!("{{\"footage_id\": \"{}\"}}", "x".repeat(2 << 20));
+    let answer = app.post(path).header("content-type", "application/json");
+    let answer = answer.body(large).send().await.unwrap();
+    assert_eq!(code_of(answer, 413).await, "too_large");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn nothing_served_runs_as_a_page_of_others() {
+    let app = TestApp::idle().await;
+    for path in [
+        "/",
+        "/static/js/main.js",
+        "/v1/jobs",
+        "/nowhere",
+        "/openapi.json",
+        "/healthz",
+    ] {
+        let answer = app.get(path).send().await.unwrap();
+        let header = |name: &str| answer.headers()[name].to_str().unwrap().to_owned();
+        assert_eq!(header("x-content-type-options"), "nosniff", "{path}");
+        assert_eq!(header("referrer-policy"), "no-referrer", "{path}");
+        let policy = header("content-security-policy");
+        assert!(policy.contains("default-src 'none'") && policy.contains("frame-ancestors 'none'"));
+        assert!(!policy.contains("unsafe"));
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn another_site_cannot_make_a_browser_write_or_read_here() {
+    let app = TestApp::idle().await;
+    for (name, value) in [
+        ("origin", "https://evil.example"),
+        ("sec-fetch-site", "cross-site"),
+    ] {
+        let answer = app
+            .post("/v1/footage")
+            .header(name, value)
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(code_of(answer, 403).await, "cross_site");
+    }
+    let rebound = app
+        .get("/v1/jobs")
+        .header("host", "evil.example")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(code_of(rebound, 403).await, "cross_site");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn nothing_new_begins_once_the_service_stops() {
+    let app = TestApp::idle().await;
+    app.context.draining.cancel();
+    let answer = app.post("/v1/footage").send().await.unwrap();
+    assert_eq!(answer.headers()["retry-after"], "5");
+    assert_eq!(code_of(answer, 503).await, "stopping");
+    assert_eq!(app.get("/v1/jobs").send().await.unwrap().status(), 200);
+    assert_eq!(app.get("/readyz").send().await.unwrap().status(), 503);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn the_document_names_every_call() {
+    let app = TestApp::idle().await;
+    let document = app.json("/openapi.json").await;
+    assert_eq!(document["openapi"], "3.1.0");
+    for (method, path) in [
+        (Method::POST, "/v1/footage"),
+        (Method::POST, "/v1/analyses"),
+        (Method::GET, "/v1/libraries/{id}/{file}"),
+        (Method::POST, "/v1/flocks"),
+        (Method::DELETE, "/v1/jobs/{id}"),
+    ] {
+        let entry = &document["paths"][path][method.as_str().to_lowercase()];
+        assert!(entry.is_object(), "{method} {path}");
+    }
+    app.assert_sound().await;
+}

@@ -1,0 +1,74 @@
+//! Range, conditional requests, HEAD (RELIABILITY.md, H4), over an uploaded film.
+
+use reqwest::StatusCode;
+
+use crate::common::TestApp;
+use crate::common::app::code_of;
+use crate::common::clip::TINY;
+
+#[tokio::test]
+async fn a_part_is_exactly_the_bytes_asked_for() {
+    let app = TestApp::idle().await;
+    let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
+    let size = TINY.len();
+    for (range, part) in [
+        ("bytes=0-0".to_owned(), 0..1),
+        ("bytes=5-99".to_owned(), 5..100),
+        (format!("bytes={}-", size - 1), size - 1..size),
+        ("bytes=-7".to_owned(), size - 7..size),
+        (format!("bytes=10-{}", 2 * size), 10..size),
+    ] {
+        let answer = app.get(&path).header("range", &range).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::PARTIAL_CONTENT, "{range}");
+        let said = format!("bytes {}-{}/{size}", part.start, part.end - 1);
+        assert_eq!(answer.headers()["content-range"], said.as_str());
+        assert_eq!(answer.bytes().await.unwrap(), TINY[part], "{range}");
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_part_beyond_the_end_cannot_be_had() {
+    let app = TestApp::idle().await;
+    let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
+    let range = format!("bytes={}-", TINY.len());
+    let answer = app.get(&path).header("range", range).send().await.unwrap();
+    let said = format!("bytes */{}", TINY.len());
+    assert_eq!(answer.headers()["content-range"], said.as_str());
+    assert_eq!(code_of(answer, 416).await, "range_not_satisfiable");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn what_the_client_has_is_not_sent_again() {
+    let app = TestApp::idle().await;
+    let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
+    let head = app.head(&path).send().await.unwrap();
+    assert_eq!(
+        head.headers()["content-length"],
+        TINY.len().to_string().as_str()
+    );
+    assert_eq!(head.headers()["accept-ranges"], "bytes");
+    let etag = head.headers()["etag"].clone();
+
+    let same = app
+        .get(&path)
+        .header("if-none-match", &etag)
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(same.status(), StatusCode::NOT_MODIFIED);
+    assert_eq!(same.bytes().await.unwrap().len(), 0);
+
+    let part = |tag: &str| {
+        app.get(&path)
+            .header("range", "bytes=1-2")
+            .header("if-range", tag)
+    };
+    let fresh = part(etag.to_str().unwrap()).send().await.unwrap();
+    assert_eq!(fresh.bytes().await.unwrap(), TINY[1..3]);
+    let stale = part("\"another\"").send().await.unwrap();
+    assert_eq!(stale.status(), StatusCode::OK);
+    assert_eq!(stale.bytes().await.unwrap(), *TINY);
+    app.assert_sound().await;
+}

@@ -1,0 +1,146 @@
+//! Uploads: what is taken, what is refused, and that a refusal leaves nothing behind.
+
+use reqwest::StatusCode;
+use reqwest::multipart::{Form, Part};
+use serde_json::json;
+
+use crate::common::TestApp;
+use crate::common::app::{code_of, json_of};
+use crate::common::clip::TINY;
+
+#[tokio::test]
+async fn a_film_is_stored_as_it_was_sent() {
+    let app = TestApp::idle().await;
+    let answer = app
+        .post("/v1/footage?name=my%20fish.mp4")
+        .body(TINY.clone());
+    let answer = answer.send().await.unwrap();
+    let location = answer.headers()["location"].to_str().unwrap().to_owned();
+    let footage = json_of(answer, StatusCode::CREATED).await;
+    assert_eq!(footage["name"], "my fish.mp4");
+    assert_eq!(footage["image_size_px"], json!([64, 64]));
+    assert_eq!(footage["n_frames_hint"], 10);
+    assert_eq!(app.json(&location).await, footage);
+    let file = app.get(&format!("{location}/file")).send().await.unwrap();
+    let disposition = file.headers()["content-disposition"].to_str().unwrap();
+    assert!(disposition.starts_with("attachment; filename=\"my fish.mp4\""));
+    assert_eq!(file.bytes().await.unwrap(), *TINY);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn the_same_bytes_again_are_the_same_footage() {
+    let app = TestApp::idle().await;
+    let id = app.upload(&TINY).await;
+    let form = Form::new().part("video", Part::bytes(TINY.clone()));
+    let again = app
+        .post("/v1/footage")
+        .multipart(form)
+        .send()
+        .await
+        .unwrap();
+    let again = json_of(again, StatusCode::OK).await;
+    assert_eq!(again["id"], id);
+    assert_eq!(app.n_folders("footage"), 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn the_same_bytes_at_the_same_time_are_one_footage() {
+    let app = TestApp::idle().await;
+    let send = || app.post("/v1/footage").body(TINY.clone()).send();
+    let (a, b, c) = tokio::join!(send(), send(), send());
+    let mut ids = Vec::new();
+    for answer in [a, b, c] {
+        let footage: serde_json::Value = answer.unwrap().json().await.unwrap();
+        ids.push(footage["id"].clone());
+    }
+    assert_eq!(ids, vec![ids[0].clone(); 3]);
+    assert_eq!(app.n_folders("footage"), 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn what_is_no_film_is_refused_and_leaves_nothing_behind() {
+    let app = TestApp::idle().await;
+    let playlist = b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n/etc/passwd\n#EXT-X-ENDLIST\n";
+    let cut_off = TINY[..TINY.len() / 2].to_vec();
+    for (body, code) in [
+        (b"".to_vec(), "not_a_video"),
+        (b"just some words\n".repeat(100), "not_a_video"),
+        (playlist.to_vec(), "not_a_video"),
+        (
+            b"ffconcat version 1.0\nfile /etc/passwd\n".to_vec(),
+            "not_a_video",
+        ),
+        (cut_off, "truncated"),
+    ] {
+        let said = String::from_utf8_lossy(&body[..body.len().min(20)]).into_owned();
+        let answer = app.post("/v1/footage").body(body).send().await.unwrap();
+        assert_eq!(code_of(answer, 422).await, code, "{said:?}");
+        assert_eq!(
+            (app.n_drafts(), app.n_folders("footage")),
+            (0, 0),
+            "{said:?}"
+        );
+    }
+    assert_eq!(app.json("/v1/footage").await["items"], json!([]));
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn more_bytes_than_the_limit_are_refused_however_they_come() {
+    let app = TestApp::start(&["--max-upload-bytes", "1000"]).await;
+    let declared = app.post("/v1/footage").body(vec![0; 1001]).send().await;
+    assert_eq!(code_of(declared.unwrap(), 413).await, "too_large");
+    let form = Form::new().part("video", Part::bytes(vec![0; 1001]));
+    let in_form = app.post("/v1/footage").multipart(form).send().await;
+    assert_eq!(code_of(in_form.unwrap(), 413).await, "too_large");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_form_must_hold_a_video_and_nothing_unknown() {
+    let app = TestApp::idle().await;
+    for form in [
+        Form::new(),
+        Form::new().text("vidoe", "x"),
+        Form::new().part("background", Part::bytes(TINY.clone())),
+    ] {
+        let answer = app
+            .post("/v1/footage")
+            .multipart(form)
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(code_of(answer, 400).await, "malformed_request");
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_background_of_another_size_is_refused() {
+    let app = TestApp::idle().await;
+    let picture = flockreel::formats::picture::write_rgb(&flockreel::raster::RgbImage::new(32, 64));
+    let form = Form::new()
+        .part("video", Part::bytes(TINY.clone()))
+        .part("background", Part::bytes(picture));
+    let answer = app
+        .post("/v1/footage")
+        .multipart(form)
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(code_of(answer, 422).await, "background_size_differs");
+    assert_eq!(app.n_folders("footage"), 0);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_packed_body_is_refused() {
+    let app = TestApp::idle().await;
+    let answer = app.post("/v1/footage").header("content-encoding", "gzip");
+    let answer = answer.body(TINY.clone()).send().await.unwrap();
+    assert_eq!(code_of(answer, 415).await, "unsupported_media_type");
+    app.assert_sound().await;
+}

@@ -1,0 +1,114 @@
+//! Jobs as people see them: accepted, listed, cancelled, followed.
+
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+
+use crate::common::TestApp;
+use crate::common::app::{code_of, json_of};
+use crate::common::clip::TINY;
+
+async fn queued(app: &TestApp) -> Value {
+    let footage_id = app.upload(&TINY).await;
+    app.accept("/v1/analyses", json!({"footage_id": footage_id}))
+        .await
+}
+
+#[tokio::test]
+async fn an_accepted_job_says_where_it_and_its_result_are() {
+    let app = TestApp::idle().await;
+    let footage_id = app.upload(&TINY).await;
+    let answer = app
+        .post("/v1/analyses")
+        .json(&json!({"footage_id": footage_id}));
+    let answer = answer.send().await.unwrap();
+    let header = |name: &str| answer.headers()[name].to_str().unwrap().to_owned();
+    let (location, link) = (header("location"), header("link"));
+    let accepted = json_of(answer, StatusCode::ACCEPTED).await;
+    let library = accepted["library_id"].as_str().unwrap();
+    assert_eq!(link, format!("</v1/libraries/{library}>; rel=\"related\""));
+    let job = app.json(&location).await;
+    assert_eq!(
+        (&job["state"], &job["kind"]),
+        (&json!("queued"), &json!("analysis"))
+    );
+    let early = app
+        .get(&format!("/v1/libraries/{library}"))
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(code_of(early, 404).await, "not_ready");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_queued_job_is_cancelled_once() {
+    let app = TestApp::idle().await;
+    let job = queued(&app).await;
+    let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
+    let answer = app.delete(&path).send().await.unwrap();
+    let cancelled = json_of(answer, StatusCode::OK).await;
+    assert_eq!(cancelled["state"], "cancelled");
+    let again = app.delete(&path).send().await.unwrap();
+    assert_eq!(code_of(again, 409).await, "already_finished");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn events_tell_every_state_and_end_with_the_last() {
+    let app = TestApp::idle().await;
+    let job = queued(&app).await;
+    let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
+    let events = app.get(&format!("{path}/events")).send().await.unwrap();
+    assert_eq!(events.headers()["content-type"], "text/event-stream");
+    let reading = tokio::spawn(events.text());
+    app.delete(&path).send().await.unwrap();
+    let text = reading.await.unwrap().unwrap();
+    let states: Vec<Value> = text
+        .lines()
+        .filter_map(|line| line.strip_prefix("data: "))
+        .map(|data| serde_json::from_str::<Value>(data).unwrap()["state"].clone())
+        .collect();
+    assert_eq!(states, [json!("queued"), json!("cancelled")]);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn lists_are_paged_from_the_newest() {
+    let app = TestApp::idle().await;
+    let footage_id = app.upload(&TINY).await;
+    let mut ids = Vec::new();
+    for _ in 0..3 {
+        let body = json!({"footage_id": footage_id});
+        ids.push(app.accept("/v1/analyses", body).await["job_id"].clone());
+    }
+    let first = app.json("/v1/jobs?limit=2").await;
+    let cursor = first["next_cursor"].as_str().unwrap();
+    let second = app.json(&format!("/v1/jobs?limit=2&cursor={cursor}")).await;
+    let of = |page: &Value| -> Vec<Value> {
+        let items = page["items"].as_array().unwrap();
+        items.iter().map(|job| job["id"].clone()).collect()
+    };
+    assert_eq!(
+        [of(&first), of(&second)].concat(),
+        [ids[2].clone(), ids[1].clone(), ids[0].clone()]
+    );
+    assert_eq!(second["next_cursor"], Value::Null);
+    let answer = app.get("/v1/jobs?limit=0").send().await.unwrap();
+    assert_eq!(code_of(answer, 422).await, "invalid_params");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_flock_needs_a_library_that_is_there_or_coming() {
+    let app = TestApp::idle().await;
+    let unknown = json!({"library_id": uuid::Uuid::now_v7(), "count": 2});
+    let answer = app.post("/v1/flocks").json(&unknown).send().await.unwrap();
+    assert_eq!(code_of(answer, 422).await, "invalid_params");
+    let job = queued(&app).await;
+    let coming = json!({"library_id": job["library_id"], "count": 2, "preset": "papers"});
+    let flock = app.accept("/v1/flocks", coming).await;
+    let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
+    app.delete(&path).send().await.unwrap();
+    assert_eq!(app.ended_job(&flock["job_id"]).await["state"], "cancelled");
+    app.assert_sound().await;
+}

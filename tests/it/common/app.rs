@@ -1,0 +1,169 @@
+//! The real service, router and all, on a port and a data folder of its own.
+
+use std::path::Path;
+use std::time::Duration;
+
+use clap::Parser;
+use flockreel::api::{self, AppState};
+use flockreel::config::Config;
+use flockreel::jobs::Context;
+use flockreel::jobs::supervisor::Supervisor;
+use reqwest::{Client, RequestBuilder, Response, StatusCode};
+use serde_json::Value;
+use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio_util::sync::CancellationToken;
+
+/// The service under test.
+pub struct TestApp {
+    pub context: Context,
+    pub client: Client,
+    base: String,
+    data: TempDir,
+    stop: CancellationToken,
+    supervisor: Option<Supervisor>,
+}
+
+#[derive(Parser)]
+struct Arguments {
+    #[command(flatten)]
+    config: Config,
+}
+
+impl TestApp {
+    /// A service without workers: jobs stay queued, and tests step them.
+    pub async fn idle() -> TestApp {
+        TestApp::start(&[]).await
+    }
+
+    /// A service with one worker.
+    pub async fn working() -> TestApp {
+        let mut app = TestApp::start(&[]).await;
+        app.supervisor = Some(Supervisor::start(app.context.clone(), 1));
+        app
+    }
+
+    /// A service with further flags.
+    pub async fn start(flags: &[&str]) -> TestApp {
+        let data = tempfile::tempdir().unwrap();
+        let folder = data.path().to_str().unwrap();
+        let flags = [&["test", "--data", folder], flags].concat();
+        let config = Arguments::parse_from(flags).config;
+        let state = AppState::open(config).await.unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let base = format!("http://{}", listener.local_addr().unwrap());
+        let (context, stop) = (state.context.clone(), CancellationToken::new());
+        tokio::spawn(api::server::serve(
+            listener,
+            api::router(state),
+            stop.clone(),
+        ));
+        TestApp {
+            context,
+            client: Client::new(),
+            base,
+            data,
+            stop,
+            supervisor: None,
+        }
+    }
+
+    pub fn get(&self, path: &str) -> RequestBuilder {
+        self.client.get(format!("{}{path}", self.base))
+    }
+
+    pub fn post(&self, path: &str) -> RequestBuilder {
+        self.client.post(format!("{}{path}", self.base))
+    }
+
+    pub fn delete(&self, path: &str) -> RequestBuilder {
+        self.client.delete(format!("{}{path}", self.base))
+    }
+
+    pub fn head(&self, path: &str) -> RequestBuilder {
+        self.client.head(format!("{}{path}", self.base))
+    }
+
+    /// Uploads a film that must be taken, and returns its id.
+    pub async fn upload(&self, film: &[u8]) -> String {
+        let answer = self.post("/v1/footage").body(film.to_vec()).send().await;
+        let footage = json_of(answer.unwrap(), StatusCode::CREATED).await;
+        footage["id"].as_str().unwrap().to_owned()
+    }
+
+    /// POSTs JSON that must be accepted as a job, and returns the answer.
+    pub async fn accept(&self, path: &str, body: Value) -> Value {
+        let answer = self.post(path).json(&body).send().await.unwrap();
+        json_of(answer, StatusCode::ACCEPTED).await
+    }
+
+    /// GETs JSON that must be there.
+    pub async fn json(&self, path: &str) -> Value {
+        json_of(self.get(path).send().await.unwrap(), StatusCode::OK).await
+    }
+
+    /// The job in its final state.
+    pub async fn ended_job(&self, id: &Value) -> Value {
+        let path = format!("/v1/jobs/{}", id.as_str().unwrap());
+        for _ in 0..1200 {
+            let job = self.json(&path).await;
+            if !job["finished_at"].is_null() {
+                return job;
+            }
+            tokio::time::sleep(Duration::from_millis(100)).await;
+        }
+        panic!("the job did not end in two minutes");
+    }
+
+    /// Files and folders under `tmp/`.
+    pub fn n_drafts(&self) -> usize {
+        entries(&self.data.path().join("tmp"))
+    }
+
+    /// Folders of a kind in the store.
+    pub fn n_folders(&self, kind: &str) -> usize {
+        entries(&self.data.path().join("blobs").join(kind))
+    }
+
+    /// Every invariant of the store holds, nothing is half made; the workers let go.
+    pub async fn assert_sound(mut self) {
+        if let Some(supervisor) = self.supervisor.take() {
+            supervisor.drain().await;
+        }
+        self.stop.cancel();
+        let faults = self.context.store.check(flockreel::jobs::clock::now_ms());
+        assert_eq!(faults.await.unwrap(), Vec::<String>::new());
+        assert_eq!(self.n_drafts(), 0, "drafts are left");
+    }
+}
+
+impl Drop for TestApp {
+    fn drop(&mut self) {
+        self.stop.cancel();
+        self.context.draining.cancel();
+    }
+}
+
+/// The JSON of an answer that must have this status.
+pub async fn json_of(answer: Response, status: StatusCode) -> Value {
+    let found = answer.status();
+    let text = answer.text().await.unwrap();
+    assert_eq!(found, status, "{text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The code of an answer that must be a problem of this status.
+pub async fn code_of(answer: Response, status: u16) -> String {
+    let media_type = answer.headers()["content-type"].to_str().unwrap();
+    assert_eq!(media_type, "application/problem+json");
+    let problem = json_of(answer, StatusCode::from_u16(status).unwrap()).await;
+    assert_eq!(problem["status"], status);
+    let (url, code) = (&problem["type"], problem["code"].as_str().unwrap());
+    assert_eq!(url, &format!("/docs/errors#{code}"));
+    assert!(problem["title"].is_string() && problem["detail"].is_string());
+    code.to_owned()
+}
+
+fn entries(folder: &Path) -> usize {
+    std::fs::read_dir(folder).unwrap().count()
+}

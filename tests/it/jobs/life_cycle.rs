@@ -1,0 +1,77 @@
+//! The way of the data through HTTP: film in, measurements, flock out.
+
+use reqwest::StatusCode;
+use serde_json::json;
+
+use crate::common::TestApp;
+use crate::common::app::code_of;
+use crate::common::clip::{SWIM, TINY};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_film_becomes_a_library_and_a_flock() {
+    let app = TestApp::working().await;
+    let footage_id = app.upload(&SWIM).await;
+    let analysis = app
+        .accept("/v1/analyses", json!({"footage_id": footage_id}))
+        .await;
+    let wishes = json!({"library_id": analysis["library_id"], "count": 3, "frames": 20, "seed": 7});
+    let flock = app.accept("/v1/flocks", wishes).await;
+
+    let job = app.ended_job(&analysis["job_id"]).await;
+    assert_eq!(job["state"], "done", "{job}");
+    let library = format!("/v1/libraries/{}", analysis["library_id"].as_str().unwrap());
+    let at_a_glance = app.json(&library).await;
+    assert_eq!(at_a_glance["n_frames"], 300);
+    assert!(
+        at_a_glance["detected_share"].as_f64().unwrap() > 0.9,
+        "{at_a_glance}"
+    );
+    let poses = app.json(&format!("{library}/poses.json")).await;
+    assert_eq!(poses["frames"].as_array().unwrap().len(), 300);
+    for (file, magic) in [
+        ("background.png", &b"\x89PNG"[..]),
+        ("distance.png", b"\x89PNG"),
+        ("headings.svg", b"<svg"),
+        ("poses.csv", b"frame"),
+        ("sprites.zip", b"PK"),
+    ] {
+        let answer = app.get(&format!("{library}/{file}")).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{file}");
+        assert!(answer.bytes().await.unwrap().starts_with(magic), "{file}");
+    }
+
+    let job = app.ended_job(&flock["job_id"]).await;
+    assert_eq!(job["state"], "done", "{job}");
+    let flock = format!("/v1/flocks/{}", flock["flock_id"].as_str().unwrap());
+    let at_a_glance = app.json(&flock).await;
+    assert_eq!(
+        (&at_a_glance["count"], &at_a_glance["seed"]),
+        (&json!(3), &json!(7))
+    );
+    let video = app.get(&format!("{flock}/video.mp4")).send().await.unwrap();
+    assert_eq!(video.headers()["content-type"], "video/mp4");
+    assert_eq!(&video.bytes().await.unwrap()[4..8], b"ftyp");
+    assert_eq!(app.json(&format!("{flock}/flock.json")).await["seed"], 7);
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_film_that_cannot_be_measured_fails_with_its_reason() {
+    let app = TestApp::working().await;
+    let footage_id = app.upload(&TINY).await;
+    let analysis = app
+        .accept("/v1/analyses", json!({"footage_id": footage_id}))
+        .await;
+    let job = app.ended_job(&analysis["job_id"]).await;
+    assert_eq!(job["state"], "failed");
+    let code = job["error"]["code"].as_str().unwrap();
+    assert!(
+        flockreel::code::Code::from_name(code).is_some() && code != "internal",
+        "{job}"
+    );
+    let library = format!("/v1/libraries/{}", analysis["library_id"].as_str().unwrap());
+    let answer = app.get(&library).send().await.unwrap();
+    assert_eq!(code_of(answer, 404).await, "not_ready");
+    assert_eq!(app.n_folders("libraries"), 0);
+    app.assert_sound().await;
+}

@@ -1,0 +1,147 @@
+//! The worker, one step at a time, with other work in the place of the real one: no sleeping, no
+//! video.
+
+use flockreel::ids::JobId;
+use flockreel::jobs::worker::{Step, Worker};
+use flockreel::jobs::{Attempt, Error, Product};
+use flockreel::progress::Progress;
+use flockreel::store::jobs::JobState;
+use flockreel::store::jobs::cancel::Cancel;
+use flockreel::store::jobs::finish::Made;
+use serde_json::json;
+
+use crate::common::TestApp;
+use crate::common::clip::TINY;
+
+/// An app with one queued analysis; its job and its footage.
+async fn with_job() -> (TestApp, JobId, uuid::Uuid) {
+    let app = TestApp::idle().await;
+    let footage_id = app.upload(&TINY).await;
+    let body = json!({"footage_id": footage_id});
+    let accepted = app.accept("/v1/analyses", body).await;
+    let job = accepted["job_id"].as_str().unwrap().parse().unwrap();
+    (app, job, footage_id.parse().unwrap())
+}
+
+fn product(attempt: &Attempt, footage: uuid::Uuid) -> Result<Product, Error> {
+    std::fs::write(attempt.folder().join("library.json"), b"{}")?;
+    Ok(Product {
+        made: Made::Library(footage),
+        params: "{}".into(),
+        summary: "{}".into(),
+    })
+}
+
+fn wait_until_cancelled(attempt: &Attempt) -> Result<Product, Error> {
+    while !attempt.listener.cancelled() {
+        std::thread::yield_now();
+    }
+    Err(Error::Cancelled)
+}
+
+#[tokio::test]
+async fn a_job_that_is_done_has_its_files_in_place() {
+    let (app, job, footage) = with_job().await;
+    let worker = Worker::new(app.context.clone());
+    let step = worker
+        .step_by(move |_, attempt| product(attempt, footage))
+        .await;
+    assert_eq!(step.unwrap(), Step::Done(job));
+    assert_eq!(worker.step().await.unwrap(), Step::Idle);
+    assert_eq!(app.n_folders("libraries"), 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_worker_that_was_given_up_throws_its_output_away() {
+    let (app, job, footage) = with_job().await;
+    let (slow, fast) = (
+        Worker::new(app.context.clone()),
+        Worker::new(app.context.clone()),
+    );
+    let (go, wait) = std::sync::mpsc::channel::<()>();
+    let (claimed, is_claimed) = tokio::sync::oneshot::channel();
+    let stalled = tokio::spawn(async move {
+        slow.step_by(move |_, attempt| {
+            claimed.send(()).unwrap();
+            wait.recv().unwrap();
+            product(attempt, footage)
+        })
+        .await
+    });
+    is_claimed.await.unwrap();
+    app.context.store.rescue_all(0).await.unwrap();
+    let step = fast
+        .step_by(move |_, attempt| product(attempt, footage))
+        .await;
+    assert_eq!(step.unwrap(), Step::Done(job));
+    go.send(()).unwrap();
+    assert_eq!(stalled.await.unwrap().unwrap(), Step::Lost(job));
+    assert_eq!(app.n_folders("libraries"), 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_running_job_lets_go_when_it_is_cancelled() {
+    let (mut app, job, _) = with_job().await;
+    app.context.lease = std::time::Duration::from_millis(60);
+    let store = app.context.store.clone();
+    let worker = Worker::new(app.context.clone());
+    let (claimed, is_claimed) = tokio::sync::oneshot::channel();
+    let cancel = async {
+        is_claimed.await.unwrap();
+        assert_eq!(store.cancel(job, 0).await.unwrap(), Cancel::Requested);
+    };
+    let step = worker.step_by(|_, attempt| {
+        claimed.send(()).unwrap();
+        wait_until_cancelled(attempt)
+    });
+    let (step, ()) = tokio::join!(step, cancel);
+    assert_eq!(step.unwrap(), Step::Cancelled(job));
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_job_under_way_goes_back_unused_when_the_service_stops() {
+    let (app, job, _) = with_job().await;
+    let worker = Worker::new(app.context.clone());
+    let draining = app.context.draining.clone();
+    let step = worker.step_by(move |_, attempt| {
+        draining.cancel();
+        wait_until_cancelled(attempt)
+    });
+    assert_eq!(step.await.unwrap(), Step::Released(job));
+    let row = app.context.store.job(job).await.unwrap().unwrap();
+    assert_eq!((row.state, row.attempt), (JobState::Queued, 0));
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_panic_fails_its_own_job_alone() {
+    let (app, job, _) = with_job().await;
+    let worker = Worker::new(app.context.clone());
+    let step = worker.step_by(|_, _| panic!("as a test wants it")).await;
+    assert_eq!(
+        step.unwrap(),
+        Step::Failed(job, flockreel::code::Code::Internal)
+    );
+    assert_eq!(worker.step().await.unwrap(), Step::Idle);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn what_may_pass_is_tried_again_three_times_at_most() {
+    let (app, job, _) = with_job().await;
+    let worker = Worker::new(app.context.clone());
+    let fail = |_: &_, _: &Attempt| Err(Error::Io(std::io::Error::other("for a moment")));
+    let step = worker.step_by(fail).await.unwrap();
+    assert_eq!(step, Step::Retried(job));
+    let row = app.context.store.job(job).await.unwrap().unwrap();
+    assert_eq!((row.state, row.attempt), (JobState::Queued, 1));
+    assert_eq!(
+        worker.step_by(fail).await.unwrap(),
+        Step::Idle,
+        "it waits its time"
+    );
+    app.assert_sound().await;
+}
