@@ -181,12 +181,13 @@ impl Params {
             "swarm" => Some(with_rules(Rules {
                 alignment: 0.0,
                 cohesion: 1.2,
-                wander: 2.0,
+                wander: 2.5,
                 ..Rules::default()
             })),
             "mill" => Some(with_rules(Rules {
                 circling: 1.5,
-                cohesion: 0.4,
+                alignment: 0.3,
+                cohesion: 0.0,
                 ..Rules::default()
             })),
             "scatter" => Some(with_rules(Rules {

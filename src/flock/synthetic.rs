@@ -58,7 +58,8 @@ pub(crate) fn library(view: View) -> Library {
 /// Where it points: 0 = right, a quarter turn = away from the viewer (in top view: down).
 fn yaw_rad(frame: u32) -> f64 {
     let turn = |period: f64, phase: f64| libm::sin(TAU * f64::from(frame) / period + phase);
-    2.4 * turn(173.0, 0.0) + 1.3 * turn(61.0, 1.0)
+    // Mostly left or right, with turns between.
+    PI / 2.0 - PI / 2.0 * libm::tanh(2.5 * turn(173.0, 0.0)) + 0.3 * turn(61.0, 1.0)
 }
 
 fn turn_rad(frame: u32) -> f64 {
@@ -195,9 +196,9 @@ fn jumps_lead_to_headings_alike() {
     for jump in &library.playback.jumps {
         let to = heading(jump.to);
         let meant = if jump.mirrored { mirrored_rad(to) } else { to };
-        let steep = libm::cos(yaw_rad(jump.to)).abs() < 0.5;
+        let end_on = libm::cos(yaw_rad(jump.to)).abs() < 0.7;
         assert!(
-            steep || wrap_rad(heading(jump.from + 1) - meant).abs() < 0.5,
+            end_on || wrap_rad(heading(jump.from + 1) - meant).abs() < 1.0,
             "{jump:?}"
         );
     }

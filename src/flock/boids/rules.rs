@@ -13,6 +13,9 @@ use crate::flock::params::{Params, Rules, Separation};
 /// A wall is steered from when the path over this time meets it.
 const WALL_HORIZON_S: f64 = 1.0;
 
+/// Weight of swimming across the picture rather than into it.
+const BROADSIDE: f64 = 0.15;
+
 /// One boid's moment.
 pub struct Moment<'a> {
     /// Where it is.
@@ -67,6 +70,7 @@ impl Steering<'_> {
                 self.alignment(&seen, moment),
             ),
             scaled(most * rules.circling, self.circling(moment)),
+            scaled(most * BROADSIDE, self.broadside(moment)),
             scaled(most * together * rules.cohesion, cohesion(&seen, rules)),
             self.wander(moment),
             self.cruise(moment),
@@ -120,6 +124,16 @@ impl Steering<'_> {
         );
         let gap = minus(around, moment.velocity);
         scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
+    }
+
+    /// In side view: out of the line of sight. Footage shows an animal best broadside, and a flock
+    /// that circles in depth would be seen end-on half the time.
+    fn broadside(&self, moment: &Moment) -> Vec3 {
+        if self.tank.is_flat() || self.params.rules.circling > 0.0 {
+            return [0.0; 3];
+        }
+        let into = moment.velocity[2] / self.calibration.cruise_bl_per_s;
+        [0.0, 0.0, -into]
     }
 
     /// The wandering turn, as the acceleration that makes it.

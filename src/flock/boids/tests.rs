@@ -119,12 +119,3 @@ fn another_seed_gives_another_flock() {
     assert_ne!(seeded(1), seeded(2));
     assert_eq!(seeded(1), seeded(1));
 }
-
-#[test]
-fn probe() {
-    for view in [View::Top, View::Side] {
-        for name in Params::PRESETS {
-            println!("{view:?} {name} {:?}", swim(view, &preset(name), 600).2);
-        }
-    }
-}
