@@ -8,6 +8,7 @@
 
 use super::background::Plate;
 use super::light::Gain;
+use super::shadow;
 use super::silhouette::{self, Difference};
 use crate::geometry::Rect;
 use crate::raster::{Frame, Mask, RgbaImage};
@@ -22,9 +23,6 @@ pub struct Cutout {
     /// Mean difference of the silhouette from the plate, levels of 255.
     pub contrast: f64,
 }
-
-/// How many inside pixels give a band pixel its animal color.
-const N_NEAREST: usize = 4;
 
 /// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
 /// pixels wide, or 2 % of it.
@@ -41,13 +39,16 @@ pub fn cut_out(
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, plate, gain, rect);
     let mask = moved(silhouette, rect);
-    let inside = (0..band_px).fold(mask.clone(), |mask, _| mask.eroded());
+    let solid = without_halo(&mask, &difference, plate);
+    let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
     let matte = Matte {
         difference: &difference,
         plate,
         mask: &mask,
+        solid: &solid,
         inside: &inside,
+        nearest_inside: nearest_set(&inside),
         band_px,
     };
     let mut image = RgbaImage::new(rect.w, rect.h);
@@ -82,6 +83,59 @@ fn moved(mask: &Mask, rect: Rect) -> Mask {
     result
 }
 
+/// The mask less the soft shadow around the animal: pixels that differ by little of what the animal
+/// mostly differs by, look like the plate, only darker, and hang together with the outside. They
+/// get a fraction of alpha like the outline, so that a shadow on the floor stays a shadow.
+fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate) -> Mask {
+    const FAINT: f64 = 0.35;
+    let faint = FAINT * contrast(difference, mask);
+    let mut solid = mask.clone();
+    let width = mask.width();
+    for k in 0..solid.bits.len() {
+        if solid.bits[k] == 1
+            && f64::from(difference.levels[k]) < faint
+            && shadow::has_shadow_color(difference, plate, k % width, k / width)
+        {
+            solid.bits[k] = 0;
+        }
+    }
+    // What was taken out of the middle of the animal is no halo.
+    solid.fill_holes();
+    solid.majority()
+}
+
+/// For each pixel the index of a set pixel reached from it in the fewest steps (8-connected); `None`
+/// everywhere when no pixel is set.
+fn nearest_set(mask: &Mask) -> Vec<Option<usize>> {
+    let (w, h) = (mask.width(), mask.height());
+    let mut nearest: Vec<Option<usize>> = mask
+        .bits
+        .iter()
+        .enumerate()
+        .map(|(at, &bit)| (bit == 1).then_some(at))
+        .collect();
+    let mut front: Vec<usize> = (0..nearest.len())
+        .filter(|&at| nearest[at].is_some())
+        .collect();
+    while !front.is_empty() {
+        let mut next = Vec::new();
+        for &at in &front {
+            let (x, y) = (at % w, at / w);
+            for ny in y.saturating_sub(1)..=(y + 1).min(h - 1) {
+                for nx in x.saturating_sub(1)..=(x + 1).min(w - 1) {
+                    let other = ny * w + nx;
+                    if nearest[other].is_none() {
+                        nearest[other] = nearest[at];
+                        next.push(other);
+                    }
+                }
+            }
+        }
+        front = next;
+    }
+    nearest
+}
+
 fn contrast(difference: &Difference, mask: &Mask) -> f64 {
     let sum: u64 = difference
         .levels
@@ -96,7 +150,12 @@ struct Matte<'a> {
     difference: &'a Difference,
     plate: &'a Plate,
     mask: &'a Mask,
+    /// The mask less the shadow around the animal.
+    solid: &'a Mask,
+    /// The solid part less the band along its outline: alpha 1.
     inside: &'a Mask,
+    /// For each pixel an inside pixel near it.
+    nearest_inside: Vec<Option<usize>>,
     band_px: u32,
 }
 
@@ -138,38 +197,49 @@ impl Matte<'_> {
         [r, g, b, (alpha * 255.0).round() as u8]
     }
 
-    /// The animal's color near a band pixel: the mean of the nearest inside pixels; where the
-    /// silhouette is too thin to have an inside, the pixel nearby that differs most from the plate.
+    /// The animal's color near a band pixel: the mean of the inside pixels around the nearest one.
+    /// Where the animal is too thin to have an inside nearby, the pixel close by that differs most
+    /// from the plate; but a shadow takes its color from the animal however far that is.
     fn color_nearby(&self, x: usize, y: usize) -> Option<[f32; 3]> {
-        let reach = i64::from(self.band_px) * 2 + 1;
-        let mut nearest: Vec<(i64, usize)> = Vec::with_capacity(16);
-        let mut starkest: Option<(u8, usize)> = None;
-        for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
-            let Some(at) = self.at(x as i64 + dx, y as i64 + dy) else {
-                continue;
-            };
-            let distance = dx * dx + dy * dy;
-            if self.inside.bits[at] == 1 {
-                nearest.push((distance, at));
-            } else if self.mask.bits[at] == 1 && distance <= 8 {
-                let level = self.difference.levels[at];
-                if starkest.is_none_or(|(most, _)| level > most) {
-                    starkest = Some((level, at));
+        let k = y * self.mask.width() + x;
+        let nearest = self.nearest_inside[k].map(|at| {
+            let (nx, ny) = (at % self.mask.width(), at / self.mask.width());
+            (nx.abs_diff(x).max(ny.abs_diff(y)), nx as i64, ny as i64)
+        });
+        let is_shadow = self.mask.bits[k] == 1 && self.solid.bits[k] == 0;
+        match nearest {
+            Some((distance, nx, ny)) if distance <= 2 * self.band_px as usize + 1 || is_shadow => {
+                Some(self.mean_inside(nx, ny))
+            }
+            _ => self.starkest(x as i64, y as i64),
+        }
+    }
+
+    /// Mean color of the inside pixels of a 3 x 3 neighborhood whose middle is one.
+    fn mean_inside(&self, x: i64, y: i64) -> [f32; 3] {
+        let (mut sum, mut n) = ([0.0; 3], 0.0);
+        for (dx, dy) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))) {
+            if let Some(at) = self
+                .at(x + dx, y + dy)
+                .filter(|&at| self.inside.bits[at] == 1)
+            {
+                n += 1.0;
+                for (s, c) in sum.iter_mut().zip(self.frame_color(at)) {
+                    *s += f32::from(c);
                 }
             }
         }
-        if nearest.is_empty() {
-            return starkest.map(|(_, at)| self.frame_color(at).map(f32::from));
-        }
-        nearest.sort_unstable();
-        nearest.truncate(N_NEAREST);
-        let mut sum = [0.0; 3];
-        for &(_, at) in &nearest {
-            for (s, c) in sum.iter_mut().zip(self.frame_color(at)) {
-                *s += f32::from(c) / nearest.len() as f32;
-            }
-        }
-        Some(sum)
+        sum.map(|s| s / n)
+    }
+
+    /// The color of the silhouette's pixel within 2 pixels that differs most from the plate.
+    fn starkest(&self, x: i64, y: i64) -> Option<[f32; 3]> {
+        let around = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dx, dy)));
+        around
+            .filter_map(|(dx, dy)| self.at(x + dx, y + dy))
+            .filter(|&at| self.mask.bits[at] == 1)
+            .max_by_key(|&at| (self.difference.levels[at], std::cmp::Reverse(at)))
+            .map(|at| self.frame_color(at).map(f32::from))
     }
 
     /// The mask blurred by a Gaussian of 0.7 pixels (5 x 5).

@@ -76,8 +76,8 @@ pub fn moments(rect: Rect, weights: &[u8]) -> Option<Moments> {
         third[1] += f * v * v * v;
     }
     let skew = [
-        third[0] / m00 / large.powf(1.5),
-        third[1] / m00 / small.max(1e-9).powf(1.5),
+        third[0] / m00 / (large * large.sqrt()),
+        third[1] / m00 / (small * small.sqrt()).max(1e-9),
     ];
     Some(Moments {
         area_px: m00,

@@ -215,10 +215,12 @@ fn half_circle(angle_rad: f64) -> f64 {
     }
 }
 
-/// Seen from above when the animal, seen at length, often stands upright in the picture and is
-/// symmetric about its length: an animal filmed from the side lies mostly level and has a back and
-/// a belly.
+/// From the side an animal has a back and a belly: the skew across its length keeps its sign. From
+/// above it has a left and a right: the skew varies about zero as it bends, and it lies at any angle.
+/// Measured on films and recordings from the side: |mean| over standard deviation 1.6 to 4.7; from
+/// above: below 0.1.
 fn guess_view(track: &[Tracked]) -> View {
+    const LEVEL: f64 = PI / 3.0;
     let sightings: Vec<&Sighting> = track.iter().filter_map(|t| t.sighting.as_ref()).collect();
     let mut lengths: Vec<f64> = sightings.iter().map(|s| s.extent_px[0]).collect();
     if lengths.is_empty() {
@@ -226,56 +228,28 @@ fn guess_view(track: &[Tracked]) -> View {
     }
     let rank = lengths.len() * 9 / 10;
     let long = 0.7 * *lengths.select_nth_unstable_by(rank, f64::total_cmp).1;
-    let at_length: Vec<&&Sighting> = sightings
-        .iter()
-        .filter(|s| s.extent_px[0] >= long && s.moments.major_rad.is_some())
+    let at_length = sightings.iter().filter(|s| s.extent_px[0] >= long);
+    let seen: Vec<(f64, f64)> = at_length
+        .filter_map(|s| Some((s.moments.major_rad?, s.moments.skew[1])))
         .collect();
-    let share = |n: usize| n as f64 / at_length.len().max(1) as f64;
-    let upright = |s: &&&&Sighting| {
-        s.moments
-            .major_rad
-            .is_some_and(|axis| axis.abs() > FRAC_PI_4)
-    };
-    let symmetric = |s: &&&&Sighting| symmetry(s) > 0.7;
-    let upright_share = share(at_length.iter().filter(upright).count());
-    let symmetric_share = share(at_length.iter().filter(symmetric).count());
-    if upright_share > 0.2 && symmetric_share > 0.5 {
+    let steep = seen
+        .iter()
+        .filter(|(axis, _)| axis.abs() > FRAC_PI_4)
+        .count();
+    let steep_share = steep as f64 / seen.len().max(1) as f64;
+    let across: Vec<f64> = seen
+        .iter()
+        .filter(|(axis, _)| axis.abs() < LEVEL)
+        .map(|(_, skew)| *skew)
+        .collect();
+    let n = across.len().max(1) as f64;
+    let mean = across.iter().sum::<f64>() / n;
+    let deviation = (across.iter().map(|skew| (skew - mean).powi(2)).sum::<f64>() / n).sqrt();
+    let has_back_and_belly = mean.abs() >= 0.5 * deviation && !across.is_empty();
+    let bends_or_turns = deviation > 0.12 || steep_share > 0.15;
+    if !has_back_and_belly && bends_or_turns {
         View::Top
     } else {
         View::Side
     }
-}
-
-/// How much of the silhouette lies on itself when folded along its major axis, 0..=1 (Jaccard).
-fn symmetry(sighting: &Sighting) -> f64 {
-    let Some(axis) = sighting.moments.major_rad else {
-        return 0.0;
-    };
-    let (c, s) = (libm::cos(axis), libm::sin(axis));
-    let rect = sighting.cutout.rect;
-    let image = &sighting.cutout.image;
-    let [cx, cy] = sighting.moments.centroid_px;
-    let inside = |x: f64, y: f64| {
-        let (column, row) = (
-            (x - f64::from(rect.x)).floor(),
-            (y - f64::from(rect.y)).floor(),
-        );
-        let within =
-            column >= 0.0 && row >= 0.0 && column < f64::from(rect.w) && row < f64::from(rect.h);
-        within && image.pixel(column as u32, row as u32)[3] >= 128
-    };
-    let (mut both, mut either) = (0u32, 0u32);
-    for (row, column) in (0..rect.h).flat_map(|row| (0..rect.w).map(move |column| (row, column))) {
-        let (x, y) = (
-            f64::from(rect.x + column) + 0.5,
-            f64::from(rect.y + row) + 0.5,
-        );
-        let (dx, dy) = (x - cx, y - cy);
-        let (u, v) = (dx * c + dy * s, dy * c - dx * s);
-        let folded = inside(cx + u * c + v * s, cy + u * s - v * c);
-        let here = inside(x, y);
-        both += u32::from(here && folded);
-        either += u32::from(here || folded);
-    }
-    f64::from(both) / f64::from(either.max(1))
 }

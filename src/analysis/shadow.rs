@@ -70,7 +70,7 @@ fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool
 }
 
 /// Darker than the plate within the range of a shadow, and of the same color.
-fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
+pub(super) fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
     let rect = difference.rect;
     let (px, py) = (rect.x + x as u32, rect.y + y as u32);
     let color = |rgb: [u8; 3]| rgb.map(f32::from);

@@ -81,23 +81,28 @@ pub fn difference(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Diff
     Difference { rect, rgb, levels }
 }
 
-/// The components of one box, which grows while any of them runs into its edge.
+/// The components of one box, which grows to the sides where any of them runs into its edge, twice
+/// as far each time.
 fn components_in(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Vec<Component> {
     let mut rect = rect;
+    let mut growth = i64::from(GROWTH_PX);
     loop {
         let difference = difference(frame, plate, gain, rect);
         let found = hysteresis(&difference, plate);
-        let grown = rect.inflated(GROWTH_PX, frame.width, frame.height);
-        let runs_out = |c: &Component| {
-            (c.rect.x == rect.x && grown.x < rect.x)
-                || (c.rect.y == rect.y && grown.y < rect.y)
-                || (c.rect.right() == rect.right() && grown.right() > rect.right())
-                || (c.rect.bottom() == rect.bottom() && grown.bottom() > rect.bottom())
-        };
-        if !found.iter().any(runs_out) {
+        let grow = |runs_out: bool| if runs_out { growth } else { 0 };
+        let grown = Rect::clipped(
+            i64::from(rect.x) - grow(found.iter().any(|c| c.rect.x == rect.x)),
+            i64::from(rect.y) - grow(found.iter().any(|c| c.rect.y == rect.y)),
+            i64::from(rect.right()) + grow(found.iter().any(|c| c.rect.right() == rect.right())),
+            i64::from(rect.bottom()) + grow(found.iter().any(|c| c.rect.bottom() == rect.bottom())),
+            frame.width,
+            frame.height,
+        );
+        if grown == rect {
             return found;
         }
         rect = grown;
+        growth *= 2;
     }
 }
 

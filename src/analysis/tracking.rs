@@ -184,7 +184,7 @@ impl<'a> Tracker<'a> {
                 f64::from(rect.x) + f64::from(rect.w) / 2.0,
                 f64::from(rect.y) + f64::from(rect.h) / 2.0,
             ];
-            let distance = (center[0] - predicted[0]).hypot(center[1] - predicted[1]);
+            let distance = libm::hypot(center[0] - predicted[0], center[1] - predicted[1]);
             distance / scale + libm::log(component.area as f64 / usual).abs()
         };
         components

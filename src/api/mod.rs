@@ -14,6 +14,7 @@ mod receive; // bodies to disk
 mod timestamp;
 
 mod analyses;
+mod fish;
 mod flocks;
 mod footage;
 mod health;
@@ -116,6 +117,9 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
         .routes(routes!(flocks::get_flock))
         .routes(routes!(flocks::get_flock_file))
+        .routes(routes!(fish::create_fish, fish::list_fish))
+        .routes(routes!(fish::get_fish))
+        .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::get_job_events))

@@ -1,10 +1,105 @@
-//! To be written.
+//! `flockreel fish`: the virtual fish that swims as the animal swam, as a video or as a model for 3-D
+//! programs (DESIGN.md, Command line).
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use super::{Error, Listener, Summary};
+use crate::fish::{self, Film, Motion, Params, side_by_side};
+use crate::formats::{glb, library_dir};
+use crate::library::Library;
+use crate::media::{VideoFormat, VideoWriter};
+use crate::progress::Progress;
+use crate::raster::{ColorSpec, Frame};
 
 /// Arguments of `fish`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The folder that `analyze` wrote.
+    #[arg(value_name = "LIBRARY_DIR")]
+    library: PathBuf,
+    /// What to write: a video (.mp4) or a model (.glb).
+    #[arg(short, long, value_name = "MP4_OR_GLB")]
+    output: PathBuf,
+    /// The animal on the left, the virtual fish on the right.
+    #[arg(long)]
+    side_by_side: bool,
+    /// `papers`: a stiff upright fish, moved by the values as they were measured.
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// Its coat: goldfish, silver or bronze.
+    #[arg(long, default_value = "goldfish")]
+    palette: String,
+}
 
-/// Not there yet.
-pub fn run(_args: Args) -> Result<Option<super::Summary>, super::Error> {
-    Err(super::Error::Usage("not there yet: fish".into()))
+/// Makes the virtual fish.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let params = params_of(&args)?;
+    let stored = library_dir::read(&args.library)
+        .map_err(|e| Error::Usage(format!("{}: {e}", args.library.display())))?;
+    let motion =
+        fish::drive(&stored.library.poses, &params).map_err(|e| Error::work(e.code(), &e))?;
+    let n_visible = motion.frames.iter().filter(|p| p.visible).count();
+    let n_frames = motion.frames.len();
+    match extension(&args.output).as_str() {
+        "glb" if args.side_by_side => {
+            return Err(Error::Usage("--side-by-side makes a video: name it .mp4".into()));
+        }
+        "glb" => std::fs::write(&args.output, glb::write(&motion))
+            .map_err(Error::io(format!("writing {}", args.output.display())))?,
+        "mp4" => write_video(&stored.library, motion, &args)?,
+        other => {
+            return Err(Error::Usage(format!(
+                "the output must end in .mp4 or .glb: .{other}"
+            )));
+        }
+    }
+    Ok(Some(Summary(json!({
+        "output": args.output.display().to_string(),
+        "frames": n_frames,
+        "visible_frames": n_visible,
+    }))))
+}
+
+fn params_of(args: &Args) -> Result<Params, Error> {
+    let palette = serde_json::from_value(Value::from(args.palette.as_str()))
+        .map_err(|_| Error::Usage(format!("palette is goldfish, silver or bronze: {}", args.palette)))?;
+    let preset = match args.preset.as_deref() {
+        None | Some("default") => Params::default(),
+        Some("papers") => Params::papers(),
+        Some(other) => return Err(Error::Usage(format!("preset is default or papers: {other}"))),
+    };
+    Ok(Params { palette, ..preset })
+}
+
+fn write_video(library: &Library, motion: Motion, args: &Args) -> Result<(), Error> {
+    let [width, height] = motion.image_size_px;
+    let n_frames = motion.frames.len();
+    let video = VideoFormat {
+        width: if args.side_by_side { 2 * width } else { width },
+        height,
+        fps: motion.fps,
+        color: ColorSpec::default(),
+    };
+    let refused = |e: crate::media::Error| Error::work(e.code(), &e);
+    let film = Film::new(motion, library.background.clone());
+    let mut writer = VideoWriter::create(&args.output, &video).map_err(refused)?;
+    let listener = Listener::new();
+    let mut frame = Frame::new(video.width, video.height, video.color);
+    for frame_idx in 0..n_frames {
+        match args.side_by_side {
+            true => side_by_side::render(library, &film, frame_idx, &mut frame),
+            false => film.render(frame_idx, &mut frame),
+        }
+        writer.write(&frame).map_err(refused)?;
+        listener.report("filming", (frame_idx + 1) as f64 / n_frames as f64);
+    }
+    writer.finish().map_err(refused)
+}
+
+/// The file name's ending in lower case; empty when it has none.
+fn extension(path: &Path) -> String {
+    let ending = path.extension().unwrap_or_default();
+    ending.to_string_lossy().to_lowercase()
 }

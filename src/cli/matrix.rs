@@ -1,10 +1,115 @@
-//! To be written.
+//! `flockreel matrix`: the distances between the clips of a library, as numbers or as a picture
+//! (DESIGN.md, Command line; ALGORITHMS.md 5).
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::{Error, Listener, Summary};
+use crate::analysis::distance::{Cancelled, ComparedSprites, DistanceMatrix, Distances, Side};
+use crate::code::Code;
+use crate::cpu::Level;
+use crate::formats::{distance_map, library_dir, npy};
 
 /// Arguments of `matrix`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The folder that `analyze` wrote.
+    #[arg(value_name = "LIBRARY_DIR")]
+    library: PathBuf,
+    /// Where to write: a name that ends in .npy for numbers, in .png for a picture.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Compare each clip with the others' mirror images.
+    #[arg(long)]
+    mirrored: bool,
+}
 
-/// Not there yet.
-pub fn run(_args: Args) -> Result<Option<super::Summary>, super::Error> {
-    Err(super::Error::Usage("not there yet: matrix".into()))
+/// Writes the distance matrix.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let format = Format::of(&args.output)?;
+    let stored = library_dir::read(&args.library)
+        .map_err(|error| Error::Usage(format!("{}: {error}", args.library.display())))?;
+    let library = stored.library;
+    let pixels = ComparedSprites::new(&library.sprites, &library.poses, stored.params.planes);
+    let distances = Distances {
+        pixels: &pixels,
+        clip_frames: library.clip_frames,
+        side: if args.mirrored {
+            Side::Mirrored
+        } else {
+            Side::Plain
+        },
+        cpu: Level::detect(),
+    };
+    match format {
+        Format::Numbers => write_numbers(&distances, &args.output)?,
+        Format::Picture => write_picture(&distances, &args.output)?,
+    }
+    Ok(Some(Summary(serde_json::json!({
+        "output": args.output,
+        "clips": distances.n_clips(),
+        "clip_frames": library.clip_frames,
+        "mirrored": args.mirrored,
+    }))))
+}
+
+enum Format {
+    Numbers,
+    Picture,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Format, Error> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("npy") => Ok(Format::Numbers),
+            Some("png") => Ok(Format::Picture),
+            _ => Err(Error::Usage(format!(
+                "the output must end in .npy or .png: {}",
+                path.display()
+            ))),
+        }
+    }
+}
+
+fn write_numbers(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
+    npy::check(distances.pixels.n_frames()).map_err(|error| Error::work(error.code(), &error))?;
+    let matrix = DistanceMatrix::of(distances, &Listener::new()).map_err(cancelled)?;
+    let write = || {
+        let mut file = BufWriter::new(File::create(path)?);
+        npy::write(&matrix, &mut file)?;
+        file.flush()
+    };
+    write().map_err(Error::io(format!("cannot write {}", path.display())))
+}
+
+fn write_picture(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
+    let png = distance_map::draw(distances, &Listener::new()).map_err(cancelled)?;
+    std::fs::write(path, png).map_err(Error::io(format!("cannot write {}", path.display())))
+}
+
+fn cancelled(_: Cancelled) -> Error {
+    Error::Work {
+        code: Code::Cancelled,
+        sentence: "the work was cancelled".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_files_name_says_what_is_written() {
+        assert!(matches!(
+            Format::of(Path::new("a/d.npy")),
+            Ok(Format::Numbers)
+        ));
+        assert!(matches!(
+            Format::of(Path::new("d.png")),
+            Ok(Format::Picture)
+        ));
+        let error = Format::of(Path::new("d.jpg")).err().expect("no such kind");
+        assert_eq!(error.exit_code(), 2);
+    }
 }

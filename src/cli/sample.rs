@@ -1,10 +1,104 @@
-//! To be written.
+//! `flockreel sample`: footage of the virtual fish, and its true poses (DESIGN.md, Command line).
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::{Error, Listener, Summary};
+use crate::fish::sample::{SampleFilm, SampleParams};
+use crate::footage::FrameSource;
+use crate::formats::poses_json;
+use crate::media::{VideoFormat, VideoWriter};
+use crate::progress::Progress;
+use crate::raster::Frame;
 
 /// Arguments of `sample`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The video to write.
+    #[arg(short, long, value_name = "MP4")]
+    output: PathBuf,
+    /// Also write the true poses, in the format of poses.json.
+    #[arg(long, value_name = "JSON")]
+    truth: Option<PathBuf>,
+    /// How many frames.
+    #[arg(long, default_value_t = 1200)]
+    frames: usize,
+    /// Another number gives another path, scene and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Frames a second.
+    #[arg(long, default_value_t = 30.0)]
+    fps: f64,
+    /// Width and height of the picture, pixels.
+    #[arg(long, default_value = "640x480", value_name = "WxH", value_parser = parse_size)]
+    size: [u32; 2],
+}
 
-/// Not there yet.
-pub fn run(_args: Args) -> Result<Option<super::Summary>, super::Error> {
-    Err(super::Error::Usage("not there yet: sample".into()))
+/// Films the virtual fish.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let params = SampleParams {
+        n_frames: args.frames,
+        seed: args.seed,
+        fps: args.fps,
+        width: args.size[0],
+        height: args.size[1],
+        ..SampleParams::default()
+    };
+    let film = SampleFilm::new(params).map_err(|e| Error::work(e.code(), &e))?;
+    let listener = Listener::new();
+    write_video(&film, &args, &listener)?;
+    if let Some(path) = &args.truth {
+        listener.report("truth", 0.0);
+        let bytes = poses_json::write(&film.truth(), None);
+        std::fs::write(path, bytes).map_err(Error::io(format!("writing {}", path.display())))?;
+    }
+    Ok(Some(Summary(json!({
+        "output": args.output.display().to_string(),
+        "truth": args.truth.as_ref().map(|path| path.display().to_string()),
+        "frames": args.frames,
+        "seed": args.seed,
+    }))))
+}
+
+fn write_video(film: &SampleFilm, args: &Args, listener: &Listener) -> Result<(), Error> {
+    let format = film.format();
+    let video = VideoFormat {
+        width: format.width,
+        height: format.height,
+        fps: format.fps,
+        color: format.color,
+    };
+    let refused = |e: crate::media::Error| Error::work(e.code(), &e);
+    let mut writer = VideoWriter::create(&args.output, &video).map_err(refused)?;
+    let mut stream = film.open().map_err(|e| Error::work(e.code, &e))?;
+    let mut frame = Frame::default();
+    for frame_idx in 0.. {
+        let more = stream.next_frame(&mut frame).map_err(|e| Error::work(e.code, &e))?;
+        if more.is_none() {
+            break;
+        }
+        writer.write(&frame).map_err(refused)?;
+        listener.report("filming", (frame_idx + 1) as f64 / args.frames as f64);
+    }
+    writer.finish().map_err(refused)
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once('x').map(|(w, h)| (w.parse(), h.parse()));
+    match sides {
+        Some((Ok(width), Ok(height))) => Ok([width, height]),
+        _ => Err("a size looks like 640x480".into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_size_is_two_numbers_with_an_x_between() {
+        assert_eq!(parse_size("640x480"), Ok([640, 480]));
+        assert!(parse_size("640").is_err() && parse_size("ax1").is_err());
+    }
 }

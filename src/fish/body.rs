@@ -106,15 +106,15 @@ fn ring_u(i: usize) -> f64 {
     t * (0.35 + 0.65 * t)
 }
 
-/// Cubic between knots k and k + 1 of one column, with the slopes of their neighbors.
+/// Monotone cubic between knots k and k + 1 of one column (Fritsch & Butland 1984): no dents.
 fn hermite(k: usize, column: usize, u: f64) -> f64 {
     let knot = |i: usize| (PROFILE[i][0], PROFILE[i][column]);
-    let slope = |i: usize| {
-        let ((u0, v0), (u1, v1)) = (
-            knot(i.saturating_sub(1)),
-            knot((i + 1).min(PROFILE.len() - 1)),
-        );
-        (v1 - v0) / (u1 - u0)
+    let secant = |i: usize| (knot(i + 1).1 - knot(i).1) / (knot(i + 1).0 - knot(i).0);
+    let slope = |i: usize| match i {
+        0 => secant(0),
+        i if i == PROFILE.len() - 1 => secant(i - 1),
+        i if secant(i - 1) * secant(i) <= 0.0 => 0.0,
+        i => 2.0 * secant(i - 1) * secant(i) / (secant(i - 1) + secant(i)),
     };
     let ((u0, v0), (u1, v1)) = (knot(k), knot(k + 1));
     let (h, t) = (u1 - u0, (u - u0) / (u1 - u0));

@@ -1,7 +1,6 @@
 //! The film of a virtual fish: each posture drawn over a background, in the encoder's own format.
 
 use super::motion::Motion;
-use super::params::Palette;
 use super::render::{Drawing, Renderer};
 use crate::geometry::Rect;
 use crate::raster::{ColorSpec, Frame, RgbImage};
@@ -16,7 +15,7 @@ pub struct Film {
 
 impl Film {
     /// The film of a motion before a background of the motion's image size. Panics on another size.
-    pub fn new(motion: Motion, palette: Palette, background: RgbImage) -> Film {
+    pub fn new(motion: Motion, background: RgbImage) -> Film {
         let [width, height] = motion.image_size_px;
         assert_eq!(
             [background.width, background.height],
@@ -26,7 +25,7 @@ impl Film {
         let mut plate = Frame::new(width, height, ColorSpec::default());
         plate.draw_rgb(&background, Rect::of_size(width, height));
         Film {
-            renderer: Renderer::new(motion.size, palette),
+            renderer: Renderer::new(motion.size, motion.palette),
             motion,
             background,
             plate,

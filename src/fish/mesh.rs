@@ -145,7 +145,7 @@ fn vertex(point: &SketchPoint, length_m: f64) -> Vertex {
     let (a, b, share) = joints_at(s);
     Vertex {
         position_m: [(ORIGIN_S - s) * length_m, down * length_m, left * length_m],
-        normal: [0.0; 3],
+        normal: [0.0, -1.0, 0.0],
         color: point.color,
         joints: [a as u8, b as u8],
         share: share as f32,

@@ -1,6 +1,7 @@
 //! Poses to virtual fish: a goldfish of our own geometry, moved as the measured animal moved, and
 //! the film of it whose truth is known (ALGORITHMS.md 4, virtual fish; N 7).
 
+pub mod drive;
 pub mod error;
 pub mod film;
 pub mod mesh;
@@ -8,6 +9,7 @@ pub mod motion;
 pub mod params;
 pub mod render;
 pub mod sample;
+pub mod side_by_side;
 pub mod spine;
 pub mod swimmer;
 
@@ -17,6 +19,7 @@ mod light;
 mod paint;
 mod scenery;
 
+pub use drive::drive;
 pub use error::Error;
 pub use film::Film;
 pub use motion::{Motion, Posture};

@@ -3,6 +3,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
+use super::params::Palette;
 use super::spine::N_JOINTS;
 use crate::geometry::Camera;
 use crate::library::Animal;
@@ -18,6 +19,8 @@ pub struct Motion {
     pub camera: Camera,
     /// The size of the fish.
     pub size: Animal,
+    /// Its coat.
+    pub palette: Palette,
     /// One entry a frame, in order.
     pub frames: Vec<Posture>,
 }

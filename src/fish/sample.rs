@@ -79,11 +79,12 @@ impl SampleFilm {
                 medium_index: 1.0,
             },
             size,
+            palette: params.palette,
             frames: strokes.iter().map(|s| posture(s, size)).collect(),
         };
         let scene = tank_scene(width, height, params.seed);
         Ok(SampleFilm {
-            film: Film::new(motion, params.palette, scene),
+            film: Film::new(motion, scene),
             noise: noise_table(params.seed, params.noise, width),
             strokes,
             params,

@@ -10,7 +10,7 @@ const HORIZON: f64 = 0.765;
 const WATER: [[f64; 3]; 2] = [[126.0, 184.0, 188.0], [34.0, 84.0, 98.0]];
 
 /// The scene without the fish.
-pub fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
+pub(super) fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
     let mut scene = Scene::of_water(width, height, seed);
     scene.plants(&PlantBed {
         key: 1,

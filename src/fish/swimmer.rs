@@ -82,7 +82,7 @@ fn wish(now: &mut Stroke, seed: u64, step: u64, dt_s: f64) {
     }
     now.speed_m_per_s += 0.8 * (0.10 - now.speed_m_per_s) * dt_s + 0.22 * noise(5) * kick;
     now.speed_m_per_s = now.speed_m_per_s.clamp(0.02, 0.24);
-    now.pitch_rad += -1.1 * now.pitch_rad * dt_s + 0.8 * noise(6) * kick;
+    now.pitch_rad += -0.8 * now.pitch_rad * dt_s + 1.9 * noise(6) * kick;
 }
 
 /// Turns from what lies ahead, sharper and slower the nearer it is.
@@ -92,12 +92,12 @@ fn avoid_walls(now: &mut Stroke, dt_s: f64) {
     let depth_m = into.x.hypot(into.z);
     if depth_m > 0.0 {
         let gap = wrap_rad(libm::atan2(into.z, into.x) - now.yaw_rad);
-        let urgency = (0.25 + depth_m / 0.05).min(1.3);
-        now.turn_rad_per_s += 13.0 * urgency * gap.clamp(-1.0, 1.0) * dt_s;
+        let urgency = (0.35 + depth_m / 0.04).min(1.5);
+        now.turn_rad_per_s += 15.0 * urgency * gap.clamp(-1.0, 1.0) * dt_s;
         now.speed_m_per_s += 1.6 * urgency * (0.06 - now.speed_m_per_s) * dt_s;
     }
     now.turn_rad_per_s = now.turn_rad_per_s.clamp(-4.0, 4.0);
-    now.pitch_rad = (now.pitch_rad + 160.0 * into.y * dt_s).clamp(-0.5, 0.5);
+    now.pitch_rad = (now.pitch_rad + 70.0 * into.y * dt_s).clamp(-0.5, 0.5);
 }
 
 /// How far the point would have to move to be clear of every wall, metres.

@@ -103,8 +103,8 @@ mod tests {
 
     #[test]
     fn distances_beyond_32_bits_are_written_in_64() {
-        // 33 million bytes that differ by 255 where they are opaque white against nothing.
-        let matrix = matrix_of_gray_levels(&[0, 255], 0x0101_0102 / 3);
+        // White against black: 3 * 255 a pixel.
+        let matrix = matrix_of_gray_levels(&[0, 255], 5_614_337);
         let mut bytes = Vec::new();
         write(&matrix, &mut bytes).expect("memory takes all");
         assert!(matrix.max() > u64::from(u32::MAX));

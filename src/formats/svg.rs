@@ -85,7 +85,11 @@ fn line(poses: &Poses, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> String
             Some((from, before)) => {
                 let (over, edge) = ((from + to) / 2.0, PI * before.signum());
                 let (leave, enter) = (y(edge), y(-edge));
-                write!(path, "L{over:.1} {leave:.1}M{over:.1} {enter:.1}L{to:.1} {:.1}", y(heading))
+                write!(
+                    path,
+                    "L{over:.1} {leave:.1}M{over:.1} {enter:.1}L{to:.1} {:.1}",
+                    y(heading)
+                )
             }
         }
         .expect("memory");

@@ -29,7 +29,7 @@ pub fn mean_rad(angles_rad: impl IntoIterator<Item = f64>) -> Option<f64> {
         x += libm::cos(angle);
         y += libm::sin(angle);
     }
-    (x.hypot(y) > 1e-9).then(|| libm::atan2(y, x))
+    (libm::hypot(x, y) > 1e-9).then(|| libm::atan2(y, x))
 }
 
 /// A heading or a difference of headings in 65536ths of a circle.

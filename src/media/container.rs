@@ -123,7 +123,7 @@ fn is_mov(head: &[u8]) -> bool {
 fn is_transport_stream(head: &[u8]) -> bool {
     [(188, 0), (192, 4)].iter().any(|&(step, first)| {
         let mut syncs = head.iter().skip(first).step_by(step);
-        head.len() >= first + 3 * step + 1 && syncs.all(|&byte| byte == 0x47)
+        head.len() > first + 3 * step && syncs.all(|&byte| byte == 0x47)
     })
 }
 

@@ -9,8 +9,9 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
+use super::allow_list::input_args;
 use super::error::Error;
-use super::gate::{Child, Order, Tool, input_args};
+use super::gate::{Child, Order, Tool};
 use super::limits::Limits;
 use super::probe::{Probe, Turn, is_rgb, probe};
 use super::timeline::Timeline;
@@ -163,7 +164,15 @@ impl FrameStream for VideoStream<'_> {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
         let video = self.video;
         let time_s = match &video.probe.timeline {
-            Timeline::Constant { fps } => self.decode(frame)?.then(|| self.n_given as f64 / fps),
+            Timeline::Constant { fps, ragged_s } => {
+                let first_ragged = video.probe.n_packets - ragged_s.len();
+                let late = self
+                    .n_given
+                    .checked_sub(first_ragged)
+                    .and_then(|k| ragged_s.get(k));
+                let time_s = late.copied().unwrap_or(self.n_given as f64 / fps);
+                self.decode(frame)?.then_some(time_s)
+            }
             Timeline::Variable {
                 times_s, sources, ..
             } => self.resample(times_s, sources, frame)?,

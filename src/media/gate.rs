@@ -8,9 +8,8 @@
 use std::ffi::OsString;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{self, ChildStdin, ChildStdout, ExitStatus, Stdio};
+use std::process::{self, ChildStdin, ChildStdout, Stdio};
 use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -18,7 +17,7 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Pid, PidfdFlags, Signal};
 
-use super::container::Container;
+use super::end::End;
 use super::error::Error;
 use super::limits::Limits;
 use super::sandbox::{self, Cage};
@@ -32,13 +31,6 @@ pub(super) enum Tool {
     Ffmpeg,
 }
 
-/// Demuxers that may run. `Container` chooses one of them; this list holds inside ffmpeg as well.
-const FORMATS: &str = "mov,matroska,avi,mpegts,asf";
-
-/// Decoders that may run, by ffmpeg's names.
-const DECODERS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
-                        ffv1,rawvideo,wmv2,wmv3,vc1";
-
 /// How much of a child's complaints is kept.
 const COMPLAINT_BYTES: usize = 8 << 10;
 
@@ -47,29 +39,6 @@ const PIPE_BYTES: usize = 1 << 20;
 
 /// How long a child may take to end by itself once it has closed its output.
 const END_TIME: Duration = Duration::from_secs(30);
-
-/// The arguments that close the ways out of a file, then the file as the input.
-pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> Vec<OsString> {
-    let mut file = OsString::from("file:");
-    file.push(path);
-    // Decoders round sizes up to whole blocks; the picture's own size is checked by `probe`.
-    let max_pixels = limits.max_pixels + u64::from(limits.max_side_px) * 128;
-    let mut args: Vec<OsString> = [
-        ("-protocol_whitelist", "file".to_owned()),
-        ("-format_whitelist", FORMATS.to_owned()),
-        ("-codec_whitelist", DECODERS.to_owned()),
-        ("-max_streams", limits.max_streams.to_string()),
-        ("-max_pixels", max_pixels.to_string()),
-        ("-probesize", "5000000".to_owned()),
-        ("-analyzeduration", "5000000".to_owned()),
-        ("-f", container.demuxer().to_owned()),
-    ]
-    .into_iter()
-    .flat_map(|(name, value)| [name.into(), value.into()])
-    .collect();
-    args.extend(["-i".into(), file]);
-    args
-}
 
 /// The version line of the installed ffmpeg, for the log.
 pub fn tool_version() -> Result<String, Error> {
@@ -126,42 +95,6 @@ impl Order {
 
 fn n_cores() -> u64 {
     std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
-}
-
-/// How a child ended.
-pub(super) struct End {
-    /// Exit code or signal.
-    pub(super) status: ExitStatus,
-    /// The last of what it said.
-    pub(super) complaint: String,
-}
-
-impl End {
-    /// What an end by failure means.
-    pub(super) fn check(self) -> Result<End, Error> {
-        const SIGKILL: i32 = 9;
-        const SIGXCPU: i32 = 24;
-        const SIGXFSZ: i32 = 25;
-        let says = |what| self.complaint.contains(what);
-        match self.status.signal() {
-            None if self.status.success() => Ok(self),
-            Some(SIGXCPU) => Err(Error::TimeLimit),
-            Some(SIGXFSZ) => Err(Error::StorageFull),
-            _ if says("No space left on device") || says("Disk quota exceeded") => {
-                Err(Error::StorageFull)
-            }
-            // A kill that is not ours is the kernel's, out of memory.
-            signal if signal == Some(SIGKILL) || says("Cannot allocate memory") => {
-                Err(Error::MemoryLimit {
-                    complaint: self.complaint,
-                })
-            }
-            _ => Err(Error::Crashed {
-                status: self.status.to_string(),
-                complaint: self.complaint,
-            }),
-        }
-    }
 }
 
 /// A running child. Dropping it kills and reaps its whole group.

@@ -4,13 +4,16 @@
 //! [`Video`] parses a foreign file at the door: once it is open, its size, rate and length are
 //! within the [`Limits`], and its frames come as planar 4:2:0 at a constant rate.
 
+mod allow_list; // what ffmpeg may open and run
 mod container; // which of the accepted containers a file is, by its first bytes
 mod decode; // Video: footage -> frames
 mod encode; // VideoWriter: frames -> MP4
+mod end; // how a child ended
 mod error;
 mod gate; // the one place that starts a process
 mod image; // a given background
 mod limits;
+mod packets; // when each packet is shown
 mod probe; // what a file holds
 mod sandbox; // what the child may do
 mod timeline; // presentation times -> a constant rate

@@ -5,14 +5,15 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-use std::time::Duration;
 
 use serde_json::Value;
 
+use super::allow_list::input_args;
 use super::container::{Container, HEAD_BYTES};
 use super::error::Error;
-use super::gate::{Child, Order, Tool, input_args};
+use super::gate::{Child, Order, Tool};
 use super::limits::Limits;
+use super::packets::Packets;
 use super::timeline::Timeline;
 use crate::raster::{ColorSpec, Matrix, Range};
 
@@ -42,9 +43,6 @@ const HEADER_ENTRIES: &str = "format=duration:stream=index,codec_name,codec_type
 
 /// Headers longer than this are not believed.
 const MAX_HEADER_BYTES: usize = 1 << 20;
-
-/// Disks read at least this fast, bytes a second; the packet times need the whole file.
-const SLOWEST_DISK: u64 = 50_000_000;
 
 /// How the stored picture is turned to be shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,6 +161,9 @@ fn read_header(container: Container, path: &Path, limits: &Limits) -> Result<Val
             unit: "index",
         });
     }
+    if let Some(codec) = refused_codec(&end.complaint) {
+        return Err(Error::CodecNotAllowed(codec.to_owned()));
+    }
     match end.check() {
         Ok(_) => serde_json::from_slice(&json[..n_read])
             .map_err(|error| Error::NotAVideo(error.to_string())),
@@ -171,6 +172,14 @@ fn read_header(container: Container, path: &Path, limits: &Limits) -> Result<Val
         }
         Err(error) => Err(error),
     }
+}
+
+/// The codec that ffprobe was not allowed to open, by its own words.
+fn refused_codec(complaint: &str) -> Option<&str> {
+    let line = complaint
+        .lines()
+        .find(|line| line.contains(") not on whitelist"))?;
+    Some(line.split_once("Codec (")?.1.split_once(')')?.0)
 }
 
 /// The video stream with the largest picture, the first of equals; cover pictures are none.
@@ -288,177 +297,22 @@ pub(super) fn is_rgb(pix_fmt: &str) -> bool {
     .any(|start| pix_fmt.starts_with(start))
 }
 
-/// What the packets of a stream say.
-struct Packets {
-    /// Presentation times of the packets to be shown, ascending; empty when the container has none.
-    times_s: Vec<f64>,
-    /// Packets to be shown.
-    n_shown: usize,
-    /// Where the last packet's time ends.
-    end_s: f64,
-    /// What was said of a file that ends too early.
-    cut: bool,
+pub(super) fn n_streams(header: &Value) -> usize {
+    header["streams"].as_array().map_or(0, Vec::len)
 }
 
-impl Packets {
-    fn read(
-        container: Container,
-        path: &Path,
-        stream_idx: u64,
-        n_bytes: u64,
-        limits: &Limits,
-    ) -> Result<Packets, Error> {
-        let entries = "packet=pts_time,duration_time,flags";
-        let mut args = vec!["-select_streams".into(), stream_idx.to_string().into()];
-        args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
-        args.extend(input_args(container, path, limits));
-        let order = Order::new(Tool::Ffprobe, args, limits, 0)
-            .with_more_time(Duration::from_secs(n_bytes / SLOWEST_DISK));
-        let mut child = Child::reading(order)?;
-        let mut packets = Packets {
-            times_s: Vec::new(),
-            n_shown: 0,
-            end_s: f64::MIN,
-            cut: false,
-        };
-        let (mut chunk, mut line) = (vec![0; 1 << 16], Vec::new());
-        loop {
-            let n_read = child.read_some(&mut chunk)?;
-            if n_read == 0 {
-                break;
-            }
-            for &byte in &chunk[..n_read] {
-                if byte != b'\n' {
-                    line.push(byte);
-                    continue;
-                }
-                packets.add(&String::from_utf8_lossy(&line));
-                line.clear();
-            }
-            if packets.n_shown > limits.max_frames {
-                return Err(Error::TooManyFrames {
-                    limit: limits.max_frames,
-                });
-            }
-        }
-        let end = child.finish()?.check()?;
-        packets.cut = ["partial file", "File ended prematurely"]
-            .iter()
-            .any(|s| end.complaint.contains(s));
-        packets.times_s.sort_by(f64::total_cmp);
-        if packets.times_s.len() < packets.n_shown {
-            packets.times_s.clear(); // some have no time: then none can be told
-        }
-        Ok(packets)
-    }
-
-    /// One line: time, duration, flags, of which the first two may be missing.
-    fn add(&mut self, line: &str) {
-        let mut cells = line.split(',');
-        let (time_s, duration_s) = (cells.next(), cells.next());
-        let flags = cells.next().unwrap_or_default();
-        if flags.contains('D') {
-            return; // outside the edit list: decoded, never shown
-        }
-        self.n_shown += 1;
-        let parse = |cell: Option<&str>| cell.and_then(|cell| cell.parse::<f64>().ok());
-        if let Some(time_s) = parse(time_s) {
-            self.times_s.push(time_s);
-            self.end_s = self.end_s.max(time_s + parse(duration_s).unwrap_or(0.0));
-        }
-    }
-
-    fn timeline(&self, stream: &Value, limits: &Limits) -> Result<Timeline, Error> {
-        if self.n_shown < limits.min_frames && !self.cut {
-            return Err(Error::TooFewFrames {
-                n_frames: self.n_shown,
-            });
-        }
-        let rate = |name: &str| ratio(text(&stream[name]), '/').filter(|fps| *fps > 0.0);
-        let claimed: Vec<f64> = [rate("avg_frame_rate"), rate("r_frame_rate")]
-            .into_iter()
-            .flatten()
-            .collect();
-        let tick_s = ratio(text(&stream["time_base"]), '/').unwrap_or(0.001);
-        let timeline = Timeline::of(&self.times_s, &claimed, tick_s)
-            .or_else(|| claimed.first().map(|&fps| Timeline::Constant { fps }))
-            .ok_or(Error::TooFewFrames {
-                n_frames: self.n_shown,
-            })?;
-        let fps = timeline.fps();
-        if fps > limits.max_fps {
-            return Err(Error::TooFast { fps });
-        }
-        let n_frames = match &timeline {
-            Timeline::Constant { .. } => self.n_shown,
-            Timeline::Variable { sources, .. } => sources.len(),
-        };
-        let duration_s = n_frames as f64 / fps;
-        if duration_s > limits.max_duration_s {
-            return Err(Error::TooLong {
-                found: duration_s,
-                unit: "s",
-            });
-        }
-        match n_frames > limits.max_frames {
-            true => Err(Error::TooManyFrames {
-                limit: limits.max_frames,
-            }),
-            false => Ok(timeline),
-        }
-    }
-
-    /// Compares what is there with what the header promised.
-    fn check_whole(
-        &self,
-        header: &Value,
-        stream: &Value,
-        timeline: &Timeline,
-    ) -> Result<(), Error> {
-        let step_s = 1.0 / timeline.fps();
-        let own_s =
-            number(&stream["duration"]).or_else(|| clock(text(&stream["tags"]["DURATION"])));
-        // The format's duration is that of its longest stream: sound may outlast the picture.
-        let whole_s = number(&header["format"]["duration"]);
-        let (promised_s, slack) = match (own_s, whole_s) {
-            (Some(own_s), _) => (own_s, 0.01),
-            (None, Some(whole_s)) => (whole_s, 0.05),
-            (None, None) => (0.0, 0.0),
-        };
-        let span_s = match (self.times_s.first(), self.times_s.last()) {
-            (Some(first), Some(last)) => (last - first + step_s).max(self.end_s).max(last + step_s),
-            _ => self.n_shown as f64 * step_s,
-        };
-        if self.cut || promised_s - span_s > (slack * promised_s).max(2.5 * step_s) {
-            return Err(Error::Truncated {
-                found: span_s,
-                promised: promised_s,
-                unit: "s",
-            });
-        }
-        Ok(())
-    }
-}
-
-fn text(value: &Value) -> &str {
+pub(super) fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }
 
 /// A number, which ffprobe may have put in quotes.
-fn number(value: &Value) -> Option<f64> {
+pub(super) fn number(value: &Value) -> Option<f64> {
     value.as_f64().or_else(|| value.as_str()?.parse().ok())
 }
 
 /// `30000/1001` or `4:3`; `None` for `0/0` and the like.
-fn ratio(text: &str, sign: char) -> Option<f64> {
+pub(super) fn ratio(text: &str, sign: char) -> Option<f64> {
     let (over, under) = text.split_once(sign)?;
     let value = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
     value.is_finite().then_some(value)
-}
-
-/// `00:00:15.400000000` in seconds.
-fn clock(text: &str) -> Option<f64> {
-    text.split(':').try_fold(0.0, |sum, part| {
-        Some(sum * 60.0 + part.parse::<f64>().ok()?)
-    })
 }

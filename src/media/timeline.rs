@@ -22,13 +22,19 @@ const COMMON_FPS: [f64; 11] = [
 /// How far from its nominal rate a wandering film may be: half a percent.
 const NEAR: f64 = 0.005;
 
+/// How many frames at the end may be late without making the rate a variable one.
+const RAGGED: usize = 3;
+
 /// Which decoded frame is shown when.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Timeline {
-    /// Every frame once, at this rate.
+    /// Every decoded frame once, at this rate.
     Constant {
         /// Frames a second.
         fps: f64,
+        /// True times, seconds from the first, of the last few frames where those are late: a film
+        /// cut without re-encoding lacks some of the frames before its last.
+        ragged_s: Vec<f64>,
     },
     /// Frames skipped and repeated so that the rate becomes constant.
     Variable {
@@ -53,12 +59,20 @@ impl Timeline {
             return None;
         }
         let mean_fps = (times_s.len() - 1) as f64 / span;
-        let mut claimed = claimed_fps.iter().copied();
-        if let Some(fps) = claimed.find(|&fps| is_regular(times_s, fps, tick_s)) {
-            return Some(Timeline::Constant { fps });
-        }
-        if is_regular(times_s, mean_fps, tick_s) {
-            return Some(Timeline::Constant { fps: mean_fps });
+        for n_ragged in [0, RAGGED] {
+            let Some(even) = times_s
+                .len()
+                .checked_sub(n_ragged)
+                .filter(|n| *n > n_ragged)
+            else {
+                break;
+            };
+            let (even, ragged) = times_s.split_at(even);
+            let rates = claimed_fps.iter().copied().chain([mean_fps]);
+            if let Some(fps) = rates.into_iter().find(|&fps| is_regular(even, fps, tick_s)) {
+                let ragged_s = ragged.iter().map(|time| time - first).collect();
+                return Some(Timeline::Constant { fps, ragged_s });
+            }
         }
         let times_s: Vec<f64> = times_s.iter().map(|time| time - first).collect();
         let fps = nominal_fps(&times_s, claimed_fps)?;
@@ -73,7 +87,7 @@ impl Timeline {
     /// Frames a second, as given.
     pub(super) fn fps(&self) -> f64 {
         match self {
-            Timeline::Constant { fps } | Timeline::Variable { fps, .. } => *fps,
+            Timeline::Constant { fps, .. } | Timeline::Variable { fps, .. } => *fps,
         }
     }
 }
@@ -145,7 +159,25 @@ mod tests {
     fn times_rounded_to_milliseconds_are_a_constant_rate() {
         let times = rounded((0..500).map(|k| f64::from(k) / 29.97), 0.001);
         let timeline = Timeline::of(&times, &[29.97], 0.001);
-        assert_eq!(timeline, Some(Timeline::Constant { fps: 29.97 }));
+        let ragged_s = Vec::new();
+        let constant = Timeline::Constant {
+            fps: 29.97,
+            ragged_s,
+        };
+        assert_eq!(timeline, Some(constant));
+    }
+
+    #[test]
+    fn a_film_that_lacks_its_last_frame_but_one_is_still_constant() {
+        let shown = (0..10).filter(|k| *k != 8);
+        let times: Vec<f64> = shown.map(|k| f64::from(k) / 25.0).collect();
+        let timeline = Timeline::of(&times, &[25.0], 1e-4);
+        let ragged_s = vec![0.24, 0.28, 0.36];
+        let constant = Timeline::Constant {
+            fps: 25.0,
+            ragged_s,
+        };
+        assert_eq!(timeline, Some(constant));
     }
 
     #[test]
@@ -170,7 +202,7 @@ mod tests {
     #[test]
     fn a_coarse_clock_does_not_hide_a_missing_frame() {
         let times: Vec<f64> = (0..10)
-            .filter(|k| *k != 8)
+            .filter(|k| *k != 5)
             .map(|k| f64::from(k) / 30.0)
             .collect();
         let timeline = Timeline::of(&times, &[30.0], 1.0 / 30.0);

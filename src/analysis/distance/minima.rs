@@ -2,9 +2,9 @@
 //! Gleicher & Pighin, Motion Graphs, 2002; ALGORITHMS.md 5, candidates).
 //!
 //! A pair is a local minimum when no other pair within two frames of it, in either clip, has a
-//! smaller D; among equals the smaller (i, j) wins. Clips that cannot be used are no neighbors.
-//! Pairs close to the diagonal count as neighbors like all others, although they make no
-//! transition themselves: a slope toward D(i, i) = 0 is no minimum.
+//! smaller D; among equals the smaller (i, j) wins. Only pairs that may become transitions compete:
+//! an animal at rest looks the same all the while, and the best of its pairs must not lose to ones
+//! too near the diagonal to be of use.
 
 use std::cmp::Ordering;
 
@@ -26,16 +26,19 @@ pub struct ClipPair {
 /// Finds the local minima below a limit in rows that stream by.
 pub struct LocalMinima<'a> {
     usable: &'a [bool],
+    least_gap: usize,
     limit: u64,
     rows: [Vec<u64>; N_ROWS],
     n_rows: usize,
 }
 
 impl LocalMinima<'_> {
-    /// For clips of which `usable` says which take part; only D < `limit` is reported.
-    pub fn new(usable: &[bool], limit: u64) -> LocalMinima<'_> {
+    /// For clips of which `usable` says which take part, in pairs at least `least_gap` apart; only
+    /// D < `limit` is reported.
+    pub fn new(usable: &[bool], least_gap: usize, limit: u64) -> LocalMinima<'_> {
         LocalMinima {
             usable,
+            least_gap,
             limit,
             rows: Default::default(),
             n_rows: 0,
@@ -48,10 +51,15 @@ impl LocalMinima<'_> {
         let usable = &self.usable[i..];
         let kept = &mut self.rows[i % N_ROWS];
         kept.clear();
-        kept.extend(row.iter().zip(usable).map(|(&distance, &usable_too)| {
-            let both = usable[0] && usable_too;
-            if both { distance } else { u64::MAX }
-        }));
+        kept.extend(
+            row.iter()
+                .zip(usable)
+                .enumerate()
+                .map(|(gap, (&distance, &usable_too))| {
+                    let competes = usable[0] && usable_too && gap >= self.least_gap;
+                    if competes { distance } else { u64::MAX }
+                }),
+        );
         self.n_rows += 1;
         if let Some(settled) = i.checked_sub(REACH) {
             self.report(settled, on_minimum);
@@ -105,7 +113,7 @@ mod tests {
 
     fn minima(rows: &[&[u64]], usable: &[bool], limit: u64) -> Vec<(usize, usize)> {
         let mut found = Vec::new();
-        let mut minima = LocalMinima::new(usable, limit);
+        let mut minima = LocalMinima::new(usable, 0, limit);
         for row in rows {
             minima.push(row, |pair| found.push((pair.from, pair.to)));
         }

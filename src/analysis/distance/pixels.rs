@@ -5,7 +5,7 @@
 //! of 48. Inside a group the bytes are cut into blocks of 1 KB, and block 0 of all 48 sprites comes
 //! before block 1: a tile of 48 x 48 distances then reads two runs of 48 KB at a time, without the
 //! cache conflicts of sprites whose size is a multiple of 4 KB. Bytes beyond the last sprite and
-//! beyond the last pixel are 0.
+//! beyond the last pixel, up to whole blocks, are 0.
 
 use rayon::prelude::*;
 
@@ -15,13 +15,15 @@ use crate::library::{Poses, Sprites, View};
 
 /// Sprites in a group: the side of a tile of distances.
 pub(super) const GROUP: usize = 48;
-/// Lines in a block of 1 KB.
-pub(super) const BLOCK: usize = 16;
+/// Bytes in a block.
+pub(super) const BLOCK: usize = 1024;
 
-/// 64 bytes on a cache line of their own.
+/// 1 KB of a sprite, on cache lines of its own.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Line(pub(super) [u8; 64]);
+pub(super) struct Block(pub(super) [u8; BLOCK]);
+
+const BLANK: Block = Block([0; BLOCK]);
 
 /// How a sprite is mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,15 +40,15 @@ pub struct ComparedSprites {
     width: usize,
     height: usize,
     flip: Flip,
-    lines: Vec<Line>,
+    blocks: Vec<Block>,
 }
 
 /// 48 sprites, the last ones blank where the footage ends.
 #[derive(Clone, Copy)]
 pub(super) struct Group<'a> {
     pub(super) n_sprites: usize,
-    n_lines: usize,
-    lines: &'a [Line],
+    /// Block 0 of each sprite, then block 1 of each.
+    blocks: &'a [Block],
 }
 
 impl ComparedSprites {
@@ -72,14 +74,13 @@ impl ComparedSprites {
             width,
             height,
             flip,
-            lines: Vec::new(),
+            blocks: Vec::new(),
         };
-        let n_lines = compared.n_lines();
-        compared
-            .lines
-            .resize(n_frames.div_ceil(GROUP) * GROUP * n_lines, Line([0; 64]));
-        let per_group = (GROUP * n_lines).max(1);
-        let groups = compared.lines.par_chunks_mut(per_group).enumerate();
+        let n_blocks = compared.n_blocks();
+        let n_groups = compared.n_groups();
+        compared.blocks.resize(n_groups * GROUP * n_blocks, BLANK);
+        let per_group = (GROUP * n_blocks).max(1);
+        let groups = compared.blocks.par_chunks_mut(per_group).enumerate();
         groups.for_each(|(group_idx, group)| {
             let mut bytes = vec![0; width * height * 4];
             let mut plain = vec![0; sprites.n_bytes()];
@@ -92,7 +93,7 @@ impl ComparedSprites {
                         canvas.turn(&plain, poses.frames[frame_idx].heading_rad, &mut bytes);
                     }
                 }
-                scatter(&bytes, frame_idx - first, n_lines, group);
+                scatter(&bytes, frame_idx - first, group);
             }
         });
         compared
@@ -111,12 +112,11 @@ impl ComparedSprites {
     /// d(i, j): the sum of absolute differences of two frames.
     pub fn sad(&self, i: usize, j: usize) -> u64 {
         let (a, b) = (self.group(i / GROUP), self.group(j / GROUP));
-        (0..a.n_blocks())
-            .flat_map(|block| {
-                let a = a.strip(block, i % GROUP);
-                a.iter().zip(b.strip(block, j % GROUP))
+        (0..self.n_blocks())
+            .map(|block| {
+                let (a, b) = (a.block(block, i % GROUP), b.block(block, j % GROUP));
+                super::kernel::scalar::sad_block(a, b)
             })
-            .map(|(a, b)| super::kernel::scalar::sad_line(a, b))
             .sum()
     }
 
@@ -125,33 +125,32 @@ impl ComparedSprites {
     }
 
     pub(super) fn group(&self, group_idx: usize) -> Group<'_> {
-        let n = GROUP * self.n_lines();
-        self.group_of(group_idx, &self.lines[group_idx * n..][..n])
+        let n = GROUP * self.n_blocks();
+        self.group_of(group_idx, &self.blocks[group_idx * n..][..n])
     }
 
     /// The group mirrored, in memory that the caller lends.
     pub(super) fn mirrored_group<'a>(
         &self,
         group_idx: usize,
-        memory: &'a mut Vec<Line>,
+        memory: &'a mut Vec<Block>,
     ) -> Group<'a> {
         let group = self.group(group_idx);
         memory.clear();
-        memory.resize(GROUP * self.n_lines(), Line([0; 64]));
+        memory.resize(GROUP * self.n_blocks(), BLANK);
         let mut bytes = vec![0; self.n_bytes()];
         for sprite in 0..group.n_sprites {
             gather(group, sprite, &mut bytes);
             self.mirror(&mut bytes);
-            scatter(&bytes, sprite, self.n_lines(), memory);
+            scatter(&bytes, sprite, memory);
         }
         self.group_of(group_idx, memory)
     }
 
-    fn group_of<'a>(&self, group_idx: usize, lines: &'a [Line]) -> Group<'a> {
+    fn group_of<'a>(&self, group_idx: usize, blocks: &'a [Block]) -> Group<'a> {
         Group {
             n_sprites: (self.n_frames - group_idx * GROUP).min(GROUP),
-            n_lines: self.n_lines(),
-            lines,
+            blocks,
         }
     }
 
@@ -172,21 +171,20 @@ impl ComparedSprites {
         }
     }
 
-    fn n_lines(&self) -> usize {
-        self.n_bytes().div_ceil(64)
+    fn n_blocks(&self) -> usize {
+        self.n_bytes().div_ceil(BLOCK)
     }
 }
 
 impl<'a> Group<'a> {
-    /// Blocks in each sprite; the last may hold fewer than 16 lines.
+    /// Blocks in each sprite.
     pub(super) fn n_blocks(&self) -> usize {
-        self.n_lines.div_ceil(BLOCK)
+        self.blocks.len() / GROUP
     }
 
     /// One block of one of the 48 sprites.
-    pub(super) fn strip(&self, block: usize, sprite: usize) -> &'a [Line] {
-        let depth = (self.n_lines - block * BLOCK).min(BLOCK);
-        &self.lines[block * BLOCK * GROUP + sprite * depth..][..depth]
+    pub(super) fn block(&self, block: usize, sprite: usize) -> &'a Block {
+        &self.blocks[block * GROUP + sprite]
     }
 }
 
@@ -209,24 +207,16 @@ fn premultiply(sprite: &[u8], planes: Planes, out: &mut [u8]) {
 }
 
 /// Writes one sprite's bytes to its place in a group.
-fn scatter(bytes: &[u8], sprite: usize, n_lines: usize, group: &mut [Line]) {
-    for (line_idx, chunk) in bytes.chunks(64).enumerate() {
-        let line = &mut group[place(sprite, line_idx, n_lines)].0;
-        line[..chunk.len()].copy_from_slice(chunk);
+fn scatter(bytes: &[u8], sprite: usize, group: &mut [Block]) {
+    for (block_idx, chunk) in bytes.chunks(BLOCK).enumerate() {
+        group[block_idx * GROUP + sprite].0[..chunk.len()].copy_from_slice(chunk);
     }
 }
 
 /// Reads one sprite's bytes from a group.
 fn gather(group: Group<'_>, sprite: usize, bytes: &mut [u8]) {
-    for (line_idx, chunk) in bytes.chunks_mut(64).enumerate() {
-        let line = &group.lines[place(sprite, line_idx, group.n_lines)].0;
-        chunk.copy_from_slice(&line[..chunk.len()]);
+    for (block_idx, chunk) in bytes.chunks_mut(BLOCK).enumerate() {
+        let block = group.block(block_idx, sprite);
+        chunk.copy_from_slice(&block.0[..chunk.len()]);
     }
-}
-
-/// Where a sprite's line lies in its group.
-fn place(sprite: usize, line_idx: usize, n_lines: usize) -> usize {
-    let block = line_idx / BLOCK;
-    let depth = (n_lines - block * BLOCK).min(BLOCK);
-    block * BLOCK * GROUP + sprite * depth + line_idx % BLOCK
 }

@@ -63,8 +63,8 @@ pub fn connect(
     let clip_frames = params.clip_frames_at(poses.fps);
     let pixels = ComparedSprites::new(sprites, poses, params.planes);
     let clips = Clips::new(sprites, poses, clip_frames);
-    let natural_step = natural_step(&pixels, &clips);
-    let rungs = rungs(params, natural_step);
+    let steps = natural_steps(&pixels, &clips);
+    let rungs = rungs(params, steps);
     let search = Search {
         distances: Distances {
             pixels: &pixels,
@@ -79,7 +79,7 @@ pub fn connect(
     let found = search
         .run(&rungs, params.mirror, progress)
         .map_err(|Cancelled| Error::Cancelled)?;
-    Ok(choose(found, &rungs, &clips, natural_step, poses.fps))
+    Ok(choose(found, &rungs, &clips, steps.median, poses.fps))
 }
 
 /// Which frames and clips can be used.
@@ -116,7 +116,13 @@ impl Clips {
 }
 
 /// How much the animal changes from one frame to the next.
-fn natural_step(pixels: &ComparedSprites, clips: &Clips) -> u64 {
+#[derive(Clone, Copy)]
+struct NaturalSteps {
+    median: u64,
+    p99: u64,
+}
+
+fn natural_steps(pixels: &ComparedSprites, clips: &Clips) -> NaturalSteps {
     let steps: Vec<u64> = (1..pixels.n_frames())
         .map(|frame_idx| pixels.sad(frame_idx - 1, frame_idx))
         .collect();
@@ -126,11 +132,15 @@ fn natural_step(pixels: &ComparedSprites, clips: &Clips) -> u64 {
         .filter(|(_, present)| present[0] && present[1])
         .map(|(steps, _)| steps.iter().sum())
         .collect();
-    if of_clips.is_empty() {
-        return 0;
+    of_clips.sort_unstable();
+    let at = |percent: usize| {
+        let rank = of_clips.len().saturating_sub(1) * percent / 100;
+        of_clips.get(rank).copied().unwrap_or(0)
+    };
+    NaturalSteps {
+        median: at(50),
+        p99: at(99),
     }
-    let middle = (of_clips.len() - 1) / 2;
-    *of_clips.select_nth_unstable(middle).1
 }
 
 /// An epsilon to try, and the kappa that it comes from.
@@ -139,7 +149,10 @@ struct Rung {
     epsilon: u64,
 }
 
-fn rungs(params: &Params, natural_step: u64) -> Vec<Rung> {
+/// The epsilons to try, the strictest first. An animal that rests most of the time has a natural step
+/// of nearly nothing: for it the last rung is the 99th percentile of its steps, what it changes by
+/// when it moves.
+fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
     if let Some(epsilon) = params.epsilon {
         return vec![Rung {
             kappa: None,
@@ -147,12 +160,15 @@ fn rungs(params: &Params, natural_step: u64) -> Vec<Rung> {
         }];
     }
     let larger = KAPPA_LADDER.into_iter().filter(|&k| k > params.kappa);
+    let liveliest = steps.p99 as f64 / steps.median.max(1) as f64;
+    let highest = KAPPA_LADDER[KAPPA_LADDER.len() - 1].max(params.kappa);
     std::iter::once(params.kappa)
         .chain(larger)
+        .chain((liveliest > highest).then_some(liveliest))
         .map(|kappa| Rung {
             kappa: Some(kappa),
             // D is whole: D < kappa * step is D < the next whole number.
-            epsilon: (kappa * natural_step as f64).ceil() as u64,
+            epsilon: (kappa * steps.median as f64).ceil() as u64,
         })
         .collect()
 }
@@ -200,7 +216,12 @@ impl Search<'_> {
         found: &mut Found,
     ) -> Result<(), Cancelled> {
         let limit = rungs.iter().map(|rung| rung.epsilon).max().unwrap_or(0);
-        let mut minima = LocalMinima::new(&self.clips.usable, limit);
+        let least_gap = if side == Side::Plain {
+            self.least_gap
+        } else {
+            0
+        };
+        let mut minima = LocalMinima::new(&self.clips.usable, least_gap, limit);
         let distances = Distances {
             side,
             ..self.distances
@@ -230,9 +251,6 @@ impl Search<'_> {
 
     fn transition(&self, pair: ClipPair, side: Side) -> Option<Transition> {
         let mirrored = side == Side::Mirrored;
-        if !mirrored && pair.to - pair.from < self.least_gap {
-            return None;
-        }
         let heading_gap_rad = self.gate.pass(pair.from, pair.to, mirrored)?;
         Some(Transition {
             from: pair.from as u32,

@@ -30,8 +30,8 @@ impl Calibration {
     pub fn of(library: &Library, motion: &[FrameMotion], params: &Params) -> Calibration {
         let stats = &library.stats;
         let [slow, cruise, fast] = stats.speed_bl_per_s.unwrap_or([0.5, 1.0, 1.5]);
-        // An animal that mostly sits still would make a flock of statues: it moves at half its best.
-        let cruise = cruise.max(0.5 * fast).max(0.05);
+        // An animal that mostly sits still would make a flock of statues: a quarter of its best.
+        let cruise = cruise.max(0.25 * fast).max(0.05);
         Calibration {
             length_px: rounded(stats.length_px.unwrap_or(1.0).max(1.0), 2),
             cruise_bl_per_s: cruise,

@@ -189,13 +189,8 @@ impl<'a> Boids<'a> {
             leads_for_s,
         };
         next.position = add_scaled(position, self.step_s, next.velocity);
-        let met = self
-            .tank
+        self.tank
             .keep_inside(&mut next.position, &mut next.velocity);
-        if met {
-            // Along the wall, or aside where it was met head-on.
-            next.velocity = self.within_limits(next.velocity, aside);
-        }
         next
     }
 

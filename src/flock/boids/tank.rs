@@ -102,8 +102,8 @@ impl Tank {
         push
     }
 
-    /// Puts a position inside; the part of the velocity that leads out is taken away. True when a
-    /// wall was met.
+    /// Puts a position inside and reflects the part of the velocity that leads out: who only lost it
+    /// would be caught in corners, never getting round. True when a wall was met.
     pub fn keep_inside(&self, position: &mut Vec3, velocity: &mut Vec3) -> bool {
         let mut met = false;
         // A few rounds settle corners of the seen area; the box's own walls come last and hold.
@@ -114,7 +114,7 @@ impl Tank {
                     let outward_speed = dot(wall.outward, *velocity).max(0.0);
                     for axis in 0..3 {
                         position[axis] -= beyond * wall.outward[axis];
-                        velocity[axis] -= outward_speed * wall.outward[axis];
+                        velocity[axis] -= 2.0 * outward_speed * wall.outward[axis];
                     }
                     met = true;
                 }

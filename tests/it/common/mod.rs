@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod clip;
+pub mod film;
 pub mod process;
 
 pub use app::TestApp;

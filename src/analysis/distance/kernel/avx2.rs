@@ -8,7 +8,10 @@
 use std::arch::x86_64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::Line;
+use crate::analysis::distance::pixels::{BLOCK, Block};
+
+/// Loads of 32 bytes in a block.
+const STEPS: usize = BLOCK / 32;
 
 /// As `scalar::sad_tile`. Panics where AVX2 is missing.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
@@ -22,9 +25,9 @@ fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
     for block in 0..tile.rows.n_blocks() {
         // Groups are padded to 48 sprites, so steps of 4 and 2 never leave them.
         for row in (0..tile.rows.n_sprites).step_by(4) {
-            let a = [0, 1, 2, 3].map(|k| tile.rows.strip(block, row + k));
+            let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             for column in tile.columns_of(row).step_by(2) {
-                let b = [0, 1].map(|k| tile.columns.strip(block, column + k));
+                let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
                 for (k, sums_of_column) in sad_4x2(a, b).into_iter().enumerate() {
                     for (r, sum) in sums_of_column.into_iter().enumerate() {
                         sums[row + r][column + k] += u64::from(sum);
@@ -35,29 +38,23 @@ fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
     }
 }
 
-/// The sums of four strips against two: `[column][row]`.
+/// The sums of four blocks against two: `[column][row]`.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn sad_4x2(a: [&[Line]; 4], b: [&[Line]; 2]) -> [[u32; 4]; 2] {
+fn sad_4x2(a: [&Block; 4], b: [&Block; 2]) -> [[u32; 4]; 2] {
     let mut sums = [[_mm256_setzero_si256(); 4]; 2];
-    let depth = b[0].len();
-    // Slices of one length, so that the loop needs no bounds checks.
-    let [a0, a1, a2, a3] = a.map(|strip| &strip[..depth]);
-    let [b0, b1] = b.map(|strip| &strip[..depth]);
-    for line in 0..depth {
-        for half in [0, 1] {
-            let a = [
-                load(&a0[line], half),
-                load(&a1[line], half),
-                load(&a2[line], half),
-                load(&a3[line], half),
-            ];
-            let b = [load(&b0[line], half), load(&b1[line], half)];
-            for column in 0..2 {
-                for row in 0..4 {
-                    let sad = _mm256_sad_epu8(a[row], b[column]);
-                    sums[column][row] = _mm256_add_epi64(sums[column][row], sad);
-                }
+    for step in 0..STEPS {
+        let a = [
+            load(a[0], step),
+            load(a[1], step),
+            load(a[2], step),
+            load(a[3], step),
+        ];
+        let b = [load(b[0], step), load(b[1], step)];
+        for column in 0..2 {
+            for row in 0..4 {
+                let sad = _mm256_sad_epu8(a[row], b[column]);
+                sums[column][row] = _mm256_add_epi64(sums[column][row], sad);
             }
         }
     }
@@ -81,10 +78,12 @@ fn totals([a, b, c, d]: [__m256i; 4]) -> [u32; 4] {
     totals
 }
 
-/// The first or second 32 bytes of a line.
+/// 32 bytes of a block.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn load(line: &Line, half: usize) -> __m256i {
-    // SAFETY: a line is 64 bytes on a boundary of 64, so both its halves may be read whole.
-    unsafe { _mm256_load_si256(line.0.as_ptr().cast::<__m256i>().add(half)) }
+fn load(block: &Block, step: usize) -> __m256i {
+    debug_assert!(step < STEPS, "a block has 32 steps");
+    // SAFETY: callers count `step` below STEPS, so the 32 bytes lie inside the block, which stands
+    // on a boundary of 64.
+    unsafe { _mm256_load_si256(block.0.as_ptr().cast::<__m256i>().add(step)) }
 }

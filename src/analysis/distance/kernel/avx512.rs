@@ -1,5 +1,5 @@
-//! AVX-512 BW: a line of 64 bytes to an instruction, a register tile of 4 x 4 sprites out of the 32
-//! registers. A block of 16 lines keeps every 64-bit lane below 2^15, a total below 2^18.
+//! AVX-512 BW: 64 bytes to an instruction, a register tile of 4 x 4 sprites out of the 32
+//! registers. The 16 steps of a block keep every 64-bit lane below 2^15, a total below 2^18.
 #![expect(
     unsafe_code,
     reason = "vector loads and the call into code for AVX-512"
@@ -8,7 +8,10 @@
 use std::arch::x86_64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::Line;
+use crate::analysis::distance::pixels::{BLOCK, Block};
+
+/// Loads of 64 bytes in a block.
+const STEPS: usize = BLOCK / 64;
 
 /// As `scalar::sad_tile`. Panics where AVX-512 BW is missing.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
@@ -25,9 +28,9 @@ fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
     for block in 0..tile.rows.n_blocks() {
         // Groups are padded to 48 sprites, so steps of 4 never leave them.
         for row in (0..tile.rows.n_sprites).step_by(4) {
-            let a = [0, 1, 2, 3].map(|k| tile.rows.strip(block, row + k));
+            let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             for column in tile.columns_of(row).step_by(4) {
-                let b = [0, 1, 2, 3].map(|k| tile.columns.strip(block, column + k));
+                let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
                 for (r, totals) in sad_4x4(a, b).into_iter().enumerate() {
                     for (k, total) in totals.into_iter().enumerate() {
                         sums[row + r][column + k] += total;
@@ -38,27 +41,23 @@ fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
     }
 }
 
-/// The sums of four strips against four: `[row][column]`.
+/// The sums of four blocks against four: `[row][column]`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
-fn sad_4x4(a: [&[Line]; 4], b: [&[Line]; 4]) -> [[u64; 4]; 4] {
+fn sad_4x4(a: [&Block; 4], b: [&Block; 4]) -> [[u64; 4]; 4] {
     let mut sums = [[_mm512_setzero_si512(); 4]; 4];
-    let depth = b[0].len();
-    // Slices of one length, so that the loop needs no bounds checks.
-    let [a0, a1, a2, a3] = a.map(|strip| &strip[..depth]);
-    let [b0, b1, b2, b3] = b.map(|strip| &strip[..depth]);
-    for line in 0..depth {
+    for step in 0..STEPS {
         let a = [
-            load(&a0[line]),
-            load(&a1[line]),
-            load(&a2[line]),
-            load(&a3[line]),
+            load(a[0], step),
+            load(a[1], step),
+            load(a[2], step),
+            load(a[3], step),
         ];
         let b = [
-            load(&b0[line]),
-            load(&b1[line]),
-            load(&b2[line]),
-            load(&b3[line]),
+            load(b[0], step),
+            load(b[1], step),
+            load(b[2], step),
+            load(b[3], step),
         ];
         for row in 0..4 {
             for column in 0..4 {
@@ -76,10 +75,12 @@ fn sad_4x4(a: [&[Line]; 4], b: [&[Line]; 4]) -> [[u64; 4]; 4] {
     totals
 }
 
-/// A line.
+/// 64 bytes of a block.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
-fn load(line: &Line) -> __m512i {
-    // SAFETY: a line is 64 bytes on a boundary of 64.
-    unsafe { _mm512_load_si512(line.0.as_ptr().cast()) }
+fn load(block: &Block, step: usize) -> __m512i {
+    debug_assert!(step < STEPS, "a block has 16 steps");
+    // SAFETY: callers count `step` below STEPS, so the 64 bytes lie inside the block, which stands
+    // on a boundary of 64.
+    unsafe { _mm512_load_si512(block.0.as_ptr().cast::<__m512i>().add(step)) }
 }

@@ -6,7 +6,10 @@
 use std::arch::aarch64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::Line;
+use crate::analysis::distance::pixels::{BLOCK, Block};
+
+/// Loads of 16 bytes in a block.
+const STEPS: usize = BLOCK / 16;
 
 /// As `scalar::sad_tile`.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
@@ -19,9 +22,9 @@ fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
     for block in 0..tile.rows.n_blocks() {
         // Groups are padded to 48 sprites, so steps of 2 and 4 never leave them.
         for row in (0..tile.rows.n_sprites).step_by(2) {
-            let a = [0, 1].map(|k| tile.rows.strip(block, row + k));
+            let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             for column in tile.columns_of(row).step_by(4) {
-                let b = [0, 1, 2, 3].map(|k| tile.columns.strip(block, column + k));
+                let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
                 for (r, totals) in sad_2x4(a, b).into_iter().enumerate() {
                     for (k, total) in totals.into_iter().enumerate() {
                         sums[row + r][column + k] += u64::from(total);
@@ -32,29 +35,23 @@ fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
     }
 }
 
-/// The sums of two strips against four: `[row][column]`.
+/// The sums of two blocks against four: `[row][column]`.
 #[inline]
 #[target_feature(enable = "neon")]
-fn sad_2x4(a: [&[Line]; 2], b: [&[Line]; 4]) -> [[u32; 4]; 2] {
+fn sad_2x4(a: [&Block; 2], b: [&Block; 4]) -> [[u32; 4]; 2] {
     let mut sums = [[vdupq_n_u16(0); 4]; 2];
-    let depth = b[0].len();
-    // Slices of one length, so that the loop needs no bounds checks.
-    let [a0, a1] = a.map(|strip| &strip[..depth]);
-    let [b0, b1, b2, b3] = b.map(|strip| &strip[..depth]);
-    for line in 0..depth {
-        for quarter in 0..4 {
-            let a = [load(&a0[line], quarter), load(&a1[line], quarter)];
-            let b = [
-                load(&b0[line], quarter),
-                load(&b1[line], quarter),
-                load(&b2[line], quarter),
-                load(&b3[line], quarter),
-            ];
-            for row in 0..2 {
-                for column in 0..4 {
-                    let difference = vabdq_u8(a[row], b[column]);
-                    sums[row][column] = vpadalq_u8(sums[row][column], difference);
-                }
+    for step in 0..STEPS {
+        let a = [load(a[0], step), load(a[1], step)];
+        let b = [
+            load(b[0], step),
+            load(b[1], step),
+            load(b[2], step),
+            load(b[3], step),
+        ];
+        for row in 0..2 {
+            for column in 0..4 {
+                let difference = vabdq_u8(a[row], b[column]);
+                sums[row][column] = vpadalq_u8(sums[row][column], difference);
             }
         }
     }
@@ -67,11 +64,11 @@ fn sad_2x4(a: [&[Line]; 2], b: [&[Line]; 4]) -> [[u32; 4]; 2] {
     totals
 }
 
-/// A quarter, 0 to 3, of a line.
+/// 16 bytes of a block.
 #[inline]
 #[target_feature(enable = "neon")]
-fn load(line: &Line, quarter: usize) -> uint8x16_t {
-    assert!(quarter < 4, "a line has four quarters");
-    // SAFETY: the line's 64 bytes hold 16 from each quarter on.
-    unsafe { vld1q_u8(line.0.as_ptr().add(16 * quarter)) }
+fn load(block: &Block, step: usize) -> uint8x16_t {
+    debug_assert!(step < STEPS, "a block has 64 steps");
+    // SAFETY: callers count `step` below STEPS, so the 16 bytes lie inside the block.
+    unsafe { vld1q_u8(block.0.as_ptr().add(16 * step)) }
 }

@@ -1,23 +1,23 @@
 //! The sum of absolute differences in plain Rust: the definition that every other kernel equals.
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::Line;
+use crate::analysis::distance::pixels::Block;
 
 /// Adds d of every pair of the tile.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
     for block in 0..tile.rows.n_blocks() {
         for (row, sums) in sums.iter_mut().enumerate().take(tile.rows.n_sprites) {
-            let a = tile.rows.strip(block, row);
+            let a = tile.rows.block(block, row);
             for column in tile.columns_of(row) {
-                let b = tile.columns.strip(block, column);
-                sums[column] += a.iter().zip(b).map(|(a, b)| sad_line(a, b)).sum::<u64>();
+                let b = tile.columns.block(block, column);
+                sums[column] += sad_block(a, b);
             }
         }
     }
 }
 
-/// The sum over 64 bytes of |a - b|.
-pub(in crate::analysis::distance) fn sad_line(a: &Line, b: &Line) -> u64 {
+/// The sum over a block of |a - b|.
+pub(in crate::analysis::distance) fn sad_block(a: &Block, b: &Block) -> u64 {
     let differences = a.0.iter().zip(&b.0).map(|(a, b)| u32::from(a.abs_diff(*b)));
     u64::from(differences.sum::<u32>())
 }

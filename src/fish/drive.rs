@@ -1,0 +1,310 @@
+//! Poses to motion: the virtual fish placed and turned as the animal was measured, bent by its
+//! midline or by a swimming wave of the measured speed (N 7; ALGORITHMS.md 4, virtual fish).
+//!
+//! With a calibrated camera the fish moves in space. Without one nothing is known of its depth: it
+//! swims at a constant distance from an assumed camera, as long in the picture as the animal, and
+//! turns about by way of the camera when the heading changes sides. Short gaps are bridged, longer
+//! ones hide it.
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
+
+use super::error::Error;
+use super::motion::{Motion, Posture, bank_rad, rotation_of, same_side, slerp};
+use super::params::Params;
+use super::spine::{N_JOINTS, Swimming, effort_at, joint_angles_of_midline_rad, tail_beat_hz};
+use crate::geometry::Camera;
+use crate::library::{Animal, Pose, Poses, View};
+
+/// The motion of the virtual fish. Fails on parameters out of range, and when the animal was found
+/// in no frame.
+pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
+    params.check().map_err(Error::InvalidParams)?;
+    let stage = Stage::of(poses, params)?;
+    let measured = place_all(poses, &stage, params);
+    let bridged = bridge(&measured, (params.bridge_s * poses.fps).round() as usize);
+    let smooth = smoothed(&bridged, params.smooth_s * poses.fps);
+    Ok(Motion {
+        fps: poses.fps,
+        image_size_px: poses.image_size_px,
+        camera: stage.camera,
+        size: stage.size,
+        palette: params.palette,
+        frames: swim(&smooth, &stage, params),
+    })
+}
+
+/// What holds for all frames.
+struct Stage {
+    fps: f64,
+    view: View,
+    camera: Camera,
+    size: Animal,
+    /// Apparent depth at which a fish is put whose depth was not measured.
+    z_apparent_m: f64,
+    /// Length of the animal seen broadside, pixels.
+    length_px: f64,
+}
+
+impl Stage {
+    fn of(poses: &Poses, params: &Params) -> Result<Stage, Error> {
+        let mut lengths_px: Vec<f64> = poses.frames.iter().filter_map(|p| p.length_px).collect();
+        lengths_px.sort_by(f64::total_cmp);
+        let found = poses.frames.iter().any(Pose::detected);
+        if !found {
+            return Err(Error::NothingMoves {
+                n_frames: poses.frames.len(),
+            });
+        }
+        let [width, height] = poses.image_size_px.map(f64::from);
+        // The 90th percentile: a fish is seen shorter than it is, rarely longer.
+        let rank = lengths_px.len() * 9 / 10;
+        let length_px = lengths_px.get(rank).copied().unwrap_or(0.15 * width);
+        let size = params.size(poses.animal);
+        let camera = poses.camera.unwrap_or(Camera {
+            z_min_m: ASSUMED_DISTANCE_BL * size.length_m,
+            pane_px_per_m: length_px / size.length_m,
+            center_px: [0.5 * width, 0.5 * height],
+            medium_index: 1.0,
+        });
+        Ok(Stage {
+            fps: poses.fps,
+            view: poses.view,
+            z_apparent_m: size.length_m * camera.focal_px() / length_px,
+            camera,
+            size,
+            length_px,
+        })
+    }
+}
+
+/// How far away an assumed camera stands, body lengths.
+const ASSUMED_DISTANCE_BL: f64 = 10.0;
+
+/// Where and how the fish is in one frame, before it swims.
+#[derive(Clone, Copy, Debug)]
+struct Placement {
+    position_m: DVec3,
+    rotation: DQuat,
+    joint_angles_rad: Option<[f64; N_JOINTS]>,
+}
+
+fn place_all(poses: &Poses, stage: &Stage, params: &Params) -> Vec<Option<Placement>> {
+    let headings = match stage.view {
+        View::Side => headings_in_image(&poses.frames, stage, params),
+        View::Top => Vec::new(),
+    };
+    let place = |(k, pose): (usize, &Pose)| {
+        let position_m = position_of(pose, stage)?;
+        let rotation = match (stage.view, pose.forward) {
+            (View::Top, _) => seen_from_above(pose.heading_rad?),
+            (View::Side, Some(forward)) => upright_along(DVec3::from(forward)),
+            (View::Side, None) => upright_along(toward_camera(headings[k]?)),
+        };
+        let midline = pose.midline_px.as_ref().filter(|_| stage.view == View::Top);
+        Some(Placement {
+            position_m,
+            rotation,
+            joint_angles_rad: midline
+                .and_then(|m| joint_angles_of_midline_rad(m, pose.heading_rad?)),
+        })
+    };
+    poses.frames.iter().enumerate().map(place).collect()
+}
+
+fn position_of(pose: &Pose, stage: &Stage) -> Option<DVec3> {
+    let by_centroid = |px| stage.camera.point_in_camera(px, stage.z_apparent_m);
+    let point = pose.position_m.or(pose.centroid_px.map(by_centroid))?;
+    Some(DVec3::from(point))
+}
+
+/// Headings as vectors in the image, shorter where the fish is seen foreshortened, smoothed: when
+/// the fish turns about they pass through zero instead of jumping.
+fn headings_in_image(frames: &[Pose], stage: &Stage, params: &Params) -> Vec<Option<DVec2>> {
+    let vectors: Vec<Option<DVec2>> = frames
+        .iter()
+        .map(|pose| {
+            let heading = pose.heading_rad?;
+            let seen = pose.length_px.map_or(1.0, |l| (1.1 * l / stage.length_px).min(1.0));
+            Some(seen * DVec2::new(libm::cos(heading), libm::sin(heading)))
+        })
+        .collect();
+    let sigma_frames = params.smooth_s.max(LEAST_TURN_S) * stage.fps;
+    (0..frames.len())
+        .map(|k| vectors[k].map(|_| weighted_mean(&vectors, k, sigma_frames)))
+        .collect()
+}
+
+/// Smoothing of headings that are known in the image alone, seconds: a fish turns about in three
+/// times as long.
+const LEAST_TURN_S: f64 = 0.08;
+
+fn weighted_mean(values: &[Option<DVec2>], middle: usize, sigma_frames: f64) -> DVec2 {
+    let (mut sum, mut total) = (DVec2::ZERO, 0.0);
+    for (k, weight) in window(values.len(), middle, sigma_frames) {
+        if let Some(value) = values[k] {
+            sum += weight * value;
+            total += weight;
+        }
+    }
+    sum / total
+}
+
+/// The direction in space of a heading vector of length 0..=1: what is missing points to the camera.
+fn toward_camera(heading: DVec2) -> DVec3 {
+    let depth = (1.0 - heading.length_squared()).max(0.0).sqrt();
+    DVec3::new(heading.x, heading.y, -depth)
+}
+
+fn upright_along(forward: DVec3) -> DQuat {
+    let pitch = libm::asin(forward.y.clamp(-1.0, 1.0));
+    rotation_of(libm::atan2(forward.z, forward.x), pitch, 0.0)
+}
+
+/// Heading in the image plane, back to the camera.
+fn seen_from_above(heading_rad: f64) -> DQuat {
+    let forward = DVec3::new(libm::cos(heading_rad), libm::sin(heading_rad), 0.0);
+    DQuat::from_mat3(&DMat3::from_cols(forward, DVec3::Z, forward.cross(DVec3::Z)))
+}
+
+/// Fills gaps of at most `longest` frames between two known ones.
+fn bridge(measured: &[Option<Placement>], longest: usize) -> Vec<Option<Placement>> {
+    let mut bridged = measured.to_vec();
+    let known: Vec<usize> = (0..measured.len()).filter(|&k| measured[k].is_some()).collect();
+    for pair in known.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let (Some(a), Some(b)) = (measured[from], measured[to]) else {
+            continue;
+        };
+        if to - from - 1 > longest {
+            continue;
+        }
+        for (k, slot) in bridged.iter_mut().enumerate().take(to).skip(from + 1) {
+            *slot = Some(between(&a, &b, (k - from) as f64 / (to - from) as f64));
+        }
+    }
+    bridged
+}
+
+fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
+    let joints = a.joint_angles_rad.zip(b.joint_angles_rad);
+    Placement {
+        position_m: a.position_m.lerp(b.position_m, share),
+        rotation: slerp(a.rotation, b.rotation, share),
+        joint_angles_rad: joints
+            .map(|(a, b)| std::array::from_fn(|j| a[j] + share * (b[j] - a[j]))),
+    }
+}
+
+/// Gaussian means over time, within each unbroken run.
+fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<Placement>> {
+    let around = |k: usize| {
+        let middle = placements[k]?;
+        let (mut position, mut turn, mut total) = (DVec3::ZERO, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), 0.0);
+        let unbroken = |other: usize| {
+            let (lo, hi) = (other.min(k), other.max(k));
+            placements[lo..=hi].iter().all(Option::is_some)
+        };
+        for (other, weight) in window(placements.len(), k, sigma_frames) {
+            let Some(near) = placements[other].filter(|_| unbroken(other)) else {
+                continue;
+            };
+            position += weight * near.position_m;
+            turn = turn + same_side(middle.rotation, near.rotation) * weight;
+            total += weight;
+        }
+        Some(Placement {
+            position_m: position / total,
+            rotation: turn.normalize(),
+            ..middle
+        })
+    };
+    (0..placements.len()).map(around).collect()
+}
+
+/// Indices within three standard deviations of `middle`, with their weights.
+fn window(n: usize, middle: usize, sigma_frames: f64) -> impl Iterator<Item = (usize, f64)> {
+    let reach = (3.0 * sigma_frames).floor() as usize;
+    (middle.saturating_sub(reach)..(middle + reach + 1).min(n)).map(move |k| {
+        let off = (k as f64 - middle as f64) / sigma_frames.max(1e-9);
+        (k, libm::exp(-0.5 * off * off))
+    })
+}
+
+/// Bends and banks the fish as fast as it moves and turns; where it is unknown, hides it.
+fn swim(placements: &[Option<Placement>], stage: &Stage, params: &Params) -> Vec<Posture> {
+    let mut phase_turns = 0.0;
+    let mut speed_bl_per_s = 0.0;
+    let first = placements.iter().flatten().next();
+    let mut last = first.map_or(Posture::at(DVec3::Z, DQuat::IDENTITY), |p| {
+        Posture::at(p.position_m, p.rotation)
+    });
+    let mut frames = Vec::with_capacity(placements.len());
+    for k in 0..placements.len() {
+        let Some(here) = placements[k] else {
+            last.visible = false;
+            frames.push(last);
+            continue;
+        };
+        let moving = Moving::around(placements, k, stage.fps);
+        let new_speed = moving.speed_m_per_s.max(0.0) / stage.size.length_m;
+        // The tail answers within a fifth of a second; measured speeds are noisier than that.
+        speed_bl_per_s += (new_speed - speed_bl_per_s) * (5.0 / stage.fps).min(1.0);
+        phase_turns += tail_beat_hz(speed_bl_per_s).min(0.45 * stage.fps) / stage.fps;
+        let swimming = Swimming {
+            phase_turns,
+            effort: effort_at(speed_bl_per_s),
+            turn_rad_per_s: moving.turn_rad_per_s,
+        };
+        let roll = match stage.view {
+            View::Side => bank_rad(moving.turn_rad_per_s, moving.speed_m_per_s, params.bank_rad),
+            View::Top => 0.0,
+        };
+        let rotation = here.rotation * rotation_of(0.0, 0.0, roll);
+        last = Posture {
+            position_m: here.position_m,
+            rotation: same_side(last.rotation, rotation),
+            joint_angles_rad: match params.swim {
+                true => here.joint_angles_rad.unwrap_or(swimming.joint_angles_rad()),
+                false => [0.0; N_JOINTS],
+            },
+            visible: true,
+        };
+        frames.push(last);
+    }
+    frames
+}
+
+/// How the fish moves about one frame.
+struct Moving {
+    /// Along its own direction, metres a second.
+    speed_m_per_s: f64,
+    /// To its left, radians a second.
+    turn_rad_per_s: f64,
+}
+
+impl Moving {
+    /// From the neighbors that are known; at rest where there are none.
+    fn around(placements: &[Option<Placement>], k: usize, fps: f64) -> Moving {
+        let known = |k: usize| placements.get(k).copied().flatten();
+        let (before, after) = (known(k.wrapping_sub(1)).or(known(k)), known(k + 1).or(known(k)));
+        let n_steps = [k.wrapping_sub(1), k + 1].into_iter().filter(|&n| known(n).is_some()).count();
+        match (before, known(k), after) {
+            (Some(a), Some(here), Some(b)) if n_steps > 0 => {
+                let per_s = fps / n_steps as f64;
+                let turned = (b.rotation * DVec3::X - a.rotation * DVec3::X) * per_s;
+                let step = (b.position_m - a.position_m) * per_s;
+                Moving {
+                    speed_m_per_s: step.dot(here.rotation * DVec3::X),
+                    turn_rad_per_s: turned.dot(here.rotation * DVec3::Z),
+                }
+            }
+            _ => Moving {
+                speed_m_per_s: 0.0,
+                turn_rad_per_s: 0.0,
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,143 @@
+//! What driving promises: the fish is where the animal was, points where it pointed, and hides
+//! where nothing is known.
+
+use std::f64::consts::PI;
+
+use super::*;
+use crate::fish::sample::{SampleFilm, SampleParams};
+
+fn truth(n_frames: usize) -> (SampleFilm, Poses) {
+    let params = SampleParams {
+        n_frames,
+        width: 320,
+        height: 240,
+        ..SampleParams::default()
+    };
+    let film = SampleFilm::new(params).expect("in range");
+    let poses = film.truth();
+    (film, poses)
+}
+
+/// A fish that crosses the image to the right, turns about and comes back; no camera.
+fn uncalibrated(view: View) -> Poses {
+    let frames = (0..120).map(|k| {
+        let t = f64::from(k);
+        let (x, heading) = if k < 60 { (20.0 + t, 0.0) } else { (140.0 - t, PI) };
+        Pose {
+            centroid_px: Some([x, 50.0]),
+            heading_rad: Some(heading),
+            length_px: Some(40.0),
+            ..Pose::default()
+        }
+    });
+    Poses {
+        fps: 30.0,
+        image_size_px: [160, 100],
+        view,
+        camera: None,
+        animal: None,
+        frames: frames.collect(),
+    }
+}
+
+#[test]
+fn driven_by_the_truth_it_lies_where_the_sample_fish_lay() {
+    let (film, poses) = truth(150);
+    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    for (k, (got, want)) in motion.frames.iter().zip(&film.motion().frames).enumerate() {
+        assert!(got.visible);
+        assert!((got.position_m - want.position_m).length() < 0.004, "frame {k}");
+        assert!(got.forward().angle_between(want.forward()) < 0.12, "frame {k}");
+    }
+}
+
+#[test]
+fn without_smoothing_and_bank_the_measured_values_come_through_unchanged() {
+    let (_, poses) = truth(30);
+    let motion = drive(&poses, &Params::papers()).expect("it was seen");
+    for (got, pose) in motion.frames.iter().zip(&poses.frames) {
+        let (position, forward) = (pose.position_m.expect("true"), pose.forward.expect("true"));
+        assert!((got.position_m - DVec3::from(position)).length() < 1e-12);
+        assert!((got.forward() - DVec3::from(forward)).length() < 1e-9);
+        assert_eq!(got.joint_angles_rad, [0.0; N_JOINTS]);
+    }
+}
+
+#[test]
+fn quaternions_never_change_sides() {
+    let (_, poses) = truth(600);
+    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    for pair in motion.frames.windows(2) {
+        assert!(pair[0].rotation.dot(pair[1].rotation) > 0.9);
+        assert!((pair[1].rotation.length() - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn short_gaps_are_bridged_and_long_ones_hide_the_fish() {
+    let (film, mut poses) = truth(120);
+    for k in (20..30).chain(60..90) {
+        poses.frames[k] = Pose::default();
+    }
+    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    for (k, posture) in motion.frames.iter().enumerate() {
+        assert_eq!(posture.visible, !(60..90).contains(&k), "frame {k}");
+    }
+    for k in 20..30 {
+        let gap = motion.frames[k].position_m - film.motion().frames[k].position_m;
+        assert!(gap.length() < 0.02, "frame {k}: {}", gap.length());
+    }
+}
+
+#[test]
+fn without_a_camera_it_is_seen_where_the_animal_was_and_as_long() {
+    let poses = uncalibrated(View::Side);
+    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    for (posture, pose) in motion.frames.iter().zip(&poses.frames) {
+        let [x, y] = motion.camera.image_from_camera(posture.position_m.to_array());
+        let [cx, cy] = pose.centroid_px.expect("seen");
+        assert!((x - cx).hypot(y - cy) < 1.5);
+    }
+    let length_px = motion.size.length_m * motion.camera.focal_px() / motion.frames[0].position_m.z;
+    assert!((length_px - 40.0).abs() < 1e-9);
+}
+
+#[test]
+fn turning_about_it_passes_by_the_camera_upright() {
+    let motion = drive(&uncalibrated(View::Side), &Params::default()).expect("it was seen");
+    let facing_camera = motion.frames.iter().any(|p| p.forward().z < -0.8);
+    assert!(facing_camera, "it does not flip from one side to the other");
+    for pair in motion.frames.windows(2) {
+        assert!((pair[1].rotation * DVec3::Y).y > 0.9, "the belly stays below");
+        assert!(pair[0].forward().angle_between(pair[1].forward()) < 0.8);
+    }
+}
+
+#[test]
+fn seen_from_above_it_shows_its_back() {
+    let motion = drive(&uncalibrated(View::Top), &Params::default()).expect("it was seen");
+    for posture in &motion.frames {
+        assert!((posture.rotation * DVec3::Y).z > 0.999, "the belly faces away");
+        assert!(posture.forward().x.abs() > 0.99 || posture.forward().z.abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_midline_bends_it() {
+    let mut poses = uncalibrated(View::Top);
+    for pose in &mut poses.frames[..60] {
+        let [x, y] = pose.centroid_px.expect("seen");
+        let arc = (0..11).map(|k| f64::from(k) / 10.0);
+        pose.midline_px = Some(arc.map(|s| [x + 20.0 - 40.0 * s, y - 10.0 * s * s]).collect());
+    }
+    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    assert!(motion.frames[30].joint_angles_rad.iter().skip(1).all(|a| *a > 0.01));
+}
+
+#[test]
+fn an_animal_that_was_never_found_drives_nothing() {
+    let mut poses = uncalibrated(View::Side);
+    poses.frames.fill(Pose::default());
+    let refused = drive(&poses, &Params::default());
+    assert_eq!(refused, Err(Error::NothingMoves { n_frames: 120 }));
+}

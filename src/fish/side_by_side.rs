@@ -1,0 +1,56 @@
+//! The animal and its virtual twin next to each other: the real frame, put together again from
+//! sprite and background, on the left; the same moment of the virtual fish on the right (N, figures
+//! 2 and 3).
+
+use super::film::Film;
+use crate::geometry::Rect;
+use crate::library::Library;
+use crate::raster::{Frame, RgbImage};
+
+/// Draws frame `frame_idx` of both into one frame twice as wide. Panics beyond the last frame of
+/// either, and when the two differ in size.
+pub fn render(library: &Library, film: &Film, frame_idx: usize, frame: &mut Frame) {
+    let real = real_frame(library, frame_idx);
+    let mut twin = film.background().clone();
+    film.draw(frame_idx).over(&mut twin);
+    assert_eq!((real.width, real.height), (twin.width, twin.height), "sizes differ");
+    let (width, height) = (2 * real.width, real.height);
+    let mut both = RgbImage::new(width, height);
+    let row_bytes = real.width as usize * 3;
+    let sides = real.pixels.chunks_exact(row_bytes).zip(twin.pixels.chunks_exact(row_bytes));
+    for (row, (left, right)) in both.pixels.chunks_exact_mut(2 * row_bytes).zip(sides) {
+        row[..row_bytes].copy_from_slice(left);
+        row[row_bytes..].copy_from_slice(right);
+    }
+    if (frame.width, frame.height) != (width, height) {
+        *frame = Frame::new(width, height, frame.color);
+    }
+    frame.draw_rgb(&both, Rect::of_size(width, height));
+}
+
+/// The background with the animal of one frame laid back where it was, to the nearest pixel.
+fn real_frame(library: &Library, frame_idx: usize) -> RgbImage {
+    let mut image = library.background.clone();
+    let sprites = &library.sprites;
+    let centroid = library.poses.frames[frame_idx].centroid_px;
+    let Some([cx, cy]) = centroid.filter(|_| sprites.is_present(frame_idx)) else {
+        return image;
+    };
+    let left = (cx - f64::from(sprites.width()) / 2.0).round() as i64;
+    let top = (cy - f64::from(sprites.height()) / 2.0).round() as i64;
+    let rows = sprites.sprite(frame_idx).chunks_exact(sprites.width().max(1) as usize * 4);
+    for (y, row) in (top..).zip(rows) {
+        for (x, rgba) in (left..).zip(row.chunks_exact(4)) {
+            let inside = (0..i64::from(image.width)).contains(&x) && (0..i64::from(image.height)).contains(&y);
+            if inside && rgba[3] > 0 {
+                let under = image.pixel(x as u32, y as u32);
+                let alpha = u32::from(rgba[3]);
+                let over = |c: usize| {
+                    (u32::from(rgba[c]) * alpha + u32::from(under[c]) * (255 - alpha) + 127) / 255
+                };
+                image.set_pixel(x as u32, y as u32, [0, 1, 2].map(|c| over(c) as u8));
+            }
+        }
+    }
+    image
+}

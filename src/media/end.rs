@@ -1,0 +1,48 @@
+//! How a media child ended, and what that means for the film (RELIABILITY.md, "Reason codes").
+
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
+
+use super::error::Error;
+
+/// How a child ended.
+pub(super) struct End {
+    /// Exit code or signal.
+    pub(super) status: ExitStatus,
+    /// The last of what it said.
+    pub(super) complaint: String,
+}
+
+impl End {
+    /// What an end by failure means.
+    pub(super) fn check(self) -> Result<End, Error> {
+        const OUT_OF_MEMORY: [&str; 4] = [
+            "Cannot allocate memory",
+            "_buffer() failed",
+            "failed to map segment",
+            "thread_encoder_init failed",
+        ];
+        const SIGKILL: i32 = 9;
+        const SIGXCPU: i32 = 24;
+        const SIGXFSZ: i32 = 25;
+        let says = |what| self.complaint.contains(what);
+        match self.status.signal() {
+            None if self.status.success() => Ok(self),
+            Some(SIGXCPU) => Err(Error::TimeLimit),
+            Some(SIGXFSZ) => Err(Error::StorageFull),
+            _ if says("No space left on device") || says("Disk quota exceeded") => {
+                Err(Error::StorageFull)
+            }
+            // A kill that is not ours is the kernel's, out of memory.
+            signal if signal == Some(SIGKILL) || OUT_OF_MEMORY.into_iter().any(says) => {
+                Err(Error::MemoryLimit {
+                    complaint: self.complaint,
+                })
+            }
+            _ => Err(Error::Crashed {
+                status: self.status.to_string(),
+                complaint: self.complaint,
+            }),
+        }
+    }
+}
