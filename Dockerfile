@@ -22,9 +22,9 @@ RUN /usr/local/sbin/system-packages run health \
 COPY --from=builder /src/target/release/flockreel /usr/local/bin/flockreel
 USER 10001:10001
 VOLUME /data
-EXPOSE 8080
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
     CMD ["curl", "-fsS", "-o", "/dev/null", "http://127.0.0.1:8080/healthz"]
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["flockreel"]
-CMD ["serve", "--bind", "0.0.0.0:8080", "--data", "/data"]
+# On loopback, as there are no accounts yet: run it with `--network host` (README).
+CMD ["serve", "--data", "/data"]

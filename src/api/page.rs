@@ -1,5 +1,5 @@
-//! The page: files of `static/` inside the program (read from disk in a debug build), each with the
-//! hash of its content as its tag.
+//! The page: files of `static/`, and of the vendored libraries, inside the program (read from disk in
+//! a debug build), each with the hash of its content as its tag.
 
 use axum::Router;
 use axum::body::Body;
@@ -16,25 +16,32 @@ use crate::store::blobs::hex;
 #[folder = "static/"]
 struct Static;
 
-/// `/` and everything under `/static/`.
+/// The page's libraries, as `make vendor` left them; the page does without them.
+#[derive(RustEmbed)]
+#[folder = "target/vendor/"]
+#[allow_missing = true]
+struct Vendor;
+
+/// `/` and everything under `/static/` and `/vendor/`.
 pub(super) fn routes() -> Router<AppState> {
     Router::new()
         .route(
             "/",
-            get(|headers: HeaderMap| async move { answer("index.html", &headers) }),
+            get(|headers: HeaderMap| async move { answer::<Static>("index.html", &headers) }),
         )
-        .route("/static/{*path}", get(get_static))
+        .route("/static/{*path}", get(get_file::<Static>))
+        .route("/vendor/{*path}", get(get_file::<Vendor>))
 }
 
-async fn get_static(
+async fn get_file<Files: RustEmbed>(
     Path(path): Path<String>,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
-    answer(&path, &headers)
+    answer::<Files>(&path, &headers)
 }
 
-fn answer(path: &str, headers: &HeaderMap) -> Result<Response<Body>, Problem> {
-    let file = Static::get(path).ok_or_else(Problem::not_found)?;
+fn answer<Files: RustEmbed>(path: &str, headers: &HeaderMap) -> Result<Response<Body>, Problem> {
+    let file = Files::get(path).ok_or_else(Problem::not_found)?;
     let etag = etag(&file);
     let known = headers.get(header::IF_NONE_MATCH);
     let tags = [

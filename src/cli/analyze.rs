@@ -1,10 +1,138 @@
-//! To be written.
+//! `flockreel analyze VIDEO -o LIBRARY_DIR`: measure the animal in a video, without a server.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value, json};
+use sha2::{Digest, Sha256};
+
+use super::{Error, Listener, Summary};
+use crate::analysis::{self, Params};
+use crate::cpu;
+use crate::formats::library_json::FootageSummary;
+use crate::formats::{csv, library_dir, params};
+use crate::library::Library;
+use crate::media::{Limits, Video, read_image};
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The video: one animal before a camera that stands still.
+    video: PathBuf,
+    /// The folder to write the library to.
+    #[arg(short, long, value_name = "LIBRARY_DIR")]
+    output: PathBuf,
+    /// A picture of the scene without the animal; estimated when absent.
+    #[arg(long, value_name = "IMAGE")]
+    background: Option<PathBuf>,
+    /// The calibrated camera, as JSON: {"z_min_m": 0.7, "pane_px_per_m": 1000, ...}.
+    #[arg(long, value_name = "JSON_FILE")]
+    camera: Option<PathBuf>,
+    /// The animal's length from nose to tail tip, metres.
+    #[arg(long, value_name = "M", requires = "animal_height")]
+    animal_length: Option<f64>,
+    /// The height of the animal's whole silhouette, fins included, metres.
+    #[arg(long, value_name = "M", requires = "animal_length")]
+    animal_height: Option<f64>,
+    /// From where the animal is seen; guessed when absent.
+    #[arg(long, value_name = "side|top")]
+    view: Option<String>,
+    /// Follow the largest animal when several move.
+    #[arg(long)]
+    follow_largest: bool,
+    /// Frames in a clip.
+    #[arg(long, value_name = "F")]
+    clip_frames: Option<u32>,
+    /// Clips nearer than this are alike; a multiple of the natural step when absent.
+    #[arg(long, value_name = "E")]
+    epsilon: Option<u64>,
+    /// Start from a preset: papers.
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// Any parameter of an analysis by its name in the API, as JSON: --set threshold=25.
+    #[arg(long = "set", value_name = "NAME=JSON")]
+    set: Vec<String>,
+}
 
-/// Not there yet.
-pub fn run(_args: Args) -> Result<Option<super::Summary>, super::Error> {
-    Err(super::Error::Usage("not there yet: analyze".into()))
+/// Analyses the video and writes the library.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let params = params_of(&args)?;
+    let limits = Limits::default();
+    let media = |error: crate::media::Error| Error::work(error.code(), &error);
+    let video = Video::open(&args.video, &limits).map_err(media)?;
+    let background = args.background.as_deref().map(|path| read_image(path, &limits));
+    let background = background.transpose().map_err(media)?;
+    let progress = Listener::new();
+    let level = cpu::Level::detect();
+    let library = analysis::analyze(&video, background.as_ref(), &params, level, &progress)
+        .map_err(|error| Error::work(error.code(), &error))?;
+    let footage = footage_summary(&args.video)?;
+    library_dir::write(&args.output, &library, &params, &footage)
+        .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
+    let table = args.output.join("poses.csv");
+    std::fs::write(&table, csv::write_poses(&library.poses))
+        .map_err(Error::io(format!("cannot write {}", table.display())))?;
+    Ok(Some(summary(&library, &args.output)))
+}
+
+/// The parameters that the flags ask for, over the preset.
+fn params_of(args: &Args) -> Result<Params, Error> {
+    let mut wanted = Map::new();
+    let mut put = |name: &str, value: Option<Value>| {
+        if let Some(value) = value {
+            wanted.insert(name.to_owned(), value);
+        }
+    };
+    put("preset", args.preset.as_ref().map(|name| json!(name)));
+    put("view", args.view.as_ref().map(|view| json!(view)));
+    put("follow", args.follow_largest.then(|| json!("largest")));
+    put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
+    put("epsilon", args.epsilon.map(|epsilon| json!(epsilon)));
+    let animal = args.animal_length.zip(args.animal_height);
+    put("animal", animal.map(|(length, height)| json!({"length_m": length, "height_m": height})));
+    put("camera", args.camera.as_deref().map(read_json).transpose()?);
+    for setting in &args.set {
+        let (name, value) = setting
+            .split_once('=')
+            .ok_or_else(|| Error::Usage(format!("--set takes NAME=JSON: {setting}")))?;
+        // A bare word is a string.
+        put(name, Some(serde_json::from_str(value).unwrap_or_else(|_| json!(value))));
+    }
+    params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
+}
+
+fn read_json(path: &Path) -> Result<Value, Error> {
+    let text = std::fs::read(path)
+        .map_err(|cause| Error::Usage(format!("cannot read {}: {cause}", path.display())))?;
+    serde_json::from_slice(&text)
+        .map_err(|cause| Error::Usage(format!("{} is not JSON: {cause}", path.display())))
+}
+
+fn footage_summary(path: &Path) -> Result<FootageSummary, Error> {
+    let failed = || Error::io(format!("cannot read {}", path.display()));
+    let mut file = File::open(path).map_err(failed())?;
+    let (mut hash, mut n_bytes) = (Sha256::new(), 0);
+    let mut chunk = vec![0; 1 << 20];
+    loop {
+        let n = file.read(&mut chunk).map_err(failed())?;
+        if n == 0 {
+            let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+            return Ok(FootageSummary { sha256, n_bytes });
+        }
+        hash.update(&chunk[..n]);
+        n_bytes += n as u64;
+    }
+}
+
+fn summary(library: &Library, output: &Path) -> Summary {
+    let stats = &library.stats;
+    Summary(json!({
+        "library": output.display().to_string(),
+        "n_frames": stats.n_frames,
+        "n_detected": stats.n_detected,
+        "n_transitions": stats.n_transitions,
+        "component_share": stats.component_share,
+        "sprite_size_px": [library.sprites.width(), library.sprites.height()],
+    }))
 }

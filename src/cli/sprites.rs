@@ -1,10 +1,42 @@
-//! To be written.
+//! `flockreel sprites LIBRARY_DIR -o DIR`: the animal of every frame as a picture with straight alpha.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+use serde_json::json;
+
+use super::{Error, Summary};
+use crate::formats::{library_dir, picture};
 
 /// Arguments of `sprites`.
 #[derive(Debug, clap::Args)]
-pub struct Args {}
+pub struct Args {
+    /// The library.
+    library: PathBuf,
+    /// The folder to write 000000.png ... to; frames without the animal are left out.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
 
-/// Not there yet.
-pub fn run(_args: Args) -> Result<Option<super::Summary>, super::Error> {
-    Err(super::Error::Usage("not there yet: sprites".into()))
+/// Writes the sprites.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let stored = library_dir::read(&args.library).map_err(|error| {
+        Error::Usage(format!("cannot read the library {}: {error}", args.library.display()))
+    })?;
+    let sprites = &stored.library.sprites;
+    let folder = &args.output;
+    std::fs::create_dir_all(folder)
+        .map_err(Error::io(format!("cannot make {}", folder.display())))?;
+    let present: Vec<usize> =
+        (0..sprites.n_frames()).filter(|&idx| sprites.is_present(idx)).collect();
+    present.par_iter().try_for_each(|&idx| {
+        let path = folder.join(library_dir::sprite_name(idx));
+        let bytes = picture::write_rgba(sprites.width(), sprites.height(), sprites.sprite(idx));
+        std::fs::write(&path, bytes)
+            .map_err(Error::io(format!("cannot write {}", path.display())))
+    })?;
+    Ok(Some(Summary(json!({
+        "sprites": present.len(),
+        "size_px": [sprites.width(), sprites.height()],
+    }))))
 }

@@ -32,10 +32,12 @@ impl Video {
     /// Fails with the reason of the first limit that the file breaks. `path` must be ours: a
     /// person's file name never comes here.
     pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
+        // The child works elsewhere, so that it sees no relative path.
+        let path = std::path::absolute(path).map_err(Error::io("finding the footage"))?;
         Ok(Video {
-            path: std::path::absolute(path).map_err(Error::io("finding the footage"))?,
+            probe: probe(&path, limits)?,
             limits: limits.clone(),
-            probe: probe(path, limits)?,
+            path,
         })
     }
 

@@ -17,7 +17,7 @@ const DIRECTIONS = ["right", "down right", "down", "down left", "left", "up left
 export function direction(heading_rad) {
   const heading_deg = Math.round(degrees(heading_rad));
   const eighth = ((Math.round(heading_deg / 45) % 8) + 8) % 8;
-  return `${heading_deg}° (${DIRECTIONS[eighth]})`;
+  return `${number.format(heading_deg).replace("-", "−")}° (${DIRECTIONS[eighth]})`;
 }
 
 const STAGES = {

@@ -72,8 +72,8 @@ def started(data):
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     address = f"http://127.0.0.1:{port}"
-    arguments = ["serve", "--bind", f"127.0.0.1:{port}", "--data", str(data), "--no-sample"]
-    service = subprocess.Popen([PROGRAM, *arguments], stdin=subprocess.DEVNULL)
+    arguments = ["serve", "--bind", f"127.0.0.1:{port}", "--data", data.name, "--no-sample"]
+    service = subprocess.Popen([PROGRAM, *arguments], cwd=data.parent, stdin=subprocess.DEVNULL)
     try:
         wait_until_ready(service, address)
         yield address
