@@ -91,7 +91,7 @@ pub fn router(state: AppState) -> Router {
     routes
         .merge(openapi::route(&document))
         .merge(page::routes())
-        .fallback(|| async { Problem::not_found() })
+        .fallback(|| async { Problem::from(Code::NotFound) })
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
         .with_state(state)
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))

@@ -63,10 +63,16 @@ async fn assert_fish(app: &TestApp, library_id: &Value) {
     assert_eq!(job["state"], "done", "{job}");
     let fish = format!("/v1/fish/{}", fish["fish_id"].as_str().unwrap());
     let at_a_glance = app.json(&fish).await;
-    assert_eq!((&at_a_glance["frames"], &at_a_glance["params"]["palette"]), (&json!(300), &json!("silver")));
+    assert_eq!(
+        (&at_a_glance["frames"], &at_a_glance["params"]["palette"]),
+        (&json!(300), &json!("silver"))
+    );
     for (file, at, magic) in [("video.mp4", 4, &b"ftyp"[..]), ("model.glb", 0, b"glTF")] {
         let answer = app.get(&format!("{fish}/{file}")).send().await.unwrap();
-        assert!(answer.bytes().await.unwrap()[at..].starts_with(magic), "{file}");
+        assert!(
+            answer.bytes().await.unwrap()[at..].starts_with(magic),
+            "{file}"
+        );
     }
 }
 
