@@ -1,4 +1,5 @@
-//! Footage: uploaded videos.
+//! Footage: uploaded videos (RELIABILITY.md, store rules: upload; S4, S5). What is refused leaves
+//! nothing behind; the original is given back only as a file to keep.
 
 use axum::body::Body;
 use axum::extract::{Query, Request, State};

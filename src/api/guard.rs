@@ -124,7 +124,7 @@ mod tests {
         let site = HeaderName::from_static("sec-fetch-site");
         let with =
             |name: &HeaderName, value| asks(Method::POST, &[host.clone(), (name.clone(), value)]);
-        assert!(asks(Method::POST, &[host.clone()]));
+        assert!(asks(Method::POST, std::slice::from_ref(&host)));
         assert!(with(&header::ORIGIN, "http://localhost:8080"));
         assert!(with(&site, "same-origin"));
         assert!(!with(&header::ORIGIN, "http://localhost:9090"));

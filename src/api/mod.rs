@@ -14,6 +14,7 @@ mod receive; // bodies to disk
 mod timestamp;
 
 mod analyses;
+mod fish;
 mod flocks;
 mod footage;
 mod health;
@@ -90,7 +91,7 @@ pub fn router(state: AppState) -> Router {
     routes
         .merge(openapi::route(&document))
         .merge(page::routes())
-        .fallback(|| async { Problem::not_found() })
+        .fallback(|| async { Problem::from(Code::NotFound) })
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
         .with_state(state)
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
@@ -116,6 +117,9 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
         .routes(routes!(flocks::get_flock))
         .routes(routes!(flocks::get_flock_file))
+        .routes(routes!(fish::create_fish, fish::list_fish))
+        .routes(routes!(fish::get_fish))
+        .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::get_job_events))

@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::{analysis, flock};
+use crate::{analysis, fish, flock};
 
 /// Parameters that have presets and ranges.
 pub trait Preset: Serialize + DeserializeOwned + Default {
@@ -74,6 +74,16 @@ impl Preset for flock::Params {
 
     fn check(&self) -> Result<(), String> {
         flock::Params::check(self)
+    }
+}
+
+impl Preset for fish::Params {
+    fn preset(name: &str) -> Option<Self> {
+        (name == "papers").then(fish::Params::papers)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        fish::Params::check(self)
     }
 }
 

@@ -4,16 +4,28 @@
 //! loads, computes by ring 2 and leaves files in its draft; the worker stores them. A job may be run
 //! twice, and only one of the runs is kept.
 
-pub mod admit; // received bytes -> footage
-pub mod analysis;
+// The way of a job.
+pub mod supervisor; // the pool, rescue, drain
+
+pub mod worker; // claim, run, finish
+
 pub mod attempt; // what one run of a job is given
+
+pub mod listener; // progress out, cancellation in
+
+// What jobs do.
+pub mod admit; // received bytes -> footage
+
+pub mod analysis; // footage -> library
+
+pub mod flock; // library -> flock
+
+pub mod fish; // library -> virtual fish
+
+pub mod sample; // the first film of an empty data folder
+
 pub mod clock;
 pub mod error;
-pub mod flock;
-pub mod listener; // progress out, cancellation in
-pub mod sample;
-pub mod supervisor; // the pool, rescue, drain
-pub mod worker; // claim, run, finish
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -63,6 +75,8 @@ pub enum Job {
     Analysis(analysis::Input),
     /// Library to flock.
     Flock(flock::Input),
+    /// Library to virtual fish.
+    Fish(fish::Input),
 }
 
 impl Job {
@@ -71,7 +85,7 @@ impl Job {
         Ok(match lease.kind {
             Kind::Analysis => Job::Analysis(serde_json::from_str(&lease.input)?),
             Kind::Flock => Job::Flock(serde_json::from_str(&lease.input)?),
-            Kind::Fish => return Err(Error::Panicked),
+            Kind::Fish => Job::Fish(serde_json::from_str(&lease.input)?),
         })
     }
 
@@ -80,6 +94,7 @@ impl Job {
         match self {
             Job::Analysis(input) => input.run(attempt),
             Job::Flock(input) => input.run(attempt),
+            Job::Fish(input) => input.run(attempt),
         }
     }
 }
@@ -89,6 +104,6 @@ pub fn stages(kind: Kind) -> Stages {
     match kind {
         Kind::Analysis => analysis::STAGES,
         Kind::Flock => flock::STAGES,
-        Kind::Fish => &[],
+        Kind::Fish => fish::STAGES,
     }
 }

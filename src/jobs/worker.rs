@@ -26,6 +26,8 @@ use crate::store::jobs::{Change, Lease};
 
 const TICK: Duration = Duration::from_millis(500);
 const MAX_ATTEMPTS: i64 = 3;
+/// The longest wait for work to let go once the process stops; then it is abandoned.
+const LET_GO: Duration = Duration::from_secs(10);
 /// The wait before the second attempt; each further one waits four times as long.
 const BACKOFF_MS: i64 = 2_000;
 
@@ -101,6 +103,7 @@ impl Worker {
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut last_beat = Instant::now();
         let mut noted = listener.position();
+        let mut told_to_stop = None;
         loop {
             tokio::select! {
                 joined = &mut work => return joined.unwrap_or(Err(Error::Panicked)),
@@ -108,6 +111,9 @@ impl Worker {
             }
             if self.context.draining.is_cancelled() {
                 listener.cancel();
+                if told_to_stop.get_or_insert_with(Instant::now).elapsed() > LET_GO {
+                    return Err(Error::Cancelled);
+                }
             }
             let position = listener.position();
             if position != noted || last_beat.elapsed() >= self.context.lease / 3 {

@@ -15,9 +15,9 @@ use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
 /// The service under test.
-pub struct TestApp {
-    pub context: Context,
-    pub client: Client,
+pub(crate) struct TestApp {
+    pub(crate) context: Context,
+    pub(crate) client: Client,
     base: String,
     data: TempDir,
     stop: CancellationToken,
@@ -32,19 +32,19 @@ struct Arguments {
 
 impl TestApp {
     /// A service without workers: jobs stay queued, and tests step them.
-    pub async fn idle() -> TestApp {
+    pub(crate) async fn idle() -> TestApp {
         TestApp::start(&[]).await
     }
 
     /// A service with one worker.
-    pub async fn working() -> TestApp {
+    pub(crate) async fn working() -> TestApp {
         let mut app = TestApp::start(&[]).await;
         app.supervisor = Some(Supervisor::start(app.context.clone(), 1));
         app
     }
 
     /// A service with further flags.
-    pub async fn start(flags: &[&str]) -> TestApp {
+    pub(crate) async fn start(flags: &[&str]) -> TestApp {
         let data = tempfile::tempdir().unwrap();
         let folder = data.path().to_str().unwrap();
         let flags = [&["test", "--data", folder], flags].concat();
@@ -68,42 +68,42 @@ impl TestApp {
         }
     }
 
-    pub fn get(&self, path: &str) -> RequestBuilder {
+    pub(crate) fn get(&self, path: &str) -> RequestBuilder {
         self.client.get(format!("{}{path}", self.base))
     }
 
-    pub fn post(&self, path: &str) -> RequestBuilder {
+    pub(crate) fn post(&self, path: &str) -> RequestBuilder {
         self.client.post(format!("{}{path}", self.base))
     }
 
-    pub fn delete(&self, path: &str) -> RequestBuilder {
+    pub(crate) fn delete(&self, path: &str) -> RequestBuilder {
         self.client.delete(format!("{}{path}", self.base))
     }
 
-    pub fn head(&self, path: &str) -> RequestBuilder {
+    pub(crate) fn head(&self, path: &str) -> RequestBuilder {
         self.client.head(format!("{}{path}", self.base))
     }
 
     /// Uploads a film that must be taken, and returns its id.
-    pub async fn upload(&self, film: &[u8]) -> String {
+    pub(crate) async fn upload(&self, film: &[u8]) -> String {
         let answer = self.post("/v1/footage").body(film.to_vec()).send().await;
         let footage = json_of(answer.unwrap(), StatusCode::CREATED).await;
         footage["id"].as_str().unwrap().to_owned()
     }
 
     /// POSTs JSON that must be accepted as a job, and returns the answer.
-    pub async fn accept(&self, path: &str, body: Value) -> Value {
+    pub(crate) async fn accept(&self, path: &str, body: Value) -> Value {
         let answer = self.post(path).json(&body).send().await.unwrap();
         json_of(answer, StatusCode::ACCEPTED).await
     }
 
     /// GETs JSON that must be there.
-    pub async fn json(&self, path: &str) -> Value {
+    pub(crate) async fn json(&self, path: &str) -> Value {
         json_of(self.get(path).send().await.unwrap(), StatusCode::OK).await
     }
 
     /// The job in its final state.
-    pub async fn ended_job(&self, id: &Value) -> Value {
+    pub(crate) async fn ended_job(&self, id: &Value) -> Value {
         let path = format!("/v1/jobs/{}", id.as_str().unwrap());
         for _ in 0..1200 {
             let job = self.json(&path).await;
@@ -116,17 +116,17 @@ impl TestApp {
     }
 
     /// Files and folders under `tmp/`.
-    pub fn n_drafts(&self) -> usize {
+    pub(crate) fn n_drafts(&self) -> usize {
         entries(&self.data.path().join("tmp"))
     }
 
     /// Folders of a kind in the store.
-    pub fn n_folders(&self, kind: &str) -> usize {
+    pub(crate) fn n_folders(&self, kind: &str) -> usize {
         entries(&self.data.path().join("blobs").join(kind))
     }
 
     /// Every invariant of the store holds, nothing is half made; the workers let go.
-    pub async fn assert_sound(mut self) {
+    pub(crate) async fn assert_sound(mut self) {
         if let Some(supervisor) = self.supervisor.take() {
             supervisor.drain().await;
         }
@@ -145,7 +145,7 @@ impl Drop for TestApp {
 }
 
 /// The JSON of an answer that must have this status.
-pub async fn json_of(answer: Response, status: StatusCode) -> Value {
+pub(crate) async fn json_of(answer: Response, status: StatusCode) -> Value {
     let found = answer.status();
     let text = answer.text().await.unwrap();
     assert_eq!(found, status, "{text}");
@@ -153,7 +153,7 @@ pub async fn json_of(answer: Response, status: StatusCode) -> Value {
 }
 
 /// The code of an answer that must be a problem of this status.
-pub async fn code_of(answer: Response, status: u16) -> String {
+pub(crate) async fn code_of(answer: Response, status: u16) -> String {
     let media_type = answer.headers()["content-type"].to_str().unwrap();
     assert_eq!(media_type, "application/problem+json");
     let problem = json_of(answer, StatusCode::from_u16(status).unwrap()).await;

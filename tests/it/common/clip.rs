@@ -8,10 +8,10 @@ use flockreel::media::{VideoFormat, VideoWriter};
 use flockreel::raster::Frame;
 
 /// Ten frames of 64x64: enough to be admitted.
-pub static TINY: LazyLock<Vec<u8>> = LazyLock::new(|| film(10, 64, 64));
+pub(crate) static TINY: LazyLock<Vec<u8>> = LazyLock::new(|| film(10, 64, 64));
 
 /// Ten seconds of 320x240: enough for a library with transitions.
-pub static SWIM: LazyLock<Vec<u8>> = LazyLock::new(|| film(300, 320, 240));
+pub(crate) static SWIM: LazyLock<Vec<u8>> = LazyLock::new(|| film(300, 320, 240));
 
 fn film(n_frames: usize, width: u32, height: u32) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();

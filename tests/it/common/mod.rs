@@ -1,8 +1,8 @@
 //! What tests arrange with: a real service on a port of its own, films, a service as a process.
 
-pub mod app;
-pub mod clip;
+pub(crate) mod app;
+pub(crate) mod clip;
 pub(crate) mod film;
-pub mod process;
+pub(crate) mod process;
 
-pub use app::TestApp;
+pub(crate) use app::TestApp;

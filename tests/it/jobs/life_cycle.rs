@@ -1,14 +1,14 @@
 //! The way of the data through HTTP: film in, measurements, flock out.
 
 use reqwest::StatusCode;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::{SWIM, TINY};
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_film_becomes_a_library_and_a_flock() {
+async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     let app = TestApp::working().await;
     let footage_id = app.upload(&SWIM).await;
     let analysis = app
@@ -52,7 +52,28 @@ async fn a_film_becomes_a_library_and_a_flock() {
     assert_eq!(video.headers()["content-type"], "video/mp4");
     assert_eq!(&video.bytes().await.unwrap()[4..8], b"ftyp");
     assert_eq!(app.json(&format!("{flock}/flock.json")).await["seed"], 7);
+    assert_fish(&app, &analysis["library_id"]).await;
     app.assert_sound().await;
+}
+
+async fn assert_fish(app: &TestApp, library_id: &Value) {
+    let wishes = json!({"library_id": library_id, "palette": "silver"});
+    let fish = app.accept("/v1/fish", wishes).await;
+    let job = app.ended_job(&fish["job_id"]).await;
+    assert_eq!(job["state"], "done", "{job}");
+    let fish = format!("/v1/fish/{}", fish["fish_id"].as_str().unwrap());
+    let at_a_glance = app.json(&fish).await;
+    assert_eq!(
+        (&at_a_glance["frames"], &at_a_glance["params"]["palette"]),
+        (&json!(300), &json!("silver"))
+    );
+    for (file, at, magic) in [("video.mp4", 4, &b"ftyp"[..]), ("model.glb", 0, b"glTF")] {
+        let answer = app.get(&format!("{fish}/{file}")).send().await.unwrap();
+        assert!(
+            answer.bytes().await.unwrap()[at..].starts_with(magic),
+            "{file}"
+        );
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -55,28 +55,29 @@ async fn a_job_that_is_done_has_its_files_in_place() {
 #[tokio::test]
 async fn a_worker_that_was_given_up_throws_its_output_away() {
     let (app, job, footage) = with_job().await;
-    let (slow, fast) = (
-        Worker::new(app.context.clone()),
-        Worker::new(app.context.clone()),
-    );
-    let (go, wait) = std::sync::mpsc::channel::<()>();
-    let (claimed, is_claimed) = tokio::sync::oneshot::channel();
-    let stalled = tokio::spawn(async move {
-        slow.step_by(move |_, attempt| {
-            claimed.send(()).unwrap();
-            wait.recv().unwrap();
-            product(attempt, footage)
-        })
-        .await
+    let (stale, ended) = (Worker::new(app.context.clone()), std::sync::mpsc::channel());
+    let (fresh, store) = (Worker::new(app.context.clone()), app.context.store.clone());
+    let (tell, told) = ended;
+    let runtime = tokio::runtime::Handle::current();
+    // While the first worker works, the job is given to a second, which works until the first ended.
+    let step = stale.step_by(move |_, attempt| {
+        runtime.block_on(store.rescue_all(0))?;
+        let (claimed, is_claimed) = std::sync::mpsc::channel();
+        runtime.spawn(async move {
+            let step = fresh.step_by(move |_, attempt| {
+                claimed.send(()).unwrap();
+                told.recv().unwrap();
+                product(attempt, footage)
+            });
+            assert_eq!(step.await.unwrap(), Step::Done(job));
+        });
+        is_claimed.recv().unwrap();
+        product(attempt, footage)
     });
-    is_claimed.await.unwrap();
-    app.context.store.rescue_all(0).await.unwrap();
-    let step = fast
-        .step_by(move |_, attempt| product(attempt, footage))
-        .await;
-    assert_eq!(step.unwrap(), Step::Done(job));
-    go.send(()).unwrap();
-    assert_eq!(stalled.await.unwrap().unwrap(), Step::Lost(job));
+    assert_eq!(step.await.unwrap(), Step::Lost(job));
+    assert_eq!(app.n_folders("libraries"), 0);
+    tell.send(()).unwrap();
+    assert_eq!(app.ended_job(&json!(job)).await["state"], "done");
     assert_eq!(app.n_folders("libraries"), 1);
     app.assert_sound().await;
 }
