@@ -3,19 +3,18 @@
 //!
 //! Inside the silhouette alpha is 1; in a band around its outline alpha is how far the pixel lies
 //! from the plate toward the animal's color nearby, and the color is what remains when the plate's
-//! share is taken away. Computed in encoded values, as the compositor blends: putting the cut-out
+//! share is taken away. Computed in encoded values, as the compositor blends: putting the matte
 //! back over the plate returns the frame.
 
 use super::background::Plate;
 use super::light::Gain;
-use super::shadow;
-use super::silhouette::{self, Difference};
+use super::silhouette::{self, Difference, shadow};
 use crate::geometry::Rect;
 use crate::raster::{Frame, Mask, RgbaImage};
 
 /// The animal cut out of one frame.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cutout {
+pub struct Matte {
     /// Where it lies in the frame.
     pub rect: Rect,
     /// Straight alpha, in the plate's light.
@@ -26,13 +25,7 @@ pub struct Cutout {
 
 /// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
 /// pixels wide, or 2 % of it.
-pub fn cut_out(
-    frame: &Frame,
-    plate: &Plate,
-    gain: &Gain,
-    silhouette: &Mask,
-    length_px: f64,
-) -> Cutout {
+pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length_px: f64) -> Matte {
     let band_px = ((0.02 * length_px).round() as u32).clamp(2, 8);
     let rect = silhouette
         .rect
@@ -42,7 +35,7 @@ pub fn cut_out(
     let solid = without_halo(&mask, &difference, plate);
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
-    let matte = Matte {
+    let puller = Puller {
         difference: &difference,
         plate,
         mask: &mask,
@@ -55,16 +48,16 @@ pub fn cut_out(
     let mut image = RgbaImage::new(rect.w, rect.h);
     for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {
         let rgba = if inside.bits[k] == 1 {
-            let [r, g, b] = matte.frame_color(k);
+            let [r, g, b] = puller.frame_color(k);
             [r, g, b, 255]
         } else if outer.bits[k] == 1 {
-            matte.band_pixel(k)
+            puller.band_pixel(k)
         } else {
             [0; 4]
         };
         pixel.copy_from_slice(&rgba);
     }
-    Cutout {
+    Matte {
         rect,
         contrast: contrast(&difference, &mask),
         image,
@@ -147,7 +140,7 @@ fn contrast(difference: &Difference, mask: &Mask) -> f64 {
     sum as f64 / mask.area().max(1) as f64
 }
 
-struct Matte<'a> {
+struct Puller<'a> {
     difference: &'a Difference,
     plate: &'a Plate,
     mask: &'a Mask,
@@ -162,7 +155,7 @@ struct Matte<'a> {
     band_px: u32,
 }
 
-impl Matte<'_> {
+impl Puller<'_> {
     fn frame_color(&self, k: usize) -> [u8; 3] {
         let rgb = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         [rgb[0], rgb[1], rgb[2]]

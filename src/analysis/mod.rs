@@ -10,8 +10,6 @@ pub mod error;
 // What the scene looks like, and where a frame differs from it.
 pub mod background;
 pub mod light;
-mod refusal;
-pub mod shadow;
 pub mod silhouette;
 
 // The animal followed and cut out.
@@ -28,7 +26,6 @@ pub mod smooth;
 
 // Which moments look alike.
 pub mod distance;
-mod gate;
 pub mod playback;
 mod stats;
 pub mod transition;

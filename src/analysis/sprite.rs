@@ -1,4 +1,4 @@
-//! Cut-outs made into sprites: one size, the centroid at the middle (O 3.1; ALGORITHMS.md 5).
+//! Mattes made into sprites: one size, the centroid at the middle (O 3.1; ALGORITHMS.md 5).
 
 use rayon::prelude::*;
 
@@ -57,10 +57,10 @@ fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
 
 /// How far the alpha reaches from the centroid: horizontally, vertically, in any direction.
 fn reach_px(sighting: &Sighting) -> [f64; 3] {
-    let rect = sighting.cutout.rect;
+    let rect = sighting.matte.rect;
     let [cx, cy] = sighting.moments.centroid_px;
     let mut most = [0.0f64; 3];
-    for (k, pixel) in sighting.cutout.image.pixels.chunks_exact(4).enumerate() {
+    for (k, pixel) in sighting.matte.image.pixels.chunks_exact(4).enumerate() {
         if pixel[3] > 0 {
             let (column, row) = (k as u32 % rect.w, k as u32 / rect.w);
             let dx = (f64::from(rect.x + column) + 0.5 - cx).abs() + 0.5;
@@ -75,11 +75,11 @@ fn reach_px(sighting: &Sighting) -> [f64; 3] {
     most
 }
 
-/// Draws a cut-out into a sprite, its centroid at the middle.
+/// Draws a matte into a sprite, its centroid at the middle.
 fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting) {
-    let (rect, image) = (sighting.cutout.rect, &sighting.cutout.image);
+    let (rect, image) = (sighting.matte.rect, &sighting.matte.image);
     let [cx, cy] = sighting.moments.centroid_px;
-    // Sprite column c shows the cut-out at column c + left, whole and fractional part.
+    // Sprite column c shows the matte at column c + left, whole and fractional part.
     let left = cx - f64::from(width) / 2.0 - f64::from(rect.x);
     let top = cy - f64::from(height) / 2.0 - f64::from(rect.y);
     let (x0, fx) = (left.floor() as i64, (left - left.floor()) as f32);

@@ -6,7 +6,7 @@
 
 use super::background::Plate;
 use super::light::{self, Gain};
-use super::matte::{self, Cutout};
+use super::matte::{self, Matte};
 use super::moments::{self, Moments};
 use super::params::Search;
 use super::silhouette;
@@ -28,7 +28,7 @@ const FULL_EVERY: usize = 30;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sighting {
     /// The animal cut out.
-    pub cutout: Cutout,
+    pub matte: Matte,
     /// Its moments, weighed by alpha.
     pub moments: Moments,
     /// Extents along the major axis and across it, after a 3 x 3 opening.
@@ -220,14 +220,14 @@ impl<'a> Tracker<'a> {
         }
         let rect = component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
-        let cutout = matte::cut_out(frame, self.plate, gain, &silhouette, length_px);
-        let weights: Vec<u8> = cutout
+        let matte = matte::pull(frame, self.plate, gain, &silhouette, length_px);
+        let weights: Vec<u8> = matte
             .image
             .pixels
             .chunks_exact(4)
             .map(|rgba| rgba[3])
             .collect();
-        let moments = moments::moments(cutout.rect, &weights)?;
+        let moments = moments::moments(matte.rect, &weights)?;
         let axis = moments.major_rad.unwrap_or(0.0);
         let opened = opened(&silhouette);
         let across = axis + std::f64::consts::FRAC_PI_2;
@@ -240,7 +240,7 @@ impl<'a> Tracker<'a> {
             || rect.right() == frame.width
             || rect.bottom() == frame.height;
         Some(Sighting {
-            cutout,
+            matte,
             moments,
             extent_px,
             box_px: rect,

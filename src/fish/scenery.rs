@@ -172,16 +172,16 @@ impl Scene {
             let of = |i: u64| self.unit(50, k, i);
             let y = HORIZON + 0.012 + (1.03 - HORIZON) * near + 0.012 * (of(0) - 0.5);
             let size = w * (0.0018 + 0.0068 * near) * (0.55 + 0.75 * of(1));
-            let grey = 92.0 + 92.0 * of(2);
+            let gray = 92.0 + 92.0 * of(2);
             let warm = of(3);
             let light = 0.70 + 0.34 * near;
             let pebble = Pebble {
                 at: [w * (1.04 * of(4) - 0.02), y * h],
                 radii: [size * (0.95 + 0.5 * of(5)), size * 0.72],
                 color: [
-                    light * grey * (1.0 + 0.14 * warm),
-                    light * grey * (0.98 - 0.02 * warm),
-                    light * grey * (0.92 - 0.22 * warm),
+                    light * gray * (1.0 + 0.14 * warm),
+                    light * gray * (0.98 - 0.02 * warm),
+                    light * gray * (0.92 - 0.22 * warm),
                 ],
             };
             self.pebble(&pebble, 0.42 * (1.0 - near));
@@ -191,7 +191,7 @@ impl Scene {
     /// Three stones at the back.
     fn rocks(&mut self) {
         let (w, h) = (self.width as f64, self.height as f64);
-        for (x, y, rx, ry, grey) in [
+        for (x, y, rx, ry, gray) in [
             (0.215, 0.795, 0.070, 0.075, 84.0),
             (0.285, 0.818, 0.046, 0.046, 104.0),
             (0.700, 0.815, 0.034, 0.034, 96.0),
@@ -199,7 +199,7 @@ impl Scene {
             let pebble = Pebble {
                 at: [x * w, y * h],
                 radii: [rx * w, ry * h],
-                color: [grey, grey * 0.98, grey * 0.92],
+                color: [gray, gray * 0.98, gray * 0.92],
             };
             self.pebble(&pebble, 0.30);
         }

@@ -16,8 +16,8 @@ pub fn draw(distances: &Distances<'_>, progress: &dyn Progress) -> Result<Vec<u8
     let matrix = PooledMatrix::of(distances, LARGEST_SIDE, progress)?;
     let side = matrix.side as u32;
     Ok(match side {
-        0 => picture::write_grey(1, 1, &[255]),
-        _ => picture::write_grey(side, side, &levels(&matrix.cells)),
+        0 => picture::write_gray(1, 1, &[255]),
+        _ => picture::write_gray(side, side, &levels(&matrix.cells)),
     })
 }
 

@@ -32,8 +32,8 @@ pub fn write_rgba(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     encode(width, height, ColorType::Rgba, pixels)
 }
 
-/// Grey levels as PNG. Panics when there are not `width * height` of them.
-pub fn write_grey(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
+/// Gray levels as PNG. Panics when there are not `width * height` of them.
+pub fn write_gray(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     encode(width, height, ColorType::Grayscale, pixels)
 }
 

@@ -19,7 +19,7 @@ pub enum Range {
     /// Luma 16..=235, chroma 16..=240: nearly all video.
     #[default]
     Limited,
-    /// 0..=255: motion JPEG and grey footage.
+    /// 0..=255: motion JPEG and gray footage.
     Full,
 }
 

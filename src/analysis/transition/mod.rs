@@ -6,13 +6,15 @@
 //! the same moment. Mirrored pairs need no such gap, because a clip is not its own mirror image:
 //! where it nearly is, seen head-on, turning over on the spot is just what is wanted.
 
+mod gate;
 #[cfg(test)]
 mod tests;
 
 use crate::analysis::distance::{
     Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Side,
 };
-use crate::analysis::gate::Gate;
+use gate::Gate;
+
 use crate::analysis::{Error, Params, playback};
 use crate::cpu::Level;
 use crate::library::{Patch, Playback, Poses, Sprites, Transition};

@@ -6,9 +6,9 @@
 
 use std::ops::RangeInclusive;
 
-use super::background::Plate;
-use super::light::Gain;
-use super::silhouette::{self, Difference};
+use super::{Difference, difference};
+use crate::analysis::background::Plate;
+use crate::analysis::light::Gain;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask};
 
@@ -39,7 +39,7 @@ pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Pla
 
 /// Whether nearly all of a component looks like the plate, only darker.
 pub fn is_shadow_alone(frame: &Frame, plate: &Plate, component: &Component) -> bool {
-    let difference = silhouette::difference(frame, plate, &Gain::ONE, component.rect);
+    let difference = difference(frame, plate, &Gain::ONE, component.rect);
     let mask = component.mask(component.rect);
     let width = mask.width();
     let like = (0..mask.bits.len()).filter(|&k| {

@@ -5,8 +5,8 @@
 //! silhouettes found by the first plate leave a pixel free. An animal that slept in the first median
 //! is seen as a ghost wherever it is gone, and its pixels are taken from just those frames.
 
-use super::silhouette::Blocks;
-use super::{Error, Params, light, refusal, shadow, silhouette};
+use super::silhouette::{Blocks, shadow};
+use super::{Error, Params, light, silhouette};
 use crate::footage::FrameSource;
 use crate::geometry::Rect;
 use crate::progress::Progress;
@@ -14,6 +14,7 @@ use crate::raster::runs::Component;
 use crate::raster::{Frame, RgbImage};
 
 mod fill;
+mod refusal;
 mod samples;
 mod scenery;
 

@@ -5,12 +5,12 @@
 //! of it count when they hang together with a certain one.
 
 mod blocks;
+pub mod shadow;
 
 pub use blocks::Blocks;
 
 use super::background::Plate;
 use super::light::Gain;
-use super::shadow;
 use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{Frame, Mask, RgbImage};

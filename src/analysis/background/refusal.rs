@@ -1,8 +1,8 @@
 //! Footage that cannot become a library, told from frames spread through it before any tracking
 //! (ALGORITHMS.md 2.9).
 
-use super::params::Follow;
-use super::{Error, Params};
+use crate::analysis::params::Follow;
+use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
 
