@@ -236,9 +236,9 @@ mod tests {
     }
 
     #[test]
-    fn a_spell_of_drifting_backward_does_not_turn_the_head() {
+    fn drifting_backward_slowly_does_not_turn_the_head() {
         let (headings, axes, velocity) =
-            circling(400, |k| if (150..200).contains(&k) { -20.0 } else { 50.0 });
+            circling(400, |k| if (150..200).contains(&k) { -6.0 } else { 50.0 });
         let heads = decode(&axes, &velocity, 60.0, None);
         assert_eq!(errors(&headings, &axes, &heads), 0);
     }

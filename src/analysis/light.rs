@@ -57,16 +57,22 @@ impl Gain {
     }
 }
 
+/// The pixels compared in every frame of this size.
+pub fn probes(width: u32, height: u32) -> Vec<u32> {
+    let n_px = u64::from(width) * u64::from(height);
+    (0..N_SAMPLES)
+        .map(|k| (random::bits(0, &[k]) % n_px) as u32)
+        .collect()
+}
+
 /// The gain of a frame, from pixels outside `occupied` (where the animal is thought to be).
 pub fn gain(frame: &Frame, plate: &Plate, occupied: Rect) -> Gain {
-    let (w, h) = (u64::from(frame.width), u64::from(frame.height));
     let convert = frame.color.to_rgb();
     let (u, v) = frame.chroma();
     let mut counts = vec![[0u32; 3]; 4 * STEPS];
     let mut n = [0u32; 3];
-    for k in 0..N_SAMPLES {
-        let at = random::bits(0, &[k]) % (w * h);
-        let (x, y) = ((at % w) as u32, (at / w) as u32);
+    for &at in &plate.probes {
+        let (x, y) = (at % frame.width, at / frame.width);
         if occupied.contains(x, y) {
             continue;
         }

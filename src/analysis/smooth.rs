@@ -93,22 +93,18 @@ fn filter(measured: &[Option<f64>], dt: f64, q: f64, r: f64) -> Filtered {
             let innovation = z - state.x[0];
             let expected = state.p[0][0] + r;
             let sigmas = innovation.abs() / expected.sqrt();
-            // Huber: a measurement too far off counts as one with more noise.
-            let weight = if sigmas > HUBER { HUBER / sigmas } else { 1.0 };
-            let s = state.p[0][0] + r / weight;
             let loss = if sigmas > HUBER {
                 2.0 * HUBER * sigmas - HUBER * HUBER
             } else {
                 sigmas * sigmas
             };
             filtered.log_likelihood -= 0.5 * (loss + libm::log(expected));
-            let k = [state.p[0][0] / s, state.p[1][0] / s];
+            // Huber: a measurement too far off pulls no harder than one just within the limit.
+            let pull = innovation.clamp(-HUBER * expected.sqrt(), HUBER * expected.sqrt());
+            let k = [state.p[0][0] / expected, state.p[1][0] / expected];
             let [[a, b], [_, d]] = state.p;
             state = State {
-                x: [
-                    state.x[0] + k[0] * innovation,
-                    state.x[1] + k[1] * innovation,
-                ],
+                x: [state.x[0] + k[0] * pull, state.x[1] + k[1] * pull],
                 p: [
                     [(1.0 - k[0]) * a, (1.0 - k[0]) * b],
                     [(1.0 - k[0]) * b, d - k[1] * b],

@@ -229,7 +229,7 @@ impl<'a> Tracker<'a> {
             .collect();
         let moments = moments::moments(matte.rect, &weights)?;
         let axis = moments.major_rad.unwrap_or(0.0);
-        let opened = opened(&silhouette);
+        let opened = opened(&solid(&matte));
         let across = axis + std::f64::consts::FRAC_PI_2;
         let extent_px = [
             moments::extent_px(&opened, axis),
@@ -268,6 +268,21 @@ impl<'a> Tracker<'a> {
             self.areas.remove(0);
         }
         self.areas.push(area);
+    }
+}
+
+/// The pixels that are more animal than background. The silhouette itself is wider: its threshold is
+/// low, so that no fin is lost.
+fn solid(matte: &Matte) -> Mask {
+    let bits = matte
+        .image
+        .pixels
+        .chunks_exact(4)
+        .map(|rgba| u8::from(rgba[3] >= 128))
+        .collect();
+    Mask {
+        rect: matte.rect,
+        bits,
     }
 }
 

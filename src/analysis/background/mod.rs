@@ -35,6 +35,8 @@ pub struct Plate {
     pub sigma: Vec<f32>,
     /// Least difference that counts as the animal for certain: max(threshold, 4 sigma).
     pub core_threshold: Vec<u8>,
+    /// The pixels whose light is compared.
+    pub probes: Vec<u32>,
     /// Means and noise of 4 x 4 blocks, to find places worth looking at.
     pub blocks: Blocks,
     /// Pixels that the animal never left free.
@@ -162,6 +164,7 @@ fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
     let threshold = f32::from(params.threshold);
     Plate {
         rgb: frame.to_rgb(),
+        probes: light::probes(frame.width, frame.height),
         core_threshold: sigma
             .iter()
             .map(|s| (4.0 * s).max(threshold).min(255.0) as u8)

@@ -77,7 +77,7 @@ fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) 
 }
 
 /// Of the plate's color, with a share of its brightness that lies in `ratios`.
-pub(super) fn has_darker_color(
+pub fn has_darker_color(
     difference: &Difference,
     plate: &Plate,
     x: usize,

@@ -1,3 +1,4 @@
 //! Accuracy against known truth, on generated films (ALGORITHMS.md 9).
 
+mod accuracy;
 mod sample;

@@ -20,7 +20,7 @@ use flockreel::progress::Silent;
 const N_FRAMES: usize = 180;
 
 /// The sample and what the analysis made of it, once for all tests.
-fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
+pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
     static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
     FILMED.get_or_init(|| {
         let params = SampleParams {
@@ -63,7 +63,7 @@ fn flockreel(args: &[&str]) -> Output {
         .unwrap()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
 }

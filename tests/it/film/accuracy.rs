@@ -1,0 +1,106 @@
+//! How near the analysis comes to the truth of a generated film, and a flock made of it
+//! (ALGORITHMS.md 9). The film is the virtual fish's; its pixels and its truth share no code with
+//! the analysis.
+
+use flockreel::flock::{self, plan_flock};
+use flockreel::geometry::wrap_rad;
+use flockreel::library::{Library, Pose};
+use flockreel::progress::Silent;
+
+use super::sample::{filmed, median};
+
+/// (measured, true) poses of the frames in which the animal was found.
+fn pairs() -> Vec<(Pose, Pose)> {
+    let (film, library, _) = filmed();
+    let truth = film.truth().frames;
+    let both = library.poses.frames.iter().cloned().zip(truth);
+    both.filter(|(got, _)| got.detected()).collect()
+}
+
+#[test]
+fn the_animal_is_found_in_every_frame_within_a_pixel() {
+    let (film, _, _) = filmed();
+    let pairs = pairs();
+    assert_eq!(pairs.len(), film.truth().frames.len());
+    let gap = |(got, want): &(Pose, Pose)| {
+        let (a, b) = (got.centroid_px.unwrap(), want.centroid_px.unwrap());
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    };
+    let gap_px = median(pairs.iter().map(gap).collect());
+    assert!(gap_px < 1.0, "{gap_px}");
+}
+
+#[test]
+fn the_head_is_where_it_is_in_all_frames_that_show_the_fish_at_length() {
+    let at_length = |(_, want): &&(Pose, Pose)| want.gamma_rad.unwrap().cos() > 0.5;
+    let gap = |(got, want): &(Pose, Pose)| {
+        wrap_rad(got.heading_rad.unwrap() - want.heading_rad.unwrap()).abs()
+    };
+    let gaps: Vec<f64> = pairs().iter().filter(at_length).map(gap).collect();
+    let right = gaps
+        .iter()
+        .filter(|gap| **gap < std::f64::consts::FRAC_PI_2)
+        .count();
+    assert!(100 * right > 99 * gaps.len(), "{right} of {}", gaps.len());
+    assert!(median(gaps) < 0.07);
+}
+
+#[test]
+fn depth_is_within_a_tenth_of_the_tank() {
+    let gap = |(got, want): &(Pose, Pose)| {
+        (got.position_m.unwrap()[2] - want.position_m.unwrap()[2]).abs()
+    };
+    let gap_m = median(
+        pairs()
+            .iter()
+            .filter(|(got, _)| got.position_m.is_some())
+            .map(gap)
+            .collect(),
+    );
+    assert!(gap_m < 0.03, "{gap_m}");
+}
+
+#[test]
+fn a_flock_of_the_film_shows_only_frames_that_may_follow_each_other() {
+    let (_, library, _) = filmed();
+    let flock = plan_flock(library, &small_flock(), &Silent).unwrap();
+    for individual in &flock.individuals {
+        for k in 1..individual.source_frame.len() {
+            let (from, to) = (individual.source_frame[k - 1], individual.source_frame[k]);
+            let mirrored = individual.mirrored[k - 1] != individual.mirrored[k];
+            assert!(
+                may_follow(library, from, to, mirrored),
+                "{from} -> {to}, {mirrored}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_flock_is_the_same_for_any_number_of_threads() {
+    let (_, library, _) = filmed();
+    let made = |n_threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n_threads)
+            .build()
+            .unwrap();
+        pool.install(|| plan_flock(library, &small_flock(), &Silent).unwrap())
+    };
+    assert_eq!(made(1), made(2));
+}
+
+fn small_flock() -> flock::Params {
+    flock::Params {
+        count: 9,
+        frames: 90,
+        ..flock::Params::default()
+    }
+}
+
+fn may_follow(library: &Library, from: u32, to: u32, mirrored: bool) -> bool {
+    let jumps = &library.playback.jumps;
+    (to == from + 1 && !mirrored)
+        || jumps
+            .iter()
+            .any(|j| (j.from, j.to, j.mirrored) == (from, to, mirrored))
+}
