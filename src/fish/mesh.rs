@@ -8,7 +8,7 @@ use super::body;
 use super::fins;
 use super::paint::Coat;
 use super::params::Palette;
-use super::spine::{ORIGIN_S, joints_at};
+use super::spine::{ORIGIN_S, SPINE_DOWN_BL, joints_at};
 use crate::library::Animal;
 
 /// One point of the surface.
@@ -144,7 +144,11 @@ fn vertex(point: &SketchPoint, length_m: f64) -> Vertex {
     let [s, down, left] = point.at;
     let (a, b, share) = joints_at(s);
     Vertex {
-        position_m: [(ORIGIN_S - s) * length_m, down * length_m, left * length_m],
+        position_m: [
+            (ORIGIN_S - s) * length_m,
+            (down + SPINE_DOWN_BL) * length_m,
+            left * length_m,
+        ],
         normal: [0.0, -1.0, 0.0],
         color: point.color,
         joints: [a as u8, b as u8],

@@ -69,11 +69,12 @@ impl Coat {
         [color[0], color[1], color[2], 1.0]
     }
 
-    /// A fin at `out` (0 where it joins the body, 1 at its edge).
+    /// A fin at `out` (0 where it joins the body, 1 at its edge). More opaque than not even at its
+    /// edge, so that the silhouette ends where the mesh does.
     pub(super) fn fin(&self, out: f64) -> [f32; 4] {
         let out = out as f32;
         let color = mix(self.fin_base, self.fin_edge, smoothstep(0.1, 1.0, out));
-        let alpha = 0.97 - 0.25 * smoothstep(0.0, 0.9, out) - 0.34 * smoothstep(0.93, 1.0, out);
+        let alpha = 0.97 - 0.25 * smoothstep(0.0, 0.9, out) - 0.20 * smoothstep(0.93, 1.0, out);
         [color[0], color[1], color[2], alpha]
     }
 

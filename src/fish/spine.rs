@@ -18,7 +18,10 @@ pub const N_JOINTS: usize = 8;
 pub const JOINT_S: [f64; N_JOINTS] = [0.27, 0.36, 0.45, 0.54, 0.63, 0.72, 0.81, 0.90];
 
 /// Where the origin of the fish's own frame lies: the middle of the silhouette.
-pub const ORIGIN_S: f64 = 0.46;
+pub const ORIGIN_S: f64 = 0.466;
+
+/// How far the spine lies below the middle of the silhouette, lengths: the dorsal fin is the tallest.
+pub const SPINE_DOWN_BL: f64 = 0.017;
 
 /// Wavelength of the swimming wave, lengths.
 const WAVELENGTH_BL: f64 = 0.95;

@@ -106,3 +106,11 @@ fn out_of_sight_or_unseen_it_covers_nothing() {
         assert!(renderer.draw(&camera(), IMAGE_PX, &posture).rect.is_empty());
     }
 }
+
+#[test]
+fn seen_from_the_side_its_middle_is_where_it_was_put() {
+    for yaw in [0.0, std::f64::consts::PI] {
+        let (_, [x, y]) = silhouette(&draw(yaw, 0.0));
+        assert!((x - 160.0).hypot(y - 120.0) < 1.0, "{x} {y}");
+    }
+}

@@ -68,7 +68,8 @@ fn the_true_centroid_is_where_the_frame_differs_from_the_background() {
         }
         let truth = film.true_pose(k).centroid_px.expect("it is in sight");
         let gap = (sum[0] / n - truth[0]).hypot(sum[1] / n - truth[1]);
-        assert!(gap < 1.0, "frame {k}: {gap} px");
+        // Colors belong to blocks of 2 x 2 pixels: the seen outline is that coarse.
+        assert!(gap < 1.5, "frame {k}: {gap} px");
     }
 }
 

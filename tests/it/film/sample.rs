@@ -27,7 +27,7 @@ pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
             n_frames: N_FRAMES,
             ..SampleParams::default()
         };
-        let film = SampleFilm::new(params).unwrap();
+        let film = SampleFilm::new(params).expect("in range");
         let (camera, animal) = (film.motion().camera, film.animal());
         let params = analysis::Params {
             camera: Some(CameraParams {
@@ -42,7 +42,8 @@ pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
             }),
             ..analysis::Params::default()
         };
-        let library = analyze(&film, None, &params, Level::detect(), &Silent).unwrap();
+        let library =
+            analyze(&film, None, &params, Level::detect(), &Silent).expect("it can be analysed");
         (film, library, params)
     })
 }
@@ -53,14 +54,14 @@ fn library_on_disk(dir: &Path) {
         sha256: "0".repeat(64),
         n_bytes: 1,
     };
-    library_dir::write(dir, library, params, &footage).unwrap();
+    library_dir::write(dir, library, params, &footage).expect("the folder can be written");
 }
 
 fn flockreel(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flockreel"))
         .args(args)
         .output()
-        .unwrap()
+        .expect("the program starts")
 }
 
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
