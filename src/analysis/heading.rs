@@ -175,11 +175,11 @@ mod tests {
 
     use super::*;
 
+    /// Headings, axes and velocities.
+    type Circling = (Vec<f64>, Vec<Option<Axes>>, Vec<Option<[f64; 2]>>);
+
     /// An animal that swims round a circle, 60 px long, seen as its axis alone.
-    fn circling(
-        n: usize,
-        speed_px_s: impl Fn(usize) -> f64,
-    ) -> (Vec<f64>, Vec<Option<Axes>>, Vec<Option<[f64; 2]>>) {
+    fn circling(n: usize, speed_px_s: impl Fn(usize) -> f64) -> Circling {
         let heading = |k: usize| crate::geometry::wrap_rad(k as f64 * 0.05);
         let axis = |h: f64| {
             if h > FRAC_PI_2 {

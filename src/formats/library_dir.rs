@@ -217,15 +217,14 @@ mod tests {
     use crate::library::{LibraryStats, Patch, Playback, Pose, Poses, View};
     use crate::raster::RgbImage;
 
-    #[test]
-    fn a_library_comes_back_from_its_folder_as_it_was() {
+    fn small_library() -> Library {
         let mut sprites = Sprites::missing(8, 8, 3);
         sprites
             .fill(1)
             .iter_mut()
             .enumerate()
             .for_each(|(k, byte)| *byte = k as u8);
-        let library = Library {
+        Library {
             poses: Poses {
                 fps: 25.0,
                 image_size_px: [16, 12],
@@ -272,7 +271,12 @@ mod tests {
                 component_share: 1.0,
                 ..LibraryStats::default()
             },
-        };
+        }
+    }
+
+    #[test]
+    fn a_library_comes_back_from_its_folder_as_it_was() {
+        let library = small_library();
         let footage = FootageSummary {
             sha256: "ab".into(),
             n_bytes: 9,

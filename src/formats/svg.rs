@@ -58,9 +58,9 @@ pub fn headings(poses: &Poses) -> String {
         )
         .expect("memory");
     }
-    write!(
+    writeln!(
         svg,
-        "<path fill=\"none\" stroke=\"#b4501e\" stroke-width=\"1.5\" d=\"{}\"/></svg>\n",
+        "<path fill=\"none\" stroke=\"#b4501e\" stroke-width=\"1.5\" d=\"{}\"/></svg>",
         line(poses, x, y)
     )
     .expect("memory");
