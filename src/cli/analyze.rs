@@ -61,7 +61,10 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let limits = Limits::default();
     let media = |error: crate::media::Error| Error::work(error.code(), &error);
     let video = Video::open(&args.video, &limits).map_err(media)?;
-    let background = args.background.as_deref().map(|path| read_image(path, &limits));
+    let background = args
+        .background
+        .as_deref()
+        .map(|path| read_image(path, &limits));
     let background = background.transpose().map_err(media)?;
     let progress = Listener::new();
     let level = cpu::Level::detect();
@@ -90,14 +93,20 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
     put("epsilon", args.epsilon.map(|epsilon| json!(epsilon)));
     let animal = args.animal_length.zip(args.animal_height);
-    put("animal", animal.map(|(length, height)| json!({"length_m": length, "height_m": height})));
+    put(
+        "animal",
+        animal.map(|(length, height)| json!({"length_m": length, "height_m": height})),
+    );
     put("camera", args.camera.as_deref().map(read_json).transpose()?);
     for setting in &args.set {
         let (name, value) = setting
             .split_once('=')
             .ok_or_else(|| Error::Usage(format!("--set takes NAME=JSON: {setting}")))?;
         // A bare word is a string.
-        put(name, Some(serde_json::from_str(value).unwrap_or_else(|_| json!(value))));
+        put(
+            name,
+            Some(serde_json::from_str(value).unwrap_or_else(|_| json!(value))),
+        );
     }
     params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
 }
@@ -117,7 +126,11 @@ fn footage_summary(path: &Path) -> Result<FootageSummary, Error> {
     loop {
         let n = file.read(&mut chunk).map_err(failed())?;
         if n == 0 {
-            let sha256 = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+            let sha256 = hash
+                .finalize()
+                .iter()
+                .map(|byte| format!("{byte:02x}"))
+                .collect();
             return Ok(FootageSummary { sha256, n_bytes });
         }
         hash.update(&chunk[..n]);

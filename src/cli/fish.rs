@@ -44,7 +44,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let n_frames = motion.frames.len();
     match extension(&args.output).as_str() {
         "glb" if args.side_by_side => {
-            return Err(Error::Usage("--side-by-side makes a video: name it .mp4".into()));
+            return Err(Error::Usage(
+                "--side-by-side makes a video: name it .mp4".into(),
+            ));
         }
         "glb" => std::fs::write(&args.output, glb::write(&motion))
             .map_err(Error::io(format!("writing {}", args.output.display())))?,
@@ -63,12 +65,20 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 fn params_of(args: &Args) -> Result<Params, Error> {
-    let palette = serde_json::from_value(Value::from(args.palette.as_str()))
-        .map_err(|_| Error::Usage(format!("palette is goldfish, silver or bronze: {}", args.palette)))?;
+    let palette = serde_json::from_value(Value::from(args.palette.as_str())).map_err(|_| {
+        Error::Usage(format!(
+            "palette is goldfish, silver or bronze: {}",
+            args.palette
+        ))
+    })?;
     let preset = match args.preset.as_deref() {
         None | Some("default") => Params::default(),
         Some("papers") => Params::papers(),
-        Some(other) => return Err(Error::Usage(format!("preset is default or papers: {other}"))),
+        Some(other) => {
+            return Err(Error::Usage(format!(
+                "preset is default or papers: {other}"
+            )));
+        }
     };
     Ok(Params { palette, ..preset })
 }

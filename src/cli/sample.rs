@@ -74,7 +74,9 @@ fn write_video(film: &SampleFilm, args: &Args, listener: &Listener) -> Result<()
     let mut stream = film.open().map_err(|e| Error::work(e.code, &e))?;
     let mut frame = Frame::default();
     for frame_idx in 0.. {
-        let more = stream.next_frame(&mut frame).map_err(|e| Error::work(e.code, &e))?;
+        let more = stream
+            .next_frame(&mut frame)
+            .map_err(|e| Error::work(e.code, &e))?;
         if more.is_none() {
             break;
         }

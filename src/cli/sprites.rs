@@ -21,19 +21,22 @@ pub struct Args {
 /// Writes the sprites.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let stored = library_dir::read(&args.library).map_err(|error| {
-        Error::Usage(format!("cannot read the library {}: {error}", args.library.display()))
+        Error::Usage(format!(
+            "cannot read the library {}: {error}",
+            args.library.display()
+        ))
     })?;
     let sprites = &stored.library.sprites;
     let folder = &args.output;
     std::fs::create_dir_all(folder)
         .map_err(Error::io(format!("cannot make {}", folder.display())))?;
-    let present: Vec<usize> =
-        (0..sprites.n_frames()).filter(|&idx| sprites.is_present(idx)).collect();
+    let present: Vec<usize> = (0..sprites.n_frames())
+        .filter(|&idx| sprites.is_present(idx))
+        .collect();
     present.par_iter().try_for_each(|&idx| {
         let path = folder.join(library_dir::sprite_name(idx));
         let bytes = picture::write_rgba(sprites.width(), sprites.height(), sprites.sprite(idx));
-        std::fs::write(&path, bytes)
-            .map_err(Error::io(format!("cannot write {}", path.display())))
+        std::fs::write(&path, bytes).map_err(Error::io(format!("cannot write {}", path.display())))
     })?;
     Ok(Some(Summary(json!({
         "sprites": present.len(),

@@ -124,7 +124,9 @@ fn headings_in_image(frames: &[Pose], stage: &Stage, params: &Params) -> Vec<Opt
         .iter()
         .map(|pose| {
             let heading = pose.heading_rad?;
-            let seen = pose.length_px.map_or(1.0, |l| (1.1 * l / stage.length_px).min(1.0));
+            let seen = pose
+                .length_px
+                .map_or(1.0, |l| (1.1 * l / stage.length_px).min(1.0));
             Some(seen * DVec2::new(libm::cos(heading), libm::sin(heading)))
         })
         .collect();
@@ -163,13 +165,19 @@ fn upright_along(forward: DVec3) -> DQuat {
 /// Heading in the image plane, back to the camera.
 fn seen_from_above(heading_rad: f64) -> DQuat {
     let forward = DVec3::new(libm::cos(heading_rad), libm::sin(heading_rad), 0.0);
-    DQuat::from_mat3(&DMat3::from_cols(forward, DVec3::Z, forward.cross(DVec3::Z)))
+    DQuat::from_mat3(&DMat3::from_cols(
+        forward,
+        DVec3::Z,
+        forward.cross(DVec3::Z),
+    ))
 }
 
 /// Fills gaps of at most `longest` frames between two known ones.
 fn bridge(measured: &[Option<Placement>], longest: usize) -> Vec<Option<Placement>> {
     let mut bridged = measured.to_vec();
-    let known: Vec<usize> = (0..measured.len()).filter(|&k| measured[k].is_some()).collect();
+    let known: Vec<usize> = (0..measured.len())
+        .filter(|&k| measured[k].is_some())
+        .collect();
     for pair in known.windows(2) {
         let (from, to) = (pair[0], pair[1]);
         let (Some(a), Some(b)) = (measured[from], measured[to]) else {
@@ -199,7 +207,8 @@ fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
 fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<Placement>> {
     let around = |k: usize| {
         let middle = placements[k]?;
-        let (mut position, mut turn, mut total) = (DVec3::ZERO, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), 0.0);
+        let (mut position, mut turn, mut total) =
+            (DVec3::ZERO, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), 0.0);
         let unbroken = |other: usize| {
             let (lo, hi) = (other.min(k), other.max(k));
             placements[lo..=hi].iter().all(Option::is_some)
@@ -286,8 +295,14 @@ impl Moving {
     /// From the neighbors that are known; at rest where there are none.
     fn around(placements: &[Option<Placement>], k: usize, fps: f64) -> Moving {
         let known = |k: usize| placements.get(k).copied().flatten();
-        let (before, after) = (known(k.wrapping_sub(1)).or(known(k)), known(k + 1).or(known(k)));
-        let n_steps = [k.wrapping_sub(1), k + 1].into_iter().filter(|&n| known(n).is_some()).count();
+        let (before, after) = (
+            known(k.wrapping_sub(1)).or(known(k)),
+            known(k + 1).or(known(k)),
+        );
+        let n_steps = [k.wrapping_sub(1), k + 1]
+            .into_iter()
+            .filter(|&n| known(n).is_some())
+            .count();
         match (before, known(k), after) {
             (Some(a), Some(here), Some(b)) if n_steps > 0 => {
                 let per_s = fps / n_steps as f64;

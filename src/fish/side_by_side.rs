@@ -13,11 +13,18 @@ pub fn render(library: &Library, film: &Film, frame_idx: usize, frame: &mut Fram
     let real = real_frame(library, frame_idx);
     let mut twin = film.background().clone();
     film.draw(frame_idx).over(&mut twin);
-    assert_eq!((real.width, real.height), (twin.width, twin.height), "sizes differ");
+    assert_eq!(
+        (real.width, real.height),
+        (twin.width, twin.height),
+        "sizes differ"
+    );
     let (width, height) = (2 * real.width, real.height);
     let mut both = RgbImage::new(width, height);
     let row_bytes = real.width as usize * 3;
-    let sides = real.pixels.chunks_exact(row_bytes).zip(twin.pixels.chunks_exact(row_bytes));
+    let sides = real
+        .pixels
+        .chunks_exact(row_bytes)
+        .zip(twin.pixels.chunks_exact(row_bytes));
     for (row, (left, right)) in both.pixels.chunks_exact_mut(2 * row_bytes).zip(sides) {
         row[..row_bytes].copy_from_slice(left);
         row[row_bytes..].copy_from_slice(right);
@@ -38,10 +45,13 @@ fn real_frame(library: &Library, frame_idx: usize) -> RgbImage {
     };
     let left = (cx - f64::from(sprites.width()) / 2.0).round() as i64;
     let top = (cy - f64::from(sprites.height()) / 2.0).round() as i64;
-    let rows = sprites.sprite(frame_idx).chunks_exact(sprites.width().max(1) as usize * 4);
+    let rows = sprites
+        .sprite(frame_idx)
+        .chunks_exact(sprites.width().max(1) as usize * 4);
     for (y, row) in (top..).zip(rows) {
         for (x, rgba) in (left..).zip(row.chunks_exact(4)) {
-            let inside = (0..i64::from(image.width)).contains(&x) && (0..i64::from(image.height)).contains(&y);
+            let inside = (0..i64::from(image.width)).contains(&x)
+                && (0..i64::from(image.height)).contains(&y);
             if inside && rgba[3] > 0 {
                 let under = image.pixel(x as u32, y as u32);
                 let alpha = u32::from(rgba[3]);

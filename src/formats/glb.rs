@@ -66,15 +66,20 @@ fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
     ];
     let body = add_material(packer, "body", AlphaMode::Opaque, 0.42);
     let fins = add_material(packer, "fins", AlphaMode::Blend, 0.6);
-    let primitives = [(&fish.body, body), (&fish.fins, fins)].map(|(triangles, material)| Primitive {
-        attributes: attributes.iter().cloned().map(|(s, a)| (Valid(s), a)).collect(),
-        extensions: None,
-        extras: None,
-        indices: Some(packer.indices(triangles)),
-        material: Some(material),
-        mode: Valid(Mode::Triangles),
-        targets: None,
-    });
+    let primitives =
+        [(&fish.body, body), (&fish.fins, fins)].map(|(triangles, material)| Primitive {
+            attributes: attributes
+                .iter()
+                .cloned()
+                .map(|(s, a)| (Valid(s), a))
+                .collect(),
+            extensions: None,
+            extras: None,
+            indices: Some(packer.indices(triangles)),
+            material: Some(material),
+            mode: Valid(Mode::Triangles),
+            targets: None,
+        });
     packer.root.push(Mesh {
         extensions: None,
         extras: None,
@@ -139,7 +144,9 @@ fn add_skin(packer: &mut Packer, motion: &Motion, first_joint: u32) -> Index<Ski
         extensions: None,
         extras: None,
         inverse_bind_matrices,
-        joints: (0..N_JOINTS as u32).map(|j| Index::new(first_joint + j)).collect(),
+        joints: (0..N_JOINTS as u32)
+            .map(|j| Index::new(first_joint + j))
+            .collect(),
         name: Some("spine".into()),
         skeleton: Some(Index::new(ROOT)),
     })
@@ -180,19 +187,39 @@ fn add_animation(packer: &mut Packer, motion: &Motion, first_joint: u32) {
     if frames.is_empty() {
         return;
     }
-    let times: Vec<f32> = (0..frames.len()).map(|k| (k as f64 / motion.fps) as f32).collect();
+    let times: Vec<f32> = (0..frames.len())
+        .map(|k| (k as f64 / motion.fps) as f32)
+        .collect();
     let mut tracks = Tracks {
         times: packer.times(&times),
         channels: Vec::new(),
         samplers: Vec::new(),
     };
-    let places: Vec<[f32; 3]> = frames.iter().map(|p| y_up(p.position_m.to_array())).collect();
+    let places: Vec<[f32; 3]> = frames
+        .iter()
+        .map(|p| y_up(p.position_m.to_array()))
+        .collect();
     let turns: Vec<[f32; 4]> = frames.iter().map(|p| turned(p.rotation)).collect();
-    tracks.add(ROOT, Property::Translation, packer.keys(&places), Interpolation::Linear);
-    tracks.add(ROOT, Property::Rotation, packer.turns(&turns), Interpolation::Linear);
+    tracks.add(
+        ROOT,
+        Property::Translation,
+        packer.keys(&places),
+        Interpolation::Linear,
+    );
+    tracks.add(
+        ROOT,
+        Property::Rotation,
+        packer.turns(&turns),
+        Interpolation::Linear,
+    );
     if frames.iter().any(|p| !p.visible) {
         let sizes: Vec<[f32; 3]> = frames.iter().map(|p| [f32::from(p.visible); 3]).collect();
-        tracks.add(ROOT, Property::Scale, packer.keys(&sizes), Interpolation::Step);
+        tracks.add(
+            ROOT,
+            Property::Scale,
+            packer.keys(&sizes),
+            Interpolation::Step,
+        );
     }
     for j in 0..N_JOINTS {
         let bends: Vec<[f32; 4]> = frames
@@ -200,7 +227,12 @@ fn add_animation(packer: &mut Packer, motion: &Motion, first_joint: u32) {
             .map(|p| turned(about_y(p.joint_angles_rad[j])))
             .collect();
         let keys = packer.turns(&bends);
-        tracks.add(first_joint + j as u32, Property::Rotation, keys, Interpolation::Linear);
+        tracks.add(
+            first_joint + j as u32,
+            Property::Rotation,
+            keys,
+            Interpolation::Linear,
+        );
     }
     packer.root.push(Animation {
         extensions: None,
@@ -259,11 +291,20 @@ fn y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
 /// The same turn seen from glTF's frame: conjugated with half a turn about x.
 fn turned(rotation: glam::DQuat) -> [f32; 4] {
     let q = rotation.normalize();
-    [q.x as f32 + 0.0, 0.0 - q.y as f32, 0.0 - q.z as f32, q.w as f32]
+    [
+        q.x as f32 + 0.0,
+        0.0 - q.y as f32,
+        0.0 - q.z as f32,
+        q.w as f32,
+    ]
 }
 
 fn joints(vertex: &Vertex) -> [u8; 4] {
-    let second = if vertex.share > 0.0 { vertex.joints[1] } else { 0 };
+    let second = if vertex.share > 0.0 {
+        vertex.joints[1]
+    } else {
+        0
+    };
     [vertex.joints[0], second, 0, 0]
 }
 

@@ -22,7 +22,11 @@ fn truth(n_frames: usize) -> (SampleFilm, Poses) {
 fn uncalibrated(view: View) -> Poses {
     let frames = (0..120).map(|k| {
         let t = f64::from(k);
-        let (x, heading) = if k < 60 { (20.0 + t, 0.0) } else { (140.0 - t, PI) };
+        let (x, heading) = if k < 60 {
+            (20.0 + t, 0.0)
+        } else {
+            (140.0 - t, PI)
+        };
         Pose {
             centroid_px: Some([x, 50.0]),
             heading_rad: Some(heading),
@@ -46,8 +50,14 @@ fn driven_by_the_truth_it_lies_where_the_sample_fish_lay() {
     let motion = drive(&poses, &Params::default()).expect("it was seen");
     for (k, (got, want)) in motion.frames.iter().zip(&film.motion().frames).enumerate() {
         assert!(got.visible);
-        assert!((got.position_m - want.position_m).length() < 0.004, "frame {k}");
-        assert!(got.forward().angle_between(want.forward()) < 0.12, "frame {k}");
+        assert!(
+            (got.position_m - want.position_m).length() < 0.004,
+            "frame {k}"
+        );
+        assert!(
+            got.forward().angle_between(want.forward()) < 0.12,
+            "frame {k}"
+        );
     }
 }
 
@@ -94,7 +104,9 @@ fn without_a_camera_it_is_seen_where_the_animal_was_and_as_long() {
     let poses = uncalibrated(View::Side);
     let motion = drive(&poses, &Params::default()).expect("it was seen");
     for (posture, pose) in motion.frames.iter().zip(&poses.frames) {
-        let [x, y] = motion.camera.image_from_camera(posture.position_m.to_array());
+        let [x, y] = motion
+            .camera
+            .image_from_camera(posture.position_m.to_array());
         let [cx, cy] = pose.centroid_px.expect("seen");
         assert!((x - cx).hypot(y - cy) < 1.5);
     }
@@ -108,7 +120,10 @@ fn turning_about_it_passes_by_the_camera_upright() {
     let facing_camera = motion.frames.iter().any(|p| p.forward().z < -0.8);
     assert!(facing_camera, "it does not flip from one side to the other");
     for pair in motion.frames.windows(2) {
-        assert!((pair[1].rotation * DVec3::Y).y > 0.9, "the belly stays below");
+        assert!(
+            (pair[1].rotation * DVec3::Y).y > 0.9,
+            "the belly stays below"
+        );
         assert!(pair[0].forward().angle_between(pair[1].forward()) < 0.8);
     }
 }
@@ -117,7 +132,10 @@ fn turning_about_it_passes_by_the_camera_upright() {
 fn seen_from_above_it_shows_its_back() {
     let motion = drive(&uncalibrated(View::Top), &Params::default()).expect("it was seen");
     for posture in &motion.frames {
-        assert!((posture.rotation * DVec3::Y).z > 0.999, "the belly faces away");
+        assert!(
+            (posture.rotation * DVec3::Y).z > 0.999,
+            "the belly faces away"
+        );
         assert!(posture.forward().x.abs() > 0.99 || posture.forward().z.abs() < 1e-6);
     }
 }
@@ -128,10 +146,19 @@ fn a_midline_bends_it() {
     for pose in &mut poses.frames[..60] {
         let [x, y] = pose.centroid_px.expect("seen");
         let arc = (0..11).map(|k| f64::from(k) / 10.0);
-        pose.midline_px = Some(arc.map(|s| [x + 20.0 - 40.0 * s, y - 10.0 * s * s]).collect());
+        pose.midline_px = Some(
+            arc.map(|s| [x + 20.0 - 40.0 * s, y - 10.0 * s * s])
+                .collect(),
+        );
     }
     let motion = drive(&poses, &Params::default()).expect("it was seen");
-    assert!(motion.frames[30].joint_angles_rad.iter().skip(1).all(|a| *a > 0.01));
+    assert!(
+        motion.frames[30]
+            .joint_angles_rad
+            .iter()
+            .skip(1)
+            .all(|a| *a > 0.01)
+    );
 }
 
 #[test]

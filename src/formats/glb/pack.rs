@@ -48,7 +48,11 @@ impl Packer {
 
     /// Vertex colors: 65535 is 1.
     pub(super) fn colors(&mut self, colors: &[[u16; 4]]) -> Index<Accessor> {
-        let bytes = colors.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+        let bytes = colors
+            .iter()
+            .flatten()
+            .flat_map(|c| c.to_le_bytes())
+            .collect();
         let kind = Kind::of(ComponentType::U16, Type::Vec4, VERTICES);
         self.add(bytes, colors.len(), kind)
     }
@@ -66,7 +70,11 @@ impl Packer {
 
     /// Triangles.
     pub(super) fn indices(&mut self, triangles: &[[u32; 3]]) -> Index<Accessor> {
-        let bytes = triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+        let bytes = triangles
+            .iter()
+            .flatten()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
         let target = Some(Target::ElementArrayBuffer);
         let kind = Kind::of(ComponentType::U32, Type::Scalar, target);
         self.add(bytes, 3 * triangles.len(), kind)
@@ -124,8 +132,16 @@ impl Packer {
         shape: Type,
         target: Option<Target>,
     ) -> Index<Accessor> {
-        let bytes = rows.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
-        self.add(bytes, rows.len(), Kind::of(ComponentType::F32, shape, target))
+        let bytes = rows
+            .iter()
+            .flatten()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
+        self.add(
+            bytes,
+            rows.len(),
+            Kind::of(ComponentType::F32, shape, target),
+        )
     }
 
     fn add(&mut self, mut bytes: Vec<u8>, count: usize, kind: Kind) -> Index<Accessor> {

@@ -21,7 +21,8 @@ fn motion(n_frames: usize) -> Motion {
 
 /// The two chunks of a GLB.
 fn open(file: &[u8]) -> (Root, Vec<u8>) {
-    let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("four bytes")) as usize;
+    let word =
+        |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("four bytes")) as usize;
     assert_eq!(&file[..4], b"glTF");
     assert_eq!((word(4), word(8)), (2, file.len()));
     let json_len = word(12);
@@ -49,7 +50,9 @@ fn channel(root: &Root, node: u32, path: Property) -> (usize, usize) {
     let found = animation
         .channels
         .iter()
-        .find(|c| c.target.node.value() == node as usize && c.target.path.as_ref().unwrap() == &path)
+        .find(|c| {
+            c.target.node.value() == node as usize && c.target.path.as_ref().unwrap() == &path
+        })
         .expect("the channel is there");
     let sampler = &animation.samplers[found.sampler.value()];
     (sampler.input.value(), sampler.output.value())
@@ -64,7 +67,10 @@ fn a_loader_puts_every_joint_where_the_renderer_does() {
         let (_, output) = channel(&root, node, path);
         let all = floats(&root, &bytes, output);
         let n = all.len() / 12;
-        all[k * n..(k + 1) * n].iter().map(|&v| f64::from(v)).collect::<Vec<f64>>()
+        all[k * n..(k + 1) * n]
+            .iter()
+            .map(|&v| f64::from(v))
+            .collect::<Vec<f64>>()
     };
     let turn = |node| DQuat::from_slice(&key(node, Property::Rotation)).normalize();
     let place = DVec3::from_slice(&key(ROOT, Property::Translation));
@@ -88,8 +94,15 @@ fn a_loader_puts_every_joint_where_the_renderer_does() {
 fn at_rest_the_inverse_bind_matrices_undo_the_joints() {
     let (root, bytes) = open(&write(&motion(2)));
     let skin = &root.skins[0];
-    let matrices = floats(&root, &bytes, skin.inverse_bind_matrices.expect("written").value());
-    assert_eq!((skin.joints.len(), matrices.len()), (N_JOINTS, 16 * N_JOINTS));
+    let matrices = floats(
+        &root,
+        &bytes,
+        skin.inverse_bind_matrices.expect("written").value(),
+    );
+    assert_eq!(
+        (skin.joints.len(), matrices.len()),
+        (N_JOINTS, 16 * N_JOINTS)
+    );
     let mut world = DVec3::ZERO;
     for (joint, matrix) in skin.joints.iter().zip(matrices.chunks_exact(16)) {
         let offset = root.nodes[joint.value()].translation.expect("written");
@@ -105,7 +118,11 @@ fn bounds_are_those_of_the_bytes_and_every_index_names_a_vertex() {
     for primitive in &root.meshes[0].primitives {
         let accessor = primitive.attributes[&Valid(Semantic::Positions)].value();
         let points = floats(&root, &bytes, accessor);
-        let lowest = points.iter().skip(1).step_by(3).fold(f32::MAX, |a, &b| a.min(b));
+        let lowest = points
+            .iter()
+            .skip(1)
+            .step_by(3)
+            .fold(f32::MAX, |a, &b| a.min(b));
         let min = root.accessors[accessor].min.as_ref().expect("written");
         assert_eq!(min[1].as_f64().expect("a number") as f32, lowest);
         let indices = floats(&root, &bytes, primitive.indices.expect("written").value());
@@ -132,7 +149,9 @@ fn a_hidden_fish_has_no_size_and_one_seen_throughout_no_such_track() {
     let has_scale = |motion: &Motion| {
         let (root, _) = open(&write(motion));
         let channels = root.animations[0].channels.iter();
-        channels.filter(|c| c.target.path.as_ref().unwrap() == &Property::Scale).count()
+        channels
+            .filter(|c| c.target.path.as_ref().unwrap() == &Property::Scale)
+            .count()
     };
     assert_eq!(has_scale(&motion), 0);
     motion.frames[2].visible = false;
