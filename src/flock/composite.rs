@@ -13,7 +13,7 @@ use super::individual::{Fade, Individual};
 use super::{Flock, Library};
 use crate::geometry::Rect;
 use crate::raster::blend::{mix, over};
-use crate::raster::resample::{Placement, Premultiplied, Resampled};
+use crate::raster::resample::{Placement, Premultiplied, Resampled, bounds_of};
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock, any of them from any thread.
@@ -21,6 +21,8 @@ pub struct Compositor<'a> {
     library: &'a Library,
     flock: &'a Flock,
     plate: Frame,
+    /// Per source frame: where its sprite shows anything.
+    bounds: Vec<[usize; 4]>,
     /// Per individual and output frame: which of its fades concerns it.
     fade_at: Vec<Vec<Option<u32>>>,
     canvases: Mutex<Vec<Canvas>>,
@@ -53,6 +55,10 @@ impl<'a> Compositor<'a> {
             library,
             flock,
             plate,
+            bounds: (0..library.sprites.n_frames())
+                .into_par_iter()
+                .map(|frame| bounds_of(library.sprites.sprite(frame), library.sprites.width()))
+                .collect(),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
             canvases: Mutex::new(Vec::new()),
         }
@@ -170,7 +176,8 @@ impl<'a> Compositor<'a> {
     fn premultiply(&self, frame: u32, sprite: &mut Premultiplied) {
         let sprites = &self.library.sprites;
         let rgba = sprites.sprite(frame as usize);
-        sprite.fill(rgba, sprites.width(), sprites.height());
+        let size = [sprites.width(), sprites.height()];
+        sprite.fill(rgba, size, self.bounds[frame as usize]);
     }
 }
 

@@ -16,6 +16,10 @@ pub struct Premultiplied {
     height: usize,
     /// Where alpha is not 0: left, top, right, bottom in the sprite's own pixels.
     bounds: [usize; 4],
+    /// Per row of the padded bounds: the columns (of the sprite) between which interpolation finds
+    /// anything; from above to when it finds nothing.
+    spans: Vec<[f32; 2]>,
+    /// The bounds and a border of `PAD`, by rows.
     pixels: Vec<[f32; 4]>,
 }
 
@@ -42,29 +46,43 @@ pub struct Resampled {
 }
 
 impl Premultiplied {
-    /// Takes a straight-alpha RGBA sprite, reusing memory.
-    pub fn fill(&mut self, rgba: &[u8], width: u32, height: u32) {
+    /// Takes a straight-alpha RGBA sprite, reusing memory. `bounds` as `bounds_of` found them.
+    pub fn fill(&mut self, rgba: &[u8], [width, height]: [u32; 2], bounds: [usize; 4]) {
         (self.width, self.height) = (width as usize, height as usize);
-        let stride = self.width + 2 * PAD;
+        self.bounds = bounds;
+        let [left, top, right, bottom] = bounds;
+        let (stride, n_rows) = (right - left + 2 * PAD, bottom - top + 2 * PAD);
         self.pixels.clear();
-        self.pixels
-            .resize(stride * (self.height + 2 * PAD), [0.0; 4]);
-        let mut bounds = [usize::MAX, usize::MAX, 0, 0];
-        for (y, row) in rgba.chunks_exact(self.width.max(1) * 4).enumerate() {
-            let out = &mut self.pixels[(y + PAD) * stride + PAD..][..self.width];
-            for (x, (out, pixel)) in out.iter_mut().zip(row.chunks_exact(4)).enumerate() {
+        self.pixels.resize(stride * n_rows, [0.0; 4]);
+        self.spans.clear();
+        self.spans.resize(n_rows, [f32::MAX, f32::MIN]);
+        for y in top..bottom {
+            let row = &rgba[(y * self.width + left) * 4..(y * self.width + right) * 4];
+            let padded = y - top + PAD;
+            let out = &mut self.pixels[padded * stride + PAD..][..right - left];
+            let mut seen = [f32::MAX, f32::MIN];
+            for (x, (out, pixel)) in (left..).zip(out.iter_mut().zip(row.chunks_exact(4))) {
                 if pixel[3] > 0 {
                     let alpha = f32::from(pixel[3]) / 255.0;
                     let color = |k: usize| f32::from(pixel[k]) * alpha;
                     *out = [color(0), color(1), color(2), alpha];
-                    bounds[0] = bounds[0].min(x);
-                    bounds[1] = bounds[1].min(y);
-                    bounds[2] = bounds[2].max(x + 1);
-                    bounds[3] = bounds[3].max(y + 1);
+                    seen = [seen[0].min(x as f32), seen[1].max(x as f32)];
                 }
             }
+            // This row is a tap of the two rows before it, its own, and the one after.
+            for span in &mut self.spans[padded - 2..padded + 2] {
+                span[0] = span[0].min(seen[0] - REACH as f32);
+                span[1] = span[1].max(seen[1] + REACH as f32);
+            }
         }
-        self.bounds = if bounds[2] > 0 { bounds } else { [0; 4] };
+    }
+
+    /// Whether interpolation finds anything at sprite coordinates.
+    #[inline]
+    fn shows(&self, u: f32, v: f32) -> bool {
+        let row = (v.floor() as i32 + PAD as i32 - self.bounds[1] as i32) as usize;
+        let [from, to] = self.spans[row];
+        u > from && u < to
     }
 
     /// Catmull-Rom at sprite coordinates (first pixel at 0, 0).
@@ -72,9 +90,9 @@ impl Premultiplied {
     fn at(&self, u: f32, v: f32) -> [f32; 4] {
         let (x, y) = (u.floor(), v.floor());
         let (wx, wy) = (weights(u - x), weights(v - y));
-        let stride = self.width + 2 * PAD;
-        let left = (x as i32 + PAD as i32 - 1) as usize;
-        let top = (y as i32 + PAD as i32 - 1) as usize;
+        let stride = self.bounds[2] - self.bounds[0] + 2 * PAD;
+        let left = (x as i32 + PAD as i32 - 1 - self.bounds[0] as i32) as usize;
+        let top = (y as i32 + PAD as i32 - 1 - self.bounds[1] as i32) as usize;
         let mut sum = [0.0f32; 4];
         for (row, wy) in wy.iter().enumerate() {
             let taps = &self.pixels[(top + row) * stride + left..][..4];
@@ -93,6 +111,24 @@ impl Premultiplied {
         let color = |k: usize| sum[k].clamp(0.0, 255.0 * alpha);
         [color(0), color(1), color(2), alpha]
     }
+}
+
+/// Where a straight-alpha RGBA sprite of `width` columns has any alpha: left, top, right, bottom; all
+/// 0 when it has none.
+pub fn bounds_of(rgba: &[u8], width: u32) -> [usize; 4] {
+    let mut bounds = [usize::MAX, usize::MAX, 0, 0];
+    for (y, row) in rgba.chunks_exact(width.max(1) as usize * 4).enumerate() {
+        let opaque = |pixel: &[u8]| pixel[3] > 0;
+        let first = row.chunks_exact(4).position(opaque);
+        let last = row.chunks_exact(4).rposition(opaque);
+        if let (Some(first), Some(last)) = (first, last) {
+            bounds[0] = bounds[0].min(first);
+            bounds[1] = bounds[1].min(y);
+            bounds[2] = bounds[2].max(last + 1);
+            bounds[3] = y + 1;
+        }
+    }
+    if bounds[2] > 0 { bounds } else { [0; 4] }
 }
 
 /// Catmull and Rom's four weights at `f` of the way from the second tap to the third.
@@ -125,7 +161,10 @@ impl Resampled {
             for (k, pixel) in row.iter_mut().enumerate().take(to).skip(from) {
                 let u = u0 + map.per_column[0] * k as f64;
                 let v = v0 + map.per_column[1] * k as f64;
-                *pixel = sprite.at(u as f32, v as f32);
+                let (u, v) = (u as f32, v as f32);
+                if sprite.shows(u, v) {
+                    *pixel = sprite.at(u, v);
+                }
             }
         }
     }
@@ -269,7 +308,7 @@ mod tests {
 
     fn drawn(rgba: &[u8], (w, h): (u32, u32), place: &Placement) -> Resampled {
         let mut sprite = Premultiplied::default();
-        sprite.fill(rgba, w, h);
+        sprite.fill(rgba, [w, h], bounds_of(rgba, w));
         let mut resampled = Resampled::default();
         resampled.draw(&sprite, place, [40, 30]);
         resampled

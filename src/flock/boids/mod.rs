@@ -26,7 +26,7 @@ use crate::random;
 
 /// The longest way in one step, body lengths.
 const LONGEST_STEP_BL: f64 = 0.2;
-/// Boids nearer than this are pushed apart after each step.
+/// Boids nearer than this are pushed apart after each step, where the tank has room.
 const OVERLAP_BL: f64 = 0.5;
 /// How long they swim before the first frame, so that the flock has formed.
 const WARM_UP_S: f64 = 6.0;
@@ -44,7 +44,9 @@ mod draw {
 
 /// Boids in their tank.
 pub struct Boids<'a> {
-    params: &'a Params,
+    /// With radii that fit the tank.
+    params: Params,
+    overlap_bl: f64,
     calibration: &'a Calibration,
     tank: &'a Tank,
     step_s: f64,
@@ -60,12 +62,18 @@ pub struct Boids<'a> {
 
 impl<'a> Boids<'a> {
     /// Boids at random places with random directions, then left to swim until they have formed.
-    pub fn new(params: &'a Params, calibration: &'a Calibration, tank: &'a Tank, fps: f64) -> Self {
+    pub fn new(params: &Params, calibration: &'a Calibration, tank: &'a Tank, fps: f64) -> Self {
         let longest_s = LONGEST_STEP_BL / calibration.speed_limits_bl_per_s[1];
         let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
         let n = params.count as usize;
+        let closeness = tank.closeness(n);
+        let mut params = params.clone();
+        params.rules.separation_bl *= closeness;
+        params.rules.alignment_bl *= closeness;
+        params.rules.cohesion_bl *= closeness;
         let mut boids = Boids {
             params,
+            overlap_bl: OVERLAP_BL * closeness,
             calibration,
             tank,
             step_s: 1.0 / (fps * f64::from(n_substeps)),
@@ -119,7 +127,7 @@ impl<'a> Boids<'a> {
         let grid = Grid::new(&self.positions, reach);
         let half_view_rad = rules.view_deg.to_radians() / 2.0;
         let steering = Steering {
-            params: self.params,
+            params: &self.params,
             calibration: self.calibration,
             tank: self.tank,
             cos_half_view: libm::cos(half_view_rad.min(std::f64::consts::PI)),
@@ -235,11 +243,11 @@ impl<'a> Boids<'a> {
 
     /// One relaxation: each pair that overlaps moves apart by half of what is missing.
     fn push_apart(&mut self) {
-        let grid = Grid::new(&self.positions, OVERLAP_BL);
+        let grid = Grid::new(&self.positions, self.overlap_bl);
         let mut neighbors = Vec::new();
         let mut moved = self.positions.clone();
         for (id, position) in moved.iter_mut().enumerate() {
-            grid.nearest(id as u32, *position, OVERLAP_BL, 16, &mut neighbors);
+            grid.nearest(id as u32, *position, self.overlap_bl, 16, &mut neighbors);
             let from = *position;
             for neighbor in &neighbors {
                 let distance = neighbor.square_bl2.sqrt();
@@ -248,7 +256,7 @@ impl<'a> Boids<'a> {
                     // In one place: apart along x, by id.
                     false => [if (id as u32) < neighbor.id { -1.0 } else { 1.0 }, 0.0, 0.0],
                 };
-                *position = add_scaled(*position, 0.5 * (OVERLAP_BL - distance), away);
+                *position = add_scaled(*position, 0.5 * (self.overlap_bl - distance), away);
             }
             if *position != from {
                 self.tank.keep_inside(position, &mut self.velocities[id]);

@@ -9,6 +9,8 @@ use crate::library::{Library, View};
 const N_SIDES: usize = 16;
 /// The seen area counts when it is at least this share of the picture.
 const LEAST_SEEN_SHARE: f64 = 0.2;
+/// The side of the square that a boid needs to keep the usual distances.
+const ROOM_BL: f64 = 1.2;
 /// How far beyond the centroids seen it reaches.
 const BEYOND_SEEN_BL: f64 = 0.25;
 
@@ -41,7 +43,11 @@ impl Tank {
             TankExtent::Seen => seen_walls(library, length_px, w * h),
             TankExtent::Picture => Vec::new(),
         };
-        let [margin_x, margin_y] = margins(library, length_px, w, h);
+        let [margin_x, margin_y] = match seen.is_empty() {
+            true => margins(library, length_px, w, h),
+            // Where the animal itself was seen is far enough inside.
+            false => margins(library, length_px, w, h).map(|margin| margin.min(0.3)),
+        };
         let depth = match (library.poses.view, params.depth_bl) {
             (View::Top, _) => 0.0,
             (View::Side, Some(depth_bl)) => depth_bl,
@@ -79,6 +85,14 @@ impl Tank {
     /// Whether it has no depth: everything happens in the picture's plane.
     pub fn is_flat(&self) -> bool {
         self.corners[1][2] <= self.corners[0][2]
+    }
+
+    /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where
+    /// each has less than a square of `ROOM_BL` in the picture.
+    pub fn closeness(&self, n: usize) -> f64 {
+        let [least, greatest] = self.corners;
+        let area = (greatest[0] - least[0]) * (greatest[1] - least[1]);
+        ((area / n as f64).sqrt() / ROOM_BL).min(1.0)
     }
 
     /// The middle of its box.
