@@ -139,13 +139,10 @@ impl Stage<'_> {
         let distance = (off[0] * off[0] + off[1] * off[1]).sqrt();
         let most = LEASH_BL * self.length_px;
         if distance > most {
-            for axis in 0..2 {
-                place[axis] = goal[axis] + off[axis] * most / distance;
-            }
+            *place = std::array::from_fn(|axis| goal[axis] + off[axis] * most / distance);
         }
-        for axis in 0..2 {
-            place[axis] = place[axis].clamp(self.corners_px[0][axis], self.corners_px[1][axis]);
-        }
+        let [least, greatest] = self.corners_px;
+        *place = std::array::from_fn(|axis| place[axis].clamp(least[axis], greatest[axis]));
     }
 
     fn fades(&self, shown: &[(u32, bool)], heading_rad: &[f64]) -> Vec<Fade> {
@@ -184,7 +181,7 @@ impl Stage<'_> {
             rotation_rad: Vec::new(),
             weight: Vec::new(),
         });
-        for u in t - half..t + half {
+        for (u, &heading) in heading_rad.iter().enumerate().take(t + half).skip(t - half) {
             let share = ((u + half - t) as f64 + 0.5) / (2 * half) as f64;
             let coming = share * share * (3.0 - 2.0 * share);
             let (side, frame, mirrored, weight) = match u < t {
@@ -195,7 +192,7 @@ impl Stage<'_> {
             if frame as usize >= sprites.n_frames() || !sprites.is_present(frame as usize) {
                 return None;
             }
-            let rotation = self.rotation((frame, mirrored), heading_rad[u]);
+            let rotation = self.rotation((frame, mirrored), heading);
             sides[side].source_frame.push(frame);
             sides[side].rotation_rad.push(rounded(rotation, 5));
             sides[side].weight.push(rounded(weight, 4));

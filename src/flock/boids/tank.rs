@@ -135,9 +135,9 @@ impl Tank {
             }
         }
         if met {
-            for axis in 0..3 {
-                position[axis] = position[axis].clamp(self.corners[0][axis], self.corners[1][axis]);
-            }
+            *position = std::array::from_fn(|axis| {
+                position[axis].clamp(self.corners[0][axis], self.corners[1][axis])
+            });
         }
         met
     }

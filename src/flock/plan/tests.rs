@@ -37,8 +37,8 @@ fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
         .map(|i| (0..turns.len()).map(|t| state(i, t)).collect())
         .collect();
     let mut total = 0;
-    for t in 0..turns.len() {
-        let wanted = weights.wanted(boid.heading_rad[t], turns[t], boid.speed_bl_per_s[t]);
+    for (t, &turn) in turns.iter().enumerate() {
+        let wanted = weights.wanted(boid.heading_rad[t], turn, boid.speed_bl_per_s[t]);
         let here = state(id, t);
         total += weights.total(wanted, features[here as usize]);
         let others = flock.individuals.iter().map(|i| &i.boid);
