@@ -56,7 +56,7 @@ deny: ## licences, bans and sources of the dependencies, offline
 
 bench: build ## the speed of the program against ffmpeg and SciPy
 	python3 bench/run.py $(RELEASE)
-	@if [ -f bench/distance.py ]; then python3 bench/distance.py $(RELEASE); fi
+	@if [ -f bench/distance.py ]; then python3 bench/distance.py; fi
 
 vendor: ## the page's libraries, from web/package-lock.json
 	@scripts/vendor.sh

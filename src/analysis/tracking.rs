@@ -31,7 +31,7 @@ pub struct Sighting {
     pub matte: Matte,
     /// Its moments, weighed by alpha.
     pub moments: Moments,
-    /// Extents along the major axis and across it, after a 3 x 3 opening.
+    /// Extents along the major axis and across it, of the pixels that are more animal than background.
     pub extent_px: [f64; 2],
     /// Bounding box of the silhouette.
     pub box_px: Rect,
@@ -229,11 +229,11 @@ impl<'a> Tracker<'a> {
             .collect();
         let moments = moments::moments(matte.rect, &weights)?;
         let axis = moments.major_rad.unwrap_or(0.0);
-        let opened = opened(&solid(&matte));
+        let solid = solid(&matte);
         let across = axis + std::f64::consts::FRAC_PI_2;
         let extent_px = [
-            moments::extent_px(&opened, axis),
-            moments::extent_px(&opened, across),
+            moments::extent_px(&solid, axis),
+            moments::extent_px(&solid, across),
         ];
         let cut = rect.x == 0
             || rect.y == 0
@@ -283,15 +283,5 @@ fn solid(matte: &Matte) -> Mask {
     Mask {
         rect: matte.rect,
         bits,
-    }
-}
-
-/// Opened, unless nothing would be left of a thin animal.
-fn opened(silhouette: &Mask) -> Mask {
-    let opened = silhouette.opened();
-    if opened.area() * 2 < silhouette.area() {
-        silhouette.clone()
-    } else {
-        opened
     }
 }
