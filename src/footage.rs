@@ -1,6 +1,8 @@
 //! What the algorithms ask of a video. Implemented by `media` (an ffmpeg child), by the virtual
 //! camera of `fish`, and by small pictures in tests.
 
+use std::ops::ControlFlow;
+
 use crate::code::Code;
 use crate::raster::{ColorSpec, Frame};
 
@@ -26,6 +28,49 @@ pub trait FrameSource: Send + Sync {
 
     /// Starts reading at the first frame.
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError>;
+
+    /// Shows `n` frames spread evenly over the video, in order: the k-th is the one in the middle of
+    /// the k-th of `n` equal parts. Fewer when the video is shorter than it seemed; stops early when
+    /// `visit` breaks. A source that can skip frames faster than it reads them does.
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        spread_by_reading(self, n, visit)
+    }
+}
+
+/// Looks at a frame and says whether to go on.
+pub type Visit<'a> = dyn FnMut(&Frame) -> ControlFlow<()> + 'a;
+
+/// [`FrameSource::spread`] by reading every frame up to the last one wanted.
+pub fn spread_by_reading<S: FrameSource + ?Sized>(
+    source: &S,
+    n: usize,
+    visit: &mut Visit<'_>,
+) -> Result<(), SourceError> {
+    let mut wanted = spread_idx(source.format().n_frames_hint, n)
+        .into_iter()
+        .peekable();
+    let mut stream = source.open()?;
+    let mut frame = Frame::default();
+    let mut frame_idx = 0;
+    while wanted.peek().is_some() && stream.next_frame(&mut frame)?.is_some() {
+        if wanted.next_if_eq(&frame_idx).is_some() && visit(&frame).is_break() {
+            break;
+        }
+        frame_idx += 1;
+    }
+    Ok(())
+}
+
+/// The middles of `n` equal parts of `n_frames` frames, rising and different; all frames when there
+/// are fewer than `n`.
+///
+/// ```
+/// assert_eq!(flockreel::footage::spread_idx(10, 2), [2, 7]);
+/// assert_eq!(flockreel::footage::spread_idx(2, 5), [0, 1]);
+/// ```
+pub fn spread_idx(n_frames: usize, n: usize) -> Vec<usize> {
+    let n = n.min(n_frames);
+    (0..n).map(|k| (2 * k + 1) * n_frames / (2 * n)).collect()
 }
 
 /// The frames of a video, in order, at a constant rate.

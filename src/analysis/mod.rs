@@ -39,6 +39,9 @@ use crate::library::Library;
 use crate::progress::Progress;
 use crate::raster::RgbImage;
 
+/// Fewer frames than these are no footage of an animal that moves.
+pub const LEAST_FRAMES: usize = 16;
+
 /// Analyses a footage: the scene without the animal, the animal's pose in every frame, its sprites,
 /// and which of its moments may follow which.
 ///

@@ -10,7 +10,7 @@ use super::matte::{self, Matte};
 use super::moments::{self, Moments};
 use super::params::Search;
 use super::silhouette;
-use super::{Error, Params};
+use super::{Error, LEAST_FRAMES, Params};
 use crate::footage::FrameSource;
 use crate::geometry::Rect;
 use crate::progress::Progress;
@@ -71,6 +71,12 @@ pub fn follow(
                 return Err(Error::Cancelled);
             }
         }
+    }
+    if track.len() < LEAST_FRAMES {
+        return Err(Error::TooFewFrames {
+            n_frames: track.len(),
+            least: LEAST_FRAMES,
+        });
     }
     if track.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);

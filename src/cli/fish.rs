@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{Error, Listener, Summary};
-use crate::fish::{self, Film, Motion, Params, side_by_side};
+use crate::fish::{self, Film, Motion, Palette, Params, side_by_side};
 use crate::formats::{glb, library_dir};
 use crate::library::Library;
 use crate::media::{VideoFormat, VideoWriter};
@@ -65,12 +65,16 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 fn params_of(args: &Args) -> Result<Params, Error> {
-    let palette = serde_json::from_value(Value::from(args.palette.as_str())).map_err(|_| {
-        Error::Usage(format!(
-            "palette is goldfish, silver or bronze: {}",
-            args.palette
-        ))
-    })?;
+    let palette = match args.palette.as_str() {
+        "goldfish" => Palette::Goldfish,
+        "silver" => Palette::Silver,
+        "bronze" => Palette::Bronze,
+        other => {
+            return Err(Error::Usage(format!(
+                "palette is goldfish, silver or bronze: {other}"
+            )));
+        }
+    };
     let preset = match args.preset.as_deref() {
         None | Some("default") => Params::default(),
         Some("papers") => Params::papers(),

@@ -15,8 +15,13 @@ use super::gate::{Child, Order, Tool};
 use super::limits::Limits;
 use super::probe::{Probe, Turn, is_rgb, probe};
 use super::timeline::Timeline;
-use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use crate::footage::{
+    FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
+};
 use crate::raster::{Frame, Matrix, Range};
+
+/// Most frames that a child may decode without showing one.
+const MOST_SKIPPED: usize = 300;
 
 /// A video file that is within its limits and can be read any number of times.
 #[derive(Clone, Debug)]
@@ -41,7 +46,8 @@ impl Video {
         })
     }
 
-    fn args(&self) -> Vec<OsString> {
+    /// The order to decode every frame, or those of the decoded frames that are `selected`.
+    fn args(&self, selected: Option<&[usize]>) -> Vec<OsString> {
         let probe = &self.probe;
         let threads = self.limits.threads.to_string();
         let mut args: Vec<OsString> =
@@ -50,7 +56,7 @@ impl Video {
                 .into();
         args.extend(input_args(probe.container, &self.path, &self.limits));
         let stream = format!("0:{}", probe.stream_idx);
-        let filters = self.filters();
+        let filters = self.filters(selected);
         args.extend(
             [
                 "-map",
@@ -67,7 +73,7 @@ impl Video {
         args
     }
 
-    fn filters(&self) -> String {
+    fn filters(&self, selected: Option<&[usize]>) -> String {
         let probe = &self.probe;
         let matrix = match probe.color.matrix {
             Matrix::Bt601 => "bt601",
@@ -80,6 +86,10 @@ impl Video {
         let mut filters = Vec::new();
         if probe.interlaced {
             filters.push("bwdif=mode=send_frame:deint=interlaced".to_owned());
+        }
+        if let Some(selected) = selected {
+            let each: Vec<String> = selected.iter().map(|idx| format!("eq(n,{idx})")).collect();
+            filters.push(format!("select='{}'", each.join("+")));
         }
         let turn = turn_filters(probe.turn);
         filters.extend(turn.iter().map(|&filter| filter.to_owned()));
@@ -138,17 +148,41 @@ impl FrameSource for Video {
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
         let order = Order::new(
             Tool::Ffmpeg,
-            self.args(),
+            self.args(None),
             &self.limits,
             self.probe.n_packets,
         );
-        Ok(Box::new(VideoStream {
-            video: self,
-            child: Some(Child::reading(order)?),
-            n_decoded: 0,
-            n_given: 0,
-            held: Frame::default(),
-        }))
+        Ok(Box::new(VideoStream::of(self, order)?))
+    }
+
+    /// The child decodes all and hands over only the frames that are wanted. The frames are not
+    /// counted here: who reads the whole footage finds out whether it is cut off.
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        // A child that shows nothing for long is taken for stalled.
+        if self.probe.n_packets > MOST_SKIPPED * n {
+            return spread_by_reading(self, n, visit);
+        }
+        let given = spread_idx(self.format().n_frames_hint, n);
+        let decoded: Vec<usize> = match &self.probe.timeline {
+            Timeline::Constant { .. } => given,
+            Timeline::Variable { sources, .. } => {
+                given.iter().map(|&idx| sources[idx] as usize).collect()
+            }
+        };
+        let order = Order::new(
+            Tool::Ffmpeg,
+            self.args(Some(&decoded)),
+            &self.limits,
+            self.probe.n_packets,
+        );
+        let mut stream = VideoStream::of(self, order)?;
+        let mut frame = Frame::default();
+        while stream.read(&mut frame)? == frame.planes.len() {
+            if visit(&frame).is_break() {
+                break;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -184,18 +218,36 @@ impl FrameStream for VideoStream<'_> {
     }
 }
 
-impl VideoStream<'_> {
-    /// The next decoded frame; false after the last, once the child has ended well.
-    fn decode(&mut self, frame: &mut Frame) -> Result<bool, Error> {
-        let Some(child) = &mut self.child else {
-            return Ok(false);
-        };
+impl<'a> VideoStream<'a> {
+    fn of(video: &'a Video, order: Order) -> Result<VideoStream<'a>, Error> {
+        Ok(VideoStream {
+            video,
+            child: Some(Child::reading(order)?),
+            n_decoded: 0,
+            n_given: 0,
+            held: Frame::default(),
+        })
+    }
+
+    /// Reads the bytes of one frame; returns how many came before the child closed its output.
+    fn read(&mut self, frame: &mut Frame) -> Result<usize, Error> {
         let probe = &self.video.probe;
         (frame.width, frame.height, frame.color) = (probe.width, probe.height, probe.color);
         frame
             .planes
             .resize(Frame::n_bytes(probe.width, probe.height), 0);
-        let n_read = child.read_full(&mut frame.planes)?;
+        match &mut self.child {
+            Some(child) => child.read_full(&mut frame.planes),
+            None => Ok(0),
+        }
+    }
+
+    /// The next decoded frame; false after the last, once the child has ended well.
+    fn decode(&mut self, frame: &mut Frame) -> Result<bool, Error> {
+        if self.child.is_none() {
+            return Ok(false);
+        }
+        let n_read = self.read(frame)?;
         if n_read < frame.planes.len() {
             self.end(n_read)?;
             return Ok(false);

@@ -80,7 +80,7 @@ impl Premultiplied {
     /// Whether interpolation finds anything at sprite coordinates.
     #[inline]
     fn shows(&self, u: f32, v: f32) -> bool {
-        let row = (v.floor() as i32 + PAD as i32 - self.bounds[1] as i32) as usize;
+        let row = (floor(v) + PAD as i32 - self.bounds[1] as i32) as usize;
         let [from, to] = self.spans[row];
         u > from && u < to
     }
@@ -88,11 +88,11 @@ impl Premultiplied {
     /// Catmull-Rom at sprite coordinates (first pixel at 0, 0).
     #[inline]
     fn at(&self, u: f32, v: f32) -> [f32; 4] {
-        let (x, y) = (u.floor(), v.floor());
-        let (wx, wy) = (weights(u - x), weights(v - y));
+        let (x, y) = (floor(u), floor(v));
+        let (wx, wy) = (weights(u - x as f32), weights(v - y as f32));
         let stride = self.bounds[2] - self.bounds[0] + 2 * PAD;
-        let left = (x as i32 + PAD as i32 - 1 - self.bounds[0] as i32) as usize;
-        let top = (y as i32 + PAD as i32 - 1 - self.bounds[1] as i32) as usize;
+        let left = (x + PAD as i32 - 1 - self.bounds[0] as i32) as usize;
+        let top = (y + PAD as i32 - 1 - self.bounds[1] as i32) as usize;
         let mut sum = [0.0f32; 4];
         for (row, wy) in wy.iter().enumerate() {
             let taps = &self.pixels[(top + row) * stride + left..][..4];
@@ -129,6 +129,13 @@ pub fn bounds_of(rgba: &[u8], width: u32) -> [usize; 4] {
         }
     }
     if bounds[2] > 0 { bounds } else { [0; 4] }
+}
+
+/// The floor of a sprite coordinate, which is above -REACH; without a call where the baseline
+/// instructions have no rounding.
+#[inline]
+fn floor(coordinate: f32) -> i32 {
+    (coordinate + 16.0) as i32 - 16
 }
 
 /// Catmull and Rom's four weights at `f` of the way from the second tap to the third.

@@ -3,10 +3,12 @@
 //! At most 64, so that a pixel's samples fit the bits of one word, and no more than fit a budget of
 //! memory: a 4K footage gets fewer.
 
+use std::ops::ControlFlow;
+
 use rayon::prelude::*;
 
 use super::{Occupancy, Plate, SIGMA_FLOOR};
-use crate::analysis::{Error, light, silhouette};
+use crate::analysis::{Error, LEAST_FRAMES, light, silhouette};
 use crate::footage::FrameSource;
 use crate::geometry::Rect;
 use crate::progress::Progress;
@@ -29,34 +31,23 @@ impl Samples {
     ) -> Result<Samples, Error> {
         let format = source.format();
         let n_bytes = Frame::n_bytes(format.width, format.height);
-        let n_kept = (BUDGET_BYTES / n_bytes)
-            .clamp(LEAST, MOST)
-            .min(format.n_frames_hint.max(1));
+        let n_kept = (BUDGET_BYTES / n_bytes).clamp(LEAST, MOST);
         let mut frames = Vec::with_capacity(n_kept);
-        let mut stream = source.open()?;
-        let mut frame = Frame::default();
-        let mut n_read = 0;
-        while stream.next_frame(&mut frame)?.is_some() {
-            // The k-th kept frame is the one in the middle of the k-th of n equal parts.
-            let wanted = (2 * frames.len() + 1) * format.n_frames_hint / (2 * n_kept);
-            if n_read == wanted && frames.len() < n_kept {
-                frames.push(frame.clone());
+        source.spread(n_kept, &mut |frame| {
+            frames.push(frame.clone());
+            progress.report("background", frames.len() as f64 / n_kept as f64);
+            match progress.cancelled() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
             }
-            n_read += 1;
-            if n_read % 32 == 0 {
-                progress.report(
-                    "background",
-                    n_read as f64 / format.n_frames_hint.max(1) as f64,
-                );
-                if progress.cancelled() {
-                    return Err(Error::Cancelled);
-                }
-            }
+        })?;
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
         }
-        if n_read < LEAST || frames.is_empty() {
+        if format.n_frames_hint < LEAST_FRAMES || frames.is_empty() {
             return Err(Error::TooFewFrames {
-                n_frames: n_read,
-                least: LEAST,
+                n_frames: format.n_frames_hint,
+                least: LEAST_FRAMES,
             });
         }
         Ok(Samples { frames })

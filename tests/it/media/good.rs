@@ -1,8 +1,10 @@
 //! Good films of every accepted kind: whole, upright, in square pixels, at a constant rate.
 
-use flockreel::footage::FrameSource;
+use std::ops::ControlFlow;
+
+use flockreel::footage::{FrameSource, spread_idx};
 use flockreel::media::{Limits, Video};
-use flockreel::raster::{Matrix, Range};
+use flockreel::raster::{Frame, Matrix, Range};
 
 use super::{read_all, read_whole};
 use crate::common::film::Films;
@@ -49,6 +51,29 @@ fn the_frames_are_those_that_plain_ffmpeg_decodes() {
         .flat_map(|(_, frame)| frame.planes)
         .collect();
     assert!(planes == reference, "the bytes differ");
+}
+
+#[test]
+fn frames_spread_over_a_film_are_those_of_reading_it_whole() {
+    let films = Films::new();
+    for options in [
+        "-bf 2",
+        "-bf 2 -vf setpts='PTS+floor(N/7)*0.2/TB' -fps_mode vfr",
+    ] {
+        let film = films.test_picture("128x96", 50, &format!("-c:v libx264 {options} f.mp4"));
+        let whole = read_whole(&film, &Limits::default()).expect("a good film");
+        let mut spread = Vec::new();
+        let visit = &mut |frame: &Frame| {
+            spread.push(frame.clone());
+            ControlFlow::Continue(())
+        };
+        open(&film).spread(7, visit).expect("a good film");
+        let wanted: Vec<Frame> = spread_idx(whole.len(), 7)
+            .into_iter()
+            .map(|idx| whole[idx].1.clone())
+            .collect();
+        assert!(spread == wanted, "{options}");
+    }
 }
 
 #[test]
