@@ -78,8 +78,8 @@ pub fn estimate(
         if given.is_none() {
             plate.never_seen_px = fill_never_seen(&mut plate, &samples, &seen, params);
         }
-        plate.blocks.measure_noise(&samples.frames);
     }
+    plate.blocks.measure_noise(&samples.frames);
     refuse(&samples, &plate, params)?;
     raise_thresholds(&mut plate, &samples);
     Ok(plate)

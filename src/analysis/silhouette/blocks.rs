@@ -1,6 +1,8 @@
 //! Means of 4 x 4 blocks of luma (2 x 2 of chroma), compared with the plate's: a cheap look at the
 //! whole frame that says where a closer one is worth it (ALGORITHMS.md 3).
 
+use rayon::prelude::*;
+
 use crate::analysis::light::Gain;
 use crate::geometry::Rect;
 use crate::raster::runs;
@@ -45,24 +47,26 @@ impl Blocks {
     /// Raises each block's thresholds to four times its noise over the samples (1.4826 times the
     /// median absolute deviation).
     pub fn measure_noise(&mut self, samples: &[Frame]) {
-        for row in 0..self.rows {
+        let plate = self.sums.par_chunks_exact(self.columns);
+        let rows = self
+            .thresholds
+            .par_chunks_exact_mut(self.columns)
+            .zip(plate);
+        rows.enumerate().for_each(|(row, (thresholds, plate))| {
             let sums: Vec<Vec<[i16; 3]>> = samples.iter().map(|s| block_row(s, row)).collect();
-            for column in 0..self.columns {
-                let at = row * self.columns + column;
+            let mut gaps = vec![0; samples.len()];
+            for (column, (threshold, base)) in thresholds.iter_mut().zip(plate).enumerate() {
                 for plane in 0..3 {
-                    let base = self.sums[at][plane];
-                    let mut gaps: Vec<i16> = sums
-                        .iter()
-                        .map(|row| (row[column][plane] - base).abs())
-                        .collect();
+                    for (gap, sums) in gaps.iter_mut().zip(&sums) {
+                        *gap = (sums[column][plane] - base[plane]).abs();
+                    }
                     let middle = gaps.len() / 2;
                     let median = f32::from(*gaps.select_nth_unstable(middle).1);
-                    let threshold = (4.0 * 1.4826 * median).min(8000.0) as i16;
-                    let slot = &mut self.thresholds[at][plane];
-                    *slot = (*slot).max(threshold);
+                    let noise = (4.0 * 1.4826 * median).min(8000.0) as i16;
+                    threshold[plane] = threshold[plane].max(noise);
                 }
             }
-        }
+        });
     }
 
     /// Boxes around connected blocks of `region` that differ, each widened by `margin_px`.
