@@ -56,7 +56,8 @@ deny: ## licences, bans and sources of the dependencies, offline
 
 bench: build ## the speed of the program against ffmpeg and SciPy
 	python3 bench/run.py $(RELEASE)
-	@if [ -f bench/distance.py ]; then python3 bench/distance.py; fi
+	@test -x target/bench-venv/bin/python || { python3 -m venv target/bench-venv && target/bench-venv/bin/pip install -q numpy scipy; }
+	target/bench-venv/bin/python bench/distance.py
 
 vendor: ## the page's libraries, from web/package-lock.json
 	@scripts/vendor.sh
