@@ -56,7 +56,7 @@ pub struct Summary {
     pub component_share: f64,
     /// Frames in a clip.
     pub clip_frames: usize,
-    /// Median length of the animal, pixels.
+    /// Length of the animal when seen at length (80th percentile), pixels.
     pub length_px: Option<f64>,
 }
 

@@ -60,6 +60,7 @@ pub struct LibraryStats {
     pub speed_bl_per_s: Option<[f64; 3]>,
     /// 95th percentile of the measured turn rate, radians a second.
     pub turn_rate_rad_per_s: Option<f64>,
-    /// Median length of the animal in the image, pixels: the body length (BL) of the flock.
+    /// Length of the animal in the image when seen at length (80th percentile), pixels: the body
+    /// length (BL) of the flock.
     pub length_px: Option<f64>,
 }
