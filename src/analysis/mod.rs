@@ -21,6 +21,7 @@ pub mod tracking;
 // What it did.
 pub mod depth;
 pub mod heading;
+pub mod midline;
 pub mod pose;
 pub mod smooth;
 
@@ -59,7 +60,8 @@ pub fn analyze(
 ) -> Result<Library, Error> {
     let plate = background::estimate(source, background, params, progress)?;
     let track = tracking::follow(source, &plate, params, progress)?;
-    let poses = pose::measure(&track, &source.format(), params);
+    let mut poses = pose::measure(&track, &source.format(), params);
+    midline::trace(&mut poses, &track);
     let sprites = sprite::align(&track, poses.view);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
