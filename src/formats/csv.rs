@@ -69,6 +69,7 @@ mod tests {
     #[test]
     fn every_row_has_as_many_cells_as_the_header() {
         let poses = Poses {
+            tail_beat: None,
             fps: 30.0,
             image_size_px: [8, 8],
             view: View::Side,

@@ -111,6 +111,7 @@ mod tests {
         };
         let frames = headings.iter().enumerate().map(pose).collect();
         Poses {
+            tail_beat: None,
             fps: 1.0,
             image_size_px: [8, 8],
             view: View::Side,

@@ -7,31 +7,44 @@ const REACH: usize = 4;
 
 /// The two ends of an outline as indices: the sharp one, and the one across from it.
 ///
-/// The sharp end is the peak of curvature with the largest integral; the other the peak farthest
-/// from it by index, or the very opposite point when there is no peak on that side.
+/// The sharp end is the peak of curvature with the largest integral. The other is where the outline
+/// bends most around the point farthest from it by index: the middle of all that bends there, not
+/// the highest peak, for a head may have two eyes or two ears at its corners.
 pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
     let curvature = curvature(outline);
     let mean = curvature.iter().sum::<f64>() / N_POINTS as f64;
     let above: Vec<f64> = curvature.iter().map(|c| c - mean).collect();
-    let peaks = peaks(&above);
-    let sharpest = peaks
-        .iter()
-        .fold(None, |best: Option<&Peak>, peak| match best {
-            Some(best) if best.integral >= peak.integral => Some(best),
-            _ => Some(peak),
-        });
-    let Some(sharpest) = sharpest else {
-        return [0, N_POINTS / 2];
-    };
-    let apart = |other: usize| {
-        let gap = sharpest.at.abs_diff(other);
-        gap.min(N_POINTS - gap)
-    };
-    let farthest = peaks.iter().map(|peak| peak.at).max_by_key(|&at| apart(at));
-    let across = farthest
-        .filter(|&at| apart(at) >= 3 * N_POINTS / 8)
-        .unwrap_or((sharpest.at + N_POINTS / 2) % N_POINTS);
-    [sharpest.at, across]
+    let sharpest =
+        peaks(&above)
+            .into_iter()
+            .reduce(|best, peak| match best.integral >= peak.integral {
+                true => best,
+                false => peak,
+            });
+    let sharp = sharpest.map_or(0, |peak| peak.at);
+    [
+        sharp,
+        bent_around(&above, (sharp + N_POINTS / 2) % N_POINTS),
+    ]
+}
+
+/// The middle of the curvature above the mean near an index, found by going there a few times.
+fn bent_around(above: &[f64], start: usize) -> usize {
+    const NEAR: i64 = N_POINTS as i64 / 10;
+    let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
+    let mut shift = 0;
+    for _ in 0..8 {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for offset in shift - NEAR..=shift + NEAR {
+            let weight = above[at(offset)].max(0.0);
+            sum += weight * offset as f64;
+            total += weight;
+        }
+        if total > 0.0 {
+            shift = ((sum / total).round() as i64).clamp(-2 * NEAR, 2 * NEAR);
+        }
+    }
+    at(shift)
 }
 
 /// Curvature at each point of a clockwise outline, 1 / pixels, positive where it is convex: four
@@ -100,6 +113,16 @@ mod tests {
         let [point, round] = ends(&drop());
         assert!(point <= 1 || point >= N_POINTS - 1, "{point}");
         assert!(round.abs_diff(64) <= 12, "{round}");
+    }
+
+    #[test]
+    fn a_head_with_two_eyes_ends_between_them() {
+        let mut above = vec![-1.0; N_POINTS];
+        for eye in [58, 72] {
+            above[eye - 2..=eye + 2].fill(5.0);
+        }
+        assert_eq!(bent_around(&above, 64), 65);
+        assert_eq!(bent_around(&above, 70), 65);
     }
 
     #[test]

@@ -92,9 +92,9 @@ impl Sausage {
         midline(&sighting, &pose).expect("it has an outline").points
     }
 
-    /// Root mean square distance of the found points from the true curve.
+    /// Root mean square distance of the found points from the true curve, led on to the surface.
     fn error_px(&self, found: &[[f64; 2]]) -> f64 {
-        let truth: Vec<[f64; 2]> = (0..=400).map(|k| self.at(f64::from(k) / 400.0)).collect();
+        let truth: Vec<[f64; 2]> = (-20..=410).map(|k| self.at(f64::from(k) / 400.0)).collect();
         let off = |p: &[f64; 2]| {
             truth
                 .iter()
@@ -108,12 +108,12 @@ impl Sausage {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn a_bent_sausage_has_its_own_midline_to_a_pixel_whichever_way_it_lies(
+    fn a_bent_sausage_has_its_own_midline_to_half_a_pixel_whichever_way_it_lies(
         turn in -2.2f64..2.2, away in -3.1f64..3.1, dx in 0.0f64..1.0, dy in 0.0f64..1.0,
     ) {
         let sausage = Sausage { turn, start: [120.0 + dx, 110.0 + dy], away };
         let found = sausage.traced();
-        prop_assert!(sausage.error_px(&found) < 1.0, "{} px", sausage.error_px(&found));
+        prop_assert!(sausage.error_px(&found) < 0.5, "{} px", sausage.error_px(&found));
         prop_assert!(distance(found[0], sausage.at(0.0)) < 3.5, "head first: {:?}", found[0]);
         prop_assert!(distance(found[10], sausage.at(1.0)) < 3.5, "tail last: {:?}", found[10]);
         // Two thirds of the way lie between the middles of the outer thirds.
@@ -123,6 +123,7 @@ proptest! {
 
 fn poses(view: View, pose: Pose) -> Poses {
     Poses {
+        tail_beat: None,
         fps: 30.0,
         image_size_px: [240, 220],
         view,
