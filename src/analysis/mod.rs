@@ -22,8 +22,10 @@ pub mod tracking;
 pub mod depth;
 pub mod direction;
 pub mod heading;
+pub mod midline;
 pub mod pose;
 pub mod smooth;
+pub mod tail_beat;
 
 // Which moments look alike.
 pub mod distance;
@@ -60,7 +62,9 @@ pub fn analyze(
 ) -> Result<Library, Error> {
     let plate = background::estimate(source, background, params, progress)?;
     let track = tracking::follow(source, &plate, params, progress)?;
-    let poses = pose::measure(&track, &source.format(), params);
+    let mut poses = pose::measure(&track, &source.format(), params);
+    midline::trace(&mut poses, &track);
+    poses.tail_beat = tail_beat::measure(&poses);
     let sprites = sprite::align(&track, poses.view);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;

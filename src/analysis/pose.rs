@@ -51,6 +51,7 @@ pub fn measure(track: &[Tracked], format: &FootageFormat, params: &Params) -> Po
     });
     let heads = heading::decode(&axes, &motion.velocity_px(), reference_px, pin);
     let mut poses = Poses {
+        tail_beat: None,
         fps: format.fps,
         image_size_px: [format.width, format.height],
         view,

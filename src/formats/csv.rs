@@ -8,7 +8,7 @@ use crate::library::{Pose, Poses};
 const COLUMNS: &str = "frame,time_s,detected,cut,confidence,head_confidence,depth_sign_confidence,\
 centroid_x_px,centroid_y_px,box_x_px,box_y_px,box_w_px,box_h_px,area_px,axis_rad,heading_rad,\
 length_px,height_px,skew,bend_rad,x_m,y_m,z_m,forward_x,forward_y,forward_z,yaw_rad,pitch_rad,\
-gamma_rad\n";
+gamma_rad,tail_beat_hz\n";
 
 /// The poses as comma-separated values, with a header line.
 pub fn write_poses(poses: &Poses) -> String {
@@ -16,7 +16,7 @@ pub fn write_poses(poses: &Poses) -> String {
     for (idx, pose) in poses.frames.iter().enumerate() {
         let (detected, cut) = (u8::from(pose.detected()), u8::from(pose.cut));
         write!(text, "{idx},{},{detected},{cut}", round(pose.time_s, 6)).expect("memory");
-        for value in scalars(pose) {
+        for value in scalars(pose).into_iter().chain([poses.tail_beat_hz(idx)]) {
             text.push(',');
             if let Some(value) = value {
                 write!(text, "{}", round(value, 6)).expect("memory");
@@ -69,6 +69,7 @@ mod tests {
     #[test]
     fn every_row_has_as_many_cells_as_the_header() {
         let poses = Poses {
+            tail_beat: None,
             fps: 30.0,
             image_size_px: [8, 8],
             view: View::Side,
@@ -84,7 +85,7 @@ mod tests {
         };
         let text = write_poses(&poses);
         let counts: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(counts, [29, 29, 29]);
+        assert_eq!(counts, [30, 30, 30]);
         let heading = text.lines().nth(2).and_then(|line| line.split(',').nth(15));
         assert_eq!(heading, Some("1"));
     }

@@ -110,7 +110,9 @@ impl Input {
         };
         library_dir::write(folder, library, &self.params, &source)?;
         std::fs::write(folder.join("poses.csv"), csv::write_poses(&library.poses))?;
-        std::fs::write(folder.join("headings.svg"), svg::headings(&library.poses))?;
+        for (name, picture) in svg::pictures(&library.poses) {
+            std::fs::write(folder.join(name), picture)?;
+        }
         std::fs::write(
             folder.join("distance.png"),
             self.distance_map(attempt, library)?,
