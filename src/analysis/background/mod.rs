@@ -14,6 +14,7 @@ use crate::raster::runs::Component;
 use crate::raster::{Frame, RgbImage};
 
 mod fill;
+mod ranks;
 mod refusal;
 mod samples;
 mod scenery;
@@ -38,7 +39,7 @@ pub struct Plate {
     /// Least difference that counts as the animal for certain: max(threshold, 4 sigma).
     pub core_threshold: Vec<u8>,
     /// The pixels whose light is compared.
-    pub probes: Vec<u32>,
+    pub probes: Vec<light::Probe>,
     /// Means and noise of 4 x 4 blocks, to find places worth looking at.
     pub blocks: Blocks,
     /// Pixels that the animal never left free: continued from the texture around them, nearest the rim
@@ -171,9 +172,10 @@ fn given_plate(image: &RgbImage, samples: &Samples, params: &Params) -> Result<P
 
 fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
     let threshold = f32::from(params.threshold);
+    let rgb = frame.to_rgb();
     Plate {
-        rgb: frame.to_rgb(),
-        probes: light::probes(frame.width, frame.height),
+        probes: light::probes(&rgb),
+        rgb,
         core_threshold: sigma
             .iter()
             .map(|s| (4.0 * s).max(threshold).min(255.0) as u8)

@@ -27,7 +27,10 @@ impl Blocks {
     /// The block sums of a plate, with the least thresholds.
     pub fn of(plate: &Frame) -> Blocks {
         let (columns, rows) = grid(plate);
-        let sums: Vec<[i16; 3]> = (0..rows).flat_map(|row| block_row(plate, row)).collect();
+        let mut sums = vec![[0; 3]; columns * rows];
+        for (row, sums) in sums.chunks_exact_mut(columns).enumerate() {
+            block_row(plate, row, 0, sums);
+        }
         let least = [LUMA_LEVELS * 16, CHROMA_LEVELS * 4, CHROMA_LEVELS * 4].map(|t| t as i16);
         let thresholds = vec![least; sums.len()];
         let black = if plate.color.range == Range::Limited {
@@ -53,7 +56,12 @@ impl Blocks {
             .par_chunks_exact_mut(self.columns)
             .zip(plate);
         rows.enumerate().for_each(|(row, (thresholds, plate))| {
-            let sums: Vec<Vec<[i16; 3]>> = samples.iter().map(|s| block_row(s, row)).collect();
+            let of = |sample: &Frame| {
+                let mut sums = vec![[0; 3]; plate.len()];
+                block_row(sample, row, 0, &mut sums);
+                sums
+            };
+            let sums: Vec<Vec<[i16; 3]>> = samples.iter().map(of).collect();
             let mut gaps = vec![0; samples.len()];
             for (column, (threshold, base)) in thresholds.iter_mut().zip(plate).enumerate() {
                 for plane in 0..3 {
@@ -69,8 +77,35 @@ impl Blocks {
         });
     }
 
+    /// The boxes worth a closer look that meet `region`: around connected blocks that differ, each widened
+    /// by `margin_px`, joined until no two of them meet.
+    ///
+    /// `seen` is where to look first. It grows until every box in it is whole and nothing beyond can
+    /// join one, so that the boxes do not depend on it: a small window says the same as the whole frame.
+    pub fn proposals(
+        &self,
+        frame: &Frame,
+        gain: &Gain,
+        [region, seen]: [Rect; 2],
+        margin_px: u32,
+    ) -> Vec<Rect> {
+        let mut seen = seen.union(&region);
+        loop {
+            let boxes = disjoint(self.differing(frame, gain, seen, margin_px));
+            let reach = margin_px + SIDE as u32;
+            let needed = boxes.iter().fold(seen, |needed, found| {
+                needed.union(&found.inflated(reach, frame.width, frame.height))
+            });
+            if needed == seen {
+                let meets = |found: &Rect| !found.intersection(&region).is_empty();
+                return boxes.into_iter().filter(meets).collect();
+            }
+            seen = needed;
+        }
+    }
+
     /// Boxes around connected blocks of `region` that differ, each widened by `margin_px`.
-    pub fn proposals(&self, frame: &Frame, gain: &Gain, region: Rect, margin_px: u32) -> Vec<Rect> {
+    fn differing(&self, frame: &Frame, gain: &Gain, region: Rect, margin_px: u32) -> Vec<Rect> {
         let side = SIDE as u32;
         let blocks = Rect {
             x: region.x / side,
@@ -79,6 +114,7 @@ impl Blocks {
             h: (region.bottom().div_ceil(side)).min(self.rows as u32) - region.y / side,
         };
         let mut mask = Mask::new(blocks);
+        let mut sums = vec![[0; 3]; blocks.w as usize];
         let to_plate = (1024.0 / gain.luma()).round() as i32;
         let black = self.black as i32;
         for (bits, row) in mask
@@ -86,15 +122,12 @@ impl Blocks {
             .chunks_exact_mut(blocks.w.max(1) as usize)
             .zip(blocks.y as usize..)
         {
-            let sums = block_row(frame, row);
             let from = blocks.x as usize;
+            block_row(frame, row, from, &mut sums);
             let plate = &self.sums[row * self.columns + from..];
             let thresholds = &self.thresholds[row * self.columns + from..];
-            for (((bit, sum), base), threshold) in bits
-                .iter_mut()
-                .zip(&sums[from..])
-                .zip(plate)
-                .zip(thresholds)
+            for (((bit, sum), base), threshold) in
+                bits.iter_mut().zip(&sums).zip(plate).zip(thresholds)
             {
                 let luma = (((i32::from(sum[0]) - black) * to_plate) >> 10) + black;
                 let luma_gap = (luma - i32::from(base[0])).abs();
@@ -126,37 +159,51 @@ fn grid(frame: &Frame) -> (usize, usize) {
     )
 }
 
-/// Sums of luma, U and V of the blocks of one row. At the edges the last pixels are repeated.
-fn block_row(frame: &Frame, row: usize) -> Vec<[i16; 3]> {
+/// Sums of luma, U and V of blocks of one row, from column `from` on, as many as `sums` holds. At the
+/// edges the last pixels are repeated.
+fn block_row(frame: &Frame, row: usize, from: usize, sums: &mut [[i16; 3]]) {
     let (w, h) = (frame.width as usize, frame.height as usize);
-    let (columns, _) = grid(frame);
-    let mut sums = vec![[0i16; 3]; columns];
+    sums.fill([0; 3]);
     for dy in 0..SIDE {
         let y = (row * SIDE + dy).min(h - 1);
-        add_row(&mut sums, 0, &frame.luma()[y * w..][..w], SIDE);
+        add_row::<SIDE>(sums, 0, &frame.luma()[y * w..][from * SIDE..w]);
     }
     let (u, v) = frame.chroma();
     let (cw, ch) = (frame.chroma_width() as usize, h.div_ceil(2));
     for dy in 0..SIDE / 2 {
         let y = (row * SIDE / 2 + dy).min(ch - 1);
-        add_row(&mut sums, 1, &u[y * cw..][..cw], SIDE / 2);
-        add_row(&mut sums, 2, &v[y * cw..][..cw], SIDE / 2);
+        for (plane, values) in [(1, u), (2, v)] {
+            add_row::<{ SIDE / 2 }>(sums, plane, &values[y * cw..][from * SIDE / 2..cw]);
+        }
     }
-    sums
 }
 
-fn add_row(sums: &mut [[i16; 3]], plane: usize, values: &[u8], side: usize) {
-    let mut whole = values.chunks_exact(side);
-    let mut n = 0;
-    for (sum, block) in sums.iter_mut().zip(&mut whole) {
+fn add_row<const N: usize>(sums: &mut [[i16; 3]], plane: usize, values: &[u8]) {
+    let (whole, rest) = values.as_chunks::<N>();
+    for (sum, block) in sums.iter_mut().zip(whole) {
         sum[plane] += block.iter().map(|&v| i16::from(v)).sum::<i16>();
-        n += 1;
     }
-    if let (Some(sum), Some(&last)) = (sums.get_mut(n), values.last()) {
-        let rest = whole.remainder();
-        let missing = (side - rest.len()) as i16 * i16::from(last);
+    if let (Some(sum), Some(&last)) = (sums.get_mut(whole.len()), values.last()) {
+        let missing = (N - rest.len()) as i16 * i16::from(last);
         sum[plane] += rest.iter().map(|&v| i16::from(v)).sum::<i16>() + missing;
     }
+}
+
+/// Boxes joined until no two of them meet.
+fn disjoint(mut boxes: Vec<Rect>) -> Vec<Rect> {
+    let mut idx = 0;
+    while idx < boxes.len() {
+        let meets = |other: &Rect| !boxes[idx].intersection(other).is_empty();
+        match (idx + 1..boxes.len()).find(|&other| meets(&boxes[other])) {
+            Some(other) => {
+                boxes[idx] = boxes[idx].union(&boxes[other]);
+                boxes.remove(other);
+                idx = 0;
+            }
+            None => idx += 1,
+        }
+    }
+    boxes
 }
 
 #[cfg(test)]
@@ -176,7 +223,7 @@ mod tests {
             }
         }
         let whole = Rect::of_size(61, 45);
-        let found = blocks.proposals(&frame, &Gain::ONE, whole, 0);
+        let found = blocks.proposals(&frame, &Gain::ONE, [whole; 2], 0);
         assert_eq!(
             found,
             [Rect {
@@ -186,6 +233,6 @@ mod tests {
                 h: 4
             }]
         );
-        assert_eq!(blocks.proposals(&plate, &Gain::ONE, whole, 0), []);
+        assert_eq!(blocks.proposals(&plate, &Gain::ONE, [whole; 2], 0), []);
     }
 }

@@ -20,11 +20,20 @@ const MARGIN_PX: u32 = 6;
 /// How far a box grows when a component runs into its edge.
 const GROWTH_PX: u32 = 16;
 
-/// The components of foreground pixels that lie in or reach into `region`, from the top left; raw:
-/// neither holes nor ragged edges mended (`shaped` does).
-pub fn components(frame: &Frame, plate: &Plate, gain: &Gain, region: Rect) -> Vec<Component> {
+/// The components of foreground pixels in the boxes that meet `region`, from the top left; raw: neither
+/// holes nor ragged edges mended (`shaped` does). They do not depend on `seen`, the part of the frame
+/// that is looked at first.
+pub fn components(
+    frame: &Frame,
+    plate: &Plate,
+    gain: &Gain,
+    [region, seen]: [Rect; 2],
+) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
-    for rect in disjoint(plate.blocks.proposals(frame, gain, region, MARGIN_PX)) {
+    let boxes = plate
+        .blocks
+        .proposals(frame, gain, [region, seen], MARGIN_PX);
+    for rect in boxes {
         for component in components_in(frame, plate, gain, rect) {
             if !found.contains(&component) {
                 found.push(component);
@@ -131,21 +140,4 @@ fn hysteresis(difference: &Difference, plate: &Plate) -> Vec<Component> {
         .into_iter()
         .filter(has_core)
         .collect()
-}
-
-/// Boxes joined until no two of them meet.
-fn disjoint(mut boxes: Vec<Rect>) -> Vec<Rect> {
-    let mut idx = 0;
-    while idx < boxes.len() {
-        let meets = |other: &Rect| !boxes[idx].intersection(other).is_empty();
-        match (idx + 1..boxes.len()).find(|&other| meets(&boxes[other])) {
-            Some(other) => {
-                boxes[idx] = boxes[idx].union(&boxes[other]);
-                boxes.remove(other);
-                idx = 0;
-            }
-            None => idx += 1,
-        }
-    }
-    boxes
 }
