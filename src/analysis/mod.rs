@@ -20,6 +20,7 @@ pub mod tracking;
 
 // What it did.
 pub mod depth;
+pub mod direction;
 pub mod heading;
 pub mod midline;
 pub mod pose;

@@ -33,6 +33,8 @@ pub struct Sighting {
     pub moments: Moments,
     /// Extents along the major axis and across it, of the pixels that are more animal than background.
     pub extent_px: [f64; 2],
+    /// Extent of the same pixels from the topmost to the lowest.
+    pub upright_px: f64,
     /// Bounding box of the silhouette.
     pub box_px: Rect,
     /// The silhouette touches the border of the frame.
@@ -249,6 +251,7 @@ impl<'a> Tracker<'a> {
             matte,
             moments,
             extent_px,
+            upright_px: moments::extent_px(&solid, std::f64::consts::FRAC_PI_2),
             box_px: rect,
             cut,
         })

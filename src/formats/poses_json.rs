@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
 use crate::geometry::{Camera, Rect};
-use crate::library::{Animal, BeatSpan, Pose, Poses, TailBeat, TailBeatMethod, View};
+use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/poses@1";
@@ -210,6 +210,17 @@ struct PoseFile {
     yaw_rad: Option<f64>,
     pitch_rad: Option<f64>,
     gamma_rad: Option<f64>,
+    raw: Option<RawFile>,
+}
+
+/// What one frame alone says: `forward`, `position_m`, `heading_rad`, `gamma_rad` before all frames were
+/// looked at together.
+#[derive(Serialize, Deserialize)]
+struct RawFile {
+    heading_rad: Option<f64>,
+    position_m: Option<[f64; 3]>,
+    forward: Option<[f64; 3]>,
+    gamma_rad: Option<f64>,
 }
 
 impl PoseFile {
@@ -241,6 +252,12 @@ impl PoseFile {
             yaw_rad: pose.yaw_rad.map(digits(5)),
             pitch_rad: pose.pitch_rad.map(digits(5)),
             gamma_rad: pose.gamma_rad.map(digits(5)),
+            raw: pose.raw.map(|raw| RawFile {
+                heading_rad: raw.heading_rad.map(digits(5)),
+                position_m: raw.position_m.map(|p| p.map(digits(5))),
+                forward: raw.forward.map(|p| p.map(digits(5))),
+                gamma_rad: raw.gamma_rad.map(digits(5)),
+            }),
         }
     }
 
@@ -266,6 +283,12 @@ impl PoseFile {
             yaw_rad: self.yaw_rad,
             pitch_rad: self.pitch_rad,
             gamma_rad: self.gamma_rad,
+            raw: self.raw.map(|raw| Raw {
+                heading_rad: raw.heading_rad,
+                position_m: raw.position_m,
+                forward: raw.forward,
+                gamma_rad: raw.gamma_rad,
+            }),
         }
     }
 }
@@ -286,6 +309,11 @@ mod tests {
                 h: 6,
             }),
             heading_rad: Some(-1.5),
+            raw: Some(Raw {
+                heading_rad: Some(-1.25),
+                forward: Some([0.6, 0.0, -0.8]),
+                ..Raw::default()
+            }),
             ..Pose::default()
         };
         let poses = Poses {

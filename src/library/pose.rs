@@ -126,6 +126,21 @@ pub struct Pose {
     pub pitch_rad: Option<f64>,
     /// Angle between the direction in space and the image plane, N (8), 0..=pi/2.
     pub gamma_rad: Option<f64>,
+    /// What this frame alone says of the same, before all frames were looked at together.
+    pub raw: Option<Raw>,
+}
+
+/// Values of one frame alone (N 5 and 6).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Raw {
+    /// Along the length axis, in (-pi, pi].
+    pub heading_rad: Option<f64>,
+    /// From the height of the silhouette, metres.
+    pub position_m: Option<[f64; 3]>,
+    /// From the share of the length that is seen; away or toward by the change of depth.
+    pub forward: Option<[f64; 3]>,
+    /// N (8), 0..=pi/2.
+    pub gamma_rad: Option<f64>,
 }
 
 impl Pose {

@@ -24,6 +24,8 @@ use samples::Samples;
 const SIGMA_FLOOR: f32 = 1.5;
 /// A pixel is known when it is free in at least this many samples.
 const FREE_LEAST: u32 = 5;
+/// Decides which of several like places a never-seen pixel is copied from.
+const FILL_SEED: u64 = 1;
 
 /// The scene without the animal.
 pub struct Plate {
@@ -39,7 +41,8 @@ pub struct Plate {
     pub probes: Vec<u32>,
     /// Means and noise of 4 x 4 blocks, to find places worth looking at.
     pub blocks: Blocks,
-    /// Pixels that the animal never left free.
+    /// Pixels that the animal never left free: continued from the texture around them, nearest the rim
+    /// first; past 16384 of them the rest is filled smoothly.
     pub never_seen_px: u64,
 }
 
@@ -63,6 +66,7 @@ pub fn estimate(
         ),
     };
     samples.even_out_light(&plate);
+    let mut unknown = Vec::new();
     // Two rounds: what the first plate took for the animal may have been its ghost.
     for _round in 0..2 {
         if progress.cancelled() {
@@ -76,9 +80,14 @@ pub fn estimate(
         let sigma = samples.noise(&frame, &seen);
         plate = plate_of(frame, sigma, params);
         if given.is_none() {
-            plate.never_seen_px = fill_never_seen(&mut plate, &samples, &seen, params);
+            unknown = never_seen(&samples, &seen);
+            fill_with(&mut plate, &unknown, params, fill::smooth);
         }
     }
+    plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
+    fill_with(&mut plate, &unknown, params, |image, unknown| {
+        fill::sample_texture(image, unknown, FILL_SEED)
+    });
     plate.blocks.measure_noise(&samples.frames);
     refuse(&samples, &plate, params)?;
     raise_thresholds(&mut plate, &samples);
@@ -247,21 +256,38 @@ fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
     sum < 0.0
 }
 
-/// Fills the pixels that are free in too few samples from around them; returns how many there are.
-fn fill_never_seen(plate: &mut Plate, samples: &Samples, seen: &Occupancy, params: &Params) -> u64 {
+/// The pixels that are free in too few samples.
+fn never_seen(samples: &Samples, seen: &Occupancy) -> Vec<bool> {
     let all = samples.all_bits();
     let least = FREE_LEAST.min(samples.frames.len() as u32 / 3);
-    let unknown: Vec<bool> = (0..samples.n_px())
+    (0..samples.n_px())
         .map(|px| seen.free(px, all).count_ones() < least)
-        .collect();
-    let count = unknown.iter().filter(|&&u| u).count() as u64;
-    if count > 0 {
-        fill::fill_from_around(&mut plate.rgb, &unknown);
-        let whole = Rect::of_size(plate.frame.width, plate.frame.height);
-        let mut frame = plate.frame.clone();
-        frame.draw_rgb(&plate.rgb, whole);
-        let sigma = std::mem::take(&mut plate.sigma);
-        *plate = plate_of(frame, sigma, params);
-    }
-    count
+        .collect()
+}
+
+/// Replaces the plate's unknown pixels as `fill` says, and nothing else.
+fn fill_with(
+    plate: &mut Plate,
+    unknown: &[bool],
+    params: &Params,
+    fill: impl Fn(&mut RgbImage, &[bool]),
+) {
+    let width = plate.frame.width;
+    let pixel = |px: usize| Rect {
+        x: px as u32 % width,
+        y: px as u32 / width,
+        w: 1,
+        h: 1,
+    };
+    let unknown_px = (0..unknown.len()).filter(|&px| unknown[px]);
+    let Some(hole) = unknown_px.map(pixel).reduce(|a, b| a.union(&b)) else {
+        return;
+    };
+    fill(&mut plate.rgb, unknown);
+    let mut frame = plate.frame.clone();
+    frame.draw_rgb(&plate.rgb, hole);
+    *plate = Plate {
+        never_seen_px: plate.never_seen_px,
+        ..plate_of(frame, std::mem::take(&mut plate.sigma), params)
+    };
 }
