@@ -65,6 +65,7 @@ impl Sausage {
                 contrast: 100.0,
             },
             extent_px: [LENGTH, 16.0],
+            upright_px: f64::from(rect.h),
             box_px: rect,
             cut: false,
         }
