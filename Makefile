@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit page-test docs deny bench vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit page-test docs deny bench papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -58,6 +58,9 @@ bench: build ## the speed of the program against ffmpeg and SciPy
 	python3 bench/run.py $(RELEASE)
 	@test -x target/bench-venv/bin/python || { python3 -m venv target/bench-venv && target/bench-venv/bin/pip install -q numpy scipy; }
 	target/bench-venv/bin/python bench/distance.py
+
+papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md
+	python3 bench/papers.py $(RELEASE)
 
 vendor: ## the page's libraries, from web/package-lock.json
 	@scripts/vendor.sh

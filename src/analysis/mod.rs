@@ -26,7 +26,6 @@ pub mod heading;
 pub mod midline;
 pub mod pose;
 pub mod smooth;
-pub mod tail_beat;
 
 // Which moments look alike.
 pub mod distance;
@@ -69,7 +68,7 @@ pub fn analyze(
     })?;
     let mut poses = pose::measure(&track, &source.format(), params);
     midline::trace(&mut poses, &track);
-    poses.tail_beat = tail_beat::measure(&poses);
+    poses.tail_beat = midline::tail_beat::measure(&poses);
     let sprites = sprite::align(&track, poses.view);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;

@@ -4,6 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use super::direction::{self, Seen};
+use super::params::AxisAndHead;
 use super::smooth::{Smoothed, smooth};
 use super::tracking::{Sighting, Tracked};
 use super::{Params, depth, heading};
@@ -38,7 +39,7 @@ impl Axes {
 /// The poses of a track.
 pub fn measure(track: &[Tracked], format: &FootageFormat, params: &Params) -> Poses {
     let view = params.view().unwrap_or_else(|| guess_view(track));
-    let axes = length_axes(track, view);
+    let axes = length_axes(track, view, params.axis_and_head);
     let motion = Motion::of(track, format.fps);
     let reference_px = reference_length_px(&axes);
     let pin = params.head.and_then(|head| {
@@ -49,7 +50,10 @@ pub fn measure(track: &[Tracked], format: &FootageFormat, params: &Params) -> Po
             + (head.point[1] - centroid[1]) * direction[1];
         Some((frame, toward >= 0.0))
     });
-    let heads = heading::decode(&axes, &motion.velocity_px(), reference_px, pin);
+    let heads = match params.axis_and_head {
+        AxisAndHead::Corrected => heading::decode(&axes, &motion.velocity_px(), reference_px, pin),
+        AxisAndHead::Printed => heading::keep(&axes),
+    };
     let mut poses = Poses {
         tail_beat: None,
         fps: format.fps,
@@ -215,7 +219,7 @@ fn seen(tracked: &Tracked, params: &Params) -> Pose {
 /// with memory: the axis nearest to the last frame's, unless the other one is nearer the
 /// horizontal by 10 degrees. A fish seen head-on is taller than long, one that pitches steeply has
 /// its major axis upright.
-fn length_axes(track: &[Tracked], view: View) -> Vec<Option<Axes>> {
+fn length_axes(track: &[Tracked], view: View, rule: AxisAndHead) -> Vec<Option<Axes>> {
     let mut last: Option<f64> = None;
     track
         .iter()
@@ -225,9 +229,9 @@ fn length_axes(track: &[Tracked], view: View) -> Vec<Option<Axes>> {
                 return Some(along(sighting, true));
             };
             let minor = half_circle(major + FRAC_PI_2);
-            let major_is_length = match view {
-                View::Top => true,
-                View::Side => {
+            let major_is_length = match (view, rule) {
+                (View::Top, AxisAndHead::Corrected) => true,
+                _ => {
                     let upright = |axis: f64| FRAC_PI_2 - axis.abs();
                     let lead = upright(major) - upright(minor);
                     let near = |last: f64| half_circle(major - last).abs() <= FRAC_PI_4;
@@ -239,7 +243,7 @@ fn length_axes(track: &[Tracked], view: View) -> Vec<Option<Axes>> {
                 }
             };
             let axes = along(sighting, major_is_length);
-            last = axes.axis_rad;
+            last = axes.axis_rad.filter(|_| rule == AxisAndHead::Corrected);
             Some(axes)
         })
         .collect()

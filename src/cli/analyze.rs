@@ -12,6 +12,7 @@ use crate::analysis::{self, Params};
 use crate::cpu;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
+use crate::jobs::overlay;
 use crate::library::Library;
 use crate::media::{Limits, Video, read_image};
 
@@ -47,6 +48,9 @@ pub struct Args {
     /// Clips nearer than this are alike; a multiple of the natural step when absent.
     #[arg(long, value_name = "E")]
     epsilon: Option<u64>,
+    /// Write the video once more with what was measured drawn over it.
+    #[arg(long, value_name = "MP4")]
+    overlay: Option<PathBuf>,
     /// Start from a preset: papers.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
@@ -74,6 +78,10 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     library_dir::write(&args.output, &library, &params, &footage)
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
     write_views(&args.output, &library)?;
+    if let Some(path) = &args.overlay {
+        overlay::film(&video, &library.poses, path, &progress)
+            .map_err(|error| Error::work(error.code(), &error))?;
+    }
     Ok(Some(summary(&library, &args.output)))
 }
 

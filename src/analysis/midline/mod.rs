@@ -4,6 +4,8 @@
 //! paired (after Walter & Couzin, TRex, eLife 2021). From the side a swimming body bends along the
 //! line of sight, where no outline shows it: there only an animal far longer than high has a midline.
 
+pub mod tail_beat;
+
 mod ends;
 mod outline;
 mod sections;

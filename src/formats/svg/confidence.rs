@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{LEFT, RIGHT, Sheet, TimeAxis, fill, runs, stroke};
+use super::{LEFT, RIGHT, Sheet, TimeAxis, fill, rimmed, runs};
 use crate::library::{Pose, Poses};
 
 const TOP: f64 = 44.0;
@@ -113,17 +113,21 @@ impl Rows<'_> {
         for span in &beat.spans {
             let [x0, x1] = self.span_x(span.frames);
             self.sheet.put(format_args!(
-                "<rect {} {} stroke-width=\"1\" x=\"{x0:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{}\"/>\n",
-                fill("water"),
-                stroke("paper"),
+                "<rect {} stroke-width=\"1\" x=\"{x0:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{}\"/>\n",
+                rimmed("water", "paper"),
                 self.y,
                 x1 - x0,
                 STRIP[0]
             ));
-            if x1 - x0 > 44.0 {
-                let middle = [(x0 + x1) / 2.0, self.y + STRIP[0] / 2.0 + 4.5];
-                let label = format!("{:.1} Hz", span.frequency_hz);
-                self.sheet.text("paper", "middle", middle, &label);
+            let middle = [(x0 + x1) / 2.0, self.y + STRIP[0] / 2.0 + 4.5];
+            let rate = format!("{:.1}", span.frequency_hz);
+            match x1 - x0 {
+                wide if wide > 48.0 => {
+                    let label = format!("{rate} Hz");
+                    self.sheet.text("paper", "middle", middle, &label);
+                }
+                wide if wide > 26.0 => self.sheet.text("paper", "middle", middle, &rate),
+                _ => {}
             }
         }
         self.y += STRIP[0] + STRIP[1];

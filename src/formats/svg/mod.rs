@@ -122,6 +122,12 @@ fn stroke(role: &str) -> String {
     format!("class=\"{role}-stroke\" stroke=\"{}\"", light(role))
 }
 
+/// Filled in one role's color, drawn round in another's.
+fn rimmed(inside: &str, rim: &str) -> String {
+    let (fill, stroke) = (light(inside), light(rim));
+    format!("class=\"{inside} {rim}-stroke\" fill=\"{fill}\" stroke=\"{stroke}\"")
+}
+
 /// Time from left to right.
 struct TimeAxis {
     end_s: f64,
@@ -190,6 +196,42 @@ mod tests {
         assert_eq!(round_step(5.0), 5.0);
         assert_eq!(round_step(70.0), 100.0);
         assert_eq!(runs(6, |k| [0, 1, 4].contains(&k)), [[0, 2], [4, 5]]);
+    }
+
+    #[test]
+    fn no_element_has_an_attribute_twice() {
+        let mut poses = crate::fish::sample::SampleFilm::new(crate::fish::sample::SampleParams {
+            n_frames: 90,
+            ..Default::default()
+        })
+        .expect("in range")
+        .truth();
+        poses.frames[20..30].fill(crate::library::Pose::default());
+        poses.tail_beat = Some(crate::library::TailBeat {
+            method: crate::library::TailBeatMethod::Bend,
+            spans: vec![crate::library::BeatSpan {
+                frames: [30, 80],
+                start_s: 1.0,
+                end_s: 2.7,
+                frequency_hz: 2.0,
+                amplitude: 0.1,
+                confidence: 0.9,
+            }],
+        });
+        for (name, svg) in pictures(&poses) {
+            for tag in svg.split('<').filter_map(|rest| rest.split_once('>')) {
+                let mut names: Vec<&str> = tag
+                    .0
+                    .split("=\"")
+                    .filter_map(|p| p.rsplit([' ', '\n']).next())
+                    .collect();
+                names.pop();
+                names.sort_unstable();
+                let n_names = names.len();
+                names.dedup();
+                assert_eq!(names.len(), n_names, "{name}: <{}>", tag.0);
+            }
+        }
     }
 
     #[test]

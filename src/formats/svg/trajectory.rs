@@ -1,7 +1,7 @@
 //! trajectory.svg: the animal's way across the picture, colored by time, with its start, its end and
 //! a scale; where it was not seen, a dashed line.
 
-use super::{RIGHT, Sheet, WIDTH, fill, round_step, runs, stroke};
+use super::{RIGHT, Sheet, WIDTH, fill, rimmed, round_step, runs};
 use crate::library::Poses;
 
 /// From first to last, readable on light and dark.
@@ -109,10 +109,9 @@ fn ends(sheet: &mut Sheet, spans: &[[usize; 2]], point: impl Fn(usize) -> Option
             ("start", 12.0)
         };
         sheet.put(format_args!(
-            "<text {} {} stroke-width=\"3\" paint-order=\"stroke\" text-anchor=\"{anchor}\" x=\"{:.1}\" \
+            "<text {} stroke-width=\"3\" paint-order=\"stroke\" text-anchor=\"{anchor}\" x=\"{:.1}\" \
              y=\"{:.1}\">{word}</text>\n",
-            fill("ink"),
-            stroke("sunken"),
+            rimmed("ink", "sunken"),
             x + aside,
             y + 4.5
         ));
