@@ -17,6 +17,7 @@ mod fill;
 mod refusal;
 mod samples;
 mod scenery;
+mod shift;
 
 use samples::Samples;
 
@@ -66,6 +67,9 @@ pub fn estimate(
         ),
     };
     samples.even_out_light(&plate);
+    if shift::camera_moves(&samples.frames, &plate.frame, refusal::OFTEN) {
+        return Err(Error::BackgroundNotStatic);
+    }
     let mut unknown = Vec::new();
     // Two rounds: what the first plate took for the animal may have been its ghost.
     for _round in 0..2 {
@@ -84,12 +88,15 @@ pub fn estimate(
             fill_with(&mut plate, &unknown, params, fill::smooth);
         }
     }
-    plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
-    fill_with(&mut plate, &unknown, params, |image, unknown| {
-        fill::sample_texture(image, unknown, FILL_SEED)
-    });
     plate.blocks.measure_noise(&samples.frames);
     refuse(&samples, &plate, params)?;
+    plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
+    if plate.never_seen_px > 0 {
+        fill_with(&mut plate, &unknown, params, |image, unknown| {
+            fill::sample_texture(image, unknown, FILL_SEED)
+        });
+        plate.blocks.measure_noise(&samples.frames);
+    }
     raise_thresholds(&mut plate, &samples);
     Ok(plate)
 }
