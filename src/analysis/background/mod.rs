@@ -18,6 +18,7 @@ mod ranks;
 mod refusal;
 mod samples;
 mod scenery;
+mod shift;
 mod sway;
 
 use samples::Samples;
@@ -71,6 +72,9 @@ pub fn estimate(
         ),
     };
     samples.even_out_light(&plate);
+    if shift::camera_moves(&samples.frames, &plate.frame, refusal::OFTEN) {
+        return Err(Error::BackgroundNotStatic);
+    }
     let mut unknown = Vec::new();
     let mut seen = occupancy(&samples, &plate);
     // Two rounds: what the first plate took for the animal may have been its ghost.
@@ -92,14 +96,17 @@ pub fn estimate(
             fill_with(&mut plate, &unknown, params, fill::smooth);
         }
     }
-    plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
-    fill_with(&mut plate, &unknown, params, |image, unknown| {
-        fill::sample_texture(image, unknown, FILL_SEED)
-    });
     let all = samples.all_bits();
     plate.other = sway::other_color(&samples.frames, &plate.frame, |px| seen.free(px, all));
     plate.blocks.measure_noise(&samples.frames);
     refuse(&samples, &plate, params)?;
+    plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
+    if plate.never_seen_px > 0 {
+        fill_with(&mut plate, &unknown, params, |image, unknown| {
+            fill::sample_texture(image, unknown, FILL_SEED)
+        });
+        plate.blocks.measure_noise(&samples.frames);
+    }
     raise_thresholds(&mut plate, &samples);
     Ok(plate)
 }
@@ -316,6 +323,7 @@ fn fill_with(
     frame.draw_rgb(&plate.rgb, hole);
     *plate = Plate {
         never_seen_px: plate.never_seen_px,
+        other: plate.other.take(),
         ..plate_of(frame, std::mem::take(&mut plate.sigma), params)
     };
 }
