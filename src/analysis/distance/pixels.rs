@@ -2,7 +2,7 @@
 //!
 //! Each sprite becomes U: four bytes a pixel, color premultiplied as `(A*C + 127) div 255`, then A;
 //! with `planes: rgb` the byte of A is 0 in every sprite and adds nothing. Sprites stand in groups
-//! of 48. Inside a group the bytes are cut into blocks of 1 KB, and block 0 of all 48 sprites comes
+//! of 48. Inside a group the sprites are cut into blocks of 16 x 16 pixels, and block 0 of all 48 comes
 //! before block 1: a tile of 48 x 48 distances then reads two runs of 48 KB at a time, without the
 //! cache conflicts of sprites whose size is a multiple of 4 KB. Bytes beyond the last sprite and
 //! beyond the last pixel, up to whole blocks, are 0.

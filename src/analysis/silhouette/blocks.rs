@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::analysis::light::Gain;
 use crate::geometry::Rect;
-use crate::raster::runs;
+use crate::raster::runs::{self, Component, Run};
 use crate::raster::{Frame, Mask, Range};
 
 const SIDE: usize = 4;
@@ -77,11 +77,11 @@ impl Blocks {
         });
     }
 
-    /// The boxes worth a closer look that meet `region`: around connected blocks that differ, each widened
-    /// by `margin_px`, joined until no two of them meet.
+    /// The boxes worth a closer look: around connected blocks that differ and lie in `region`, widened by
+    /// `margin_px`, joined with what differs inside or as near to them again.
     ///
-    /// `seen` is where to look first. It grows until every box in it is whole and nothing beyond can
-    /// join one, so that the boxes do not depend on it: a small window says the same as the whole frame.
+    /// `seen` is where to look first. It grows until nothing beyond it could belong to a box, so that the
+    /// boxes do not depend on it: a small window says the same as the whole frame.
     pub fn proposals(
         &self,
         frame: &Frame,
@@ -89,23 +89,24 @@ impl Blocks {
         [region, seen]: [Rect; 2],
         margin_px: u32,
     ) -> Vec<Rect> {
+        let [width, height] = [frame.width, frame.height];
         let mut seen = seen.union(&region);
         loop {
-            let boxes = disjoint(self.differing(frame, gain, seen, margin_px));
-            let reach = margin_px + SIDE as u32;
+            let differing = self.differing(frame, gain, seen);
+            let near = |rect: &Rect| rect.inflated(margin_px, width, height);
+            let boxes = gathered(&differing, region, near);
             let needed = boxes.iter().fold(seen, |needed, found| {
-                needed.union(&found.inflated(reach, frame.width, frame.height))
+                needed.union(&found.inflated(margin_px + SIDE as u32, width, height))
             });
             if needed == seen {
-                let meets = |found: &Rect| !found.intersection(&region).is_empty();
-                return boxes.into_iter().filter(meets).collect();
+                return boxes;
             }
             seen = needed;
         }
     }
 
-    /// Boxes around connected blocks of `region` that differ, each widened by `margin_px`.
-    fn differing(&self, frame: &Frame, gain: &Gain, region: Rect, margin_px: u32) -> Vec<Rect> {
+    /// The connected blocks that differ, of those that `region` touches.
+    fn differing(&self, frame: &Frame, gain: &Gain, region: Rect) -> Vec<Component> {
         let side = SIDE as u32;
         let blocks = Rect {
             x: region.x / side,
@@ -138,16 +139,75 @@ impl Blocks {
                 *bit = u8::from(differs);
             }
         }
-        let to_pixels = |rect: Rect| Rect {
-            x: rect.x * side,
-            y: rect.y * side,
-            w: (rect.right() * side).min(frame.width) - rect.x * side,
-            h: (rect.bottom() * side).min(frame.height) - rect.y * side,
-        };
         runs::components(&mask)
-            .iter()
-            .map(|c| to_pixels(c.rect).inflated(margin_px, frame.width, frame.height))
-            .collect()
+    }
+}
+
+/// Boxes of pixels around the components that have a block in `region`, as wide as `near` makes them, and
+/// around those that have a block near such a box, and so on.
+fn gathered(components: &[Component], region: Rect, near: impl Fn(&Rect) -> Rect) -> Vec<Rect> {
+    let mut boxes: Vec<Rect> = Vec::new();
+    let mut box_of: Vec<Option<usize>> = vec![None; components.len()];
+    for (idx, component) in components.iter().enumerate() {
+        if has_block_in(component, &region) {
+            box_of[idx] = Some(boxes.len());
+            boxes.push(near(&pixels_of(component.rect)));
+        }
+    }
+    loop {
+        let mut live = (0..boxes.len()).filter(|&slot| !boxes[slot].is_empty());
+        let reached = live.find_map(|slot| {
+            let reach = near(&boxes[slot]);
+            let other =
+                |idx: &usize| box_of[*idx] != Some(slot) && has_block_in(&components[*idx], &reach);
+            let idx = (0..components.len()).find(other)?;
+            Some((slot, idx))
+        });
+        let Some((slot, idx)) = reached else {
+            break;
+        };
+        match box_of[idx] {
+            None => boxes[slot] = boxes[slot].union(&near(&pixels_of(components[idx].rect))),
+            Some(other) => {
+                let taken = std::mem::take(&mut boxes[other]);
+                boxes[slot] = boxes[slot].union(&taken);
+            }
+        }
+        let joined = box_of[idx];
+        box_of[idx] = Some(slot);
+        if joined.is_some() {
+            for of in box_of.iter_mut().filter(|of| **of == joined) {
+                *of = Some(slot);
+            }
+        }
+    }
+    boxes.retain(|found| !found.is_empty());
+    boxes.sort_by_key(|found| (found.y, found.x));
+    boxes
+}
+
+/// Whether any of the component's blocks touches a box of pixels.
+fn has_block_in(component: &Component, rect: &Rect) -> bool {
+    let touches = |run: &Run| {
+        let block = Rect {
+            x: run.x0,
+            y: run.y,
+            w: run.x1 - run.x0,
+            h: 1,
+        };
+        !pixels_of(block).intersection(rect).is_empty()
+    };
+    !pixels_of(component.rect).intersection(rect).is_empty() && component.runs.iter().any(touches)
+}
+
+/// The pixels of a box of blocks; those of the last ones may hang over the edge.
+fn pixels_of(blocks: Rect) -> Rect {
+    let side = SIDE as u32;
+    Rect {
+        x: blocks.x * side,
+        y: blocks.y * side,
+        w: blocks.w * side,
+        h: blocks.h * side,
     }
 }
 
@@ -189,25 +249,10 @@ fn add_row<const N: usize>(sums: &mut [[i16; 3]], plane: usize, values: &[u8]) {
     }
 }
 
-/// Boxes joined until no two of them meet.
-fn disjoint(mut boxes: Vec<Rect>) -> Vec<Rect> {
-    let mut idx = 0;
-    while idx < boxes.len() {
-        let meets = |other: &Rect| !boxes[idx].intersection(other).is_empty();
-        match (idx + 1..boxes.len()).find(|&other| meets(&boxes[other])) {
-            Some(other) => {
-                boxes[idx] = boxes[idx].union(&boxes[other]);
-                boxes.remove(other);
-                idx = 0;
-            }
-            None => idx += 1,
-        }
-    }
-    boxes
-}
-
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::raster::ColorSpec;
 
@@ -234,5 +279,29 @@ mod tests {
             }]
         );
         assert_eq!(blocks.proposals(&plate, &Gain::ONE, [whole; 2], 0), []);
+    }
+
+    proptest! {
+        #[test]
+        fn the_boxes_do_not_depend_on_where_one_looks_first(
+            spots in prop::collection::vec((0u32..150, 0u32..100, 1u32..30, 1u32..30), 1..14),
+            (x, y, w, h) in (0u32..140, 0u32..90, 4u32..40, 4u32..40),
+            margin_px in 0u32..9,
+        ) {
+            let (width, height) = (161, 117);
+            let mut plate = Frame::new(width, height, ColorSpec::default());
+            plate.planes.fill(100);
+            let blocks = Blocks::of(&plate);
+            let mut frame = plate.clone();
+            for (x, y, w, h) in spots {
+                let spot = Rect { x, y, w, h }.intersection(&Rect::of_size(width, height));
+                for y in spot.y..spot.bottom() {
+                    frame.planes[(y * width + spot.x) as usize..][..spot.w as usize].fill(140);
+                }
+            }
+            let region = Rect { x, y, w, h }.intersection(&Rect::of_size(width, height));
+            let from = |seen| blocks.proposals(&frame, &Gain::ONE, [region, seen], margin_px);
+            prop_assert_eq!(from(region), from(Rect::of_size(width, height)));
+        }
     }
 }

@@ -20,7 +20,7 @@ const MARGIN_PX: u32 = 6;
 /// How far a box grows when a component runs into its edge.
 const GROWTH_PX: u32 = 16;
 
-/// The components of foreground pixels in the boxes that meet `region`, from the top left; raw: neither
+/// The components of foreground pixels in the boxes that `region` proposes, from the top left; raw: neither
 /// holes nor ragged edges mended (`shaped` does). They do not depend on `seen`, the part of the frame
 /// that is looked at first.
 pub fn components(
