@@ -30,10 +30,10 @@ pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
 
 /// The middle of the curvature above the mean near an index, found by going there a few times.
 fn bent_around(above: &[f64], start: usize) -> usize {
-    const NEAR: i64 = N_POINTS as i64 / 10;
+    const NEAR: i64 = N_POINTS as i64 / 6;
     let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
     let mut shift = 0;
-    for _ in 0..8 {
+    for _ in 0..4 {
         let (mut sum, mut total) = (0.0, 0.0);
         for offset in shift - NEAR..=shift + NEAR {
             let weight = above[at(offset)].max(0.0);
@@ -41,7 +41,7 @@ fn bent_around(above: &[f64], start: usize) -> usize {
             total += weight;
         }
         if total > 0.0 {
-            shift = ((sum / total).round() as i64).clamp(-2 * NEAR, 2 * NEAR);
+            shift = ((sum / total).round() as i64).clamp(-NEAR, NEAR);
         }
     }
     at(shift)
