@@ -17,8 +17,6 @@ use super::{Outline, View, Views};
 
 /// Residuals of measurements beyond this many standard deviations count linearly (Huber 1964).
 const HUBER: f64 = 2.5;
-/// Noise of the upright extent, relative.
-const UPRIGHT_NOISE: f64 = 0.02;
 /// Noise of a centroid, pixels.
 const CENTROID_NOISE_PX: f64 = 0.2;
 /// Sideways slip, lengths a second.
@@ -176,7 +174,7 @@ impl<'a> Energy<'a> {
         let scale = (self.views.focal_px * libm::exp(-state.log_z())).powi(2);
         let seen = axes.seen(view.slope, flatten);
         let by = [axes.by_yaw(), axes.by_pitch()].map(|a| a.seen(view.slope, flatten));
-        let noise = moment_noise(outline.covariance_px2);
+        let noise = moment_noise(outline.covariance_px2).map(|n| n * self.shape.moment_noise);
         for (c, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             let value = scale * form(&seen[i], &seen[j], &body);
             let turned =
@@ -206,13 +204,11 @@ impl<'a> Energy<'a> {
         add: &mut dyn FnMut(f64, &[(usize, f64)]),
     ) {
         let (extent_m, by_pitch) = self.shape.upright_m(state.pitch());
+        let noise = self.shape.upright_noise;
         let shown = libm::log(self.views.focal_px * extent_m) - state.log_z();
-        let residual = (shown - libm::log(outline.upright_px)) / UPRIGHT_NOISE;
+        let residual = (shown - libm::log(outline.upright_px)) / noise;
         let at = k * N_STATE;
-        let terms = [
-            (at, -1.0 / UPRIGHT_NOISE),
-            (at + 2, by_pitch / extent_m / UPRIGHT_NOISE),
-        ];
+        let terms = [(at, -1.0 / noise), (at + 2, by_pitch / extent_m / noise)];
         add(residual, &terms);
     }
 

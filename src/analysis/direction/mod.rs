@@ -83,7 +83,7 @@ pub struct Direction {
     pub depth_sign_confidence: f64,
 }
 
-/// Rounds of estimating poses and learning the shape.
+/// Rounds of estimating states and learning the shape, after a first look.
 const ROUNDS: usize = 2;
 /// Longest gap between sightings that is bridged, seconds.
 const BRIDGE_S: f64 = 0.5;
@@ -104,8 +104,12 @@ pub fn estimate(
     let Some(mut shape) = Shape::first(&views, animal) else {
         return nothing();
     };
-    let sphere = sphere::decode(&views, &shape);
-    let mut states = sphere.states(&views, &shape);
+    // The first round learns what the animal looks like; the second knows where to look.
+    let mut states = sphere::decode(&views, &shape).states(&views, &shape);
+    solve::whole(&Energy::new(&views, &shape), &mut states);
+    shape = shape.learned(&views, &states);
+    let course = sphere::decode(&views, &shape);
+    states = course.states(&views, &shape);
     for _ in 0..ROUNDS {
         let energy = Energy::new(&views, &shape);
         solve::whole(&energy, &mut states);
@@ -118,7 +122,7 @@ pub fn estimate(
             let idx = k.checked_sub(views.first)?;
             let state = states.get(idx).filter(|_| views.bridged[idx])?;
             let forward = body::Axes::of(state.yaw(), state.pitch()).forward;
-            let [head, depth] = sphere.confidence(idx, forward);
+            let [head, depth] = course.confidence(idx, forward);
             Some(Direction {
                 z_apparent_m: libm::exp(state.log_z()),
                 forward,

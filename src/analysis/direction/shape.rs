@@ -27,12 +27,20 @@ pub(super) struct Shape {
     pub(super) bend: f64,
     /// Standard deviation of the sway, square metres.
     pub(super) sway_sd: f64,
+    /// Noise of the upright extent, relative: fins rise and fall.
+    pub(super) upright_noise: f64,
+    /// Noise of the moments, against `moment_noise`.
+    pub(super) moment_noise: f64,
 }
 
 /// Sway of an unknown animal, against its second moment along forward.
 const FIRST_SWAY: f64 = 0.15;
 /// And never less than this.
 const LEAST_SWAY: f64 = 0.1;
+/// Noise of the upright extent of an unknown animal.
+const FIRST_UPRIGHT_NOISE: f64 = 0.03;
+/// Residuals are smaller than the noise, for the states follow it.
+const FOLLOWED: f64 = 1.2;
 /// The learned moments stay within this factor of the first guess.
 const TRUST: f64 = 1.25;
 
@@ -69,6 +77,8 @@ impl Shape {
             slant_m2,
             bend: 0.0,
             sway_sd: FIRST_SWAY * along_m2,
+            upright_noise: FIRST_UPRIGHT_NOISE,
+            moment_noise: 1.0,
         })
     }
 
@@ -126,6 +136,41 @@ impl Shape {
             sway_sd: (1.4826 * sway.unwrap_or(0.0)).max(LEAST_SWAY * along_m2),
             ..*self
         }
+        .with_noise(views, states)
+    }
+
+    /// How far off the measurements lie from what the states make of the shape.
+    fn with_noise(self, views: &Views, states: &[State]) -> Shape {
+        let outlines = || {
+            let seen = views.frames.iter().zip(states);
+            seen.filter_map(|(view, state)| Some((view, view.outline.as_ref()?, state)))
+        };
+        let off = |values: Option<f64>| FOLLOWED * 1.4826 * values.unwrap_or(0.0);
+        let upright = median(outlines().map(|(_, outline, state)| {
+            let shown = views.focal_px * self.upright_m(state.pitch()).0;
+            (libm::log(shown / outline.upright_px) - state.log_z()).abs()
+        }));
+        let moments = median(outlines().flat_map(|(view, outline, state)| {
+            let expected = self.moments_px2(views, view, state);
+            let noise = moment_noise(outline.covariance_px2);
+            [0, 1, 2].map(|c| ((expected[c] - outline.covariance_px2[c]) / noise[c]).abs())
+        }));
+        Shape {
+            upright_noise: off(upright).clamp(0.015, 0.15),
+            moment_noise: off(moments).clamp(0.7, 4.0),
+            ..self
+        }
+    }
+
+    /// The moments that a silhouette shows in a state: xx, xy, yy.
+    fn moments_px2(&self, views: &Views, view: &View, state: &State) -> [f64; 3] {
+        let seen = Axes::of(state.yaw(), state.pitch()).seen(view.slope, 1.0 / views.medium_index);
+        let scale = (views.focal_px * libm::exp(-state.log_z())).powi(2);
+        let body = self.body(state.sway());
+        [(0, 0), (0, 1), (1, 1)].map(|(i, j)| {
+            let pixel = if i == j { 1.0 / 12.0 } else { 0.0 };
+            scale * form(&seen[i], &seen[j], &body) + pixel
+        })
     }
 
     /// The three moments of one frame as rows of a linear system for (along, down, side, slant, bend),

@@ -167,7 +167,7 @@ impl Cells {
                 let sway = pairs
                     .map(|(i, j)| seen[i][0] * seen[j][2] + seen[i][2] * seen[j][0])
                     .map(|v| v * shape.sway_sd);
-                let (inverse, half_log_det) = precision(moments, sway);
+                let (inverse, half_log_det) = precision(moments, sway, shape);
                 cells.axes.push(axes);
                 cells.moments.push(moments);
                 cells.inverse.push(inverse);
@@ -233,12 +233,15 @@ impl Cells {
 
 /// The inverse covariance of measured moments about those of a cell, and half the logarithm of its
 /// determinant: noise of each, of the common scale, and whatever the sway.
-fn precision(m: [f64; 3], sway: [f64; 3]) -> ([f64; 6], f64) {
+fn precision(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], f64) {
     let mean = (m[0] * m[2]).max(0.0).sqrt();
-    let noise = [0.08 * m[0] + 0.04 * mean, 0.08 * mean, 0.08 * m[2]];
+    let noise = [0.08 * m[0] + 0.04 * mean, 0.08 * mean, 0.08 * m[2]]
+        .map(|n| n * shape.moment_noise.max(1.0));
+    // The scale is that of the upright extent; moments go with its square.
+    let scale = (2.0 * shape.upright_noise).powi(2);
     let entry = |i: usize, j: usize| {
         let own = if i == j { noise[i] * noise[i] } else { 0.0 };
-        own + 0.0025 * m[i] * m[j] + sway[i] * sway[j]
+        own + scale * m[i] * m[j] + sway[i] * sway[j]
     };
     let (a, b, c) = (entry(0, 0), entry(0, 1), entry(0, 2));
     let (d, e, f) = (entry(1, 1), entry(1, 2), entry(2, 2));
