@@ -107,7 +107,7 @@ pub fn gain(frame: &Frame, plate: &Plate) -> Gain {
         for channel in 0..3 {
             // (value * STEPS + base / 2) / base, exact because the dividend is below 2^19.
             let dividend = u32::from(rgb[channel]) * STEPS as u32 + probe.base[channel] / 2;
-            let ratio = u64::from(dividend) * u64::from(probe.inverse[channel]) >> 32;
+            let ratio = (u64::from(dividend) * u64::from(probe.inverse[channel])) >> 32;
             counts[channel][(ratio as usize).min(4 * STEPS - 1)] += 1;
         }
     }
@@ -159,7 +159,7 @@ mod tests {
             for value in 0..256 {
                 let dividend = value * STEPS as u32 + base / 2;
                 assert_eq!(
-                    u64::from(dividend) * inverse >> 32,
+                    (u64::from(dividend) * inverse) >> 32,
                     u64::from(dividend / base)
                 );
             }
