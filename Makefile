@@ -54,9 +54,11 @@ deny: ## licences, bans and sources of the dependencies, offline
 		echo "cargo deny: SKIPPED, not installed (cargo install --locked cargo-deny)"; \
 	fi
 
-bench: build ## the speed of the program against ffmpeg and SciPy
+bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
+	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
+	@target/bench-venv/bin/python -c "import numpy, scipy, cv2" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless
+	target/bench-venv/bin/python bench/analyze.py $(RELEASE)
 	python3 bench/run.py $(RELEASE)
-	@test -x target/bench-venv/bin/python || { python3 -m venv target/bench-venv && target/bench-venv/bin/pip install -q numpy scipy; }
 	target/bench-venv/bin/python bench/distance.py
 
 papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md

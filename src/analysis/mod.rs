@@ -15,6 +15,7 @@ pub mod silhouette;
 // The animal followed and cut out.
 pub mod matte;
 pub mod moments;
+pub mod read_ahead;
 pub mod sprite;
 pub mod tracking;
 
@@ -59,8 +60,12 @@ pub fn analyze(
     cpu: cpu::Level,
     progress: &dyn Progress,
 ) -> Result<Library, Error> {
-    let plate = background::estimate(source, background, params, progress)?;
-    let track = tracking::follow(source, &plate, params, progress)?;
+    let n_frames = source.format().n_frames_hint;
+    let (plate, track) = read_ahead::while_reading(source, |batches| {
+        let plate = background::estimate(source, background, params, progress)?;
+        let track = tracking::follow(batches, n_frames, &plate, params, progress)?;
+        Ok::<_, Error>((plate, track))
+    })?;
     let mut poses = pose::measure(&track, &source.format(), params);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);

@@ -15,7 +15,7 @@ const MOVING_SHARE: f64 = 0.05;
 /// More than this share of the pixels ...
 const BUSY_AREA: f64 = 0.15;
 /// ... in this share of the frames is a moving background; and a second animal in this share counts.
-const OFTEN: f64 = 0.3;
+pub(super) const OFTEN: f64 = 0.3;
 /// A second component of this share of the largest one's area may be a second animal.
 const COMPARABLE: f64 = 0.5;
 

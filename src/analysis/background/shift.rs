@@ -1,0 +1,363 @@
+//! Whether the camera moves: how far each sample is shifted against the plate (ALGORITHMS.md 2.9).
+//!
+//! Phase correlation (Kuglin & Hines 1975) of small tiles spread over the picture: it looks at
+//! structure alone, so that light may change. A plant that sways or water that glitters shifts its own
+//! tiles its own way; only what most tiles agree upon is the camera. The animal is not in the plate
+//! and only adds noise; tiles without structure say nothing. A shift beyond half a tile goes unseen here: then nearly
+//! everything differs from the plate, which the refusals notice by themselves.
+
+use std::f64::consts::TAU;
+
+use rayon::prelude::*;
+
+use crate::geometry::Rect;
+use crate::raster::Frame;
+
+/// Side of a tile, a power of two.
+const SIDE: usize = 64;
+/// At most this many tiles along each side of the picture.
+const MOST_ALONG: u32 = 5;
+/// Standard deviation of a tile's luma, levels of 255, below which it has no structure.
+const LEAST_DEVIATION: f64 = 3.0;
+/// Height of the peak, of that of two equal tiles, below which tiles are not the same scene.
+const LEAST_PEAK: f64 = 0.3;
+/// Fewer tiles than these do not speak for the picture.
+const LEAST_TILES: usize = 4;
+/// A shift above this is the camera's ...
+const MOST_SHIFT_PX: f64 = 1.0;
+/// ... when this share of the tiles agrees with it ...
+const AGREEMENT: f64 = 0.6;
+/// ... to within this, or to within this share of the shift: a tile fades to its edges, which holds a large
+/// shift back.
+const TOLERANCE_PX: f64 = 0.5;
+const TOLERANCE: f64 = 0.35;
+/// Spatial frequencies count by a Gaussian of this width, cycles a pixel ...
+const BANDWIDTH: f64 = 0.2;
+/// ... and by how far they stand out of white noise of this many levels: only what is the scene's is
+/// brought to equal strength.
+const NOISE: f64 = 8.0;
+
+/// Whether a share of more than `often` of the frames is shifted against the plate by over a pixel.
+pub(super) fn camera_moves(frames: &[Frame], plate: &Frame, often: f64) -> bool {
+    const N_JUDGED: usize = 21;
+    let correlator = Correlator::of(plate);
+    let judged: Vec<&Frame> = frames
+        .iter()
+        .step_by(frames.len().div_ceil(N_JUDGED).max(1))
+        .collect();
+    let has_moved = |frame: &&&Frame| {
+        let shift = correlator.shift_px(frame);
+        shift.is_some_and(|shift| libm::hypot(shift[0], shift[1]) > MOST_SHIFT_PX)
+    };
+    let n_moved = judged.par_iter().filter(has_moved).count();
+    n_moved as f64 > often * judged.len() as f64
+}
+
+/// The plate's tiles that have structure, with their spectra.
+struct Correlator {
+    tiles: Vec<(Rect, Vec<Complex>)>,
+    fourier: Fourier,
+}
+
+impl Correlator {
+    fn of(plate: &Frame) -> Correlator {
+        let fourier = Fourier::new();
+        let tiles = tiles(plate.width, plate.height)
+            .into_iter()
+            .filter_map(|rect| {
+                let mut tile = fourier.windowed(plate, rect)?;
+                fourier.transform(&mut tile, Way::Forth);
+                Some((rect, tile))
+            })
+            .collect();
+        Correlator { tiles, fourier }
+    }
+
+    /// The shift that most tiles agree upon; `None` when they do not.
+    fn shift_px(&self, frame: &Frame) -> Option<[f64; 2]> {
+        let shifts: Vec<[f64; 2]> = self
+            .tiles
+            .iter()
+            .filter_map(|(rect, plate)| {
+                let mut tile = self.fourier.windowed(frame, *rect)?;
+                self.fourier.transform(&mut tile, Way::Forth);
+                self.fourier.peak(&tile, plate)
+            })
+            .collect();
+        if shifts.len() < LEAST_TILES {
+            return None;
+        }
+        let middle = |axis: usize| {
+            let mut along: Vec<f64> = shifts.iter().map(|shift| shift[axis]).collect();
+            along.sort_by(f64::total_cmp);
+            along[along.len() / 2]
+        };
+        let shift = [middle(0), middle(1)];
+        let tolerance_px = TOLERANCE_PX.max(TOLERANCE * libm::hypot(shift[0], shift[1]));
+        let agrees = |s: &&[f64; 2]| libm::hypot(s[0] - shift[0], s[1] - shift[1]) <= tolerance_px;
+        let agreeing = shifts.iter().filter(agrees).count() as f64;
+        (agreeing >= AGREEMENT * shifts.len() as f64).then_some(shift)
+    }
+}
+
+/// Tiles spread evenly over a picture; they overlap in a small one. None in one smaller than a tile.
+fn tiles(width: u32, height: u32) -> Vec<Rect> {
+    let side = SIDE as u32;
+    let along = |length: u32| -> Vec<u32> {
+        let n = (2 * length / side).saturating_sub(1).min(MOST_ALONG);
+        (0..n)
+            .map(|k| (length - side) * (2 * k + 1) / (2 * n))
+            .collect()
+    };
+    let columns = along(width);
+    let at = |y: u32| {
+        let tile = move |&x: &u32| Rect {
+            x,
+            y,
+            w: side,
+            h: side,
+        };
+        columns.iter().map(tile).collect::<Vec<_>>()
+    };
+    along(height).into_iter().flat_map(at).collect()
+}
+
+#[derive(Clone, Copy, Default)]
+struct Complex {
+    re: f64,
+    im: f64,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Way {
+    Forth,
+    Back,
+}
+
+/// The Fourier transform of a tile (Cooley & Tukey 1965), and what it needs once.
+struct Fourier {
+    /// exp(-i tau k / SIDE).
+    roots: Vec<Complex>,
+    /// Hann's window.
+    window: Vec<f64>,
+    /// How much each frequency counts.
+    weights: Vec<f64>,
+    /// What noise adds to the product of two spectra.
+    noise: f64,
+}
+
+impl Fourier {
+    fn new() -> Fourier {
+        let turn = |k: usize| TAU * k as f64 / SIDE as f64;
+        let frequency = |k: usize| k.min(SIDE - k) as f64 / SIDE as f64 / BANDWIDTH;
+        let weights = (0..SIDE * SIDE).map(|at| {
+            let (fx, fy) = (frequency(at % SIDE), frequency(at / SIDE));
+            libm::exp(-0.5 * (fx * fx + fy * fy))
+        });
+        let root = |k| Complex {
+            re: libm::cos(turn(k)),
+            im: -libm::sin(turn(k)),
+        };
+        let hann = |k: usize| 0.5 - 0.5 * libm::cos(turn(k) + TAU / (2 * SIDE) as f64);
+        let window: Vec<f64> = (0..SIDE).map(hann).collect();
+        let along = window.iter().map(|w| w * w).sum::<f64>();
+        Fourier {
+            roots: (0..SIDE).map(root).collect(),
+            noise: NOISE * NOISE * along * along,
+            window,
+            weights: weights.collect(),
+        }
+    }
+
+    /// The tile's luma less its mean, fading to its edges; `None` where it has no structure.
+    fn windowed(&self, frame: &Frame, rect: Rect) -> Option<Vec<Complex>> {
+        let width = frame.width as usize;
+        let level = |k: usize| {
+            let (x, y) = (rect.x as usize + k % SIDE, rect.y as usize + k / SIDE);
+            f64::from(frame.luma()[y * width + x])
+        };
+        let n = (SIDE * SIDE) as f64;
+        let mean = (0..SIDE * SIDE).map(level).sum::<f64>() / n;
+        let variance = (0..SIDE * SIDE).map(|k| (level(k) - mean) * (level(k) - mean));
+        if variance.sum::<f64>() / n < LEAST_DEVIATION * LEAST_DEVIATION {
+            return None;
+        }
+        let value = |k: usize| Complex {
+            re: (level(k) - mean) * self.window[k % SIDE] * self.window[k / SIDE],
+            im: 0.0,
+        };
+        Some((0..SIDE * SIDE).map(value).collect())
+    }
+
+    /// Rows, then columns.
+    fn transform(&self, tile: &mut [Complex], way: Way) {
+        for row in tile.chunks_exact_mut(SIDE) {
+            self.transform_line(row, way);
+        }
+        let mut column = [Complex::default(); SIDE];
+        for x in 0..SIDE {
+            for (value, y) in column.iter_mut().zip(0..) {
+                *value = tile[y * SIDE + x];
+            }
+            self.transform_line(&mut column, way);
+            for (value, y) in column.iter().zip(0..) {
+                tile[y * SIDE + x] = *value;
+            }
+        }
+    }
+
+    fn transform_line(&self, line: &mut [Complex], way: Way) {
+        let n_bits = SIDE.trailing_zeros();
+        for k in 0..SIDE {
+            let reversed = k.reverse_bits() >> (usize::BITS - n_bits);
+            if k < reversed {
+                line.swap(k, reversed);
+            }
+        }
+        let mut half = 1;
+        while half < SIDE {
+            for pair in line.chunks_exact_mut(2 * half) {
+                let (low, high) = pair.split_at_mut(half);
+                for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
+                    let root = self.roots[k * SIDE / (2 * half)];
+                    let im = if way == Way::Forth { root.im } else { -root.im };
+                    let turned = Complex {
+                        re: b.re * root.re - b.im * im,
+                        im: b.re * im + b.im * root.re,
+                    };
+                    *b = Complex {
+                        re: a.re - turned.re,
+                        im: a.im - turned.im,
+                    };
+                    *a = Complex {
+                        re: a.re + turned.re,
+                        im: a.im + turned.im,
+                    };
+                }
+            }
+            half *= 2;
+        }
+    }
+
+    /// Where the phase correlation of two spectra has its peak: the shift of the first against the
+    /// second, pixels. `None` when the peak is low.
+    fn peak(&self, frame: &[Complex], plate: &[Complex]) -> Option<[f64; 2]> {
+        let mut ideal = 0.0;
+        let product = |k: usize| {
+            let (f, p) = (frame[k], plate[k]);
+            let (re, im) = (f.re * p.re + f.im * p.im, f.im * p.re - f.re * p.im);
+            let length = libm::hypot(re, im);
+            let weight = self.weights[k] / (length + self.noise);
+            ideal += weight * length;
+            Complex {
+                re: re * weight,
+                im: im * weight,
+            }
+        };
+        let mut tile: Vec<Complex> = (0..SIDE * SIDE).map(product).collect();
+        self.transform(&mut tile, Way::Back);
+        let highest = |a: &usize, b: &usize| tile[*a].re.total_cmp(&tile[*b].re);
+        let at = (0..SIDE * SIDE).max_by(highest)?;
+        if tile[at].re < LEAST_PEAK * ideal {
+            return None;
+        }
+        let (x, y) = (at % SIDE, at / SIDE);
+        let value = |x: usize, y: usize| tile[y % SIDE * SIDE + x % SIDE].re;
+        let signed = |k: usize| k as f64 - if k > SIDE / 2 { SIDE as f64 } else { 0.0 };
+        Some([
+            signed(x) + vertex(value(x + SIDE - 1, y), value(x, y), value(x + 1, y)),
+            signed(y) + vertex(value(x, y + SIDE - 1), value(x, y), value(x, y + 1)),
+        ])
+    }
+}
+
+/// Where the parabola through three neighbors, the middle one the highest, has its vertex: -0.5..=0.5.
+fn vertex(before: f64, middle: f64, after: f64) -> f64 {
+    let bend = before - 2.0 * middle + after;
+    if bend < 0.0 {
+        (0.5 * (before - after) / bend).clamp(-0.5, 0.5)
+    } else {
+        0.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random;
+    use crate::raster::ColorSpec;
+
+    /// A scene of soft blotches seen by a camera shifted by (dx, dy), in light of `gain`, with noise.
+    fn scene(dx: f64, dy: f64, gain: f64, noise_key: u64) -> Frame {
+        let mut frame = Frame::new(320, 240, ColorSpec::default());
+        let blotch = |k: u64| {
+            let unit = |c: u64| random::unit(4, &[k, c]);
+            let radius_px = 1.5 + 5.0 * unit(2);
+            (
+                unit(0) * 320.0,
+                unit(1) * 240.0,
+                radius_px,
+                80.0 * unit(3) - 40.0,
+            )
+        };
+        let blotches: Vec<_> = (0..600).map(blotch).collect();
+        for at in 0..320 * 240 {
+            let (x, y) = ((at % 320) as f64 - dx, (at / 320) as f64 - dy);
+            let light = |&(cx, cy, radius, level): &(f64, f64, f64, f64)| {
+                let square = ((x - cx).powi(2) + (y - cy).powi(2)) / (2.0 * radius * radius);
+                if square < 5.0 {
+                    level * (-square).exp()
+                } else {
+                    0.0
+                }
+            };
+            let level = gain * (110.0 + blotches.iter().map(light).sum::<f64>());
+            let noise = 2.0 * random::normal(5, &[noise_key, at as u64]);
+            frame.planes[at] = (level + noise).round().clamp(0.0, 255.0) as u8;
+        }
+        frame
+    }
+
+    #[test]
+    fn a_shift_is_measured_in_any_light() {
+        let correlator = Correlator::of(&scene(0.0, 0.0, 1.0, 0));
+        for (dx, dy, gain) in [(0.0, 0.0, 1.2), (1.5, -0.7, 1.0), (-4.0, 2.4, 0.8)] {
+            let frame = scene(dx, dy, gain, 1);
+            let shift = correlator.shift_px(&frame);
+            let [x, y] = shift.expect("most tiles agree");
+            let off_px = (x - dx).hypot(y - dy);
+            assert!(
+                off_px < 0.25 + 0.2 * dx.hypot(dy),
+                "{dx} {dy} {gain}: {shift:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_shifts_in_a_third_of_the_picture_is_not_the_camera() {
+        let still = scene(0.0, 0.0, 1.0, 0);
+        let mut swaying = still.clone();
+        let shifted = scene(3.0, 0.0, 1.0, 0);
+        for at in (0..320 * 240).filter(|at| at % 320 < 107) {
+            swaying.planes[at] = shifted.planes[at];
+        }
+        let shift = Correlator::of(&still).shift_px(&swaying);
+        assert!(shift.is_none_or(|s| s[0].hypot(s[1]) < 0.3), "{shift:?}");
+    }
+
+    #[test]
+    fn a_picture_without_structure_says_nothing() {
+        let mut flat = Frame::new(320, 240, ColorSpec::default());
+        flat.planes.fill(128);
+        assert!(Correlator::of(&flat).shift_px(&flat).is_none());
+        assert!(tiles(48, 48).is_empty());
+    }
+
+    #[test]
+    fn tiles_lie_inside_the_picture() {
+        for (width, height) in [(64, 64), (65, 100), (210, 80), (1920, 1080), (63, 500)] {
+            let inside = |t: &Rect| t.right() <= width && t.bottom() <= height;
+            assert!(tiles(width, height).iter().all(inside));
+        }
+    }
+}
