@@ -192,3 +192,33 @@ fn a_line_bent_by_a_quarter_circle_says_so_and_a_straight_one_says_0() {
     let corner = [[0.0, 0.0], [-3.0, 0.0], [-3.0, 3.0]];
     assert!((bend_rad(&corner).abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
 }
+
+#[test]
+fn a_head_broad_with_eyes_begins_between_them() {
+    // A hammer: two eyes at the corners of a blunt head, a long thin tail behind.
+    let rect = Rect::of_size(120, 60);
+    let mut image = RgbaImage::new(rect.w, rect.h);
+    for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {
+        let p = [(k % 120) as f64 + 0.5, (k / 120) as f64 + 0.5];
+        let eyes = [22.0, 38.0].map(|y| 5.0 - distance(p, [98.0, y]));
+        let head = 5.0 - (p[1] - 30.0).abs().max((p[0] - 94.0).abs() - 3.0);
+        let tail = 1.6 - (p[1] - 30.0).abs().max((p[0] - 50.0).abs() - 42.0);
+        let depth = eyes[0].max(eyes[1]).max(head).max(tail);
+        pixel[3] = (255.0 * (depth + 0.5).clamp(0.0, 1.0)) as u8;
+    }
+    let mut sighting = BENT.sighting();
+    sighting.matte.rect = rect;
+    sighting.matte.image = image;
+    let pose = Pose {
+        heading_rad: Some(0.0),
+        length_px: Some(95.0),
+        ..Pose::default()
+    };
+    let found = midline(&sighting, &pose).expect("it has an outline").points;
+    assert!((found[0][1] - 30.0).abs() < 2.0, "head: {:?}", found[0]);
+    assert!(
+        distance(found[10], [7.0, 30.0]) < 3.0,
+        "tail: {:?}",
+        found[10]
+    );
+}
