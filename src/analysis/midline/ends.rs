@@ -11,21 +11,25 @@ const REACH: usize = 4;
 /// bends most around the point farthest from it by index: the middle of all that bends there, not
 /// the highest peak, for a head may have two eyes or two ears at its corners.
 pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
+    let sharpest = peaks(&above_mean(outline))
+        .into_iter()
+        .reduce(|best, peak| match best.integral >= peak.integral {
+            true => best,
+            false => peak,
+        });
+    let sharp = sharpest.map_or(0, |peak| peak.at);
+    [sharp, across(outline, sharp)]
+}
+
+/// The end across from another end.
+pub(super) fn across(outline: &[[f64; 2]], end: usize) -> usize {
+    bent_around(&above_mean(outline), (end + N_POINTS / 2) % N_POINTS)
+}
+
+fn above_mean(outline: &[[f64; 2]]) -> Vec<f64> {
     let curvature = curvature(outline);
     let mean = curvature.iter().sum::<f64>() / N_POINTS as f64;
-    let above: Vec<f64> = curvature.iter().map(|c| c - mean).collect();
-    let sharpest =
-        peaks(&above)
-            .into_iter()
-            .reduce(|best, peak| match best.integral >= peak.integral {
-                true => best,
-                false => peak,
-            });
-    let sharp = sharpest.map_or(0, |peak| peak.at);
-    [
-        sharp,
-        bent_around(&above, (sharp + N_POINTS / 2) % N_POINTS),
-    ]
+    curvature.iter().map(|c| c - mean).collect()
 }
 
 /// The middle of the curvature above the mean near an index, found by going there a few times.

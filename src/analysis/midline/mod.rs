@@ -98,10 +98,15 @@ fn midline(sighting: &Sighting, pose: &Pose) -> Option<Traced> {
     let span = [0, 1].map(|c| outline[one][c] - outline[other][c]);
     let lead = span[0] * toward[0] + span[1] * toward[1];
     let unsure = lead.abs() < ACROSS * libm::hypot(span[0], span[1]);
-    let (head, tail) = if lead >= 0.0 {
-        (one, other)
+    let (head, tail) = match lead >= 0.0 {
+        true => (one, other),
+        false => (other, one),
+    };
+    // An eye may be sharper than the tail: the head is where it lies across from the tail.
+    let head = if head == one {
+        ends::across(&outline, tail)
     } else {
-        (other, one)
+        head
     };
     let walked = resampled(&walk::walk(&outline, head, tail), N_POINTS);
     if is_sound(&walked, pose) {

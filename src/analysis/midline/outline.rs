@@ -121,7 +121,11 @@ impl Grid {
 
     fn crossing(&self, edge: usize) -> [f64; 2] {
         let k = edge / 2;
-        let beyond = k + if edge % 2 == 0 { 1 } else { self.width };
+        let beyond = k + if edge.is_multiple_of(2) {
+            1
+        } else {
+            self.width
+        };
         let share = (LEVEL - self.values[k]) / (self.values[beyond] - self.values[k]);
         let (x, y) = ((k % self.width) as f64, (k / self.width) as f64);
         match edge % 2 {

@@ -39,6 +39,29 @@ pub fn headings(poses: &Poses) -> String {
     );
     sheet.text("ink", "start", [16.0, 24.0], "Heading, degrees");
     axis.draw(&mut sheet, TOP, STRIP[1]);
+    grid(&mut sheet, poses, &axis, y);
+    let pen = |sure: bool| {
+        if sure {
+            "stroke-width=\"1.8\""
+        } else {
+            "stroke-width=\"0.7\""
+        }
+    };
+    for sure in [false, true] {
+        let of = |pose: &Pose| (pose.head_confidence.unwrap_or(1.0) >= SURE) == sure;
+        let more = format!(
+            "{} stroke-linejoin=\"round\" stroke-linecap=\"round\"",
+            pen(sure)
+        );
+        let path = line(poses, of, |t| axis.x(t), y);
+        sheet.stroke("accent", &path, &more);
+    }
+    strip(&mut sheet, poses, &axis);
+    sheet.finish()
+}
+
+/// The directions by their names, and shade where nothing is known.
+fn grid(sheet: &mut Sheet, poses: &Poses, axis: &TimeAxis, y: impl Fn(f64) -> f64) {
     for [from, to] in runs(poses.frames.len(), |k| {
         poses.frames[k].heading_rad.is_none()
     }) {
@@ -67,24 +90,6 @@ pub fn headings(poses: &Poses) -> String {
             &format!("{word} {degrees}°"),
         );
     }
-    let pen = |sure: bool| {
-        if sure {
-            "stroke-width=\"1.8\""
-        } else {
-            "stroke-width=\"0.7\""
-        }
-    };
-    for sure in [false, true] {
-        let of = |pose: &Pose| (pose.head_confidence.unwrap_or(1.0) >= SURE) == sure;
-        let more = format!(
-            "{} stroke-linejoin=\"round\" stroke-linecap=\"round\"",
-            pen(sure)
-        );
-        let path = line(poses, of, |t| axis.x(t), y);
-        sheet.stroke("accent", &path, &more);
-    }
-    strip(&mut sheet, poses, &axis);
-    sheet.finish()
 }
 
 /// How sure the head is, 0.5 at the bottom to 1 at the top.
