@@ -9,7 +9,7 @@ use super::light::{self, Gain};
 use super::matte::{self, Matte};
 use super::moments::{self, Moments};
 use super::params::Search;
-use super::silhouette;
+use super::silhouette::{self, parting};
 use super::{Error, LEAST_FRAMES, Params};
 use crate::footage::FrameSource;
 use crate::geometry::Rect;
@@ -21,6 +21,10 @@ use crate::raster::{Frame, Mask};
 const LEAST_AREA_PX: u64 = 12;
 /// Frames without the animal before it is looked for anew, anywhere.
 const MISSES: u32 = 5;
+/// A component of this many times the usual area may be the animal and something else ...
+const MERGED: f64 = 1.2;
+/// ... if the usual area is known from this many silhouettes.
+const LEAST_AREAS: usize = 8;
 /// Every so many frames the whole frame is searched.
 const FULL_EVERY: usize = 30;
 
@@ -94,7 +98,7 @@ struct Tracker<'a> {
     velocity_px: [f64; 2],
     box_px: Rect,
     misses: u32,
-    /// Areas of the last silhouettes, for their running median.
+    /// Areas of the last components, for their running median.
     areas: Vec<f64>,
 }
 
@@ -119,13 +123,16 @@ impl<'a> Tracker<'a> {
         let found = self
             .near(frame, &gain)
             .or_else(|| self.anywhere(frame, &gain))
-            .and_then(|component| self.see(frame, &gain, component));
+            .and_then(|component| {
+                let area = component.area as f64;
+                Some((self.see(frame, &gain, component)?, area))
+            });
         match &found {
-            Some(sighting) => self.remember(sighting),
+            Some((sighting, area)) => self.remember(sighting, *area),
             None => self.misses = (self.misses + 1).min(MISSES),
         }
         self.frame_idx += 1;
-        found
+        found.map(|(sighting, _)| sighting)
     }
 
     /// The best component in the search window; `None` when the window is not to be trusted.
@@ -136,13 +143,13 @@ impl<'a> Tracker<'a> {
             return None;
         }
         let window = self.window();
-        let components = silhouette::components(frame, self.plate, gain, window);
+        let components = self.components(frame, gain, window);
         self.best(&components, window)
     }
 
     /// The best component of the whole frame.
     fn anywhere(&mut self, frame: &Frame, gain: &Gain) -> Option<Component> {
-        let components = silhouette::components(frame, self.plate, gain, self.whole);
+        let components = self.components(frame, gain, self.whole);
         if self.misses >= MISSES {
             return components
                 .into_iter()
@@ -154,6 +161,37 @@ impl<'a> Tracker<'a> {
             let only = fitting.next();
             only.filter(|_| fitting.next().is_none()).cloned()
         })
+    }
+
+    /// The components of a region. One that is larger than the animal mostly is and that is two things
+    /// counts with the part where the animal should be alone.
+    fn components(&self, frame: &Frame, gain: &Gain, region: Rect) -> Vec<Component> {
+        let mut components = silhouette::components(frame, self.plate, gain, region);
+        let Some(predicted) = self.predicted().filter(|_| self.areas.len() >= LEAST_AREAS) else {
+            return components;
+        };
+        let usual = self.usual_area();
+        let far_off = |area: u64| libm::log(area as f64 / usual).abs();
+        for component in &mut components {
+            if component.area as f64 > MERGED * usual {
+                let difference = silhouette::difference(frame, self.plate, gain, component.rect);
+                let part = parting::part_at(component, &difference, usual, predicted);
+                if let Some(part) = part.filter(|p| far_off(p.area) < far_off(component.area)) {
+                    *component = part;
+                }
+            }
+        }
+        components
+    }
+
+    /// Where the animal should be now; `None` before it was seen.
+    fn predicted(&self) -> Option<[f64; 2]> {
+        let (_, last) = self.last?;
+        let steps = f64::from(self.misses + 1);
+        Some([
+            last[0] + self.velocity_px[0] * steps,
+            last[1] + self.velocity_px[1] * steps,
+        ])
     }
 
     /// The last box where it should be now, widened by how far it may have gone besides.
@@ -176,12 +214,7 @@ impl<'a> Tracker<'a> {
     /// The component of fitting area in the window that lies nearest the prediction and differs
     /// least in area.
     fn best(&self, components: &[Component], window: Rect) -> Option<Component> {
-        let (_, last) = self.last?;
-        let steps = f64::from(self.misses + 1);
-        let predicted = [
-            last[0] + self.velocity_px[0] * steps,
-            last[1] + self.velocity_px[1] * steps,
-        ];
+        let predicted = self.predicted()?;
         let scale = f64::from(self.box_px.w.max(self.box_px.h)).max(8.0);
         let usual = self.usual_area();
         let cost = |component: &Component| {
@@ -254,7 +287,7 @@ impl<'a> Tracker<'a> {
         })
     }
 
-    fn remember(&mut self, sighting: &Sighting) {
+    fn remember(&mut self, sighting: &Sighting, area: f64) {
         let centroid = sighting.moments.centroid_px;
         self.velocity_px = match self.last {
             Some((frame_idx, last)) if self.misses < MISSES => {
@@ -269,7 +302,6 @@ impl<'a> Tracker<'a> {
         self.last = Some((self.frame_idx, centroid));
         self.box_px = sighting.box_px;
         self.misses = 0;
-        let area = sighting.moments.area_px;
         if self.areas.len() == 61 {
             self.areas.remove(0);
         }
