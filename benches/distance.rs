@@ -62,6 +62,7 @@ fn read(path: &Path, [width, height]: [u32; 2]) -> (Sprites, Poses) {
         sprites.fill(frame_idx).copy_from_slice(sprite);
     }
     let poses = Poses {
+        tail_beat: None,
         fps: 30.0,
         image_size_px: [width, height],
         view: View::Side,

@@ -1,193 +1,95 @@
-//! Position and direction in space (N 5.3 and 6, corrected; ALGORITHMS.md 1 and 4).
+//! Position and direction in space from one frame alone (N 5.3 and 6, corrected as ALGORITHMS.md 1 says).
 //!
-//! Depth from the height of the silhouette; yaw from how much of the known length is seen at that
-//! depth; toward or away by a decision over the whole footage, because an image of a fish that comes
-//! looks like one of a fish that goes.
+//! Depth from the height of the silhouette, the angle to the picture from how much of the known length
+//! is seen at that depth. N leaves open whether the animal comes or goes; alone, a frame can only be
+//! compared with the one before. These are the raw values; `direction` gives the best estimate.
 
 use super::Params;
 use super::params::Eq7;
-use super::pose::Motion;
-use super::smooth::{Smoothed, smooth};
-use crate::geometry::{Camera, wrap_rad};
-use crate::library::{Animal, Poses};
+use crate::geometry::Camera;
+use crate::library::{Animal, Poses, Raw};
 
-/// Fills in position, direction, yaw, pitch and gamma of every pose that can have them. Without a
-/// camera or the animal's size nothing is filled in.
-pub fn place_in_space(poses: &mut Poses, motion: &Motion, params: &Params) {
-    let (Some(camera), Some(animal)) = (poses.camera, poses.animal) else {
-        return;
-    };
-    let seen = Seen::of(poses, &camera, &animal, params);
-    let z_apparent = if params.smooth {
-        smooth(&seen.z_apparent_m, poses.fps)
-    } else {
-        raw(seen.z_apparent_m.clone())
-    };
-    let cosines = foreshortening(poses, &camera, &animal, &z_apparent, params);
-    let toward = depth_signs(poses, &camera, motion, &z_apparent, &cosines);
-    for (k, pose) in poses.frames.iter_mut().enumerate() {
-        let Some(z) = z_apparent.value[k] else {
+/// Fills in the raw heading of every pose, and with a camera and the animal's size its raw position and
+/// direction.
+pub fn measure_alone(poses: &mut Poses, params: &Params) {
+    let calibrated = poses.camera.zip(poses.animal);
+    let mut last_depth = None;
+    for pose in &mut poses.frames {
+        if !pose.detected() {
             continue;
-        };
-        let Some(centroid) = (if params.smooth {
-            motion.x.value[k]
-                .zip(motion.y.value[k])
-                .map(|(x, y)| [x, y])
-        } else {
-            pose.centroid_px
-        }) else {
-            continue;
-        };
-        pose.position_m = Some(camera.point_in_camera(centroid, z));
-        let (Some(cosine), Some(heading)) = (cosines[k], pose.heading_rad) else {
-            continue;
-        };
-        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-        let sign = if toward[k].away { 1.0 } else { -1.0 };
-        let forward = [
-            cosine * libm::cos(heading),
-            cosine * libm::sin(heading),
-            sign * sine,
-        ];
-        pose.gamma_rad = Some(libm::acos(cosine));
-        pose.depth_sign_confidence = Some(toward[k].confidence);
-        pose.yaw_rad = Some(wrap_rad(libm::atan2(forward[2], forward[0])));
-        pose.pitch_rad = Some(libm::asin(forward[1].clamp(-1.0, 1.0)));
-        pose.forward = Some(forward);
-    }
-}
-
-/// What one frame alone says.
-struct Seen {
-    z_apparent_m: Vec<Option<f64>>,
-}
-
-impl Seen {
-    fn of(poses: &Poses, camera: &Camera, animal: &Animal, params: &Params) -> Seen {
-        let depth = |height_px: f64| match params.eq7 {
-            Eq7::Corrected => camera.apparent_depth_m(animal.height_m, height_px),
-            Eq7::Printed => height_px / camera.pane_px_per_m / animal.height_m * camera.z_min_m,
-        };
-        // A silhouette cut by the border shows less than its height.
-        let one = |pose: &crate::library::Pose| {
-            pose.height_px.filter(|&h| h > 0.0 && !pose.cut).map(depth)
-        };
-        Seen {
-            z_apparent_m: poses.frames.iter().map(one).collect(),
         }
+        let mut raw = Raw {
+            heading_rad: pose.heading_rad,
+            ..Raw::default()
+        };
+        let sizes = pose.length_px.zip(pose.height_px);
+        // A silhouette cut by the border shows less than its height.
+        let whole = sizes.filter(|&(_, height)| height > 0.0 && !pose.cut);
+        if let (Some((camera, animal)), Some(sizes), Some(centroid)) =
+            (calibrated, whole, pose.centroid_px)
+        {
+            let (depth_m, cosine) = depth_and_cosine(&camera, &animal, sizes, params.eq7);
+            raw.position_m = Some(camera.point_in_camera(centroid, depth_m));
+            raw.gamma_rad = Some(libm::acos(cosine));
+            let toward = last_depth.is_some_and(|last| depth_m < last);
+            let sine = (1.0 - cosine * cosine).sqrt();
+            raw.forward = pose.heading_rad.map(|heading| {
+                let along = [libm::cos(heading), libm::sin(heading)];
+                let away = if toward { -sine } else { sine };
+                [cosine * along[0], cosine * along[1], away]
+            });
+            last_depth = Some(depth_m);
+        }
+        pose.raw = Some(raw);
     }
 }
 
-/// cos(gamma): the share of the animal's length that is seen, 0..=1. With smoothing the cosine is
-/// smoothed before it is clamped, for acos is infinitely steep at 1 (N 8 corrected).
-fn foreshortening(
-    poses: &Poses,
+/// The apparent depth, metres, by N (7), and the share of the length that is seen, by N (8), 0..=1.
+fn depth_and_cosine(
     camera: &Camera,
     animal: &Animal,
-    z_apparent: &Smoothed,
-    params: &Params,
-) -> Vec<Option<f64>> {
-    let measured: Vec<Option<f64>> = poses
-        .frames
-        .iter()
-        .zip(&z_apparent.value)
-        .map(|(pose, z)| {
-            let on_pane_m = pose.length_px.filter(|_| !pose.cut)? / camera.pane_px_per_m;
-            Some(on_pane_m * (*z)? / (camera.z_min_m * animal.length_m))
-        })
-        .collect();
-    let cosines = if params.smooth {
-        smooth(&measured, poses.fps).value
-    } else {
-        measured
+    (length_px, height_px): (f64, f64),
+    eq7: Eq7,
+) -> (f64, f64) {
+    let depth_m = match eq7 {
+        Eq7::Corrected => camera.apparent_depth_m(animal.height_m, height_px),
+        Eq7::Printed => height_px / camera.pane_px_per_m / animal.height_m * camera.z_min_m,
     };
-    cosines
-        .iter()
-        .map(|cosine| cosine.map(|c| c.clamp(0.0, 1.0)))
-        .collect()
+    let seen = length_px * animal.height_m / (height_px * animal.length_m);
+    (depth_m, seen.clamp(0.0, 1.0))
 }
 
-/// Toward the camera or away from it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Sign {
-    away: bool,
-    confidence: f64,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// The likeliest sequence of signs: the depth must change as a fish of the measured speed and angle
-/// would change it, and the sign may only flip when the fish is seen broadside.
-fn depth_signs(
-    poses: &Poses,
-    camera: &Camera,
-    motion: &Motion,
-    z_apparent: &Smoothed,
-    cosines: &[Option<f64>],
-) -> Vec<Sign> {
-    let n = poses.frames.len();
-    let step = |k: usize| {
-        let sine = cosines[k].map_or(0.0, |c| (1.0 - c * c).max(0.0).sqrt());
-        let z_rate = z_apparent.rate[k]
-            .map(|rate| rate * camera.medium_index)
-            .unwrap_or(0.0);
-        let across = motion.x.rate[k]
-            .zip(motion.y.rate[k])
-            .zip(z_apparent.value[k])
-            .map_or(0.0, |((x, y), z)| libm::hypot(x, y) * z / camera.focal_px());
-        let speed = libm::hypot(across, z_rate);
-        let cost = |sign: f64| {
-            0.075
-                * ((z_rate - sign * speed * sine) / 0.05)
-                    .clamp(-4.0, 4.0)
-                    .powi(2)
-        };
-        ([cost(-1.0), cost(1.0)], 0.3 + 12.0 * sine * sine)
+    const CAMERA: Camera = Camera {
+        z_min_m: 0.7,
+        pane_px_per_m: 1000.0,
+        center_px: [320.0, 240.0],
+        medium_index: 1.0,
     };
-    let steps: Vec<([f64; 2], f64)> = (0..n).map(step).collect();
-    let mut costs = [0.0f64; 2];
-    let mut came_from = Vec::with_capacity(n);
-    let mut ahead = Vec::with_capacity(n);
-    for (emission, flip) in &steps {
-        let mut from = [0, 1];
-        let mut next = [0.0; 2];
-        for state in 0..2 {
-            let (stay, swap) = (costs[state], costs[1 - state] + flip);
-            from[state] = if stay <= swap { state } else { 1 - state };
-            next[state] = stay.min(swap) + emission[state];
-        }
-        costs = next;
-        came_from.push(from);
-        ahead.push(costs);
-    }
-    let mut behind = [0.0f64; 2];
-    let mut signs = vec![
-        Sign {
-            away: true,
-            confidence: 0.5
-        };
-        n
-    ];
-    let mut state = usize::from(costs[1] <= costs[0]);
-    for k in (0..n).rev() {
-        // Min-marginals: how much worse the best sequence through the other sign is.
-        let other = 1 - state;
-        let gap = (ahead[k][other] + behind[other]) - (ahead[k][state] + behind[state]);
-        signs[k] = Sign {
-            away: state == 1,
-            confidence: 1.0 / (1.0 + libm::exp(-gap.max(0.0))),
-        };
-        let (emission, flip) = &steps[k];
-        let through = [behind[0] + emission[0], behind[1] + emission[1]];
-        behind = [
-            through[0].min(through[1] + flip),
-            through[1].min(through[0] + flip),
-        ];
-        state = came_from[k][state];
-    }
-    signs
-}
+    const ANIMAL: Animal = Animal {
+        length_m: 0.1,
+        height_m: 0.05,
+    };
 
-/// Values as they are, with rates from central differences left out.
-fn raw(value: Vec<Option<f64>>) -> Smoothed {
-    let rate = vec![None; value.len()];
-    Smoothed { value, rate }
+    #[test]
+    fn a_fish_at_double_distance_is_half_as_tall() {
+        let near = depth_and_cosine(&CAMERA, &ANIMAL, (100.0, 50.0), Eq7::Corrected);
+        let far = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 25.0), Eq7::Corrected);
+        assert!((near.0 - 0.7).abs() < 1e-12 && (far.0 - 1.4).abs() < 1e-12);
+        assert_eq!((near.1, far.1), (1.0, 1.0));
+        let printed = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 25.0), Eq7::Printed);
+        assert!(
+            (printed.0 - 0.35).abs() < 1e-12,
+            "as printed, it comes nearer"
+        );
+    }
+
+    #[test]
+    fn a_fish_seen_at_half_its_length_is_turned_by_sixty_degrees() {
+        let (_, cosine) = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 50.0), Eq7::Corrected);
+        assert!((libm::acos(cosine).to_degrees() - 60.0).abs() < 1e-9);
+    }
 }

@@ -41,8 +41,8 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         mask: &mask,
         solid: &solid,
         inside: &inside,
-        nearest_inside: nearest_set(&inside),
-        nearest_solid: nearest_set(&solid),
+        nearest_inside: nearest_set(&inside, &outer),
+        nearest_solid: nearest_set(&solid, &outer),
         band_px,
     };
     let mut image = RgbaImage::new(rect.w, rect.h);
@@ -98,36 +98,52 @@ fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate) -> Mask {
     solid.majority()
 }
 
-/// For each pixel the index of a set pixel reached from it in the fewest steps (8-connected); `None`
-/// everywhere when no pixel is set.
-fn nearest_set(mask: &Mask) -> Vec<Option<usize>> {
+/// No set pixel is known for this one.
+const NOWHERE: u32 = u32::MAX;
+
+/// For each pixel of `wanted` the index of a set pixel of `mask` reached from it in the fewest steps
+/// (8-connected); [`NOWHERE`] everywhere when no pixel is set.
+///
+/// The front starts at the set pixels that have a clear neighbor and stops when it has been everywhere
+/// that is wanted; a frame of pixels around the mask that count as reached keeps it inside.
+fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
+    const BORDER: u32 = NOWHERE - 1;
     let (w, h) = (mask.width(), mask.height());
-    let mut nearest: Vec<Option<usize>> = mask
-        .bits
-        .iter()
-        .enumerate()
-        .map(|(at, &bit)| (bit == 1).then_some(at))
-        .collect();
-    let mut front: Vec<usize> = (0..nearest.len())
-        .filter(|&at| nearest[at].is_some())
-        .collect();
-    while !front.is_empty() {
-        let mut next = Vec::new();
+    let padded = w + 2;
+    let inner = mask.eroded();
+    let mut nearest = vec![BORDER; padded * (h + 2)];
+    let mut is_wanted = vec![0u8; nearest.len()];
+    let (mut front, mut next) = (Vec::new(), Vec::new());
+    let mut n_left = 0;
+    for y in 0..h {
+        for x in 0..w {
+            let (k, at) = (y * w + x, (y + 1) * padded + x + 1);
+            let is_set = mask.bits[k] == 1;
+            nearest[at] = if is_set { k as u32 } else { NOWHERE };
+            is_wanted[at] = wanted.bits[k];
+            n_left += usize::from(!is_set && wanted.bits[k] == 1);
+            if is_set && inner.bits[k] == 0 {
+                front.push(at);
+            }
+        }
+    }
+    while !front.is_empty() && n_left > 0 {
         for &at in &front {
-            let (x, y) = (at % w, at / w);
-            for ny in y.saturating_sub(1)..=(y + 1).min(h - 1) {
-                for nx in x.saturating_sub(1)..=(x + 1).min(w - 1) {
-                    let other = ny * w + nx;
-                    if nearest[other].is_none() {
+            for first in [at - padded - 1, at - 1, at + padded - 1] {
+                for other in first..first + 3 {
+                    if nearest[other] == NOWHERE {
                         nearest[other] = nearest[at];
+                        n_left -= usize::from(is_wanted[other]);
                         next.push(other);
                     }
                 }
             }
         }
-        front = next;
+        std::mem::swap(&mut front, &mut next);
+        next.clear();
     }
-    nearest
+    let rows = nearest[padded..].chunks_exact(padded).take(h);
+    rows.flat_map(|row| row[1..=w].iter().copied()).collect()
 }
 
 fn contrast(difference: &Difference, mask: &Mask) -> f64 {
@@ -149,9 +165,9 @@ struct Puller<'a> {
     /// The solid part less the band along its outline: alpha 1.
     inside: &'a Mask,
     /// For each pixel an inside pixel near it.
-    nearest_inside: Vec<Option<usize>>,
+    nearest_inside: Vec<u32>,
     /// For each pixel a solid pixel near it.
-    nearest_solid: Vec<Option<usize>>,
+    nearest_solid: Vec<u32>,
     band_px: u32,
 }
 
@@ -189,16 +205,16 @@ impl Puller<'_> {
         } else {
             fore
         };
-        let [r, g, b] = color.map(|c| c.round() as u8);
-        [r, g, b, (alpha * 255.0).round() as u8]
+        let [r, g, b] = color.map(|c| (c + 0.5) as u8);
+        [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
     /// The animal's color near a band pixel: the mean of the inside pixels around the nearest one.
     /// Where the animal is too thin to have an inside nearby, the solid pixel close by that differs
     /// most from the plate; but a shadow takes its color from the animal however far that is.
     fn color_nearby(&self, x: usize, y: usize) -> Option<[f32; 3]> {
-        let near = |found: Option<usize>| {
-            let at = found?;
+        let near = |found: u32| {
+            let at = (found != NOWHERE).then_some(found as usize)?;
             let (nx, ny) = (at % self.mask.width(), at / self.mask.width());
             let is_near = nx.abs_diff(x).max(ny.abs_diff(y)) <= 2 * self.band_px as usize + 1;
             Some((is_near, nx as i64, ny as i64))

@@ -15,12 +15,15 @@ pub mod silhouette;
 // The animal followed and cut out.
 pub mod matte;
 pub mod moments;
+pub mod read_ahead;
 pub mod sprite;
 pub mod tracking;
 
 // What it did.
 pub mod depth;
+pub mod direction;
 pub mod heading;
+pub mod midline;
 pub mod pose;
 pub mod smooth;
 
@@ -57,9 +60,15 @@ pub fn analyze(
     cpu: cpu::Level,
     progress: &dyn Progress,
 ) -> Result<Library, Error> {
-    let plate = background::estimate(source, background, params, progress)?;
-    let track = tracking::follow(source, &plate, params, progress)?;
-    let poses = pose::measure(&track, &source.format(), params);
+    let n_frames = source.format().n_frames_hint;
+    let (plate, track) = read_ahead::while_reading(source, |batches| {
+        let plate = background::estimate(source, background, params, progress)?;
+        let track = tracking::follow(batches, n_frames, &plate, params, progress)?;
+        Ok::<_, Error>((plate, track))
+    })?;
+    let mut poses = pose::measure(&track, &source.format(), params);
+    midline::trace(&mut poses, &track);
+    poses.tail_beat = midline::tail_beat::measure(&poses);
     let sprites = sprite::align(&track, poses.view);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;

@@ -16,6 +16,8 @@ pub struct Moments {
     pub area_px: f64,
     /// N (2).
     pub centroid_px: [f64; 2],
+    /// Second central moments over the area: xx, xy, yy, square pixels; a pixel's own 1 / 12 included.
+    pub covariance_px2: [f64; 3],
     /// The major axis, in (-pi/2, pi/2]: 0.5 atan2(2 mu11, mu20 - mu02), N (4) corrected. `None`
     /// when the silhouette is round.
     pub major_rad: Option<f64>,
@@ -82,6 +84,7 @@ pub fn moments(rect: Rect, weights: &[u8]) -> Option<Moments> {
     Some(Moments {
         area_px: m00,
         centroid_px: [f64::from(rect.x) + cx, f64::from(rect.y) + cy],
+        covariance_px2: [mu20, mu11, mu02],
         major_rad,
         eigenvalue_ratio,
         skew,

@@ -40,6 +40,8 @@ pub struct Params {
     pub mirror: bool,
     /// How N (7) is read: `corrected`, or `printed` with its quotient upside down.
     pub eq7: Eq7,
+    /// How axis and head are told: `corrected`, or as N and O are `printed`.
+    pub axis_and_head: AxisAndHead,
 }
 
 /// From where the animal is seen.
@@ -128,6 +130,17 @@ pub enum Eq7 {
     Printed,
 }
 
+/// How the length axis and the head are told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AxisAndHead {
+    /// The axis with memory, the head by one decision over the whole footage.
+    Corrected,
+    /// N (4) and 5.3: the arctangent of a quotient gives the axis nearer the horizontal, each frame by
+    /// itself. O 3.3: the head is where it was in the frame before, in the first one at +axis.
+    Printed,
+}
+
 impl Default for Params {
     fn default() -> Params {
         Params {
@@ -146,17 +159,20 @@ impl Default for Params {
             planes: Planes::Rgba,
             mirror: true,
             eq7: Eq7::Corrected,
+            axis_and_head: AxisAndHead::Corrected,
         }
     }
 }
 
 impl Params {
-    /// What N and O say, as far as they say it: raw values, RGB planes, no mirror.
+    /// What N and O say, as far as they say it: raw values, axis and head as printed,
+    /// RGB planes, no mirror.
     pub fn papers() -> Params {
         Params {
             smooth: false,
             planes: Planes::Rgb,
             mirror: false,
+            axis_and_head: AxisAndHead::Printed,
             ..Params::default()
         }
     }

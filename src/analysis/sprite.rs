@@ -4,6 +4,7 @@ use rayon::prelude::*;
 
 use super::tracking::{Sighting, Tracked};
 use crate::library::{Sprites, View};
+use crate::raster::RgbaImage;
 
 /// Room around the largest silhouette.
 const MARGIN_PX: f64 = 4.0;
@@ -60,11 +61,25 @@ fn reach_px(sighting: &Sighting) -> [f64; 3] {
     let rect = sighting.matte.rect;
     let [cx, cy] = sighting.moments.centroid_px;
     let mut most = [0.0f64; 3];
-    for (k, pixel) in sighting.matte.image.pixels.chunks_exact(4).enumerate() {
-        if pixel[3] > 0 {
-            let (column, row) = (k as u32 % rect.w, k as u32 / rect.w);
-            let dx = (f64::from(rect.x + column) + 0.5 - cx).abs() + 0.5;
-            let dy = (f64::from(rect.y + row) + 0.5 - cy).abs() + 0.5;
+    let columns = rect.w.max(1) as usize;
+    let rows = sighting
+        .matte
+        .image
+        .pixels
+        .as_chunks::<4>()
+        .0
+        .chunks_exact(columns);
+    let inside = |rgba: &[u8; 4]| rgba[3] > 0;
+    for (row, y) in rows.zip(rect.y..) {
+        // The ends of a row lie farthest from any centroid.
+        let ends = row
+            .iter()
+            .position(inside)
+            .into_iter()
+            .chain(row.iter().rposition(inside));
+        for column in ends {
+            let dx = (f64::from(rect.x + column as u32) + 0.5 - cx).abs() + 0.5;
+            let dy = (f64::from(y) + 0.5 - cy).abs() + 0.5;
             most = [
                 most[0].max(dx),
                 most[1].max(dy),
@@ -90,34 +105,54 @@ fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting) {
         (1.0 - fx) * fy,
         fx * fy,
     ];
-    let at = |x: i64, y: i64| {
-        let inside = x >= 0 && y >= 0 && x < i64::from(rect.w) && y < i64::from(rect.h);
-        if inside {
-            image.pixel(x as u32, y as u32)
-        } else {
-            [0; 4]
-        }
-    };
-    for (k, pixel) in sprite.chunks_exact_mut(4).enumerate() {
-        let (x, y) = (
-            x0 + (k as u32 % width) as i64,
-            y0 + (k as u32 / width) as i64,
-        );
-        let corners = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
-        let mut sum = [0.0f32; 4];
-        for (corner, weight) in corners.iter().zip(weights) {
-            let alpha = weight * f32::from(corner[3]);
-            sum[3] += alpha;
-            for c in 0..3 {
-                sum[c] += alpha * f32::from(corner[c]);
-            }
-        }
-        let alpha = sum[3].round();
-        if alpha >= 1.0 {
-            for c in 0..3 {
-                pixel[c] = (sum[c] / sum[3]).round().clamp(0.0, 255.0) as u8;
-            }
-            pixel[3] = alpha as u8;
+    // Beyond the matte and the pixel around it there is nothing to draw.
+    let columns = (-1 - x0).clamp(0, width.into())..(i64::from(rect.w) - x0).clamp(0, width.into());
+    let rows = (-1 - y0).clamp(0, height.into())..(i64::from(rect.h) - y0).clamp(0, height.into());
+    let blank = vec![[0; 4]; rect.w as usize + 2];
+    let (mut above, mut below) = (blank.clone(), blank);
+    let stride = width as usize * 4;
+    for row in rows {
+        fetch(image, y0 + row, &mut above);
+        fetch(image, y0 + row + 1, &mut below);
+        let line = &mut sprite[row as usize * stride..][..stride];
+        for column in columns.clone() {
+            // One pixel of blank stands before the matte's first.
+            let at = (x0 + column + 1) as usize;
+            let corners = [above[at], above[at + 1], below[at], below[at + 1]];
+            let pixel = &mut line[column as usize * 4..][..4];
+            pixel.copy_from_slice(&blend(corners, weights));
         }
     }
+}
+
+/// Copies a row of the matte between one blank pixel on either side; blanks it when there is none.
+fn fetch(image: &RgbaImage, row: i64, line: &mut [[u8; 4]]) {
+    let n = image.width as usize;
+    let within = &mut line[1..=n];
+    if (0..i64::from(image.height)).contains(&row) {
+        within.copy_from_slice(&image.pixels.as_chunks().0[row as usize * n..][..n]);
+    } else {
+        within.fill([0; 4]);
+    }
+}
+
+/// The weighted mean of four straight-alpha pixels, in premultiplied alpha.
+fn blend(corners: [[u8; 4]; 4], weights: [f32; 4]) -> [u8; 4] {
+    if corners.iter().all(|corner| corner[3] == 0) {
+        return [0; 4];
+    }
+    let mut sum = [0.0f32; 4];
+    for (corner, weight) in corners.iter().zip(weights) {
+        let alpha = weight * f32::from(corner[3]);
+        sum[3] += alpha;
+        for c in 0..3 {
+            sum[c] += alpha * f32::from(corner[c]);
+        }
+    }
+    let alpha = (sum[3] + 0.5) as u8;
+    if alpha == 0 {
+        return [0; 4];
+    }
+    let color = |c: usize| (sum[c] / sum[3] + 0.5) as u8;
+    [color(0), color(1), color(2), alpha]
 }

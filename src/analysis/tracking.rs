@@ -3,15 +3,23 @@
 //! Its place is predicted by constant velocity; near it the component is taken that fits the track
 //! in place and area. Another component elsewhere (a reflection, a second animal) is taken only when
 //! nothing near the prediction has been seen for five frames, or when it is the only one there is.
+//!
+//! N probes squares on a lattice of 4 pixels in a spiral around the prediction; here the means of 4 x 4
+//! blocks of the search window are compared, all of them, which costs less than the spiral's branches.
+//! `search: full` compares those of the whole frame. The boxes they propose near the prediction are the
+//! same, so is all that follows; and when nothing there fits, both look everywhere in that same frame,
+//! which makes a search of the whole frame every so often needless.
+
+use rayon::prelude::*;
 
 use super::background::Plate;
 use super::light::{self, Gain};
 use super::matte::{self, Matte};
 use super::moments::{self, Moments};
 use super::params::Search;
+use super::read_ahead::Batches;
 use super::silhouette::{self, parting};
 use super::{Error, LEAST_FRAMES, Params};
-use crate::footage::FrameSource;
 use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
@@ -25,8 +33,6 @@ const MISSES: u32 = 5;
 const MERGED: f64 = 1.2;
 /// ... if the usual area is known from this many silhouettes.
 const LEAST_AREAS: usize = 8;
-/// Every so many frames the whole frame is searched.
-const FULL_EVERY: usize = 30;
 
 /// What was seen of the animal in one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +43,8 @@ pub struct Sighting {
     pub moments: Moments,
     /// Extents along the major axis and across it, of the pixels that are more animal than background.
     pub extent_px: [f64; 2],
+    /// Extent of the same pixels from the topmost to the lowest.
+    pub upright_px: f64,
     /// Bounding box of the silhouette.
     pub box_px: Rect,
     /// The silhouette touches the border of the frame.
@@ -52,28 +60,44 @@ pub struct Tracked {
     pub sighting: Option<Sighting>,
 }
 
+/// The component taken for the animal in one frame, and its mended form.
+struct Choice {
+    component: Component,
+    silhouette: Mask,
+}
+
 /// Follows the animal through the footage: one entry a frame.
+///
+/// Only the choice of the component needs the frames before; light, cutting out and measuring are
+/// done for many frames at once.
 pub fn follow(
-    source: &dyn FrameSource,
+    batches: Batches,
+    n_frames_hint: usize,
     plate: &Plate,
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<Vec<Tracked>, Error> {
-    let n_frames_hint = source.format().n_frames_hint.max(1);
     let mut tracker = Tracker::new(plate, params);
-    let mut stream = source.open()?;
-    let mut frame = Frame::default();
     let mut track = Vec::with_capacity(n_frames_hint);
-    while let Some(time_s) = stream.next_frame(&mut frame)? {
-        track.push(Tracked {
-            time_s,
-            sighting: tracker.step(&frame),
-        });
-        if track.len() % 16 == 0 {
-            progress.report("tracking", track.len() as f64 / n_frames_hint as f64);
-            if progress.cancelled() {
-                return Err(Error::Cancelled);
-            }
+    while let Some(batch) = batches.next_batch()? {
+        let gains: Vec<Gain> = batch
+            .par_iter()
+            .map(|(_, frame)| light::gain(frame, plate))
+            .collect();
+        let choices: Vec<Option<Choice>> = batch
+            .iter()
+            .zip(&gains)
+            .map(|((_, frame), gain)| tracker.step(frame, gain))
+            .collect();
+        let looks = batch.par_iter().zip(&gains).zip(choices);
+        track.par_extend(looks.map(|(((time_s, frame), gain), choice)| Tracked {
+            time_s: *time_s,
+            sighting: choice.and_then(|choice| see(frame, plate, gain, &choice)),
+        }));
+        batches.give_back(batch);
+        progress.report("tracking", track.len() as f64 / n_frames_hint.max(1) as f64);
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
         }
     }
     if track.len() < LEAST_FRAMES {
@@ -118,38 +142,42 @@ impl<'a> Tracker<'a> {
     }
 
     /// Looks at the next frame.
-    fn step(&mut self, frame: &Frame) -> Option<Sighting> {
-        let gain = light::gain(frame, self.plate, self.box_px);
+    fn step(&mut self, frame: &Frame, gain: &Gain) -> Option<Choice> {
         let found = self
-            .near(frame, &gain)
-            .or_else(|| self.anywhere(frame, &gain))
+            .near(frame, gain)
+            .or_else(|| self.anywhere(frame, gain))
             .and_then(|component| {
-                let area = component.area as f64;
-                Some((self.see(frame, &gain, component)?, area))
+                let silhouette = silhouette::shaped(&component, frame.width, frame.height);
+                (silhouette.area() > 0).then_some(Choice {
+                    component,
+                    silhouette,
+                })
             });
         match &found {
-            Some((sighting, area)) => self.remember(sighting, *area),
+            Some(choice) => self.remember(&choice.component),
             None => self.misses = (self.misses + 1).min(MISSES),
         }
         self.frame_idx += 1;
-        found.map(|(sighting, _)| sighting)
+        found
     }
 
-    /// The best component in the search window; `None` when the window is not to be trusted.
-    fn near(&mut self, frame: &Frame, gain: &Gain) -> Option<Component> {
-        let whole_frame =
-            self.params.search == Search::Full || self.frame_idx.is_multiple_of(FULL_EVERY);
-        if whole_frame || self.misses >= MISSES {
+    /// The best component in the search window; `None` when there is none, or no window to be trusted.
+    fn near(&self, frame: &Frame, gain: &Gain) -> Option<Component> {
+        if self.misses >= MISSES {
             return None;
         }
         let window = self.window();
-        let components = self.components(frame, gain, window);
+        let seen = match self.params.search {
+            Search::Window => window,
+            Search::Full => self.whole,
+        };
+        let components = self.components(frame, gain, [window, seen]);
         self.best(&components, window)
     }
 
     /// The best component of the whole frame.
-    fn anywhere(&mut self, frame: &Frame, gain: &Gain) -> Option<Component> {
-        let components = self.components(frame, gain, self.whole);
+    fn anywhere(&self, frame: &Frame, gain: &Gain) -> Option<Component> {
+        let components = self.components(frame, gain, [self.whole; 2]);
         if self.misses >= MISSES {
             return components
                 .into_iter()
@@ -163,10 +191,10 @@ impl<'a> Tracker<'a> {
         })
     }
 
-    /// The components of a region. One that is larger than the animal mostly is and that is two things
+    /// The components of [the window, what is seen]. One that is larger than the animal mostly is and that is two things
     /// counts with the part where the animal should be alone.
-    fn components(&self, frame: &Frame, gain: &Gain, region: Rect) -> Vec<Component> {
-        let mut components = silhouette::components(frame, self.plate, gain, region);
+    fn components(&self, frame: &Frame, gain: &Gain, regions: [Rect; 2]) -> Vec<Component> {
+        let mut components = silhouette::components(frame, self.plate, gain, regions);
         let Some(predicted) = self.predicted().filter(|_| self.areas.len() >= LEAST_AREAS) else {
             return components;
         };
@@ -251,44 +279,8 @@ impl<'a> Tracker<'a> {
         *areas.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
-    /// Cuts the component out and measures it.
-    fn see(&self, frame: &Frame, gain: &Gain, component: Component) -> Option<Sighting> {
-        let silhouette = silhouette::shaped(&component, frame.width, frame.height);
-        if silhouette.area() == 0 {
-            return None;
-        }
-        let rect = component.rect;
-        let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
-        let matte = matte::pull(frame, self.plate, gain, &silhouette, length_px);
-        let weights: Vec<u8> = matte
-            .image
-            .pixels
-            .chunks_exact(4)
-            .map(|rgba| rgba[3])
-            .collect();
-        let moments = moments::moments(matte.rect, &weights)?;
-        let axis = moments.major_rad.unwrap_or(0.0);
-        let solid = solid(&matte);
-        let across = axis + std::f64::consts::FRAC_PI_2;
-        let extent_px = [
-            moments::extent_px(&solid, axis),
-            moments::extent_px(&solid, across),
-        ];
-        let cut = rect.x == 0
-            || rect.y == 0
-            || rect.right() == frame.width
-            || rect.bottom() == frame.height;
-        Some(Sighting {
-            matte,
-            moments,
-            extent_px,
-            box_px: rect,
-            cut,
-        })
-    }
-
-    fn remember(&mut self, sighting: &Sighting, area: f64) {
-        let centroid = sighting.moments.centroid_px;
+    fn remember(&mut self, component: &Component) {
+        let centroid = component.centroid_px();
         self.velocity_px = match self.last {
             Some((frame_idx, last)) if self.misses < MISSES => {
                 let steps = (self.frame_idx - frame_idx) as f64;
@@ -300,13 +292,40 @@ impl<'a> Tracker<'a> {
             _ => [0.0; 2],
         };
         self.last = Some((self.frame_idx, centroid));
-        self.box_px = sighting.box_px;
+        self.box_px = component.rect;
         self.misses = 0;
         if self.areas.len() == 61 {
             self.areas.remove(0);
         }
-        self.areas.push(area);
+        self.areas.push(component.area as f64);
     }
+}
+
+/// Cuts the animal out and measures it.
+fn see(frame: &Frame, plate: &Plate, gain: &Gain, choice: &Choice) -> Option<Sighting> {
+    let rect = choice.component.rect;
+    let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
+    let matte = matte::pull(frame, plate, gain, &choice.silhouette, length_px);
+    let pixels = matte.image.pixels.as_chunks::<4>().0;
+    let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
+    let moments = moments::moments(matte.rect, &weights)?;
+    let axis = moments.major_rad.unwrap_or(0.0);
+    let solid = solid(&matte);
+    let across = axis + std::f64::consts::FRAC_PI_2;
+    let extent_px = [
+        moments::extent_px(&solid, axis),
+        moments::extent_px(&solid, across),
+    ];
+    let cut =
+        rect.x == 0 || rect.y == 0 || rect.right() == frame.width || rect.bottom() == frame.height;
+    Some(Sighting {
+        matte,
+        moments,
+        extent_px,
+        upright_px: moments::extent_px(&solid, std::f64::consts::FRAC_PI_2),
+        box_px: rect,
+        cut,
+    })
 }
 
 /// The pixels that are more animal than background. The silhouette itself is wider: its threshold is

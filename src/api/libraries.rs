@@ -25,6 +25,9 @@ const FILES: Files = &[
     ("background.png", "image/png"),
     ("distance.png", "image/png"),
     ("headings.svg", "image/svg+xml"),
+    ("trajectory.svg", "image/svg+xml"),
+    ("confidence.svg", "image/svg+xml"),
+    ("overlay.mp4", "video/mp4"),
     ("sprites.zip", "application/zip"),
 ];
 
@@ -76,7 +79,7 @@ pub(super) async fn get_library(
 }
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,
-/// headings.svg, sprites.zip.
+/// headings.svg, trajectory.svg, confidence.svg, overlay.mp4, sprites.zip.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),

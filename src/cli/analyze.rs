@@ -11,7 +11,8 @@ use super::{Error, Listener, Summary};
 use crate::analysis::{self, Params};
 use crate::cpu;
 use crate::formats::library_json::FootageSummary;
-use crate::formats::{csv, library_dir, params};
+use crate::formats::{csv, library_dir, params, svg};
+use crate::jobs::overlay;
 use crate::library::Library;
 use crate::media::{Limits, Video, read_image};
 
@@ -47,6 +48,9 @@ pub struct Args {
     /// Clips nearer than this are alike; a multiple of the natural step when absent.
     #[arg(long, value_name = "E")]
     epsilon: Option<u64>,
+    /// Write the video once more with what was measured drawn over it.
+    #[arg(long, value_name = "MP4")]
+    overlay: Option<PathBuf>,
     /// Start from a preset: papers.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
@@ -73,10 +77,23 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let footage = footage_summary(&args.video)?;
     library_dir::write(&args.output, &library, &params, &footage)
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
-    let table = args.output.join("poses.csv");
-    std::fs::write(&table, csv::write_poses(&library.poses))
-        .map_err(Error::io(format!("cannot write {}", table.display())))?;
+    write_views(&args.output, &library)?;
+    if let Some(path) = &args.overlay {
+        overlay::film(&video, &library.poses, path, &progress)
+            .map_err(|error| Error::work(error.code(), &error))?;
+    }
     Ok(Some(summary(&library, &args.output)))
+}
+
+/// What people look at: the table and the pictures.
+fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
+    let table = ("poses.csv", csv::write_poses(&library.poses));
+    for (name, text) in svg::pictures(&library.poses).into_iter().chain([table]) {
+        let path = folder.join(name);
+        std::fs::write(&path, text)
+            .map_err(Error::io(format!("cannot write {}", path.display())))?;
+    }
+    Ok(())
 }
 
 /// The parameters that the flags ask for, over the preset.

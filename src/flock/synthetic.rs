@@ -34,6 +34,7 @@ pub(crate) fn library(view: View) -> Library {
     Library {
         stats: stats(&frames),
         poses: Poses {
+            tail_beat: None,
             fps: 30.0,
             image_size_px: SIZE_PX,
             view,

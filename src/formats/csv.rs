@@ -8,7 +8,9 @@ use crate::library::{Pose, Poses};
 const COLUMNS: &str = "frame,time_s,detected,cut,confidence,head_confidence,depth_sign_confidence,\
 centroid_x_px,centroid_y_px,box_x_px,box_y_px,box_w_px,box_h_px,area_px,axis_rad,heading_rad,\
 length_px,height_px,skew,bend_rad,x_m,y_m,z_m,forward_x,forward_y,forward_z,yaw_rad,pitch_rad,\
-gamma_rad\n";
+gamma_rad,\
+raw_heading_rad,raw_x_m,raw_y_m,raw_z_m,raw_forward_x,raw_forward_y,raw_forward_z,raw_gamma_rad,\
+tail_beat_hz\n";
 
 /// The poses as comma-separated values, with a header line.
 pub fn write_poses(poses: &Poses) -> String {
@@ -16,7 +18,7 @@ pub fn write_poses(poses: &Poses) -> String {
     for (idx, pose) in poses.frames.iter().enumerate() {
         let (detected, cut) = (u8::from(pose.detected()), u8::from(pose.cut));
         write!(text, "{idx},{},{detected},{cut}", round(pose.time_s, 6)).expect("memory");
-        for value in scalars(pose) {
+        for value in scalars(pose).into_iter().chain([poses.tail_beat_hz(idx)]) {
             text.push(',');
             if let Some(value) = value {
                 write!(text, "{}", round(value, 6)).expect("memory");
@@ -31,6 +33,7 @@ pub fn write_poses(poses: &Poses) -> String {
 fn scalars(pose: &Pose) -> Vec<Option<f64>> {
     let at = |values: Option<[f64; 3]>, k: usize| values.map(|v| v[k]);
     let centroid = |k: usize| pose.centroid_px.map(|c| c[k]);
+    let raw = pose.raw.unwrap_or_default();
     let rect = pose.box_px.map(|r| [r.x, r.y, r.w, r.h].map(f64::from));
     vec![
         pose.confidence,
@@ -58,6 +61,14 @@ fn scalars(pose: &Pose) -> Vec<Option<f64>> {
         pose.yaw_rad,
         pose.pitch_rad,
         pose.gamma_rad,
+        raw.heading_rad,
+        at(raw.position_m, 0),
+        at(raw.position_m, 1),
+        at(raw.position_m, 2),
+        at(raw.forward, 0),
+        at(raw.forward, 1),
+        at(raw.forward, 2),
+        raw.gamma_rad,
     ]
 }
 
@@ -69,6 +80,7 @@ mod tests {
     #[test]
     fn every_row_has_as_many_cells_as_the_header() {
         let poses = Poses {
+            tail_beat: None,
             fps: 30.0,
             image_size_px: [8, 8],
             view: View::Side,
@@ -84,7 +96,7 @@ mod tests {
         };
         let text = write_poses(&poses);
         let counts: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(counts, [29, 29, 29]);
+        assert_eq!(counts, [38, 38, 38]);
         let heading = text.lines().nth(2).and_then(|line| line.split(',').nth(15));
         assert_eq!(heading, Some("1"));
     }

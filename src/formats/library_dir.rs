@@ -226,6 +226,7 @@ mod tests {
             .for_each(|(k, byte)| *byte = k as u8);
         Library {
             poses: Poses {
+                tail_beat: None,
                 fps: 25.0,
                 image_size_px: [16, 12],
                 view: View::Side,

@@ -8,6 +8,7 @@ pub mod glb;
 pub mod library_dir;
 pub mod library_json;
 pub mod npy;
+pub mod overlay;
 pub mod params;
 pub mod picture;
 pub mod poses_json;

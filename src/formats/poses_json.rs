@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
 use crate::geometry::{Camera, Rect};
-use crate::library::{Animal, Pose, Poses, View};
+use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/poses@1";
@@ -34,6 +34,7 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
             length_m: a.length_m,
             height_m: a.height_m,
         }),
+        tail_beat: poses.tail_beat.as_ref().map(TailBeatFile::of),
         frames: (), // written line by line below
     };
     let head = serde_json::to_string(&file).expect("plain values serialise");
@@ -77,6 +78,7 @@ pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
             height_m: a.height_m,
         }),
         frames: file.frames.into_iter().map(PoseFile::into_pose).collect(),
+        tail_beat: file.tail_beat.map(TailBeatFile::into_tail_beat),
     })
 }
 
@@ -97,6 +99,8 @@ struct PosesFile<Frames> {
     view: ViewName,
     camera: Option<CameraFile>,
     animal: Option<AnimalFile>,
+    #[serde(default)]
+    tail_beat: Option<TailBeatFile>,
     frames: Frames,
 }
 
@@ -122,6 +126,67 @@ struct AnimalFile {
 }
 
 #[derive(Serialize, Deserialize)]
+struct TailBeatFile {
+    method: MethodName,
+    spans: Vec<BeatSpanFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum MethodName {
+    Bend,
+    LengthAndSkew,
+}
+
+#[derive(Serialize, Deserialize)]
+struct BeatSpanFile {
+    frames: [usize; 2],
+    start_s: f64,
+    end_s: f64,
+    frequency_hz: f64,
+    amplitude: f64,
+    confidence: f64,
+}
+
+impl TailBeatFile {
+    fn of(beat: &TailBeat) -> TailBeatFile {
+        let span = |span: &BeatSpan| BeatSpanFile {
+            frames: span.frames,
+            start_s: round(span.start_s, 6),
+            end_s: round(span.end_s, 6),
+            frequency_hz: round(span.frequency_hz, 3),
+            amplitude: round(span.amplitude, 5),
+            confidence: round(span.confidence, 4),
+        };
+        TailBeatFile {
+            method: match beat.method {
+                TailBeatMethod::Bend => MethodName::Bend,
+                TailBeatMethod::LengthAndSkew => MethodName::LengthAndSkew,
+            },
+            spans: beat.spans.iter().map(span).collect(),
+        }
+    }
+
+    fn into_tail_beat(self) -> TailBeat {
+        let span = |span: BeatSpanFile| BeatSpan {
+            frames: span.frames,
+            start_s: span.start_s,
+            end_s: span.end_s,
+            frequency_hz: span.frequency_hz,
+            amplitude: span.amplitude,
+            confidence: span.confidence,
+        };
+        TailBeat {
+            method: match self.method {
+                MethodName::Bend => TailBeatMethod::Bend,
+                MethodName::LengthAndSkew => TailBeatMethod::LengthAndSkew,
+            },
+            spans: self.spans.into_iter().map(span).collect(),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
 struct PoseFile {
     frame: usize,
     time_s: f64,
@@ -144,6 +209,17 @@ struct PoseFile {
     forward: Option<[f64; 3]>,
     yaw_rad: Option<f64>,
     pitch_rad: Option<f64>,
+    gamma_rad: Option<f64>,
+    raw: Option<RawFile>,
+}
+
+/// What one frame alone says: `forward`, `position_m`, `heading_rad`, `gamma_rad` before all frames were
+/// looked at together.
+#[derive(Serialize, Deserialize)]
+struct RawFile {
+    heading_rad: Option<f64>,
+    position_m: Option<[f64; 3]>,
+    forward: Option<[f64; 3]>,
     gamma_rad: Option<f64>,
 }
 
@@ -176,6 +252,12 @@ impl PoseFile {
             yaw_rad: pose.yaw_rad.map(digits(5)),
             pitch_rad: pose.pitch_rad.map(digits(5)),
             gamma_rad: pose.gamma_rad.map(digits(5)),
+            raw: pose.raw.map(|raw| RawFile {
+                heading_rad: raw.heading_rad.map(digits(5)),
+                position_m: raw.position_m.map(|p| p.map(digits(5))),
+                forward: raw.forward.map(|p| p.map(digits(5))),
+                gamma_rad: raw.gamma_rad.map(digits(5)),
+            }),
         }
     }
 
@@ -201,6 +283,12 @@ impl PoseFile {
             yaw_rad: self.yaw_rad,
             pitch_rad: self.pitch_rad,
             gamma_rad: self.gamma_rad,
+            raw: self.raw.map(|raw| Raw {
+                heading_rad: raw.heading_rad,
+                position_m: raw.position_m,
+                forward: raw.forward,
+                gamma_rad: raw.gamma_rad,
+            }),
         }
     }
 }
@@ -221,6 +309,11 @@ mod tests {
                 h: 6,
             }),
             heading_rad: Some(-1.5),
+            raw: Some(Raw {
+                heading_rad: Some(-1.25),
+                forward: Some([0.6, 0.0, -0.8]),
+                ..Raw::default()
+            }),
             ..Pose::default()
         };
         let poses = Poses {
@@ -233,6 +326,17 @@ mod tests {
                 height_m: 0.057,
             }),
             frames: vec![Pose::default(), pose],
+            tail_beat: Some(TailBeat {
+                method: TailBeatMethod::Bend,
+                spans: vec![BeatSpan {
+                    frames: [0, 2],
+                    start_s: 0.0,
+                    end_s: 0.066667,
+                    frequency_hz: 3.25,
+                    amplitude: 0.2,
+                    confidence: 0.9,
+                }],
+            }),
         };
         assert_eq!(
             read(&write(&poses, Some(&Params::default()))).expect("our own file"),

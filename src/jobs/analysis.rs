@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::{Attempt, Context, Error, Product, Stages, clock};
+use super::{Attempt, Context, Error, Product, Stages, clock, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{Params, analyze};
 use crate::formats::library_json::FootageSummary;
@@ -22,10 +22,11 @@ use crate::{cpu, store};
 
 /// The stages, with their measured shares.
 pub const STAGES: Stages = &[
-    ("background", 0.2),
-    ("tracking", 0.45),
-    ("distances", 0.25),
-    ("writing", 0.1),
+    ("background", 0.15),
+    ("tracking", 0.35),
+    ("distances", 0.15),
+    ("writing", 0.05),
+    ("overlay", 0.3),
 ];
 
 /// What an analysis needs.
@@ -94,6 +95,12 @@ impl Input {
         let progress = attempt.listener;
         let library = analyze(&video, background.as_ref(), &self.params, level, progress)?;
         self.write(attempt, &library, &footage)?;
+        overlay::film(
+            &video,
+            &library.poses,
+            &attempt.folder().join("overlay.mp4"),
+            progress,
+        )?;
         Ok(Product {
             made: Made::Library(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
@@ -110,7 +117,9 @@ impl Input {
         };
         library_dir::write(folder, library, &self.params, &source)?;
         std::fs::write(folder.join("poses.csv"), csv::write_poses(&library.poses))?;
-        std::fs::write(folder.join("headings.svg"), svg::headings(&library.poses))?;
+        for (name, picture) in svg::pictures(&library.poses) {
+            std::fs::write(folder.join(name), picture)?;
+        }
         std::fs::write(
             folder.join("distance.png"),
             self.distance_map(attempt, library)?,

@@ -21,6 +21,7 @@ pub mod analysis; // footage -> library
 pub mod flock; // library -> flock
 
 pub mod fish; // library -> virtual fish
+pub mod overlay; // footage -> the same with its poses drawn over it
 
 pub mod sample; // the first film of an empty data folder
 

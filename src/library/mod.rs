@@ -7,7 +7,7 @@ pub mod pose;
 pub mod sprites;
 
 pub use playback::{Jump, Patch, Playback, Transition};
-pub use pose::{Animal, Pose, Poses, View};
+pub use pose::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 pub use sprites::Sprites;
 
 use crate::raster::RgbImage;

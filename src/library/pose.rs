@@ -35,6 +35,52 @@ pub struct Poses {
     pub animal: Option<Animal>,
     /// One entry for every frame of the footage, in order.
     pub frames: Vec<Pose>,
+    /// How often the tail beats, where that can be told.
+    pub tail_beat: Option<TailBeat>,
+}
+
+impl Poses {
+    /// Tail beats a second in a frame, where they were measured.
+    pub fn tail_beat_hz(&self, frame_idx: usize) -> Option<f64> {
+        let spans = &self.tail_beat.as_ref()?.spans;
+        let span = (spans.iter()).find(|s| (s.frames[0]..s.frames[1]).contains(&frame_idx))?;
+        Some(span.frequency_hz)
+    }
+}
+
+/// How often the tail beats.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TailBeat {
+    /// What swings with the tail.
+    pub method: TailBeatMethod,
+    /// Where it stands out of the noise, in order and apart; at least one.
+    pub spans: Vec<BeatSpan>,
+}
+
+/// What the tail beat was measured by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TailBeatMethod {
+    /// The bend of the midline, seen from above.
+    Bend,
+    /// The length and the skew of the silhouette, seen from the side.
+    LengthAndSkew,
+}
+
+/// A while in which the tail beats at one rate.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BeatSpan {
+    /// The first frame and the one after the last.
+    pub frames: [usize; 2],
+    /// Seconds from the first frame of the footage, at its constant rate.
+    pub start_s: f64,
+    /// Likewise.
+    pub end_s: f64,
+    /// Beats a second: one to the left and one to the right is one beat.
+    pub frequency_hz: f64,
+    /// Of the bend, radians; of the length, as a share of it.
+    pub amplitude: f64,
+    /// 1 less the noise floor over the power, 0.75..=1.
+    pub confidence: f64,
 }
 
 /// What was measured in one frame.
@@ -79,6 +125,21 @@ pub struct Pose {
     /// asin(dy) of `forward`: positive = nose down.
     pub pitch_rad: Option<f64>,
     /// Angle between the direction in space and the image plane, N (8), 0..=pi/2.
+    pub gamma_rad: Option<f64>,
+    /// What this frame alone says of the same, before all frames were looked at together.
+    pub raw: Option<Raw>,
+}
+
+/// Values of one frame alone (N 5 and 6).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Raw {
+    /// Along the length axis, in (-pi, pi].
+    pub heading_rad: Option<f64>,
+    /// From the height of the silhouette, metres.
+    pub position_m: Option<[f64; 3]>,
+    /// From the share of the length that is seen; away or toward by the change of depth.
+    pub forward: Option<[f64; 3]>,
+    /// N (8), 0..=pi/2.
     pub gamma_rad: Option<f64>,
 }
 

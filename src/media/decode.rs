@@ -23,6 +23,9 @@ use crate::raster::{Frame, Matrix, Range};
 /// Most frames that a child may decode without showing one.
 const MOST_SKIPPED: usize = 300;
 
+/// In a part of so many frames there is one that others refer to: three in a row without are usual.
+const LEAST_SKIPPED: usize = 8;
+
 /// A video file that is within its limits and can be read any number of times.
 #[derive(Clone, Debug)]
 pub struct Video {
@@ -46,17 +49,20 @@ impl Video {
         })
     }
 
-    /// The order to decode every frame, or those of the decoded frames that are `selected`.
-    fn args(&self, selected: Option<&[usize]>) -> Vec<OsString> {
+    /// The order to decode every frame, or some.
+    fn args(&self, wanted: &Wanted) -> Vec<OsString> {
         let probe = &self.probe;
-        let threads = self.limits.threads.to_string();
+        let threads = self.n_threads().to_string();
         let mut args: Vec<OsString> =
             ["-nostdin", "-copyts", "-noautorotate", "-threads", &threads]
                 .map(Into::into)
                 .into();
+        if matches!(wanted, Wanted::InTime { .. }) {
+            args.extend(["-skip_frame", "noref"].map(Into::into));
+        }
         args.extend(input_args(probe.container, &self.path, &self.limits));
         let stream = format!("0:{}", probe.stream_idx);
-        let filters = self.filters(selected);
+        let filters = self.filters(wanted);
         args.extend(
             [
                 "-map",
@@ -73,7 +79,35 @@ impl Video {
         args
     }
 
-    fn filters(&self, selected: Option<&[usize]>) -> String {
+    /// Decoding threads: one for each megapixel, for threads that share less than that cost more than
+    /// they bring.
+    fn n_threads(&self) -> u32 {
+        let pixels = u64::from(self.probe.width) * u64::from(self.probe.height);
+        let useful = 1 + (pixels >> 20) as u32;
+        match self.limits.threads {
+            0 => useful.min(std::thread::available_parallelism().map_or(1, |n| n.get() as u32)),
+            most => useful.min(most),
+        }
+    }
+
+    /// Calls `visit` with the wanted frames; returns how many there were. They are not compared with
+    /// what the header promised: who reads the whole footage finds out whether it is cut off.
+    fn show(&self, wanted: &Wanted, visit: &mut Visit<'_>) -> Result<usize, Error> {
+        let n_packets = self.probe.n_packets;
+        let order = Order::new(Tool::Ffmpeg, self.args(wanted), &self.limits, n_packets);
+        let mut stream = VideoStream::of(self, order)?;
+        let mut frame = Frame::default();
+        let mut n_shown = 0;
+        while stream.read(&mut frame)? == frame.planes.len() {
+            n_shown += 1;
+            if visit(&frame).is_break() {
+                break;
+            }
+        }
+        Ok(n_shown)
+    }
+
+    fn filters(&self, wanted: &Wanted) -> String {
         let probe = &self.probe;
         let matrix = match probe.color.matrix {
             Matrix::Bt601 => "bt601",
@@ -87,10 +121,7 @@ impl Video {
         if probe.interlaced {
             filters.push("bwdif=mode=send_frame:deint=interlaced".to_owned());
         }
-        if let Some(selected) = selected {
-            let each: Vec<String> = selected.iter().map(|idx| format!("eq(n,{idx})")).collect();
-            filters.push(format!("select='{}'", each.join("+")));
-        }
+        filters.extend(wanted.filter());
         let turn = turn_filters(probe.turn);
         filters.extend(turn.iter().map(|&filter| filter.to_owned()));
         // Bit-exact scaling: the same bytes from every processor.
@@ -146,43 +177,66 @@ impl FrameSource for Video {
     }
 
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
-        let order = Order::new(
-            Tool::Ffmpeg,
-            self.args(None),
-            &self.limits,
-            self.probe.n_packets,
-        );
+        let args = self.args(&Wanted::All);
+        let order = Order::new(Tool::Ffmpeg, args, &self.limits, self.probe.n_packets);
         Ok(Box::new(VideoStream::of(self, order)?))
     }
 
-    /// The child decodes all and hands over only the frames that are wanted. The frames are not
-    /// counted here: who reads the whole footage finds out whether it is cut off.
+    /// The child hands over only the frames that are wanted. Of a long footage it decodes only those
+    /// that others refer to, and the first of them after the middle of each part stands for it: that
+    /// takes half the time or less.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        let n_packets = self.probe.n_packets;
         // A child that shows nothing for long is taken for stalled.
-        if self.probe.n_packets > MOST_SKIPPED * n {
+        if n_packets > MOST_SKIPPED * n {
             return spread_by_reading(self, n, visit);
         }
-        let given = spread_idx(self.format().n_frames_hint, n);
-        let decoded: Vec<usize> = match &self.probe.timeline {
+        let format = self.format();
+        if n_packets >= LEAST_SKIPPED * n {
+            let parts_per_s = n as f64 * format.fps / format.n_frames_hint as f64;
+            if self.show(&Wanted::InTime { parts_per_s }, visit)? > 0 {
+                return Ok(());
+            }
+        }
+        let given = spread_idx(format.n_frames_hint, n);
+        let decoded = match &self.probe.timeline {
             Timeline::Constant { .. } => given,
             Timeline::Variable { sources, .. } => {
                 given.iter().map(|&idx| sources[idx] as usize).collect()
             }
         };
-        let order = Order::new(
-            Tool::Ffmpeg,
-            self.args(Some(&decoded)),
-            &self.limits,
-            self.probe.n_packets,
-        );
-        let mut stream = VideoStream::of(self, order)?;
-        let mut frame = Frame::default();
-        while stream.read(&mut frame)? == frame.planes.len() {
-            if visit(&frame).is_break() {
-                break;
+        self.show(&Wanted::Numbers(decoded), visit)?;
+        Ok(())
+    }
+}
+
+/// Which frames a child hands over.
+enum Wanted {
+    /// Every one.
+    All,
+    /// Those of these numbers, counted as they are decoded.
+    Numbers(Vec<usize>),
+    /// The first after the middle of each of so many parts a second.
+    InTime { parts_per_s: f64 },
+}
+
+impl Wanted {
+    fn filter(&self) -> Option<String> {
+        match self {
+            Wanted::All => None,
+            Wanted::Numbers(numbers) => {
+                let each: Vec<String> = numbers.iter().map(|idx| format!("eq(n,{idx})")).collect();
+                Some(format!("select='{}'", each.join("+")))
+            }
+            Wanted::InTime { parts_per_s } => {
+                // A little before the middle, for times are rounded.
+                let part = |time: &str| format!("floor(({time}-start_t)*{parts_per_s}-0.499)");
+                let (this, last) = (part("t"), part("prev_selected_t"));
+                Some(format!(
+                    "select='if(isnan(prev_selected_t),gte({this},0),gt({this},{last}))'"
+                ))
             }
         }
-        Ok(())
     }
 }
 

@@ -5,6 +5,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
+use std::thread;
 
 use serde_json::Value;
 
@@ -40,6 +41,9 @@ const HEADER_ENTRIES: &str = "format=duration:stream=index,codec_name,codec_type
     width,height,pix_fmt,sample_aspect_ratio,r_frame_rate,avg_frame_rate,time_base,nb_frames,\
     duration,color_range,color_space,field_order:stream_disposition=attached_pic:\
     stream_tags=DURATION,enc_key_id:stream_side_data=displaymatrix";
+
+/// A larger file may turn out to be none of ours: its packets are read only once its headers are good.
+const MOST_READ_EARLY: u64 = 64 << 20;
 
 /// Headers longer than this are not believed.
 const MAX_HEADER_BYTES: usize = 1 << 20;
@@ -87,13 +91,23 @@ pub(super) struct Probe {
 /// Reads the headers and the packet times of a file.
 pub(super) fn probe(path: &Path, limits: &Limits) -> Result<Probe, Error> {
     let (container, n_bytes) = sniff(path, limits)?;
-    let header = read_header(container, path, limits)?;
+    // The film is mostly the first stream: its packets are read while the headers are.
+    let read_packets = |idx| Packets::read(container, path, idx, n_bytes, limits);
+    let (header, first) = thread::scope(|scope| {
+        let first = (n_bytes < MOST_READ_EARLY).then(|| scope.spawn(|| read_packets(0)));
+        let header = read_header(container, path, limits);
+        (header, first.and_then(|thread| thread.join().ok()))
+    });
+    let header = header?;
     let stream = choose_stream(&header, limits)?;
     check_codec(stream)?;
     let (width, height, turn) = shown_size(stream);
     check_size(width, height, limits)?;
     let stream_idx = number(&stream["index"]).unwrap_or(0.0) as u64;
-    let packets = Packets::read(container, path, stream_idx, n_bytes, limits)?;
+    let packets = match first {
+        Some(packets) if stream_idx == 0 => packets?,
+        _ => read_packets(stream_idx)?,
+    };
     let timeline = packets.timeline(stream, limits)?;
     if !limits.allow_truncated {
         packets.check_whole(&header, stream, &timeline)?;

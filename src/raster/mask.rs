@@ -105,21 +105,24 @@ impl Mask {
         if w == 0 {
             return result;
         }
-        // Sums of three along rows first, then along columns.
-        let mut rows = vec![0u8; self.bits.len()];
-        for (sums, bits) in rows.chunks_exact_mut(w).zip(self.bits.chunks_exact(w)) {
-            for x in 0..w {
-                let left = if x > 0 { bits[x - 1] } else { 0 };
-                let right = if x + 1 < w { bits[x + 1] } else { 0 };
-                sums[x] = left + bits[x] + right;
+        // Sums of three along rows first, then along columns, a row of zeros above and below.
+        let mut rows = vec![0u8; (h + 2) * w];
+        for (sums, bits) in rows[w..].chunks_exact_mut(w).zip(self.bits.chunks_exact(w)) {
+            sums.copy_from_slice(bits);
+            for (sum, left) in sums[1..].iter_mut().zip(bits) {
+                *sum += left;
+            }
+            for (sum, right) in sums.iter_mut().zip(&bits[1..]) {
+                *sum += right;
             }
         }
-        for y in 0..h {
-            for x in 0..w {
-                let at = y * w + x;
-                let above = if y > 0 { rows[at - w] } else { 0 };
-                let below = if y + 1 < h { rows[at + w] } else { 0 };
-                result.bits[at] = u8::from(keep(above + rows[at] + below, self.bits[at]));
+        let bits = self.bits.chunks_exact(w);
+        for (y, (kept, bits)) in result.bits.chunks_exact_mut(w).zip(bits).enumerate() {
+            let around = rows[y * w..][..3 * w].split_at(w);
+            let (above, (here, below)) = (around.0, around.1.split_at(w));
+            let sums = above.iter().zip(here).zip(below);
+            for ((kept, bit), ((a, b), c)) in kept.iter_mut().zip(bits).zip(sums) {
+                *kept = u8::from(keep(a + b + c, *bit));
             }
         }
         result

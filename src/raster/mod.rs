@@ -5,6 +5,7 @@ pub mod color;
 pub mod frame;
 pub mod image;
 pub mod mask;
+pub mod pen;
 pub mod resample;
 pub mod runs;
 
@@ -12,3 +13,4 @@ pub use color::{ColorSpec, Matrix, Range};
 pub use frame::Frame;
 pub use image::{RgbImage, RgbaImage};
 pub use mask::Mask;
+pub use pen::Pen;

@@ -47,6 +47,24 @@ impl Component {
         mask
     }
 
+    /// The mean of its pixels' centers, from sums along the runs (exact in integers).
+    ///
+    /// ```
+    /// use flockreel::{geometry::Rect, raster::{Mask, runs::components}};
+    /// let mask = Mask { rect: Rect::of_size(3, 2), bits: vec![1, 0, 0, 0, 1, 0] };
+    /// assert_eq!(components(&mask)[0].centroid_px(), [1.0, 1.0]);
+    /// ```
+    pub fn centroid_px(&self) -> [f64; 2] {
+        let (mut twice_x, mut twice_y) = (0u64, 0u64);
+        for run in &self.runs {
+            let n = u64::from(run.x1 - run.x0);
+            twice_x += n * u64::from(run.x0 + run.x1);
+            twice_y += n * u64::from(2 * run.y + 1);
+        }
+        let twice_area = 2.0 * self.area as f64;
+        [twice_x as f64 / twice_area, twice_y as f64 / twice_area]
+    }
+
     /// Both as one.
     pub fn joined(mut self, other: Component) -> Component {
         self.runs.extend(other.runs);

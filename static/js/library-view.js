@@ -5,6 +5,8 @@ import { byId, element, showProblem } from "./element.js";
 import { showHeading } from "./heading.js";
 import { count, percent, seconds } from "./words.js";
 
+const PICTURES = [["overlay", "overlay.mp4"], ["trajectory", "trajectory.svg"], ["confidence", "confidence.svg"]];
+
 /** @param {any} library */
 export async function showLibrary(library) {
   const at = `/v1/libraries/${library.id}`;
@@ -12,6 +14,11 @@ export async function showLibrary(library) {
   byId("library-numbers").replaceChildren(...numbersOf(library).map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
   byId("library-distance").src = `${at}/distance.png`;
   byId("library-background").src = `${at}/background.png`;
+  for (const [name, file] of PICTURES) {
+    byId(`library-${name}`).src = `${at}/${file}`;
+    byId(`library-${name}-file`).href = `${at}/${file}`;
+  }
+  byId("library-headings-file").href = `${at}/headings.svg`;
   byId("library-table").href = `${at}/poses.csv`;
   byId("library-poses").href = `${at}/poses.json`;
   byId("library").hidden = false;

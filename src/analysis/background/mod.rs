@@ -11,13 +11,15 @@ use crate::footage::FrameSource;
 use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
-use crate::raster::{Frame, RgbImage};
+use crate::raster::{Frame, Mask, RgbImage};
 
 mod fill;
+mod ranks;
 mod refusal;
 mod samples;
 mod scenery;
 mod shift;
+mod sway;
 
 use samples::Samples;
 
@@ -34,12 +36,15 @@ pub struct Plate {
     pub frame: Frame,
     /// The same in RGB.
     pub rgb: RgbImage,
+    /// The other color of pixels that something sways across, the plate's color everywhere else; what
+    /// lies between the two is no difference. `None` where nothing sways.
+    pub other: Option<RgbImage>,
     /// Noise of each pixel (the largest over R, G, B), one standard deviation, levels of 255.
     pub sigma: Vec<f32>,
     /// Least difference that counts as the animal for certain: max(threshold, 4 sigma).
     pub core_threshold: Vec<u8>,
     /// The pixels whose light is compared.
-    pub probes: Vec<u32>,
+    pub probes: Vec<light::Probe>,
     /// Means and noise of 4 x 4 blocks, to find places worth looking at.
     pub blocks: Blocks,
     /// Pixels that the animal never left free: continued from the texture around them, nearest the rim
@@ -71,12 +76,15 @@ pub fn estimate(
         return Err(Error::BackgroundNotStatic);
     }
     let mut unknown = Vec::new();
+    let mut seen = occupancy(&samples, &plate);
     // Two rounds: what the first plate took for the animal may have been its ghost.
-    for _round in 0..2 {
+    for round in 0..2 {
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
-        let seen = occupancy(&samples, &plate);
+        if round > 0 {
+            seen = occupancy(&samples, &plate);
+        }
         let frame = match given {
             Some(_) => plate.frame.clone(),
             None => samples.median_where_free(&plate.frame, &seen),
@@ -88,6 +96,8 @@ pub fn estimate(
             fill_with(&mut plate, &unknown, params, fill::smooth);
         }
     }
+    let all = samples.all_bits();
+    plate.other = sway::other_color(&samples.frames, &plate.frame, |px| seen.free(px, all));
     plate.blocks.measure_noise(&samples.frames);
     refuse(&samples, &plate, params)?;
     plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
@@ -178,15 +188,17 @@ fn given_plate(image: &RgbImage, samples: &Samples, params: &Params) -> Result<P
 
 fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
     let threshold = f32::from(params.threshold);
+    let rgb = frame.to_rgb();
     Plate {
-        rgb: frame.to_rgb(),
-        probes: light::probes(frame.width, frame.height),
+        probes: light::probes(&rgb),
+        rgb,
         core_threshold: sigma
             .iter()
             .map(|s| (4.0 * s).max(threshold).min(255.0) as u8)
             .collect(),
         blocks: Blocks::of(&frame),
         frame,
+        other: None,
         sigma,
         never_seen_px: 0,
     }
@@ -214,20 +226,16 @@ fn occupancy(samples: &Samples, plate: &Plate) -> Occupancy {
             let rect = component
                 .rect
                 .inflated(3, plate.frame.width, plate.frame.height);
-            let mask = component.mask(rect).dilated().dilated().dilated();
-            let width = plate.frame.width as usize;
-            let set = mask
-                .bits
-                .iter()
-                .enumerate()
-                .filter(|&(_, &bit)| bit == 1)
-                .map(|(at, _)| {
-                    let (x, y) = (at % mask.width(), at / mask.width());
-                    (rect.y as usize + y) * width + rect.x as usize + x
-                });
+            let mut mask = component.mask(rect);
             if scenery::is_scenery(&found, k, component) {
-                set.for_each(|px| seen.scenery[px] = true);
-            } else if is_ghost(&samples.frames[k], plate, component) {
+                let around = mask.dilated().dilated().dilated();
+                pixels_of(&around, plate.frame.width).for_each(|px| seen.scenery[px] = true);
+                // An animal that rests before a plant hangs together with it.
+                mask = without_displaced(&mask, &samples.frames[k], &plate.frame);
+            }
+            let mask = mask.dilated().dilated().dilated();
+            let set = pixels_of(&mask, plate.frame.width);
+            if is_ghost(&samples.frames[k], plate, component) {
                 set.for_each(|px| seen.ghost[px] |= 1 << k);
             } else {
                 set.for_each(|px| seen.taken[px] |= 1 << k);
@@ -235,6 +243,26 @@ fn occupancy(samples: &Samples, plate: &Plate) -> Occupancy {
         }
     }
     seen
+}
+
+/// The indices in a picture `width` pixels wide of the set pixels of a mask.
+fn pixels_of(mask: &Mask, width: u32) -> impl Iterator<Item = usize> {
+    let set = mask.bits.iter().enumerate().filter(|&(_, &bit)| bit == 1);
+    set.map(move |(at, _)| {
+        let (x, y) = (at % mask.width(), at / mask.width());
+        (mask.rect.y as usize + y) * width as usize + mask.rect.x as usize + x
+    })
+}
+
+/// The mask less the pixels whose color the plate shows a little to the side.
+fn without_displaced(mask: &Mask, frame: &Frame, plate: &Frame) -> Mask {
+    let mut rest = mask.clone();
+    let pixels: Vec<usize> = pixels_of(mask, plate.width).collect();
+    let set = rest.bits.iter_mut().filter(|bit| **bit == 1);
+    for (bit, px) in set.zip(pixels) {
+        *bit = u8::from(!sway::is_displaced(frame, plate, px));
+    }
+    rest.majority()
 }
 
 /// Whether a component's outline lives in the plate rather than in the frame: the sum over the
@@ -295,6 +323,7 @@ fn fill_with(
     frame.draw_rgb(&plate.rgb, hole);
     *plate = Plate {
         never_seen_px: plate.never_seen_px,
+        other: plate.other.take(),
         ..plate_of(frame, std::mem::take(&mut plate.sigma), params)
     };
 }

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use crate::cpu::Level;
 use crate::progress::Progress;
 use kernel::Tile;
-use pixels::GROUP;
+use pixels::{GROUP, GroupMemory};
 use window::WindowSums;
 
 /// What is compared with clip i: clip j as it is, or clip j mirrored.
@@ -93,7 +93,7 @@ impl Distances<'_> {
 
     /// The tiles of a panel of 48 rows, from the diagonal to the right.
     fn panel(&self, panel_idx: usize) -> Vec<Box<kernel::SadTile>> {
-        let mut memory = Vec::new();
+        let mut memory = GroupMemory::default();
         let rows = match self.side {
             Side::Plain => self.pixels.group(panel_idx),
             Side::Mirrored => self.pixels.mirrored_group(panel_idx, &mut memory),

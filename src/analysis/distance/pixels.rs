@@ -2,7 +2,7 @@
 //!
 //! Each sprite becomes U: four bytes a pixel, color premultiplied as `(A*C + 127) div 255`, then A;
 //! with `planes: rgb` the byte of A is 0 in every sprite and adds nothing. Sprites stand in groups
-//! of 48. Inside a group the bytes are cut into blocks of 1 KB, and block 0 of all 48 sprites comes
+//! of 48. Inside a group the sprites are cut into blocks of 16 x 16 pixels, and block 0 of all 48 comes
 //! before block 1: a tile of 48 x 48 distances then reads two runs of 48 KB at a time, without the
 //! cache conflicts of sprites whose size is a multiple of 4 KB. Bytes beyond the last sprite and
 //! beyond the last pixel, up to whole blocks, are 0.
@@ -18,7 +18,13 @@ pub(super) const GROUP: usize = 48;
 /// Bytes in a block.
 pub(super) const BLOCK: usize = 1024;
 
-/// 1 KB of a sprite, on cache lines of its own.
+/// Side of the square of pixels that a block holds: an animal fills few of them, and of two blank blocks
+/// nothing need be compared.
+const SIDE: usize = 16;
+/// Bytes of one row of a block.
+const ROW: usize = SIDE * 4;
+
+/// 16 x 16 pixels of a sprite, on cache lines of their own.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Block(pub(super) [u8; BLOCK]);
@@ -40,7 +46,29 @@ pub struct ComparedSprites {
     width: usize,
     height: usize,
     flip: Flip,
+    memory: GroupMemory,
+}
+
+/// The blocks of some groups, and what the bytes of each add up to.
+#[derive(Default)]
+pub(super) struct GroupMemory {
     blocks: Vec<Block>,
+    sums: Vec<u32>,
+}
+
+impl GroupMemory {
+    fn clear(&mut self, n_blocks: usize) {
+        self.blocks.clear();
+        self.blocks.resize(n_blocks, BLANK);
+        self.sums.clear();
+        self.sums.resize(n_blocks, 0);
+    }
+}
+
+fn sum_up(blocks: &[Block], sums: &mut [u32]) {
+    for (sum, block) in sums.iter_mut().zip(blocks) {
+        *sum = block.0.iter().map(|&byte| u32::from(byte)).sum();
+    }
 }
 
 /// 48 sprites, the last ones blank where the footage ends.
@@ -49,6 +77,7 @@ pub(super) struct Group<'a> {
     pub(super) n_sprites: usize,
     /// Block 0 of each sprite, then block 1 of each.
     blocks: &'a [Block],
+    sums: &'a [u32],
 }
 
 impl ComparedSprites {
@@ -74,14 +103,17 @@ impl ComparedSprites {
             width,
             height,
             flip,
-            blocks: Vec::new(),
+            memory: GroupMemory::default(),
         };
         let n_blocks = compared.n_blocks();
         let n_groups = compared.n_groups();
-        compared.blocks.resize(n_groups * GROUP * n_blocks, BLANK);
+        compared.memory.clear(n_groups * GROUP * n_blocks);
         let per_group = (GROUP * n_blocks).max(1);
-        let groups = compared.blocks.par_chunks_mut(per_group).enumerate();
-        groups.for_each(|(group_idx, group)| {
+        let GroupMemory { blocks, sums } = &mut compared.memory;
+        let groups = blocks
+            .par_chunks_mut(per_group)
+            .zip(sums.par_chunks_mut(per_group));
+        groups.enumerate().for_each(|(group_idx, (group, sums))| {
             let mut bytes = vec![0; width * height * 4];
             let mut plain = vec![0; sprites.n_bytes()];
             let first = group_idx * GROUP;
@@ -93,8 +125,9 @@ impl ComparedSprites {
                         canvas.turn(&plain, poses.frames[frame_idx].heading_rad, &mut bytes);
                     }
                 }
-                scatter(&bytes, frame_idx - first, group);
+                scatter(&bytes, width, frame_idx - first, group);
             }
+            sum_up(group, sums);
         });
         compared
     }
@@ -126,32 +159,37 @@ impl ComparedSprites {
 
     pub(super) fn group(&self, group_idx: usize) -> Group<'_> {
         let n = GROUP * self.n_blocks();
-        self.group_of(group_idx, &self.blocks[group_idx * n..][..n])
+        Group {
+            n_sprites: self.n_sprites(group_idx),
+            blocks: &self.memory.blocks[group_idx * n..][..n],
+            sums: &self.memory.sums[group_idx * n..][..n],
+        }
     }
 
     /// The group mirrored, in memory that the caller lends.
     pub(super) fn mirrored_group<'a>(
         &self,
         group_idx: usize,
-        memory: &'a mut Vec<Block>,
+        memory: &'a mut GroupMemory,
     ) -> Group<'a> {
         let group = self.group(group_idx);
-        memory.clear();
-        memory.resize(GROUP * self.n_blocks(), BLANK);
+        memory.clear(GROUP * self.n_blocks());
         let mut bytes = vec![0; self.n_bytes()];
         for sprite in 0..group.n_sprites {
-            gather(group, sprite, &mut bytes);
+            gather(group, self.width, sprite, &mut bytes);
             self.mirror(&mut bytes);
-            scatter(&bytes, sprite, memory);
+            scatter(&bytes, self.width, sprite, &mut memory.blocks);
         }
-        self.group_of(group_idx, memory)
+        sum_up(&memory.blocks, &mut memory.sums);
+        Group {
+            n_sprites: group.n_sprites,
+            blocks: &memory.blocks,
+            sums: &memory.sums,
+        }
     }
 
-    fn group_of<'a>(&self, group_idx: usize, blocks: &'a [Block]) -> Group<'a> {
-        Group {
-            n_sprites: (self.n_frames - group_idx * GROUP).min(GROUP),
-            blocks,
-        }
+    fn n_sprites(&self, group_idx: usize) -> usize {
+        (self.n_frames - group_idx * GROUP).min(GROUP)
     }
 
     fn mirror(&self, bytes: &mut [u8]) {
@@ -172,7 +210,7 @@ impl ComparedSprites {
     }
 
     fn n_blocks(&self) -> usize {
-        self.n_bytes().div_ceil(BLOCK)
+        self.width.div_ceil(SIDE) * self.height.div_ceil(SIDE)
     }
 }
 
@@ -185,6 +223,11 @@ impl<'a> Group<'a> {
     /// One block of one of the 48 sprites.
     pub(super) fn block(&self, block: usize, sprite: usize) -> &'a Block {
         &self.blocks[block * GROUP + sprite]
+    }
+
+    /// What the bytes of that block add up to.
+    pub(super) fn sum(&self, block: usize, sprite: usize) -> u32 {
+        self.sums[block * GROUP + sprite]
     }
 }
 
@@ -207,16 +250,29 @@ fn premultiply(sprite: &[u8], planes: Planes, out: &mut [u8]) {
 }
 
 /// Writes one sprite's bytes to its place in a group.
-fn scatter(bytes: &[u8], sprite: usize, group: &mut [Block]) {
-    for (block_idx, chunk) in bytes.chunks(BLOCK).enumerate() {
-        group[block_idx * GROUP + sprite].0[..chunk.len()].copy_from_slice(chunk);
+fn scatter(bytes: &[u8], width: usize, sprite: usize, group: &mut [Block]) {
+    for (first, block, at) in pieces(bytes.len(), width) {
+        let n = ROW.min(width * 4 - first % (width * 4));
+        group[block * GROUP + sprite].0[at..at + n].copy_from_slice(&bytes[first..first + n]);
     }
 }
 
 /// Reads one sprite's bytes from a group.
-fn gather(group: Group<'_>, sprite: usize, bytes: &mut [u8]) {
-    for (block_idx, chunk) in bytes.chunks_mut(BLOCK).enumerate() {
-        let block = group.block(block_idx, sprite);
-        chunk.copy_from_slice(&block.0[..chunk.len()]);
+fn gather(group: Group<'_>, width: usize, sprite: usize, bytes: &mut [u8]) {
+    for (first, block, at) in pieces(bytes.len(), width) {
+        let n = ROW.min(width * 4 - first % (width * 4));
+        bytes[first..first + n].copy_from_slice(&group.block(block, sprite).0[at..at + n]);
     }
+}
+
+/// The rows of all blocks: where each begins in a sprite's bytes, its block, and where in that.
+fn pieces(n_bytes: usize, width: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    let n_columns = width.div_ceil(SIDE);
+    let row_bytes = (width * 4).max(1);
+    (0..n_bytes / row_bytes).flat_map(move |y| {
+        (0..n_columns).map(move |column| {
+            let first = y * row_bytes + column * ROW;
+            (first, y / SIDE * n_columns + column, y % SIDE * ROW)
+        })
+    })
 }

@@ -25,6 +25,7 @@ fn poses(view: View, headings_rad: impl IntoIterator<Item = Option<f64>>) -> Pos
         ..Pose::default()
     });
     Poses {
+        tail_beat: None,
         fps: 30.0,
         image_size_px: [640, 480],
         view,

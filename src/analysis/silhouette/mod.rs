@@ -21,11 +21,20 @@ const MARGIN_PX: u32 = 6;
 /// How far a box grows when a component runs into its edge.
 const GROWTH_PX: u32 = 16;
 
-/// The components of foreground pixels that lie in or reach into `region`, from the top left; raw:
-/// neither holes nor ragged edges mended (`shaped` does).
-pub fn components(frame: &Frame, plate: &Plate, gain: &Gain, region: Rect) -> Vec<Component> {
+/// The components of foreground pixels in the boxes that `region` proposes, from the top left; raw: neither
+/// holes nor ragged edges mended (`shaped` does). They do not depend on `seen`, the part of the frame
+/// that is looked at first.
+pub fn components(
+    frame: &Frame,
+    plate: &Plate,
+    gain: &Gain,
+    [region, seen]: [Rect; 2],
+) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
-    for rect in disjoint(plate.blocks.proposals(frame, gain, region, MARGIN_PX)) {
+    let boxes = plate
+        .blocks
+        .proposals(frame, gain, [region, seen], MARGIN_PX);
+    for rect in boxes {
         for component in components_in(frame, plate, gain, rect) {
             if !found.contains(&component) {
                 found.push(component);
@@ -44,7 +53,8 @@ pub fn shaped(component: &Component, width: u32, height: u32) -> Mask {
     mask.majority()
 }
 
-/// The difference of a box from the plate: the largest over R, G, B of |I / gain - B|.
+/// The difference of a box from the plate: the largest over R, G, B of |I / gain - B|; where something
+/// sways, from the nearest color between the two that are seen there.
 pub struct Difference {
     /// The box.
     pub rect: Rect,
@@ -79,7 +89,33 @@ pub fn difference(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Diff
                 .max(i[2].abs_diff(b[2]))
         }));
     }
+    if let Some(other) = &plate.other {
+        for (k, level) in levels.iter_mut().enumerate() {
+            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
+            let at = ((rect.y as usize + y) * width + rect.x as usize + x) * 3;
+            let (base, other) = (&plate.rgb.pixels[at..at + 3], &other.pixels[at..at + 3]);
+            if *level > 0 && base != other {
+                *level = beside(&rgb.pixels[3 * k..3 * k + 3], base, other);
+            }
+        }
+    }
     Difference { rect, rgb, levels }
+}
+
+/// The largest channel difference of a color from the nearest one between two: what sways across a
+/// pixel covers a part of it.
+fn beside(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
+    let gap = |a: &[u8], b: &[u8], c: usize| i32::from(a[c]) - i32::from(b[c]);
+    let along: i32 = (0..3)
+        .map(|c| gap(color, base, c) * gap(other, base, c))
+        .sum();
+    let length: i32 = (0..3).map(|c| gap(other, base, c).pow(2)).sum();
+    let share = along.clamp(0, length);
+    let off = |c: usize| {
+        let nearest = i32::from(base[c]) + gap(other, base, c) * share / length.max(1);
+        (i32::from(color[c]) - nearest).unsigned_abs() as u8
+    };
+    off(0).max(off(1)).max(off(2))
 }
 
 /// The components of one box, which grows to the sides where any of them runs into its edge, twice
@@ -132,21 +168,4 @@ fn hysteresis(difference: &Difference, plate: &Plate) -> Vec<Component> {
         .into_iter()
         .filter(has_core)
         .collect()
-}
-
-/// Boxes joined until no two of them meet.
-fn disjoint(mut boxes: Vec<Rect>) -> Vec<Rect> {
-    let mut idx = 0;
-    while idx < boxes.len() {
-        let meets = |other: &Rect| !boxes[idx].intersection(other).is_empty();
-        match (idx + 1..boxes.len()).find(|&other| meets(&boxes[other])) {
-            Some(other) => {
-                boxes[idx] = boxes[idx].union(&boxes[other]);
-                boxes.remove(other);
-                idx = 0;
-            }
-            None => idx += 1,
-        }
-    }
-    boxes
 }

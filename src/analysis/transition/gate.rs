@@ -87,6 +87,7 @@ mod tests {
             ..Pose::default()
         });
         let poses = Poses {
+            tail_beat: None,
             fps: 10.0,
             image_size_px: [100, 100],
             view,

@@ -34,6 +34,7 @@ fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
         ..Pose::default()
     };
     let poses = Poses {
+        tail_beat: None,
         fps: FPS,
         image_size_px: [320, 240],
         view: View::Side,

@@ -29,7 +29,7 @@ pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
         camera: stage.camera,
         size: stage.size,
         palette: params.palette,
-        frames: swim(&smooth, &stage, params),
+        frames: swim(&smooth, poses, &stage, params),
     })
 }
 
@@ -240,7 +240,12 @@ fn window(n: usize, middle: usize, sigma_frames: f64) -> impl Iterator<Item = (u
 }
 
 /// Bends and banks the fish as fast as it moves and turns; where it is unknown, hides it.
-fn swim(placements: &[Option<Placement>], stage: &Stage, params: &Params) -> Vec<Posture> {
+fn swim(
+    placements: &[Option<Placement>],
+    poses: &Poses,
+    stage: &Stage,
+    params: &Params,
+) -> Vec<Posture> {
     let mut phase_turns = 0.0;
     let mut speed_bl_per_s = 0.0;
     let first = placements.iter().flatten().next();
@@ -258,7 +263,11 @@ fn swim(placements: &[Option<Placement>], stage: &Stage, params: &Params) -> Vec
         let new_speed = moving.speed_m_per_s.max(0.0) / stage.size.length_m;
         // The tail answers within a fifth of a second; measured speeds are noisier than that.
         speed_bl_per_s += (new_speed - speed_bl_per_s) * (5.0 / stage.fps).min(1.0);
-        phase_turns += tail_beat_hz(speed_bl_per_s).min(0.45 * stage.fps) / stage.fps;
+        // Where no beat was measured, the one that goes with the speed.
+        let beat_hz = poses
+            .tail_beat_hz(k)
+            .unwrap_or(tail_beat_hz(speed_bl_per_s));
+        phase_turns += beat_hz.min(0.45 * stage.fps) / stage.fps;
         let swimming = Swimming {
             phase_turns,
             effort: effort_at(speed_bl_per_s),

@@ -35,6 +35,7 @@ fn uncalibrated(view: View) -> Poses {
         }
     });
     Poses {
+        tail_beat: None,
         fps: 30.0,
         image_size_px: [160, 100],
         view,

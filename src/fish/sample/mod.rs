@@ -119,6 +119,7 @@ impl SampleFilm {
     pub fn truth(&self) -> Poses {
         let frames = (0..self.params.n_frames).into_par_iter();
         Poses {
+            tail_beat: None,
             fps: self.params.fps,
             image_size_px: [self.params.width, self.params.height],
             view: View::Side,

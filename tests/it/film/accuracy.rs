@@ -2,7 +2,11 @@
 //! (ALGORITHMS.md 9). The film is the virtual fish's; its pixels and its truth share no code with
 //! the analysis.
 
+use flockreel::analysis::params::Search;
+use flockreel::analysis::{self, analyze};
+use flockreel::cpu::Level;
 use flockreel::flock::{self, plan_flock};
+use flockreel::formats::poses_json;
 use flockreel::geometry::wrap_rad;
 use flockreel::library::{Library, Pose};
 use flockreel::progress::Silent;
@@ -58,6 +62,23 @@ fn depth_is_within_a_tenth_of_the_tank() {
             .collect(),
     );
     assert!(gap_m < 0.03, "{gap_m}");
+}
+
+#[test]
+fn searching_everywhere_finds_what_the_window_found_on_any_number_of_threads() {
+    let (film, library, params) = filmed();
+    let params = analysis::Params {
+        search: Search::Full,
+        ..params.clone()
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .unwrap();
+    let full = pool.install(|| analyze(film, None, &params, Level::detect(), &Silent).unwrap());
+    let bytes = |library: &Library| poses_json::write(&library.poses, None);
+    assert!(bytes(&full) == bytes(library), "poses.json differs");
+    assert!(full.sprites == library.sprites, "the sprites differ");
 }
 
 #[test]

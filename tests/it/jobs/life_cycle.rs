@@ -32,6 +32,9 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
         ("background.png", &b"\x89PNG"[..]),
         ("distance.png", b"\x89PNG"),
         ("headings.svg", b"<svg"),
+        ("trajectory.svg", b"<svg"),
+        ("confidence.svg", b"<svg"),
+        ("overlay.mp4", b"\0\0\0"),
         ("poses.csv", b"frame"),
         ("sprites.zip", b"PK"),
     ] {

@@ -27,6 +27,9 @@ fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
         for row in (0..tile.rows.n_sprites).step_by(4) {
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             for column in tile.columns_of(row).step_by(2) {
+                if tile.add_blank::<4, 2>([block, row, column], sums) {
+                    continue;
+                }
                 let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
                 for (k, sums_of_column) in sad_4x2(a, b).into_iter().enumerate() {
                     for (r, sum) in sums_of_column.into_iter().enumerate() {

@@ -32,6 +32,27 @@ impl Tile<'_> {
         let first = if self.diagonal { row } else { 0 };
         first..self.columns.n_sprites
     }
+
+    /// Adds d of `R` rows and `C` columns in a block that is blank in all those rows or in all those
+    /// columns: |a - 0| is a, whose sum is known. Returns false, and adds nothing, when it is neither.
+    #[inline]
+    fn add_blank<const R: usize, const C: usize>(
+        &self,
+        [block, row, column]: [usize; 3],
+        sums: &mut SadTile,
+    ) -> bool {
+        let a: [u32; R] = std::array::from_fn(|r| self.rows.sum(block, row + r));
+        let b: [u32; C] = std::array::from_fn(|c| self.columns.sum(block, column + c));
+        if a != [0; R] && b != [0; C] {
+            return false;
+        }
+        for (r, a) in a.into_iter().enumerate() {
+            for (c, b) in b.into_iter().enumerate() {
+                sums[row + r][column + c] += u64::from(a + b);
+            }
+        }
+        true
+    }
 }
 
 /// The distances of a tile. Entries that were not asked for may hold anything.

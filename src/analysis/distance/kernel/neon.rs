@@ -24,6 +24,9 @@ fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
         for row in (0..tile.rows.n_sprites).step_by(2) {
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             for column in tile.columns_of(row).step_by(4) {
+                if tile.add_blank::<2, 4>([block, row, column], sums) {
+                    continue;
+                }
                 let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
                 for (r, totals) in sad_2x4(a, b).into_iter().enumerate() {
                     for (k, total) in totals.into_iter().enumerate() {

@@ -1,0 +1,138 @@
+//! Symmetric positive definite systems whose unknowns touch only their neighbors in time: normal
+//! equations in a band, solved by Cholesky, O(frames).
+
+/// Unknowns of one frame.
+pub(super) const N_STATE: usize = 5;
+/// A residual reaches over three frames.
+pub(super) const BAND: usize = 3 * N_STATE;
+
+/// The normal equations `H x = -g` of a sum of squares; `H` by rows, each from the diagonal leftward.
+pub(super) struct Normal {
+    rows: Vec<[f64; BAND]>,
+    gradient: Vec<f64>,
+    /// Half the energy itself is not needed: this is the whole sum of squares.
+    pub(super) cost: f64,
+}
+
+impl Normal {
+    pub(super) fn new(n_unknowns: usize) -> Normal {
+        Normal {
+            rows: vec![[0.0; BAND]; n_unknowns],
+            gradient: vec![0.0; n_unknowns],
+            cost: 0.0,
+        }
+    }
+
+    /// Adds one residual of weight `weight`; `terms` are (unknown, derivative), unknowns ascending.
+    pub(super) fn add(&mut self, residual: f64, weight: f64, terms: &[(usize, f64)]) {
+        for (k, &(row, slope)) in terms.iter().enumerate() {
+            let pulled = weight * slope;
+            self.gradient[row] += pulled * residual;
+            for &(column, other) in &terms[..=k] {
+                self.rows[row][row - column] += pulled * other;
+            }
+        }
+    }
+
+    /// The step that minimises the quadratic model with `damping` times the diagonal added (Marquardt
+    /// 1963); unknowns for which `held` is true do not move. `None` when the system is not definite.
+    pub(super) fn step(&self, damping: f64, held: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
+        let n = self.rows.len();
+        let mut factor = self.rows.clone();
+        let mut x: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
+        for (k, row) in factor.iter_mut().enumerate() {
+            row[0] = row[0] * (1.0 + damping) + 1e-9;
+            if held(k) {
+                *row = [0.0; BAND];
+                row[0] = 1.0;
+                x[k] = 0.0;
+            } else {
+                for back in 1..BAND.min(k + 1) {
+                    if held(k - back) {
+                        row[back] = 0.0;
+                    }
+                }
+            }
+        }
+        for i in 0..n {
+            let (done, rest) = factor.split_at_mut(i);
+            let row = &mut rest[0];
+            let reach = BAND.min(i + 1);
+            for back in (1..reach).rev() {
+                // Column j = i - back: dot product of rows i and j left of j.
+                let j = i - back;
+                let other = &done[j];
+                let mut sum = row[back];
+                for m in 1..BAND - back {
+                    sum -= row[back + m] * other[m];
+                }
+                row[back] = sum / other[0];
+            }
+            let mut sum = row[0];
+            for value in &row[1..] {
+                sum -= value * value;
+            }
+            if !(sum > 0.0) {
+                return None;
+            }
+            row[0] = sum.sqrt();
+            for back in 1..reach {
+                let known = x[i - back];
+                x[i] -= row[back] * known;
+            }
+            x[i] /= row[0];
+        }
+        for i in (0..n).rev() {
+            let solved = x[i] / factor[i][0];
+            x[i] = solved;
+            for back in 1..BAND.min(i + 1) {
+                x[i - back] -= factor[i][back] * solved;
+            }
+        }
+        Some(x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random;
+
+    #[test]
+    fn the_step_solves_the_normal_equations() {
+        let mut count = 0;
+        let mut normal_number = || {
+            count += 1;
+            random::normal(3, &[count])
+        };
+        let n = 40;
+        let mut normal = Normal::new(n);
+        let mut dense = vec![vec![0.0; n]; n];
+        let mut right = vec![0.0; n];
+        for start in 0..n - BAND + 1 {
+            for _ in 0..20 {
+                let residual = normal_number();
+                let terms: Vec<(usize, f64)> =
+                    (0..BAND).map(|k| (start + k, normal_number())).collect();
+                normal.add(residual, 0.7, &terms);
+                for &(i, a) in &terms {
+                    right[i] -= 0.7 * a * residual;
+                    for &(j, b) in &terms {
+                        dense[i][j] += 0.7 * a * b;
+                    }
+                }
+            }
+        }
+        let x = normal.step(0.0, |_| false).expect("definite");
+        for i in 0..n {
+            let got: f64 = (0..n).map(|j| dense[i][j] * x[j]).sum();
+            assert!((got - right[i]).abs() < 1e-5, "{got} {}", right[i]);
+        }
+        let held = normal.step(0.0, |k| k < 7).expect("definite");
+        assert!(held[..7].iter().all(|&v| v == 0.0));
+        for i in 7..n {
+            let got: f64 = (7..n).map(|j| dense[i][j] * held[j]).sum();
+            assert!((got - right[i]).abs() < 1e-5);
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! How badly a course through space explains what was seen: the sum of squares that the best estimate
+//! makes least (ALGORITHMS.md 4).
+//!
+//! The unknowns of a frame are the logarithm of the apparent depth, yaw, pitch, speed, and the sway: how
+//! far the body's length and side vary together, which is how far the tail lies to one side. Residuals,
+//! each in units of its standard deviation, those of measurements with Huber weights:
+//!
+//! - second moments of the silhouette against those of the body;
+//! - its upright extent, which hardly depends on yaw or sway, against the animal's height;
+//! - motion against speed along forward, sideways slip allowed;
+//! - changes of yaw rate, pitch rate and speed; swimming backward; pitch itself; sway against what the turn would bend.
+
+use super::banded::{N_STATE, Normal};
+use super::body::{Axes, form};
+use super::shape::Shape;
+use super::{Outline, View, Views};
+
+/// Residuals of measurements beyond this many standard deviations count linearly (Huber 1964).
+const HUBER: f64 = 2.5;
+/// Noise of the upright extent, relative.
+const UPRIGHT_NOISE: f64 = 0.02;
+/// Noise of a centroid, pixels.
+const CENTROID_NOISE_PX: f64 = 0.2;
+/// Sideways slip, lengths a second.
+const SLIP_BL: f64 = 0.2;
+/// Usual turning rate, radians a second.
+const TURN_RATE: f64 = 3.0;
+/// Change of the turning rate, radians a second, per square root of a second.
+const TURN_CHANGE: f64 = 6.5;
+/// The same of pitch.
+const PITCH_CHANGE: f64 = 1.5;
+/// Usual pitch, radians.
+const PITCH: f64 = 0.5;
+/// Change of speed, lengths a second, per square root of a second.
+const SPEED_CHANGE_BL: f64 = 2.2;
+/// Animals rarely swim backward, lengths a second.
+const BACKWARD_BL: f64 = 0.1;
+/// Pointing away from where the head is known to be.
+const PINNED: f64 = 0.01;
+/// Turning rates count toward the bend up to here, radians a second.
+pub(super) const BEND_RATE: f64 = 4.0;
+
+/// The unknowns of one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct State(pub(super) [f64; N_STATE]);
+
+impl State {
+    pub(super) fn log_z(&self) -> f64 {
+        self.0[0]
+    }
+    pub(super) fn yaw(&self) -> f64 {
+        self.0[1]
+    }
+    pub(super) fn pitch(&self) -> f64 {
+        self.0[2]
+    }
+    pub(super) fn speed(&self) -> f64 {
+        self.0[3]
+    }
+    pub(super) fn sway(&self) -> f64 {
+        self.0[4]
+    }
+}
+
+/// The energy of courses through the views, for a body of known shape.
+pub(super) struct Energy<'a> {
+    pub(super) views: &'a Views,
+    pub(super) shape: &'a Shape,
+}
+
+/// Standard deviations of xx, xy, yy as they were measured.
+pub(super) fn moment_noise([xx, _, yy]: [f64; 3]) -> [f64; 3] {
+    let mean = (xx * yy).max(1.0).sqrt();
+    [
+        0.05 * xx + 0.03 * mean,
+        0.06 * mean,
+        0.05 * yy + 0.01 * mean,
+    ]
+}
+
+impl<'a> Energy<'a> {
+    pub(super) fn new(views: &'a Views, shape: &'a Shape) -> Energy<'a> {
+        Energy { views, shape }
+    }
+
+    /// The sum of squares over the frames from `start` on that `states` covers: the residuals among
+    /// them alone.
+    pub(super) fn cost(&self, start: usize, states: &[State]) -> f64 {
+        let mut cost = 0.0;
+        self.visit(start, states, &mut |residual, scale, robust, _| {
+            cost += scale * loss(residual, robust);
+        });
+        cost
+    }
+
+    /// The normal equations of the same, with the cost.
+    pub(super) fn normal(&self, start: usize, states: &[State]) -> Normal {
+        let mut normal = Normal::new(states.len() * N_STATE);
+        let mut cost = 0.0;
+        self.visit(start, states, &mut |residual, scale, robust, terms| {
+            cost += scale * loss(residual, robust);
+            let size = residual.abs();
+            let weight = if robust && size > HUBER {
+                HUBER / size
+            } else {
+                1.0
+            };
+            normal.add(residual, scale * weight, terms);
+        });
+        normal.cost = cost;
+        normal
+    }
+
+    /// Gives every residual to `add`: value, weight, whether it is a measurement, derivatives.
+    fn visit(&self, start: usize, states: &[State], add: &mut Add) {
+        let evidence = self.views.evidence();
+        let axes: Vec<Axes> = states
+            .iter()
+            .map(|s| Axes::of(s.yaw(), s.pitch()))
+            .collect();
+        for (k, state) in states.iter().enumerate() {
+            let view = &self.views.frames[start + k];
+            if let Some(outline) = &view.outline {
+                self.moments(k, state, &axes[k], (view, outline), &mut |r, terms| {
+                    add(r, evidence, true, terms);
+                });
+                self.upright(k, state, outline, &mut |r, terms| {
+                    add(r, evidence, true, terms)
+                });
+            }
+            let backward = state.speed().min(0.0) / (BACKWARD_BL * self.shape.length_m);
+            if backward < 0.0 {
+                let slope = backward / state.speed();
+                add(backward, 1.0, true, &[(k * N_STATE + 3, slope)]);
+            }
+            add(
+                state.pitch() / PITCH,
+                evidence,
+                false,
+                &[(k * N_STATE + 2, 1.0 / PITCH)],
+            );
+            if let Some([x, y]) = view.toward {
+                let along = |v: [f64; 3]| (x * v[0] + y * v[1]) / PINNED;
+                let residual = along(axes[k].forward);
+                if residual < 0.0 {
+                    let slopes = [axes[k].by_yaw(), axes[k].by_pitch()].map(|a| along(a.forward));
+                    let at = k * N_STATE;
+                    add(
+                        residual,
+                        1.0,
+                        false,
+                        &[(at + 1, slopes[0]), (at + 2, slopes[1])],
+                    );
+                }
+            }
+            if k + 1 < states.len() {
+                let pair = [&axes[k], &axes[k + 1]];
+                self.motion(start, k, states, pair, &mut |r, terms| {
+                    add(r, evidence, true, terms)
+                });
+            }
+            self.habits(k, states, &mut |r, terms| add(r, 1.0, false, terms));
+        }
+    }
+
+    fn moments(
+        &self,
+        k: usize,
+        state: &State,
+        axes: &Axes,
+        (view, outline): (&View, &Outline),
+        add: &mut dyn FnMut(f64, &[(usize, f64)]),
+    ) {
+        let flatten = 1.0 / self.views.medium_index;
+        let body = self.shape.body(state.sway());
+        let scale = (self.views.focal_px * libm::exp(-state.log_z())).powi(2);
+        let seen = axes.seen(view.slope, flatten);
+        let by = [axes.by_yaw(), axes.by_pitch()].map(|a| a.seen(view.slope, flatten));
+        let noise = moment_noise(outline.covariance_px2);
+        for (c, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
+            let value = scale * form(&seen[i], &seen[j], &body);
+            let turned =
+                by.map(|b| scale * (form(&b[i], &seen[j], &body) + form(&seen[i], &b[j], &body)));
+            let swayed = scale * (seen[i][0] * seen[j][2] + seen[i][2] * seen[j][0]);
+            // A pixel is a square: 1 / 12 of second moment of its own.
+            let pixel = if i == j { 1.0 / 12.0 } else { 0.0 };
+            let residual = (value + pixel - outline.covariance_px2[c]) / noise[c];
+            let at = k * N_STATE;
+            add(
+                residual,
+                &[
+                    (at, -2.0 * value / noise[c]),
+                    (at + 1, turned[0] / noise[c]),
+                    (at + 2, turned[1] / noise[c]),
+                    (at + 4, swayed / noise[c]),
+                ],
+            );
+        }
+    }
+
+    fn upright(
+        &self,
+        k: usize,
+        state: &State,
+        outline: &Outline,
+        add: &mut dyn FnMut(f64, &[(usize, f64)]),
+    ) {
+        let (extent_m, by_pitch) = self.shape.upright_m(state.pitch());
+        let shown = libm::log(self.views.focal_px * extent_m) - state.log_z();
+        let residual = (shown - libm::log(outline.upright_px)) / UPRIGHT_NOISE;
+        let at = k * N_STATE;
+        let terms = [
+            (at, -1.0 / UPRIGHT_NOISE),
+            (at + 2, by_pitch / extent_m / UPRIGHT_NOISE),
+        ];
+        add(residual, &terms);
+    }
+
+    /// The way from one frame to the next against speed along forward.
+    fn motion(
+        &self,
+        start: usize,
+        k: usize,
+        states: &[State],
+        axes: [&Axes; 2],
+        add: &mut dyn FnMut(f64, &[(usize, f64)]),
+    ) {
+        let views = self.views;
+        let both = [&views.frames[start + k], &views.frames[start + k + 1]];
+        let pair = [&states[k], &states[k + 1]];
+        let depth = pair.map(|s| libm::exp(s.log_z()));
+        let pixel = CENTROID_NOISE_PX * depth[0] / views.focal_px * std::f64::consts::SQRT_2;
+        let unsure = if both.iter().all(|v| v.seen) {
+            1.0
+        } else {
+            3.0
+        };
+        let slip = unsure * libm::hypot(SLIP_BL * self.shape.length_m, pixel / views.dt);
+        let speed = (pair[0].speed() + pair[1].speed()) / 2.0;
+        let at = [k * N_STATE, (k + 1) * N_STATE];
+        let slopes = [0, 1].map(|m| [both[m].slope[0], both[m].slope[1], views.medium_index]);
+        let by = axes.map(|a| [a.by_yaw().forward, a.by_pitch().forward]);
+        for c in 0..3 {
+            // x and y follow the apparent depth, z is stretched by the medium.
+            let place = [0, 1].map(|m| slopes[m][c] * depth[m]);
+            let forward = (axes[0].forward[c] + axes[1].forward[c]) / 2.0;
+            let residual = ((place[1] - place[0]) / views.dt - speed * forward) / slip;
+            let half = -speed / 2.0 / slip;
+            let moved = [-place[0], place[1]].map(|p| p / views.dt / slip);
+            add(
+                residual,
+                &[
+                    (at[0], moved[0]),
+                    (at[0] + 1, half * by[0][0][c]),
+                    (at[0] + 2, half * by[0][1][c]),
+                    (at[0] + 3, -forward / 2.0 / slip),
+                    (at[1], moved[1]),
+                    (at[1] + 1, half * by[1][0][c]),
+                    (at[1] + 2, half * by[1][1][c]),
+                    (at[1] + 3, -forward / 2.0 / slip),
+                ],
+            );
+        }
+    }
+
+    /// What animals rarely do.
+    fn habits(&self, k: usize, states: &[State], add: &mut dyn FnMut(f64, &[(usize, f64)])) {
+        let dt = self.views.dt;
+        let root = dt.sqrt();
+        let at = |m: usize, part: usize| (k + m) * N_STATE + part;
+        if let Some([a, b]) = states
+            .get(k..k + 2)
+            .and_then(|s| <&[State; 2]>::try_from(s).ok())
+        {
+            let slope = 1.0 / (dt * TURN_RATE);
+            let turned = b.yaw() - a.yaw();
+            add(turned * slope, &[(at(0, 1), -slope), (at(1, 1), slope)]);
+            let slope = 1.0 / (SPEED_CHANGE_BL * self.shape.length_m * root);
+            let faster = b.speed() - a.speed();
+            add(faster * slope, &[(at(0, 3), -slope), (at(1, 3), slope)]);
+        }
+        let Some([a, b, c]) = states
+            .get(k..k + 3)
+            .and_then(|s| <&[State; 3]>::try_from(s).ok())
+        else {
+            return;
+        };
+        for (part, change) in [(1, TURN_CHANGE), (2, PITCH_CHANGE)] {
+            let slope = 1.0 / (dt * change * root);
+            let second = a.0[part] - 2.0 * b.0[part] + c.0[part];
+            let terms = [
+                (at(0, part), slope),
+                (at(1, part), -2.0 * slope),
+                (at(2, part), slope),
+            ];
+            add(second * slope, &terms);
+        }
+        let rate = (c.yaw() - a.yaw()) / (2.0 * dt);
+        let bend = self.shape.bend * rate.clamp(-BEND_RATE, BEND_RATE);
+        let by_yaw = if rate.abs() < BEND_RATE {
+            self.shape.bend / (2.0 * dt)
+        } else {
+            0.0
+        };
+        let scale = 1.0 / self.shape.sway_sd;
+        let terms = [
+            (at(0, 1), by_yaw * scale),
+            (at(1, 4), scale),
+            (at(2, 1), -by_yaw * scale),
+        ];
+        add((b.sway() - bend) * scale, &terms);
+    }
+}
+
+/// Takes a residual, its weight, whether it is a measurement, and its derivatives.
+type Add<'a> = dyn FnMut(f64, f64, bool, &[(usize, f64)]) + 'a;
+
+fn loss(residual: f64, robust: bool) -> f64 {
+    let size = residual.abs();
+    if robust && size > HUBER {
+        HUBER * (2.0 * size - HUBER)
+    } else {
+        residual * residual
+    }
+}

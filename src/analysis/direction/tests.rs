@@ -1,0 +1,171 @@
+//! A swimmer whose course is known, seen as the projected moments of many points of its body.
+
+use std::f64::consts::TAU;
+
+use super::*;
+use crate::random;
+
+const CAMERA: Camera = Camera {
+    z_min_m: 0.7,
+    pane_px_per_m: 1000.0,
+    center_px: [320.0, 240.0],
+    medium_index: 1.0,
+};
+const ANIMAL: Animal = Animal {
+    length_m: 0.1,
+    height_m: 0.05,
+};
+
+/// Where it was and how it lay.
+struct Truth {
+    position_m: [f64; 3],
+    forward: [f64; 3],
+}
+
+/// It wanders for `n` frames: yaw in uneven turns all round, a little pitch, speed about a length a second,
+/// the tail beating.
+fn wandering(n: usize, camera: &Camera) -> (Vec<Truth>, Vec<Option<Seen>>) {
+    let mut place = [0.0, 0.0, 0.85];
+    (0..n)
+        .map(|k| {
+            let t = k as f64 / 30.0;
+            let yaw = 0.9 * t + 1.3 * libm::sin(0.7 * t) + 0.5 * libm::sin(1.9 * t + 1.0);
+            let pitch = 0.2 * libm::sin(0.5 * t);
+            let axes = body::Axes::of(yaw, pitch);
+            let speed = 0.1 + 0.03 * libm::sin(0.4 * t);
+            for c in 0..3 {
+                place[c] += axes.forward[c] * speed / 30.0;
+            }
+            let truth = Truth {
+                position_m: place,
+                forward: axes.forward,
+            };
+            let seen = look(&axes, place, 0.1 * libm::sin(TAU * 2.3 * t), camera, k);
+            (truth, Some(seen))
+        })
+        .unzip()
+}
+
+/// The moments of points spread through an ellipsoid with a bent tail, each projected by itself.
+fn look(axes: &body::Axes, place: [f64; 3], bend: f64, camera: &Camera, frame: usize) -> Seen {
+    let points: Vec<[f64; 2]> = (0..600)
+        .map(|m| {
+            let [a, b, c] = [0, 1, 2].map(|word| random::normal(11, &[m, word]));
+            // A uniform ellipsoid's silhouette has a quarter of its half axes as standard deviation.
+            let along = a * ANIMAL.length_m / 4.0;
+            let side = c * 0.018 / 4.0 + bend * (along - 0.05).powi(2) / 0.1;
+            let down = b * ANIMAL.height_m / 4.0;
+            let point: [f64; 3] = std::array::from_fn(|k| {
+                place[k] + axes.forward[k] * along + axes.down[k] * down + axes.side[k] * side
+            });
+            camera.image_from_camera(point)
+        })
+        .collect();
+    let n = points.len() as f64;
+    let mean = [0, 1].map(|c| points.iter().map(|p| p[c]).sum::<f64>() / n);
+    let second = |i: usize, j: usize| {
+        points
+            .iter()
+            .map(|p| (p[i] - mean[i]) * (p[j] - mean[j]))
+            .sum::<f64>()
+            / n
+    };
+    let noise = |word: u64| random::normal(5, &[frame as u64, word]);
+    let pitch = libm::asin(axes.forward[1]);
+    let tall = libm::hypot(0.05 * libm::cos(pitch), 0.1 * libm::sin(pitch));
+    let apparent = camera.apparent_from_true_depth_m(place[2]);
+    Seen {
+        centroid_px: [mean[0] + 0.2 * noise(0), mean[1] + 0.2 * noise(1)],
+        covariance_px2: [second(0, 0), second(0, 1), second(1, 1)],
+        upright_px: tall * camera.focal_px() / apparent * (1.0 + 0.02 * noise(2)),
+        cut: false,
+        toward: None,
+    }
+}
+
+fn angles_deg(truth: &[Truth], found: &[Option<Direction>]) -> Vec<f64> {
+    let angle = |(truth, found): (&Truth, &Option<Direction>)| {
+        let found = found.as_ref()?.forward;
+        let dot: f64 = found.iter().zip(&truth.forward).map(|(a, b)| a * b).sum();
+        Some(libm::acos(dot.clamp(-1.0, 1.0)).to_degrees())
+    };
+    let mut angles: Vec<f64> = truth.iter().zip(found).filter_map(angle).collect();
+    angles.sort_by(f64::total_cmp);
+    angles
+}
+
+#[test]
+fn the_direction_of_a_wandering_swimmer_is_found_all_round() {
+    for medium_index in [1.0, 4.0 / 3.0] {
+        let camera = Camera {
+            medium_index,
+            ..CAMERA
+        };
+        let (truth, seen) = wandering(600, &camera);
+        let found = estimate(&seen, &camera, &ANIMAL, 30.0);
+        let angles = angles_deg(&truth, &found);
+        assert_eq!(angles.len(), 600);
+        assert!(
+            angles[300] < 6.0 && angles[540] < 15.0,
+            "{} {}",
+            angles[300],
+            angles[540]
+        );
+        let depth_error = |(truth, found): (&Truth, &Option<Direction>)| {
+            let z = found.as_ref().expect("found").z_apparent_m;
+            (camera.point_in_camera([0.0; 2], z)[2] - truth.position_m[2]).powi(2)
+        };
+        let squares: f64 = truth.iter().zip(&found).map(depth_error).sum();
+        assert!(
+            (squares / 600.0).sqrt() < 0.02,
+            "{}",
+            (squares / 600.0).sqrt()
+        );
+    }
+}
+
+#[test]
+fn a_swimmer_that_is_cut_or_lost_for_a_while_is_bridged_and_no_longer_gap_is() {
+    let (truth, mut seen) = wandering(400, &CAMERA);
+    for one in seen[100..140].iter_mut().flatten() {
+        one.cut = true;
+    }
+    seen[200..210].fill(None);
+    seen[300..330].fill(None);
+    let found = estimate(&seen, &CAMERA, &ANIMAL, 30.0);
+    assert!(found[205].is_some() && found[120].is_some());
+    assert!(found[315].is_none());
+    let angles = angles_deg(&truth, &found);
+    assert!(
+        angles[angles.len() / 2] < 8.0,
+        "{}",
+        angles[angles.len() / 2]
+    );
+}
+
+#[test]
+fn a_pinned_head_holds_against_the_motion() {
+    let (truth, mut seen) = wandering(300, &CAMERA);
+    let backward = truth[150].forward.map(|c| -c);
+    for one in seen[149..152].iter_mut().flatten() {
+        one.toward = Some([backward[0], backward[1]]);
+    }
+    let found = estimate(&seen, &CAMERA, &ANIMAL, 30.0);
+    let forward = found[150].expect("found").forward;
+    assert!(forward[0] * backward[0] + forward[1] * backward[1] > -1e-3);
+}
+
+#[test]
+fn too_little_is_no_direction() {
+    let (_, seen) = wandering(20, &CAMERA);
+    assert!(
+        estimate(&seen, &CAMERA, &ANIMAL, 30.0)
+            .iter()
+            .all(Option::is_none)
+    );
+    assert!(
+        estimate(&[None; 50], &CAMERA, &ANIMAL, 30.0)
+            .iter()
+            .all(Option::is_none)
+    );
+}

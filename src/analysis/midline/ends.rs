@@ -1,0 +1,143 @@
+//! Where an outline ends in head and tail: at its sharpest bends (ALGORITHMS.md 4, Midline).
+
+use super::outline::N_POINTS;
+
+/// Half the base of the triangles that curvature is taken from, points.
+const REACH: usize = 4;
+
+/// The two ends of an outline as indices: the sharp one, and the one across from it.
+///
+/// The sharp end is the peak of curvature with the largest integral. The other is where the outline
+/// bends most around the point farthest from it by index: the middle of all that bends there, not
+/// the highest peak, for a head may have two eyes or two ears at its corners.
+pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
+    let curvature = curvature(outline);
+    let mean = curvature.iter().sum::<f64>() / N_POINTS as f64;
+    let above: Vec<f64> = curvature.iter().map(|c| c - mean).collect();
+    let sharpest =
+        peaks(&above)
+            .into_iter()
+            .reduce(|best, peak| match best.integral >= peak.integral {
+                true => best,
+                false => peak,
+            });
+    let sharp = sharpest.map_or(0, |peak| peak.at);
+    [
+        sharp,
+        bent_around(&above, (sharp + N_POINTS / 2) % N_POINTS),
+    ]
+}
+
+/// The middle of the curvature above the mean near an index, found by going there a few times.
+fn bent_around(above: &[f64], start: usize) -> usize {
+    const NEAR: i64 = N_POINTS as i64 / 6;
+    let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
+    let mut shift = 0;
+    for _ in 0..4 {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for offset in shift - NEAR..=shift + NEAR {
+            let weight = above[at(offset)].max(0.0);
+            sum += weight * offset as f64;
+            total += weight;
+        }
+        if total > 0.0 {
+            shift = ((sum / total).round() as i64).clamp(-NEAR, NEAR);
+        }
+    }
+    at(shift)
+}
+
+/// Curvature at each point of a clockwise outline, 1 / pixels, positive where it is convex: four
+/// times the area of the triangle with the points on either side, over the product of its sides.
+fn curvature(outline: &[[f64; 2]]) -> Vec<f64> {
+    let distance = |p: [f64; 2], q: [f64; 2]| libm::hypot(q[0] - p[0], q[1] - p[1]);
+    (0..N_POINTS)
+        .map(|k| {
+            let [a, b, c] = [k + N_POINTS - REACH, k, k + REACH].map(|at| outline[at % N_POINTS]);
+            let cross = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]);
+            2.0 * cross / (distance(a, b) * distance(b, c) * distance(a, c)).max(1e-9)
+        })
+        .collect()
+}
+
+struct Peak {
+    at: usize,
+    integral: f64,
+}
+
+/// The runs of values above 0 around the circle: where each is highest, and its sum.
+fn peaks(values: &[f64]) -> Vec<Peak> {
+    let n = values.len();
+    let Some(start) = (0..n).find(|&k| values[k] <= 0.0) else {
+        return Vec::new();
+    };
+    let mut peaks: Vec<Peak> = Vec::new();
+    let mut inside = false;
+    for k in (start..start + n).map(|k| k % n) {
+        if values[k] <= 0.0 {
+            inside = false;
+        } else if let Some(peak) = peaks.last_mut().filter(|_| inside) {
+            peak.integral += values[k];
+            if values[k] > values[peak.at] {
+                peak.at = k;
+            }
+        } else {
+            inside = true;
+            peaks.push(Peak {
+                at: k,
+                integral: values[k],
+            });
+        }
+    }
+    peaks
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+
+    /// A drop: round at index 64, pointed at index 0.
+    fn drop() -> Vec<[f64; 2]> {
+        (0..N_POINTS)
+            .map(|k| {
+                let t = TAU * k as f64 / N_POINTS as f64;
+                [30.0 * t.cos(), 18.0 * t.sin() * (t / 2.0).sin().abs()]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_drop_ends_in_its_point_and_across_from_it() {
+        let [point, round] = ends(&drop());
+        assert!(point <= 1 || point >= N_POINTS - 1, "{point}");
+        assert!(round.abs_diff(64) <= 12, "{round}");
+    }
+
+    #[test]
+    fn a_head_with_two_eyes_ends_between_them() {
+        let mut above = vec![-1.0; N_POINTS];
+        for eye in [58, 72] {
+            above[eye - 2..=eye + 2].fill(5.0);
+        }
+        assert_eq!(bent_around(&above, 64), 65);
+        assert_eq!(bent_around(&above, 70), 65);
+    }
+
+    #[test]
+    fn a_circle_is_bent_by_one_over_its_radius_everywhere() {
+        let circle: Vec<[f64; 2]> = (0..N_POINTS)
+            .map(|k| TAU * k as f64 / N_POINTS as f64)
+            .map(|t| [10.0 * t.cos(), 10.0 * t.sin()])
+            .collect();
+        assert!(curvature(&circle).iter().all(|c| (c - 0.1).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_peak_across_the_first_index_is_one_peak() {
+        let found = peaks(&[2.0, -1.0, -1.0, 1.0, -1.0, 3.0]);
+        let found: Vec<(usize, f64)> = found.iter().map(|p| (p.at, p.integral)).collect();
+        assert_eq!(found, [(3, 1.0), (5, 5.0)]);
+    }
+}

@@ -1,0 +1,163 @@
+//! The midline of an animal seen from above, and how far it is bent (ALGORITHMS.md 4, Midline).
+//!
+//! From the outline: both sides are walked from head to tail and the points facing each other are
+//! paired (after Walter & Couzin, TRex, eLife 2021). From the side a swimming body bends along the
+//! line of sight, where no outline shows it: there only an animal far longer than high has a midline.
+
+pub mod tail_beat;
+
+mod ends;
+mod outline;
+mod sections;
+mod walk;
+
+use rayon::prelude::*;
+
+use super::tracking::{Sighting, Tracked};
+use crate::geometry::wrap_rad;
+use crate::library::{Pose, Poses, View};
+
+/// Points of a midline, head and tail tip included.
+pub const N_POINTS: usize = 11;
+/// Seen from the side, an animal longer than this many heights has a midline too.
+const LONG: f64 = 3.0;
+/// A midline must reach this share of the silhouette's length from end to end of its way.
+const LEAST_REACH: f64 = 0.8;
+/// Where the ends lie across the heading (cosine below this), the frame before decides.
+const ACROSS: f64 = 0.25;
+
+/// Fills in the midline, from head to tail, and the bend of every pose whose heading is known.
+pub fn trace(poses: &mut Poses, track: &[Tracked]) {
+    if poses.view == View::Side && !is_long(&poses.frames) {
+        return;
+    }
+    let traced: Vec<Option<Traced>> = poses
+        .frames
+        .par_iter()
+        .zip(track)
+        .map(|(pose, tracked)| midline(tracked.sighting.as_ref()?, pose))
+        .collect();
+    let mut last: Option<[f64; 2]> = None;
+    for (pose, traced) in poses.frames.iter_mut().zip(traced) {
+        let Some(mut traced) = traced else {
+            last = None;
+            continue;
+        };
+        if let Some(head) = last
+            && traced.unsure
+            && distance(traced.points[N_POINTS - 1], head) < distance(traced.points[0], head)
+        {
+            traced.points.reverse();
+        }
+        last = Some(traced.points[0]);
+        pose.bend_rad = Some(bend_rad(&traced.points));
+        pose.midline_px = Some(traced.points);
+    }
+}
+
+/// The angle of the last third of a midline against the first third, in (-pi, pi], image axes.
+pub fn bend_rad(midline: &[[f64; 2]]) -> f64 {
+    let thirds = resampled(midline, 4);
+    if thirds.len() < 4 {
+        return 0.0;
+    }
+    let along = |k: usize| {
+        libm::atan2(
+            thirds[k + 1][1] - thirds[k][1],
+            thirds[k + 1][0] - thirds[k][0],
+        )
+    };
+    wrap_rad(along(2) - along(0))
+}
+
+fn is_long(frames: &[Pose]) -> bool {
+    let mut ratios: Vec<f64> = frames
+        .iter()
+        .filter_map(|pose| Some(pose.length_px? / pose.height_px?.max(1.0)))
+        .collect();
+    let middle = ratios.len() / 2;
+    !ratios.is_empty() && *ratios.select_nth_unstable_by(middle, f64::total_cmp).1 > LONG
+}
+
+struct Traced {
+    /// From head to tail.
+    points: Vec<[f64; 2]>,
+    /// The heading says little about which end is the head.
+    unsure: bool,
+}
+
+fn midline(sighting: &Sighting, pose: &Pose) -> Option<Traced> {
+    let heading = pose.heading_rad?;
+    let toward = [libm::cos(heading), libm::sin(heading)];
+    let alpha: Vec<u8> = (sighting.matte.image.pixels.chunks_exact(4))
+        .map(|rgba| rgba[3])
+        .collect();
+    let rect = sighting.matte.rect;
+    let outline = outline::outline(rect, &alpha)?;
+    let [one, other] = ends::ends(&outline);
+    let span = [0, 1].map(|c| outline[one][c] - outline[other][c]);
+    let lead = span[0] * toward[0] + span[1] * toward[1];
+    let unsure = lead.abs() < ACROSS * libm::hypot(span[0], span[1]);
+    let (head, tail) = if lead >= 0.0 {
+        (one, other)
+    } else {
+        (other, one)
+    };
+    let walked = resampled(&walk::walk(&outline, head, tail), N_POINTS);
+    if is_sound(&walked, pose) {
+        return Some(Traced {
+            points: walked,
+            unsure,
+        });
+    }
+    let points = resampled(&sections::means(rect, &alpha, toward), N_POINTS);
+    (points.len() == N_POINTS).then_some(Traced {
+        points,
+        unsure: false,
+    })
+}
+
+/// Whether a midline runs the length of the animal without doubling back.
+fn is_sound(points: &[[f64; 2]], pose: &Pose) -> bool {
+    let length_px: f64 = points.windows(2).map(|p| distance(p[0], p[1])).sum();
+    let doubles_back = points.windows(3).any(|p| {
+        let (a, b) = (
+            [p[1][0] - p[0][0], p[1][1] - p[0][1]],
+            [p[2][0] - p[1][0], p[2][1] - p[1][1]],
+        );
+        a[0] * b[0] + a[1] * b[1] <= 0.0
+    });
+    points.len() == N_POINTS
+        && !doubles_back
+        && length_px >= LEAST_REACH * pose.length_px.unwrap_or(0.0)
+}
+
+/// `n` points at equal distances along a line, its ends included; empty for a line without length.
+fn resampled(line: &[[f64; 2]], n: usize) -> Vec<[f64; 2]> {
+    let mut along_px = vec![0.0];
+    for pair in line.windows(2) {
+        along_px.push(along_px[along_px.len() - 1] + distance(pair[0], pair[1]));
+    }
+    let total_px = along_px[along_px.len() - 1];
+    if line.len() < 2 || total_px <= 0.0 {
+        return Vec::new();
+    }
+    (0..n)
+        .map(|k| {
+            let target = total_px * k as f64 / (n - 1) as f64;
+            let next = along_px
+                .partition_point(|&a| a < target)
+                .clamp(1, line.len() - 1);
+            let step = along_px[next] - along_px[next - 1];
+            let share = ((target - along_px[next - 1]) / step.max(1e-12)).clamp(0.0, 1.0);
+            [0, 1].map(|c| line[next - 1][c] + share * (line[next][c] - line[next - 1][c]))
+        })
+        .collect()
+}
+
+fn distance(p: [f64; 2], q: [f64; 2]) -> f64 {
+    libm::hypot(q[0] - p[0], q[1] - p[1])
+}
+
+#[cfg(test)]
+mod tests;

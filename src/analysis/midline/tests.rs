@@ -1,0 +1,194 @@
+//! What a midline promises, on soft sausages bent by a known amount.
+
+use super::*;
+use crate::analysis::matte::Matte;
+use crate::analysis::moments::moments;
+use crate::geometry::Rect;
+use crate::raster::RgbaImage;
+use proptest::prelude::*;
+
+/// A fish from above: a circular arc of length 80 that turns by `turn` over its length, thick ahead,
+/// tapering to the tail; the head at `start`, pointing against `away`.
+struct Sausage {
+    turn: f64,
+    start: [f64; 2],
+    away: f64,
+}
+
+const LENGTH: f64 = 80.0;
+
+impl Sausage {
+    fn at(&self, s: f64) -> [f64; 2] {
+        let n = 200;
+        let (mut p, ds) = (self.start, s * LENGTH / f64::from(n));
+        for k in 0..n {
+            let angle = self.away + self.turn * s * (f64::from(k) + 0.5) / f64::from(n);
+            p = [p[0] + ds * angle.cos(), p[1] + ds * angle.sin()];
+        }
+        p
+    }
+
+    /// Half the thickness: round ahead, thin behind.
+    fn radius(s: f64) -> f64 {
+        8.0 * (1.0 - s).powf(0.7) * (1.0 - (1.0 - s / 0.15).clamp(0.0, 1.0).powi(2)).sqrt() + 0.9
+    }
+
+    fn sighting(&self) -> Sighting {
+        let rect = Rect {
+            x: 20,
+            y: 10,
+            w: 200,
+            h: 200,
+        };
+        let spine: Vec<([f64; 2], f64)> = (0..=160)
+            .map(|k| f64::from(k) / 160.0)
+            .map(|s| (self.at(s), Sausage::radius(s)))
+            .collect();
+        let mut image = RgbaImage::new(rect.w, rect.h);
+        for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {
+            let p = [
+                20.5 + (k % rect.w as usize) as f64,
+                10.5 + (k / rect.w as usize) as f64,
+            ];
+            let depth = spine
+                .iter()
+                .map(|(q, radius)| radius - distance(p, *q))
+                .fold(f64::NEG_INFINITY, f64::max);
+            pixel[3] = (255.0 * (depth + 0.5).clamp(0.0, 1.0)) as u8;
+        }
+        let alpha: Vec<u8> = image.pixels.chunks_exact(4).map(|p| p[3]).collect();
+        Sighting {
+            moments: moments(rect, &alpha).expect("it is opaque"),
+            matte: Matte {
+                rect,
+                image,
+                contrast: 100.0,
+            },
+            extent_px: [LENGTH, 16.0],
+            upright_px: f64::from(rect.h),
+            box_px: rect,
+            cut: false,
+        }
+    }
+
+    /// The pose as the analysis would find it: heading along the major axis.
+    fn pose(&self) -> Pose {
+        let axis = self.sighting().moments.major_rad.expect("it is long");
+        let (head, tail) = (self.at(0.0), self.at(1.0));
+        let lead = (head[0] - tail[0]) * axis.cos() + (head[1] - tail[1]) * axis.sin();
+        Pose {
+            heading_rad: Some(if lead >= 0.0 {
+                axis
+            } else {
+                wrap_rad(axis + std::f64::consts::PI)
+            }),
+            length_px: Some(distance(head, tail)),
+            height_px: Some(16.0),
+            ..Pose::default()
+        }
+    }
+
+    fn traced(&self) -> Vec<[f64; 2]> {
+        let (sighting, pose) = (self.sighting(), self.pose());
+        midline(&sighting, &pose).expect("it has an outline").points
+    }
+
+    /// Root mean square distance of the found points from the true curve, led on to the surface.
+    fn error_px(&self, found: &[[f64; 2]]) -> f64 {
+        let truth: Vec<[f64; 2]> = (-20..=410).map(|k| self.at(f64::from(k) / 400.0)).collect();
+        let off = |p: &[f64; 2]| {
+            truth
+                .iter()
+                .map(|q| distance(*p, *q))
+                .fold(f64::INFINITY, f64::min)
+        };
+        (found.iter().map(|p| off(p).powi(2)).sum::<f64>() / found.len() as f64).sqrt()
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    #[test]
+    fn a_bent_sausage_has_its_own_midline_to_half_a_pixel_whichever_way_it_lies(
+        turn in -2.2f64..2.2, away in -3.1f64..3.1, dx in 0.0f64..1.0, dy in 0.0f64..1.0,
+    ) {
+        let sausage = Sausage { turn, start: [120.0 + dx, 110.0 + dy], away };
+        let found = sausage.traced();
+        prop_assert!(sausage.error_px(&found) < 0.5, "{} px", sausage.error_px(&found));
+        prop_assert!(distance(found[0], sausage.at(0.0)) < 3.5, "head first: {:?}", found[0]);
+        prop_assert!(distance(found[10], sausage.at(1.0)) < 3.5, "tail last: {:?}", found[10]);
+        // Two thirds of the way lie between the middles of the outer thirds.
+        prop_assert!((bend_rad(&found) - turn * 2.0 / 3.0).abs() < 0.12, "{}", bend_rad(&found));
+    }
+}
+
+fn poses(view: View, pose: Pose) -> Poses {
+    Poses {
+        tail_beat: None,
+        fps: 30.0,
+        image_size_px: [240, 220],
+        view,
+        camera: None,
+        animal: None,
+        frames: vec![pose],
+    }
+}
+
+fn tracked(sausage: &Sausage) -> Tracked {
+    Tracked {
+        time_s: 0.0,
+        sighting: Some(sausage.sighting()),
+    }
+}
+
+const BENT: Sausage = Sausage {
+    turn: 1.0,
+    start: [80.0, 80.0],
+    away: 0.4,
+};
+
+#[test]
+fn from_the_side_only_an_animal_far_longer_than_high_has_a_midline() {
+    let high = Pose {
+        height_px: Some(40.0),
+        ..BENT.pose()
+    };
+    for (pose, has_one) in [(high, false), (BENT.pose(), true)] {
+        let mut poses = poses(View::Side, pose);
+        trace(&mut poses, &[tracked(&BENT)]);
+        assert_eq!(poses.frames[0].midline_px.is_some(), has_one);
+        assert_eq!(poses.frames[0].bend_rad.is_some(), has_one);
+    }
+}
+
+#[test]
+fn an_unknown_heading_leaves_the_midline_unknown() {
+    let pose = Pose {
+        heading_rad: None,
+        ..BENT.pose()
+    };
+    let mut poses = poses(View::Top, pose);
+    trace(&mut poses, &[tracked(&BENT)]);
+    assert_eq!(poses.frames[0].midline_px, None);
+}
+
+#[test]
+fn an_outline_whose_ends_cannot_be_told_falls_back_to_its_cross_sections() {
+    // The measured length belies every short cut across the outline.
+    let pose = Pose {
+        length_px: Some(1000.0),
+        ..BENT.pose()
+    };
+    let found = midline(&BENT.sighting(), &pose).expect("it has sections");
+    assert_eq!(found.points.len(), N_POINTS);
+    assert!(BENT.error_px(&found.points) < 3.0);
+    assert!(distance(found.points[0], BENT.at(0.0)) < 10.0, "head first");
+}
+
+#[test]
+fn a_line_bent_by_a_quarter_circle_says_so_and_a_straight_one_says_0() {
+    let straight: Vec<[f64; 2]> = (0..N_POINTS).map(|k| [-(k as f64), 3.0]).collect();
+    assert_eq!(bend_rad(&straight), 0.0);
+    let corner = [[0.0, 0.0], [-3.0, 0.0], [-3.0, 3.0]];
+    assert!((bend_rad(&corner).abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
+}

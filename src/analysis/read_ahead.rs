@@ -1,0 +1,173 @@
+//! Frames read ahead on a thread of their own, so that decoding and measuring go on at the same time
+//! (ALGORITHMS.md 3: the decoder is the slowest part, so it must never wait).
+//!
+//! The ring is bounded in bytes. Reading starts before the plate is known: the first frames are there
+//! when tracking begins. Memory goes round: who has looked at a batch gives it back.
+
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
+use std::thread;
+
+use crate::footage::{FrameSource, SourceError};
+use crate::raster::Frame;
+
+/// Bytes of frames that may wait, about; at least two batches of one frame.
+const RING_BYTES: usize = 64 << 20;
+/// Bytes of a batch, about.
+const BATCH_BYTES: usize = 4 << 20;
+/// Most frames of a batch.
+const BATCH_FRAMES: usize = 16;
+
+/// A frame and the true time of its picture, seconds from the first frame.
+pub type Timed = (f64, Frame);
+
+/// The frames of a footage, a batch at a time.
+pub struct Batches {
+    ready: Receiver<Result<Vec<Timed>, SourceError>>,
+    used: Sender<Vec<Timed>>,
+}
+
+impl Batches {
+    /// The next frames, in order, at least one; `None` after the last.
+    pub fn next_batch(&self) -> Result<Option<Vec<Timed>>, SourceError> {
+        // A reader that is gone has read all there is.
+        self.ready.recv().ok().transpose()
+    }
+
+    /// Gives the memory of a batch back to the reader.
+    pub fn give_back(&self, batch: Vec<Timed>) {
+        // A reader that is done needs none.
+        self.used.send(batch).ok();
+    }
+}
+
+/// Calls `work` while a thread reads the footage from its start.
+pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> R) -> R {
+    let format = source.format();
+    let n_bytes = Frame::n_bytes(format.width, format.height).max(1);
+    let n_frames = (BATCH_BYTES / n_bytes).clamp(1, BATCH_FRAMES);
+    let n_waiting = (RING_BYTES / (n_bytes * n_frames)).max(2);
+    let (send, ready) = sync_channel(n_waiting);
+    let (used, free) = channel();
+    thread::scope(|scope| {
+        scope.spawn(move || {
+            if let Err(error) = read(source, n_frames, &send, &free) {
+                // Whoever does not listen any more has an error of its own.
+                send.send(Err(error)).ok();
+            }
+        });
+        work(Batches { ready, used })
+    })
+}
+
+/// Reads until the footage ends or nobody wants more.
+fn read(
+    source: &dyn FrameSource,
+    n_frames: usize,
+    send: &SyncSender<Result<Vec<Timed>, SourceError>>,
+    free: &Receiver<Vec<Timed>>,
+) -> Result<(), SourceError> {
+    let mut stream = source.open()?;
+    loop {
+        let mut batch = free.try_recv().unwrap_or_default();
+        batch.resize_with(n_frames, Timed::default);
+        let mut n_read = 0;
+        for (time_s, frame) in &mut batch {
+            match stream.next_frame(frame)? {
+                Some(time) => *time_s = time,
+                None => break,
+            }
+            n_read += 1;
+        }
+        batch.truncate(n_read);
+        let is_last = n_read < n_frames;
+        if n_read > 0 && send.send(Ok(batch)).is_err() || is_last {
+            return Ok(());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::Code;
+    use crate::footage::{FootageFormat, FrameStream};
+    use crate::raster::ColorSpec;
+
+    /// Frames that hold their number, then a failure if there is to be one.
+    struct Numbers {
+        n_frames: u8,
+        fails: bool,
+    }
+
+    struct Counting<'a>(&'a Numbers, u8);
+
+    impl FrameSource for Numbers {
+        fn format(&self) -> FootageFormat {
+            FootageFormat {
+                width: 2,
+                height: 2,
+                fps: 10.0,
+                n_frames_hint: usize::from(self.n_frames),
+                color: ColorSpec::default(),
+            }
+        }
+
+        fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+            Ok(Box::new(Counting(self, 0)))
+        }
+    }
+
+    impl FrameStream for Counting<'_> {
+        fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+            if self.1 == self.0.n_frames {
+                return match self.0.fails {
+                    true => Err(SourceError {
+                        code: Code::Truncated,
+                        cause: "cut off".into(),
+                    }),
+                    false => Ok(None),
+                };
+            }
+            frame.planes = vec![self.1; 6];
+            self.1 += 1;
+            Ok(Some(f64::from(self.1)))
+        }
+    }
+
+    fn numbers(n_frames: u8, fails: bool) -> (Vec<u8>, bool) {
+        while_reading(&Numbers { n_frames, fails }, |batches| {
+            let mut seen = Vec::new();
+            loop {
+                match batches.next_batch() {
+                    Ok(Some(batch)) => {
+                        seen.extend(batch.iter().map(|(_, frame)| frame.planes[0]));
+                        batches.give_back(batch);
+                    }
+                    Ok(None) => return (seen, false),
+                    Err(_) => return (seen, true),
+                }
+            }
+        })
+    }
+
+    #[test]
+    fn every_frame_comes_once_and_in_order() {
+        for n_frames in [0, 1, 15, 16, 17, 200] {
+            assert_eq!(numbers(n_frames, false), ((0..n_frames).collect(), false));
+        }
+    }
+
+    #[test]
+    fn a_failure_comes_after_the_whole_batches_before_it() {
+        assert_eq!(numbers(40, true), ((0..32).collect(), true));
+    }
+
+    #[test]
+    fn a_reader_that_nobody_listens_to_ends() {
+        let source = Numbers {
+            n_frames: 250,
+            fails: false,
+        };
+        assert_eq!(while_reading(&source, |_| 7), 7);
+    }
+}

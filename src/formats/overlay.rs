@@ -1,0 +1,200 @@
+//! The poses drawn over the footage, frame by frame (O's figure 10): box, centroid, a line to where
+//! the head points, the way of the last two seconds, the midline, frame number and time.
+//!
+//! Every stroke lies on a dark rim, so that it can be seen on light and dark.
+
+use crate::library::{Pose, Poses};
+use crate::raster::{Frame, Pen};
+
+/// How much of the way is shown, seconds.
+const TRACE_S: f64 = 2.0;
+const RIM: [u8; 3] = [16, 24, 28];
+const BOX: [u8; 3] = [236, 240, 238];
+const TRACE: [u8; 3] = [84, 214, 230];
+const HEADING: [u8; 3] = [255, 132, 60];
+const MIDLINE: [u8; 3] = [255, 226, 92];
+
+/// Draws poses over frames of one footage.
+pub struct Overlay<'a> {
+    poses: &'a Poses,
+    pen: Pen,
+    /// Strokes are wider on larger pictures.
+    unit_px: f64,
+    /// Length of the heading line.
+    reach_px: f64,
+}
+
+impl<'a> Overlay<'a> {
+    /// What draws the poses of a footage.
+    pub fn new(poses: &'a Poses) -> Overlay<'a> {
+        let [width, height] = poses.image_size_px;
+        let unit_px = (f64::from(width.max(height)) / 640.0).clamp(0.5, 4.0);
+        let mut lengths: Vec<f64> = poses.frames.iter().filter_map(|p| p.length_px).collect();
+        lengths.sort_by(f64::total_cmp);
+        let length_px = lengths.get(lengths.len() / 2).copied().unwrap_or(0.0);
+        Overlay {
+            poses,
+            pen: Pen::new(width, height),
+            unit_px,
+            reach_px: (0.8 * length_px).max(18.0 * unit_px),
+        }
+    }
+
+    /// Draws over frame `frame_idx` of the footage what was measured in it. A frame beyond the last
+    /// pose stays as it is. Panics when the frame has another size than the footage.
+    pub fn draw(&mut self, frame_idx: usize, frame: &mut Frame) {
+        let Some(pose) = self.poses.frames.get(frame_idx) else {
+            return;
+        };
+        let (poses, unit) = (self.poses, self.unit_px);
+        self.trace(frame_idx, frame);
+        if let Some(rect) = pose.box_px {
+            let [x, y] = [f64::from(rect.x), f64::from(rect.y)];
+            let [right, bottom] = [f64::from(rect.right()), f64::from(rect.bottom())];
+            let corners = [[x, y], [right, y], [right, bottom], [x, bottom], [x, y]];
+            self.stroke(frame, &corners, 0.5 * unit, BOX);
+        }
+        if let Some(midline) = &pose.midline_px {
+            self.stroke(frame, midline, 0.9 * unit, MIDLINE);
+        }
+        self.heading(pose, frame);
+        let label = format!("{frame_idx:06}  {:.2} s", pose.time_s);
+        let [dot, n_dots] = [1.6 * unit, 6.0 * label.len() as f64];
+        // On a picture too small for it, the label would only hide the animal.
+        if n_dots * dot < 0.6 * f64::from(poses.image_size_px[0]) {
+            self.label(frame, &label, dot);
+        }
+    }
+
+    /// The way of the last seconds, fading toward the past.
+    fn trace(&mut self, frame_idx: usize, frame: &mut Frame) {
+        let n_frames = ((TRACE_S * self.poses.fps).round() as usize).max(1);
+        let first = frame_idx.saturating_sub(n_frames);
+        let centers: Vec<Option<[f64; 2]>> = self.poses.frames[first..=frame_idx]
+            .iter()
+            .map(|pose| pose.centroid_px)
+            .collect();
+        for (rgb, rim_px, most) in [(RIM, 0.9 * self.unit_px, 0.45), (TRACE, 0.0, 0.95)] {
+            for (k, pair) in centers.windows(2).enumerate() {
+                if let (Some(from), Some(to)) = (pair[0], pair[1]) {
+                    let age = (centers.len() - 2 - k) as f64 / n_frames as f64;
+                    let alpha = most * (1.0 - age).clamp(0.0, 1.0);
+                    self.pen.line(from, to, 0.9 * self.unit_px + rim_px, alpha);
+                }
+            }
+            self.pen.ink(frame, rgb);
+        }
+    }
+
+    /// An arrow from the centroid to where the head points; only the centroid where that is unknown.
+    fn heading(&mut self, pose: &Pose, frame: &mut Frame) {
+        let Some(center) = pose.centroid_px else {
+            return;
+        };
+        let unit = self.unit_px;
+        if let Some(heading) = pose.heading_rad {
+            let toward = |turn: f64, reach: f64, from: [f64; 2]| {
+                let angle = heading + turn;
+                [
+                    from[0] + reach * libm::cos(angle),
+                    from[1] + reach * libm::sin(angle),
+                ]
+            };
+            let tip = toward(0.0, self.reach_px, center);
+            let barb = 7.0 * unit;
+            let arrow = [
+                center,
+                tip,
+                toward(2.6, barb, tip),
+                tip,
+                toward(-2.6, barb, tip),
+            ];
+            self.stroke(frame, &arrow, 1.1 * unit, HEADING);
+        }
+        self.stroke(frame, &[center, center], 2.6 * unit, HEADING);
+    }
+
+    fn label(&mut self, frame: &mut Frame, label: &str, dot_px: f64) {
+        let at = [6.0 * dot_px, 5.0 * dot_px];
+        for (dx, dy) in [(-0.6, 0.0), (0.6, 0.0), (0.0, -0.6), (0.0, 0.6)] {
+            let beside = [at[0] + dx * dot_px, at[1] + dy * dot_px];
+            self.pen.text(label, beside, dot_px);
+        }
+        self.pen.ink(frame, RIM);
+        self.pen.text(label, at, dot_px);
+        self.pen.ink(frame, BOX);
+    }
+
+    /// A line in one color on its rim.
+    fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
+        self.pen
+            .polyline(points, radius_px + 0.9 * self.unit_px, 0.55);
+        self.pen.ink(frame, RIM);
+        self.pen.polyline(points, radius_px, 1.0);
+        self.pen.ink(frame, rgb);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rect;
+    use crate::library::View;
+    use crate::raster::ColorSpec;
+
+    fn poses() -> Poses {
+        let pose = Pose {
+            centroid_px: Some([60.0, 60.0]),
+            box_px: Some(Rect {
+                x: 40,
+                y: 50,
+                w: 40,
+                h: 20,
+            }),
+            heading_rad: Some(0.0),
+            length_px: Some(40.0),
+            ..Pose::default()
+        };
+        Poses {
+            fps: 30.0,
+            image_size_px: [640, 120],
+            view: View::Side,
+            camera: None,
+            animal: None,
+            frames: vec![pose, Pose::default()],
+            tail_beat: None,
+        }
+    }
+
+    fn drawn(frame_idx: usize, level: u8) -> Frame {
+        let mut frame = Frame::new(640, 120, ColorSpec::default());
+        frame.planes.fill(level);
+        frame.planes[640 * 120..].fill(128);
+        Overlay::new(&poses()).draw(frame_idx, &mut frame);
+        frame
+    }
+
+    #[test]
+    fn the_arrow_points_to_the_head_on_light_and_on_dark() {
+        for level in [16, 235] {
+            let frame = drawn(0, level).to_rgb();
+            let [r, _, b] = frame.pixel(86, 59);
+            assert!(r > b + 80, "ahead of the centroid: {r} {b}");
+            let [r, g, b] = frame.pixel(34, 59);
+            assert!(r == g && g == b, "nothing behind the box: {r} {g} {b}");
+        }
+    }
+
+    #[test]
+    fn a_frame_without_the_animal_shows_its_number_alone() {
+        let frame = drawn(1, 16);
+        let below_label = &frame.luma()[640 * 40..];
+        assert!(below_label.iter().all(|&y| y == 16));
+        assert!(frame.luma()[..640 * 40].iter().any(|&y| y > 150));
+    }
+
+    #[test]
+    fn beyond_the_last_pose_nothing_is_drawn() {
+        assert!(drawn(2, 16).luma().iter().all(|&y| y == 16));
+    }
+}

@@ -1,0 +1,191 @@
+//! headings.svg: the heading over time (O's figure 5), as degrees on the page; up is above.
+//!
+//! Where the heading passes from +180 to -180 degrees the line leaves at one edge and comes back at
+//! the other: a wrap is drawn as a wrap, not as a stroke through the whole circle. Below it how
+//! sure the head is; where nothing is known the plot is shaded.
+
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+use super::{LEFT, RIGHT, Sheet, TimeAxis, fill, runs};
+use crate::library::{Pose, Poses};
+
+const HEIGHT: f64 = 340.0;
+const TOP: f64 = 40.0;
+const BOTTOM: f64 = 262.0;
+/// The strip of head confidence.
+const STRIP: [f64; 2] = [272.0, 298.0];
+/// A head that is less sure than this is drawn thinly.
+const SURE: f64 = 0.9;
+
+/// The heading over time as an SVG picture of 960 by 340.
+pub fn headings(poses: &Poses) -> String {
+    let n_known = poses
+        .frames
+        .iter()
+        .filter(|pose| pose.heading_rad.is_some())
+        .count();
+    let axis = TimeAxis::of(poses);
+    let y = |heading: f64| TOP + (heading + PI) / (2.0 * PI) * (BOTTOM - TOP);
+    let mut sheet = Sheet::new(
+        HEIGHT,
+        "Heading over time",
+        &format!(
+            "Where the head points in the picture, in degrees, over {:.1} seconds; known in {n_known} of \
+             {} frames. 0 is right, 90 down, 180 left, -90 up.",
+            axis.end_s,
+            poses.frames.len()
+        ),
+    );
+    sheet.text("ink", "start", [16.0, 24.0], "Heading, degrees");
+    axis.draw(&mut sheet, TOP, STRIP[1]);
+    for [from, to] in runs(poses.frames.len(), |k| {
+        poses.frames[k].heading_rad.is_none()
+    }) {
+        let (x0, x1) = (
+            axis.x(from as f64 / poses.fps),
+            axis.x(to as f64 / poses.fps),
+        );
+        sheet.rect(
+            "sunken",
+            [x0, TOP, (x1.min(RIGHT) - x0).max(0.5), BOTTOM - TOP],
+        );
+    }
+    for (degrees, word) in [
+        (-180, "left"),
+        (-90, "up"),
+        (0, "right"),
+        (90, "down"),
+        (180, "left"),
+    ] {
+        let at = y(f64::from(degrees) * PI / 180.0);
+        sheet.stroke("line", &format!("M{LEFT} {at:.1}H{RIGHT}"), "");
+        sheet.text(
+            "soft",
+            "end",
+            [LEFT - 8.0, at + 4.0],
+            &format!("{word} {degrees}°"),
+        );
+    }
+    let pen = |sure: bool| {
+        if sure {
+            "stroke-width=\"1.8\""
+        } else {
+            "stroke-width=\"0.7\""
+        }
+    };
+    for sure in [false, true] {
+        let of = |pose: &Pose| (pose.head_confidence.unwrap_or(1.0) >= SURE) == sure;
+        let more = format!(
+            "{} stroke-linejoin=\"round\" stroke-linecap=\"round\"",
+            pen(sure)
+        );
+        let path = line(poses, of, |t| axis.x(t), y);
+        sheet.stroke("accent", &path, &more);
+    }
+    strip(&mut sheet, poses, &axis);
+    sheet.finish()
+}
+
+/// How sure the head is, 0.5 at the bottom to 1 at the top.
+fn strip(sheet: &mut Sheet, poses: &Poses, axis: &TimeAxis) {
+    sheet.text("soft", "end", [LEFT - 8.0, STRIP[1] - 8.0], "head sure");
+    sheet.rect(
+        "sunken",
+        [LEFT, STRIP[0], RIGHT - LEFT, STRIP[1] - STRIP[0]],
+    );
+    let height = |pose: &Pose| {
+        let sure = pose
+            .head_confidence
+            .map_or(0.0, |sure| (2.0 * sure - 1.0).clamp(0.0, 1.0));
+        STRIP[1] - sure * (STRIP[1] - STRIP[0])
+    };
+    let mut path = format!("M{LEFT} {}", STRIP[1]);
+    for pose in poses.frames.iter().step_by(stride(poses)) {
+        write!(path, "L{:.1} {:.1}", axis.x(pose.time_s), height(pose)).expect("memory");
+    }
+    sheet.put(format_args!(
+        "<path {} d=\"{path}L{RIGHT} {}Z\"/>\n",
+        fill("water"),
+        STRIP[1]
+    ));
+}
+
+/// Every so many frames are drawn: a picture does not hold more.
+fn stride(poses: &Poses) -> usize {
+    poses.frames.len().div_ceil(6000).max(1)
+}
+
+/// The line as path data, of the poses chosen and the one that leads to each: broken where the
+/// heading is not known, wrapped at +-180 degrees.
+fn line(
+    poses: &Poses,
+    chosen: impl Fn(&Pose) -> bool,
+    x: impl Fn(f64) -> f64,
+    y: impl Fn(f64) -> f64,
+) -> String {
+    let mut path = String::new();
+    let mut last: Option<(f64, f64)> = None;
+    let mut pen_down = false;
+    for pose in poses.frames.iter().step_by(stride(poses)) {
+        let Some(heading) = pose.heading_rad else {
+            (last, pen_down) = (None, false);
+            continue;
+        };
+        let to = x(pose.time_s);
+        if !chosen(pose) {
+            (last, pen_down) = (Some((to, heading)), false);
+            continue;
+        }
+        let (from, before) = last.unwrap_or((to, heading));
+        if !pen_down {
+            write!(path, "M{from:.1} {:.1}", y(before)).expect("memory");
+        }
+        if (heading - before).abs() > PI {
+            let (over, edge) = ((from + to) / 2.0, PI * before.signum());
+            let (leave, enter) = (y(edge), y(-edge));
+            write!(path, "L{over:.1} {leave:.1}M{over:.1} {enter:.1}").expect("memory");
+        }
+        write!(path, "L{to:.1} {:.1}", y(heading)).expect("memory");
+        (last, pen_down) = (Some((to, heading)), true);
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::{Pose, View};
+
+    fn poses(headings: &[Option<f64>]) -> Poses {
+        let pose = |(k, &heading_rad): (usize, &Option<f64>)| Pose {
+            time_s: k as f64,
+            heading_rad,
+            ..Pose::default()
+        };
+        let frames = headings.iter().enumerate().map(pose).collect();
+        Poses {
+            tail_beat: None,
+            fps: 1.0,
+            image_size_px: [8, 8],
+            view: View::Side,
+            camera: None,
+            animal: None,
+            frames,
+        }
+    }
+
+    #[test]
+    fn a_wrap_lifts_the_pen_and_an_ordinary_turn_does_not() {
+        let strokes = |headings: &[Option<f64>]| {
+            line(&poses(headings), |_| true, |t| t, |h| h)
+                .matches('M')
+                .count()
+        };
+        assert_eq!(strokes(&[Some(0.1), Some(0.5), Some(2.0)]), 1);
+        assert_eq!(strokes(&[Some(3.0), Some(-3.0)]), 2);
+        assert_eq!(strokes(&[Some(0.0), None, Some(0.0)]), 2);
+        let svg = headings(&poses(&[Some(3.0), Some(-3.0), None, Some(-2.0)]));
+        assert!(svg.contains("known in 3 of 4 frames"));
+    }
+}

@@ -1,0 +1,245 @@
+//! Pictures of a library for people, as SVG written by hand: headings.svg, trajectory.svg and
+//! confidence.svg (DESIGN.md, REST API).
+//!
+//! Each has a title and a description for those who do not see it, and colors for a light page in its
+//! attributes, over which a style sheet lays those for a dark one.
+
+mod confidence;
+mod headings;
+mod trajectory;
+
+use std::fmt::Write;
+
+pub use confidence::confidence;
+pub use headings::headings;
+pub use trajectory::trajectory;
+
+/// Every picture of the poses, by its file name.
+pub fn pictures(poses: &crate::library::Poses) -> [(&'static str, String); 3] {
+    [
+        ("headings.svg", headings(poses)),
+        ("trajectory.svg", trajectory(poses)),
+        ("confidence.svg", confidence(poses)),
+    ]
+}
+
+/// Width of every picture.
+const WIDTH: f64 = 960.0;
+/// The part of a picture in which time runs from left to right.
+const LEFT: f64 = 78.0;
+const RIGHT: f64 = WIDTH - 16.0;
+
+/// Colors by role: on a light page, on a dark page.
+const COLORS: &[(&str, &str, &str)] = &[
+    ("paper", "#fdfcf9", "#142127"),
+    ("sunken", "#efece3", "#0d171b"),
+    ("ink", "#18272d", "#e6ecea"),
+    ("soft", "#4c5c61", "#a3b3b5"),
+    ("line", "#d5d1c4", "#2f4149"),
+    ("accent", "#b8410f", "#ff9d66"),
+    ("water", "#1c6b78", "#6cc3cf"),
+];
+
+/// A picture on its way.
+struct Sheet {
+    svg: String,
+}
+
+impl Sheet {
+    /// An empty picture of `WIDTH` by `height`.
+    fn new(height: f64, title: &str, description: &str) -> Sheet {
+        let mut sheet = Sheet {
+            svg: String::with_capacity(1 << 16),
+        };
+        sheet.put(format_args!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" \
+             height=\"{height}\" role=\"img\" aria-labelledby=\"title desc\" \
+             font-family=\"system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif\" font-size=\"13\">\n\
+             <title id=\"title\">{title}</title>\n<desc id=\"desc\">{description}</desc>\n<style>"
+        ));
+        for (scheme, open, close) in [
+            (0, "", ""),
+            (1, "@media (prefers-color-scheme: dark) { ", " }"),
+        ] {
+            sheet.put(format_args!("{open}"));
+            for (role, light, dark) in COLORS {
+                let color = [light, dark][scheme];
+                sheet.put(format_args!(
+                    ".{role} {{ fill: {color} }} .{role}-stroke {{ stroke: {color} }} "
+                ));
+            }
+            sheet.put(format_args!("{close}"));
+        }
+        sheet.put(format_args!("</style>\n"));
+        sheet.rect("paper", [0.0, 0.0, WIDTH, height]);
+        sheet
+    }
+
+    fn put(&mut self, text: std::fmt::Arguments) {
+        self.svg.write_fmt(text).expect("memory");
+    }
+
+    fn rect(&mut self, role: &str, [x, y, w, h]: [f64; 4]) {
+        self.put(format_args!(
+            "<rect {} x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\"/>\n",
+            fill(role)
+        ));
+    }
+
+    fn text(&mut self, role: &str, anchor: &str, [x, y]: [f64; 2], text: &str) {
+        self.put(format_args!(
+            "<text {} text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{text}</text>\n",
+            fill(role)
+        ));
+    }
+
+    /// A line of path data; `more` is further attributes.
+    fn stroke(&mut self, role: &str, path: &str, more: &str) {
+        if !path.is_empty() {
+            self.put(format_args!(
+                "<path {} fill=\"none\" {more} d=\"{path}\"/>\n",
+                stroke(role)
+            ));
+        }
+    }
+
+    fn finish(mut self) -> String {
+        self.put(format_args!("</svg>\n"));
+        self.svg
+    }
+}
+
+fn light(role: &str) -> &'static str {
+    let found = COLORS.iter().find(|(name, ..)| *name == role);
+    found.map_or("#18272d", |(_, light, _)| light)
+}
+
+fn fill(role: &str) -> String {
+    format!("class=\"{role}\" fill=\"{}\"", light(role))
+}
+
+fn stroke(role: &str) -> String {
+    format!("class=\"{role}-stroke\" stroke=\"{}\"", light(role))
+}
+
+/// Filled in one role's color, drawn round in another's.
+fn rimmed(inside: &str, rim: &str) -> String {
+    let (fill, stroke) = (light(inside), light(rim));
+    format!("class=\"{inside} {rim}-stroke\" fill=\"{fill}\" stroke=\"{stroke}\"")
+}
+
+/// Time from left to right.
+struct TimeAxis {
+    end_s: f64,
+}
+
+impl TimeAxis {
+    fn of(poses: &crate::library::Poses) -> TimeAxis {
+        let end_s = poses.frames.last().map_or(1.0, |pose| pose.time_s);
+        TimeAxis {
+            end_s: end_s.max(1e-3),
+        }
+    }
+
+    fn x(&self, time_s: f64) -> f64 {
+        LEFT + time_s / self.end_s * (RIGHT - LEFT)
+    }
+
+    /// Ticks with their times under a plot from `top` to `bottom`.
+    fn draw(&self, sheet: &mut Sheet, top: f64, bottom: f64) {
+        let step_s = round_step(self.end_s / 9.0);
+        for tick in 0..=(self.end_s / step_s * (1.0 + 1e-9)) as u32 {
+            let time_s = f64::from(tick) * step_s;
+            let x = self.x(time_s);
+            sheet.stroke("line", &format!("M{x:.1} {top:.1}V{:.1}", bottom + 5.0), "");
+            let label = (time_s * 1000.0).round() / 1000.0;
+            let unit = if tick == 0 { " s" } else { "" };
+            sheet.text(
+                "soft",
+                "middle",
+                [x, bottom + 20.0],
+                &format!("{label}{unit}"),
+            );
+        }
+    }
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+fn round_step(least: f64) -> f64 {
+    let power = libm::pow(10.0, libm::log10(least.max(1e-9)).floor());
+    [1.0, 2.0, 5.0]
+        .into_iter()
+        .map(|n| n * power)
+        .find(|step| *step >= least * (1.0 - 1e-9))
+        .unwrap_or(10.0 * power)
+}
+
+/// Runs of frames for which something holds: the first frame and the one after the last.
+fn runs(n_frames: usize, holds: impl Fn(usize) -> bool) -> Vec<[usize; 2]> {
+    let mut runs: Vec<[usize; 2]> = Vec::new();
+    for k in (0..n_frames).filter(|&k| holds(k)) {
+        match runs.last_mut().filter(|run| run[1] == k) {
+            Some(run) => run[1] = k + 1,
+            None => runs.push([k, k + 1]),
+        }
+    }
+    runs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_round_and_runs_are_whole() {
+        assert_eq!(round_step(0.3), 0.5);
+        assert_eq!(round_step(5.0), 5.0);
+        assert_eq!(round_step(70.0), 100.0);
+        assert_eq!(runs(6, |k| [0, 1, 4].contains(&k)), [[0, 2], [4, 5]]);
+    }
+
+    #[test]
+    fn no_element_has_an_attribute_twice() {
+        let mut poses = crate::fish::sample::SampleFilm::new(crate::fish::sample::SampleParams {
+            n_frames: 90,
+            ..Default::default()
+        })
+        .expect("in range")
+        .truth();
+        poses.frames[20..30].fill(crate::library::Pose::default());
+        poses.tail_beat = Some(crate::library::TailBeat {
+            method: crate::library::TailBeatMethod::Bend,
+            spans: vec![crate::library::BeatSpan {
+                frames: [30, 80],
+                start_s: 1.0,
+                end_s: 2.7,
+                frequency_hz: 2.0,
+                amplitude: 0.1,
+                confidence: 0.9,
+            }],
+        });
+        for (name, svg) in pictures(&poses) {
+            for tag in svg.split('<').filter_map(|rest| rest.split_once('>')) {
+                let mut names: Vec<&str> = tag
+                    .0
+                    .split("=\"")
+                    .filter_map(|p| p.rsplit([' ', '\n']).next())
+                    .collect();
+                names.pop();
+                names.sort_unstable();
+                let n_names = names.len();
+                names.dedup();
+                assert_eq!(names.len(), n_names, "{name}: <{}>", tag.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_picture_names_itself_and_has_colors_for_a_dark_page() {
+        let svg = Sheet::new(100.0, "A title", "What it shows").finish();
+        assert!(svg.contains("<title id=\"title\">A title</title>"));
+        assert!(svg.contains("<desc id=\"desc\">What it shows</desc>"));
+        assert!(svg.contains("prefers-color-scheme: dark"));
+        assert!(svg.ends_with("</svg>\n"));
+    }
+}

@@ -1,0 +1,44 @@
+//! overlay.mp4: the footage once more, with its poses drawn over it (O's figure 10).
+
+use std::path::Path;
+
+use super::Error;
+use crate::footage::FrameSource;
+use crate::formats::overlay::Overlay;
+use crate::library::Poses;
+use crate::media::{VideoFormat, VideoWriter};
+use crate::progress::Progress;
+use crate::raster::Frame;
+
+/// Films the footage with its poses drawn over it. `path` must end in the video's own ending.
+pub fn film(
+    source: &dyn FrameSource,
+    poses: &Poses,
+    path: &Path,
+    progress: &dyn Progress,
+) -> Result<(), Error> {
+    let format = source.format();
+    let video = VideoFormat {
+        width: format.width,
+        height: format.height,
+        fps: format.fps,
+        color: format.color,
+    };
+    let mut writer = VideoWriter::create(path, &video)?;
+    let mut overlay = Overlay::new(poses);
+    let mut stream = source.open()?;
+    let mut frame = Frame::default();
+    let n_frames = poses.frames.len();
+    for frame_idx in 0..n_frames {
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        if stream.next_frame(&mut frame)?.is_none() {
+            break;
+        }
+        overlay.draw(frame_idx, &mut frame);
+        writer.write(&frame)?;
+        progress.report("overlay", (frame_idx + 1) as f64 / n_frames as f64);
+    }
+    Ok(writer.finish()?)
+}

@@ -1,0 +1,250 @@
+//! A pen for planar frames: smooth lines, discs and small figures, gathered as coverage and then inked
+//! in one color, so that strokes of one drawing do not darken each other where they cross.
+
+use super::Frame;
+use crate::geometry::Rect;
+
+/// Coverage of the strokes since the last ink, for frames of one size.
+#[derive(Clone, Debug)]
+pub struct Pen {
+    width: usize,
+    height: usize,
+    /// 0..=255 for each pixel.
+    coverage: Vec<u8>,
+    /// The pixels touched.
+    touched: Rect,
+}
+
+impl Pen {
+    /// A pen for frames of `width` by `height` pixels.
+    pub fn new(width: u32, height: u32) -> Pen {
+        Pen {
+            width: width as usize,
+            height: height as usize,
+            coverage: vec![0; width as usize * height as usize],
+            touched: Rect::default(),
+        }
+    }
+
+    /// A round-ended line from `from` to `to`, pixels, `radius_px` to either side; `alpha` in 0..=1.
+    /// A line without length is a disc.
+    pub fn line(&mut self, from: [f64; 2], to: [f64; 2], radius_px: f64, alpha: f64) {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let squared = along[0] * along[0] + along[1] * along[1];
+        let reach = radius_px + 1.0;
+        let least = [0, 1].map(|c| from[c].min(to[c]) - reach);
+        let most = [0, 1].map(|c| from[c].max(to[c]) + reach);
+        self.cover(least, most, |p| {
+            let (dx, dy) = (p[0] - from[0], p[1] - from[1]);
+            let share = ((dx * along[0] + dy * along[1]) / squared.max(1e-12)).clamp(0.0, 1.0);
+            let distance = libm::hypot(dx - share * along[0], dy - share * along[1]);
+            alpha * (radius_px + 0.5 - distance).clamp(0.0, 1.0)
+        });
+    }
+
+    /// A line through all points.
+    pub fn polyline(&mut self, points: &[[f64; 2]], radius_px: f64, alpha: f64) {
+        for pair in points.windows(2) {
+            self.line(pair[0], pair[1], radius_px, alpha);
+        }
+    }
+
+    /// Figures, a point and the letters f and s with their upper left corner at `at`, each dot of
+    /// their 5 x 7 dots `dot_px` wide; what is not known to the pen is a space.
+    pub fn text(&mut self, text: &str, at: [f64; 2], dot_px: f64) {
+        for (n, glyph) in text.chars().map(rows_of).enumerate() {
+            for (row, bits) in glyph.into_iter().enumerate() {
+                for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
+                    let center = [
+                        at[0] + (n as f64 * 6.0 + f64::from(column) + 0.5) * dot_px,
+                        at[1] + (row as f64 + 0.5) * dot_px,
+                    ];
+                    let half = dot_px / 2.0;
+                    let [least, most] = [-half, half].map(|d| [center[0] + d, center[1] + d]);
+                    let inside = |p: [f64; 2]| {
+                        let off = (p[0] - center[0]).abs().max((p[1] - center[1]).abs());
+                        (half + 0.5 - off).clamp(0.0, 1.0)
+                    };
+                    self.cover(least, most, inside);
+                }
+            }
+        }
+    }
+
+    /// Lays the color over the frame where the strokes are, and forgets them. Panics on a frame of
+    /// another size.
+    pub fn ink(&mut self, frame: &mut Frame, rgb: [u8; 3]) {
+        assert_eq!(
+            (frame.width as usize, frame.height as usize),
+            (self.width, self.height),
+            "sizes differ"
+        );
+        let from = frame.color.from_rgb();
+        let luma = from.luma(rgb);
+        let chroma = from.chroma_of_block(rgb.map(|c| 4 * i32::from(c)));
+        let chroma_width = frame.chroma_width() as usize;
+        let (luma_plane, chroma_planes) = frame.planes.split_at_mut(self.width * self.height);
+        let (u_plane, v_plane) = chroma_planes.split_at_mut(chroma_planes.len() / 2);
+        let t = self.touched;
+        for y in t.y as usize / 2..(t.bottom() as usize).div_ceil(2) {
+            for x in t.x as usize / 2..(t.right() as usize).div_ceil(2) {
+                let mut sum = 0;
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let (px, py) = (2 * x + dx, 2 * y + dy);
+                    if px >= self.width || py >= self.height {
+                        continue;
+                    }
+                    let at = py * self.width + px;
+                    let alpha = std::mem::take(&mut self.coverage[at]);
+                    sum += u32::from(alpha);
+                    luma_plane[at] = mixed(luma_plane[at], luma, u32::from(alpha));
+                }
+                for (plane, value) in [&mut *u_plane, &mut *v_plane].into_iter().zip(chroma) {
+                    let old = &mut plane[y * chroma_width + x];
+                    *old = mixed(*old, value, sum / 4);
+                }
+            }
+        }
+        self.touched = Rect::default();
+    }
+
+    /// Raises the coverage of the pixels between two corners to what `of` says of their centers.
+    fn cover(&mut self, least: [f64; 2], most: [f64; 2], of: impl Fn([f64; 2]) -> f64) {
+        let (w, h) = (self.width as u32, self.height as u32);
+        if [least, most].concat().iter().any(|c| !c.is_finite()) {
+            return;
+        }
+        let rect = Rect::clipped(
+            least[0].floor() as i64,
+            least[1].floor() as i64,
+            most[0].ceil() as i64 + 1,
+            most[1].ceil() as i64 + 1,
+            w,
+            h,
+        );
+        for y in rect.y..rect.bottom() {
+            for x in rect.x..rect.right() {
+                let covered = (255.0 * of([f64::from(x) + 0.5, f64::from(y) + 0.5])).round() as u8;
+                let at = &mut self.coverage[y as usize * self.width + x as usize];
+                *at = covered.max(*at);
+            }
+        }
+        self.touched = match (self.touched.is_empty(), rect.is_empty()) {
+            (_, true) => self.touched,
+            (true, false) => rect,
+            (false, false) => {
+                let t = self.touched;
+                let (x, y) = (t.x.min(rect.x), t.y.min(rect.y));
+                Rect {
+                    x,
+                    y,
+                    w: t.right().max(rect.right()) - x,
+                    h: t.bottom().max(rect.bottom()) - y,
+                }
+            }
+        };
+    }
+}
+
+fn mixed(old: u8, new: u8, alpha: u32) -> u8 {
+    ((u32::from(old) * (255 - alpha) + u32::from(new) * alpha + 127) / 255) as u8
+}
+
+/// The seven rows of a figure, five dots each, the leftmost dot the highest bit.
+fn rows_of(figure: char) -> [u8; 7] {
+    match figure {
+        '0' => [
+            0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110,
+        ],
+        '1' => [
+            0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110,
+        ],
+        '2' => [
+            0b01110, 0b10001, 0b00001, 0b00110, 0b01000, 0b10000, 0b11111,
+        ],
+        '3' => [
+            0b11110, 0b00001, 0b00001, 0b01110, 0b00001, 0b00001, 0b11110,
+        ],
+        '4' => [
+            0b00010, 0b00110, 0b01010, 0b10010, 0b11111, 0b00010, 0b00010,
+        ],
+        '5' => [
+            0b11111, 0b10000, 0b11110, 0b00001, 0b00001, 0b10001, 0b01110,
+        ],
+        '6' => [
+            0b00110, 0b01000, 0b10000, 0b11110, 0b10001, 0b10001, 0b01110,
+        ],
+        '7' => [
+            0b11111, 0b00001, 0b00010, 0b00100, 0b01000, 0b01000, 0b01000,
+        ],
+        '8' => [
+            0b01110, 0b10001, 0b10001, 0b01110, 0b10001, 0b10001, 0b01110,
+        ],
+        '9' => [
+            0b01110, 0b10001, 0b10001, 0b01111, 0b00001, 0b00010, 0b01100,
+        ],
+        '.' => [0, 0, 0, 0, 0, 0b01100, 0b01100],
+        's' => [0, 0, 0b01111, 0b10000, 0b01110, 0b00001, 0b11110],
+        _ => [0; 7],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::ColorSpec;
+
+    fn gray() -> Frame {
+        let mut frame = Frame::new(33, 21, ColorSpec::default());
+        frame.planes.fill(128);
+        frame
+    }
+
+    #[test]
+    fn a_line_is_inked_where_it_lies_and_nowhere_else() {
+        let (mut frame, mut pen) = (gray(), Pen::new(33, 21));
+        pen.line([4.0, 10.5], [20.0, 10.5], 1.0, 1.0);
+        pen.ink(&mut frame, [255, 0, 0]);
+        let [r, g, b] = frame.to_rgb().pixel(12, 10);
+        assert!(r > 200 && g < 60 && b < 60, "{r} {g} {b}");
+        let old = gray();
+        for y in (0..8).chain(14..21) {
+            let row = 33 * y..33 * (y + 1);
+            assert_eq!(frame.luma()[row.clone()], old.luma()[row]);
+        }
+        // The pen is empty now.
+        let inked = frame.clone();
+        pen.ink(&mut frame, [0, 255, 0]);
+        assert_eq!(frame, inked);
+    }
+
+    #[test]
+    fn lines_that_cross_do_not_darken_each_other_and_may_leave_the_frame() {
+        let (mut once, mut twice, mut pen) = (gray(), gray(), Pen::new(33, 21));
+        pen.line([-50.0, 5.0], [90.0, 5.0], 2.0, 0.5);
+        pen.ink(&mut once, [0; 3]);
+        for _ in 0..2 {
+            pen.line([-50.0, 5.0], [90.0, 5.0], 2.0, 0.5);
+        }
+        pen.line([f64::NAN, 5.0], [90.0, 5.0], 2.0, 0.5);
+        pen.ink(&mut twice, [0; 3]);
+        assert_eq!(once, twice);
+    }
+
+    #[test]
+    fn every_figure_is_drawn_differently() {
+        let drawn = |text: &str| {
+            let (mut frame, mut pen) = (gray(), Pen::new(33, 21));
+            pen.text(text, [2.0, 2.0], 2.0);
+            pen.ink(&mut frame, [255; 3]);
+            frame
+        };
+        let all: Vec<Frame> = "0123456789.s "
+            .chars()
+            .map(|c| drawn(&c.to_string()))
+            .collect();
+        for (k, one) in all.iter().enumerate() {
+            assert!(all[k + 1..].iter().all(|other| other != one), "{k}");
+        }
+    }
+}
