@@ -32,16 +32,8 @@ pub enum Error {
     #[error("the background moves: the camera must stand still")]
     BackgroundNotStatic,
     /// Two components of comparable area, each persistent.
-    #[error("more than one animal moves in the footage; film one alone, or set follow to largest")]
+    #[error("more than one animal moves in the footage: film one alone, or set follow to largest")]
     SeveralAnimals,
-    /// Too few pixels to cut out.
-    #[error("the animal covers {area_px:.0} pixels, at least {least_px} are needed")]
-    AnimalTooSmall {
-        /// Median area.
-        area_px: f64,
-        /// Least area.
-        least_px: u32,
-    },
     /// Somebody cancelled.
     #[error("the analysis was cancelled")]
     Cancelled,
@@ -57,7 +49,6 @@ impl Error {
             Error::NothingMoves => Code::NothingMoves,
             Error::BackgroundNotStatic => Code::BackgroundNotStatic,
             Error::SeveralAnimals => Code::SeveralAnimals,
-            Error::AnimalTooSmall { .. } => Code::AnimalTooSmall,
             Error::Cancelled => Code::Cancelled,
         }
     }

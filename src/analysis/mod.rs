@@ -34,11 +34,12 @@ mod stats;
 pub mod transition;
 
 pub use error::Error;
+use params::CutSprites;
 pub use params::Params;
 
 use crate::cpu;
 use crate::footage::FrameSource;
-use crate::library::Library;
+use crate::library::{Library, LibraryStats};
 use crate::progress::Progress;
 use crate::raster::RgbImage;
 
@@ -69,10 +70,19 @@ pub fn analyze(
     let mut poses = pose::measure(&track, &source.format(), params);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
-    let sprites = sprite::align(&track, poses.view);
+    let animal_too_small = params.sprites == CutSprites::Auto && stats::is_too_small(&poses);
+    let sprites = match animal_too_small {
+        true => sprite::none(track.len()),
+        false => sprite::align(&track, poses.view),
+    };
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
-    let stats = stats::of(&poses, &connections, plate.never_seen_px);
+    let stats = LibraryStats {
+        never_seen_px: plate.never_seen_px,
+        several_animals: plate.several_animals,
+        animal_too_small,
+        ..stats::of(&poses, &connections)
+    };
     Ok(Library {
         poses,
         background: plate.rgb,
@@ -86,3 +96,6 @@ pub fn analyze(
         stats,
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -22,6 +22,8 @@ pub struct Params {
     pub search: Search,
     /// What to do when several animals move.
     pub follow: Follow,
+    /// Whether sprites are cut out of an animal too small to be looked at.
+    pub sprites: CutSprites,
     /// Where the head is, once and for all, in one frame: decides between head and tail.
     pub head: Option<HeadParam>,
     /// Smooth positions and directions over time; off gives each frame's raw values.
@@ -110,6 +112,17 @@ pub enum Follow {
     Largest,
 }
 
+/// Whether sprites are cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CutSprites {
+    /// Unless the animal's median area is below 24 pixels: then the library holds poses alone, and a
+    /// flock of it is refused with `animal_too_small`.
+    Auto,
+    /// Of an animal of any size.
+    Always,
+}
+
 /// Which planes are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -150,6 +163,7 @@ impl Default for Params {
             threshold: 18,
             search: Search::Window,
             follow: Follow::One,
+            sprites: CutSprites::Auto,
             head: None,
             smooth: true,
             clip_frames: None,

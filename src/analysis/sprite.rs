@@ -31,6 +31,11 @@ pub fn align(track: &[Tracked], view: View) -> Sprites {
     sprites
 }
 
+/// The sprites of an animal that none are cut of: all missing.
+pub fn none(n_frames: usize) -> Sprites {
+    Sprites::missing(MULTIPLE, MULTIPLE, n_frames)
+}
+
 fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
     let all = || track.iter().filter_map(|t| t.sighting.as_ref());
     let reach = |sightings: &mut dyn Iterator<Item = &Sighting>| {

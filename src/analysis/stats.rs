@@ -6,17 +6,18 @@ use super::transition::Connections;
 use crate::geometry::wrap_rad;
 use crate::library::{LibraryStats, Poses};
 
+/// An animal of a smaller median area is too small to be looked at.
+const LEAST_SPRITE_AREA_PX: f64 = 24.0;
 /// Bins of the heading histogram: 10 degrees each, from -180.
 const N_BINS: usize = 36;
 
-/// The statistics of a library.
-pub(super) fn of(poses: &Poses, connections: &Connections, never_seen_px: u64) -> LibraryStats {
+/// The statistics of a library; what the plate and the sprites tell is the caller's to add.
+pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
     let component = &connections.playback.component;
     let length_px = length_px(poses);
     LibraryStats {
         n_frames: poses.frames.len(),
         n_detected: poses.frames.iter().filter(|pose| pose.detected()).count(),
-        never_seen_px,
         n_candidates: connections.n_candidates,
         n_transitions: connections.transitions.len(),
         kappa_used: connections.kappa_used,
@@ -25,7 +26,17 @@ pub(super) fn of(poses: &Poses, connections: &Connections, never_seen_px: u64) -
         speed_bl_per_s: length_px.and_then(|length| speeds(poses, length)),
         turn_rate_rad_per_s: turn_rate(poses),
         length_px,
+        ..LibraryStats::default()
     }
+}
+
+/// Whether the animal covers, in the median, fewer pixels than a sprite needs.
+pub(super) fn is_too_small(poses: &Poses) -> bool {
+    let mut areas: Vec<f64> = poses.frames.iter().filter_map(|p| p.area_px).collect();
+    areas.sort_by(f64::total_cmp);
+    areas
+        .get(areas.len() / 2)
+        .is_some_and(|&area_px| area_px < LEAST_SPRITE_AREA_PX)
 }
 
 fn length_px(poses: &Poses) -> Option<f64> {

@@ -18,7 +18,7 @@ use super::matte::{self, Matte};
 use super::moments::{self, Moments};
 use super::params::Search;
 use super::read_ahead::Batches;
-use super::silhouette;
+use super::silhouette::{self, parting};
 use super::{Error, LEAST_FRAMES, Params};
 use crate::geometry::Rect;
 use crate::progress::Progress;
@@ -29,6 +29,10 @@ use crate::raster::{Frame, Mask};
 const LEAST_AREA_PX: u64 = 12;
 /// Frames without the animal before it is looked for anew, anywhere.
 const MISSES: u32 = 5;
+/// A component of this many times the usual area may be the animal and something else ...
+const MERGED: f64 = 1.2;
+/// ... if the usual area is known from this many silhouettes.
+const LEAST_AREAS: usize = 8;
 
 /// What was seen of the animal in one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -118,7 +122,7 @@ struct Tracker<'a> {
     velocity_px: [f64; 2],
     box_px: Rect,
     misses: u32,
-    /// Areas of the last silhouettes, for their running median.
+    /// Areas of the last components, for their running median.
     areas: Vec<f64>,
 }
 
@@ -167,13 +171,13 @@ impl<'a> Tracker<'a> {
             Search::Window => window,
             Search::Full => self.whole,
         };
-        let components = silhouette::components(frame, self.plate, gain, [window, seen]);
+        let components = self.components(frame, gain, [window, seen]);
         self.best(&components, window)
     }
 
     /// The best component of the whole frame.
     fn anywhere(&self, frame: &Frame, gain: &Gain) -> Option<Component> {
-        let components = silhouette::components(frame, self.plate, gain, [self.whole; 2]);
+        let components = self.components(frame, gain, [self.whole; 2]);
         if self.misses >= MISSES {
             return components
                 .into_iter()
@@ -185,6 +189,37 @@ impl<'a> Tracker<'a> {
             let only = fitting.next();
             only.filter(|_| fitting.next().is_none()).cloned()
         })
+    }
+
+    /// The components of [the window, what is seen]. One that is larger than the animal mostly is and that is two things
+    /// counts with the part where the animal should be alone.
+    fn components(&self, frame: &Frame, gain: &Gain, regions: [Rect; 2]) -> Vec<Component> {
+        let mut components = silhouette::components(frame, self.plate, gain, regions);
+        let Some(predicted) = self.predicted().filter(|_| self.areas.len() >= LEAST_AREAS) else {
+            return components;
+        };
+        let usual = self.usual_area();
+        let far_off = |area: u64| libm::log(area as f64 / usual).abs();
+        for component in &mut components {
+            if component.area as f64 > MERGED * usual {
+                let difference = silhouette::difference(frame, self.plate, gain, component.rect);
+                let part = parting::part_at(component, &difference, usual, predicted);
+                if let Some(part) = part.filter(|p| far_off(p.area) < far_off(component.area)) {
+                    *component = part;
+                }
+            }
+        }
+        components
+    }
+
+    /// Where the animal should be now; `None` before it was seen.
+    fn predicted(&self) -> Option<[f64; 2]> {
+        let (_, last) = self.last?;
+        let steps = f64::from(self.misses + 1);
+        Some([
+            last[0] + self.velocity_px[0] * steps,
+            last[1] + self.velocity_px[1] * steps,
+        ])
     }
 
     /// The last box where it should be now, widened by how far it may have gone besides.
@@ -207,12 +242,7 @@ impl<'a> Tracker<'a> {
     /// The component of fitting area in the window that lies nearest the prediction and differs
     /// least in area.
     fn best(&self, components: &[Component], window: Rect) -> Option<Component> {
-        let (_, last) = self.last?;
-        let steps = f64::from(self.misses + 1);
-        let predicted = [
-            last[0] + self.velocity_px[0] * steps,
-            last[1] + self.velocity_px[1] * steps,
-        ];
+        let predicted = self.predicted()?;
         let scale = f64::from(self.box_px.w.max(self.box_px.h)).max(8.0);
         let usual = self.usual_area();
         let cost = |component: &Component| {

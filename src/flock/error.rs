@@ -11,6 +11,12 @@ pub enum Error {
          film longer, and let the animal come back to the same poses"
     )]
     NoTransitions,
+    /// The library has no sprites, because the animal covers too few pixels.
+    #[error(
+        "the animal is too small in the picture: film it from nearer, \
+         or analyze it again with sprites set to always"
+    )]
+    AnimalTooSmall,
     /// The sentence says which parameter is out of which range.
     #[error("{0}")]
     InvalidParams(String),
@@ -24,6 +30,7 @@ impl Error {
     pub fn code(&self) -> Code {
         match self {
             Error::NoTransitions => Code::NoTransitions,
+            Error::AnimalTooSmall => Code::AnimalTooSmall,
             Error::InvalidParams(_) => Code::InvalidParams,
             Error::Cancelled => Code::Cancelled,
         }

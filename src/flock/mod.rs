@@ -56,6 +56,9 @@ pub fn plan_flock(
     progress: &dyn Progress,
 ) -> Result<Flock, Error> {
     params.check().map_err(Error::InvalidParams)?;
+    if library.stats.animal_too_small {
+        return Err(Error::AnimalTooSmall);
+    }
     if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
         return Err(Error::NoTransitions);
     }

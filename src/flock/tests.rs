@@ -93,6 +93,15 @@ fn a_library_without_jumps_is_refused_with_advice() {
 }
 
 #[test]
+fn an_animal_too_small_for_sprites_is_refused_with_advice() {
+    let mut library = synthetic::library(View::Side);
+    library.stats.animal_too_small = true;
+    let error = plan_flock(&library, &params("school"), &Silent).expect_err("there are no sprites");
+    assert_eq!(error.code(), crate::code::Code::AnimalTooSmall);
+    assert!(error.to_string().contains("film it from nearer"));
+}
+
+#[test]
 fn a_parameter_out_of_range_is_refused() {
     let none = Params {
         count: 0,

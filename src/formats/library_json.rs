@@ -208,6 +208,10 @@ struct StatsFile {
     n_frames: usize,
     n_detected: usize,
     background: BackgroundStats,
+    #[serde(default)]
+    several_animals: bool,
+    #[serde(default)]
+    animal_too_small: bool,
     n_candidates: u64,
     n_transitions: usize,
     kappa_used: Option<f64>,
@@ -232,6 +236,8 @@ impl StatsFile {
             background: BackgroundStats {
                 never_seen_px: stats.never_seen_px,
             },
+            several_animals: stats.several_animals,
+            animal_too_small: stats.animal_too_small,
             n_candidates: stats.n_candidates,
             n_transitions: stats.n_transitions,
             kappa_used: stats.kappa_used,
@@ -248,6 +254,8 @@ impl StatsFile {
             n_frames: self.n_frames,
             n_detected: self.n_detected,
             never_seen_px: self.background.never_seen_px,
+            several_animals: self.several_animals,
+            animal_too_small: self.animal_too_small,
             n_candidates: self.n_candidates,
             n_transitions: self.n_transitions,
             kappa_used: self.kappa_used,

@@ -47,6 +47,10 @@ pub struct LibraryStats {
     /// Pixels of the background that the animal never left free: continued from the texture around them
     /// (Efros & Leung 1999), nearest the rim first; past 16384 of them the rest is filled smoothly.
     pub never_seen_px: u64,
+    /// Several animals move in the footage, and the largest was followed because that was asked for.
+    pub several_animals: bool,
+    /// The animal covers too few pixels for sprites: there are poses alone.
+    pub animal_too_small: bool,
     /// Pairs of clips with D < epsilon, before any other test (O's figure 3).
     pub n_candidates: u64,
     /// Transitions found: pairs that are alike, point the same way and are the best around (O: 72).

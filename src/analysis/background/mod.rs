@@ -50,6 +50,8 @@ pub struct Plate {
     /// Pixels that the animal never left free: continued from the texture around them, nearest the rim
     /// first; past 16384 of them the rest is filled smoothly.
     pub never_seen_px: u64,
+    /// Several animals move, and the largest is to be followed.
+    pub several_animals: bool,
 }
 
 /// Estimates the plate, or takes the picture given and estimates its noise alone.
@@ -99,7 +101,7 @@ pub fn estimate(
     let all = samples.all_bits();
     plate.other = sway::other_color(&samples.frames, &plate.frame, |px| seen.free(px, all));
     plate.blocks.measure_noise(&samples.frames);
-    refuse(&samples, &plate, params)?;
+    plate.several_animals = refuse(&samples, &plate, params)?;
     plate.never_seen_px = unknown.iter().filter(|&&u| u).count() as u64;
     if plate.never_seen_px > 0 {
         fill_with(&mut plate, &unknown, params, |image, unknown| {
@@ -144,8 +146,9 @@ fn raise_thresholds(plate: &mut Plate, samples: &Samples) {
     }
 }
 
-/// Refuses a footage that shows nothing, too much, or more than one animal.
-fn refuse(samples: &Samples, plate: &Plate, params: &Params) -> Result<(), Error> {
+/// Refuses a footage that shows nothing, too much, or more than one animal; returns whether it shows
+/// several of which the largest is to be followed.
+fn refuse(samples: &Samples, plate: &Plate, params: &Params) -> Result<bool, Error> {
     let found: Vec<Vec<Component>> = samples.components(plate);
     refusal::judge(&found, samples.n_px(), params, |k, component| {
         shadow::is_shadow_alone(&samples.frames[k], plate, component)
@@ -201,6 +204,7 @@ fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
         other: None,
         sigma,
         never_seen_px: 0,
+        several_animals: false,
     }
 }
 
@@ -323,6 +327,7 @@ fn fill_with(
     frame.draw_rgb(&plate.rgb, hole);
     *plate = Plate {
         never_seen_px: plate.never_seen_px,
+        several_animals: plate.several_animals,
         other: plate.other.take(),
         ..plate_of(frame, std::mem::take(&mut plate.sigma), params)
     };

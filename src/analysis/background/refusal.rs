@@ -8,8 +8,6 @@ use crate::raster::runs::Component;
 
 /// Least area of something that moves.
 const LEAST_AREA_PX: u64 = 12;
-/// Least median area of an animal worth cutting out.
-const LEAST_SPRITE_AREA_PX: u32 = 24;
 /// Something must move in this share of the frames.
 const MOVING_SHARE: f64 = 0.05;
 /// More than this share of the pixels ...
@@ -20,13 +18,14 @@ pub(super) const OFTEN: f64 = 0.3;
 const COMPARABLE: f64 = 0.5;
 
 /// Judges a footage by the components of some of its frames; `is_shadow` tells whether one of frame
-/// k's components looks like the plate, only darker.
+/// k's components looks like the plate, only darker. Returns whether several animals move, where that is no
+/// reason to refuse.
 pub(super) fn judge(
     components: &[Vec<Component>],
     n_px: usize,
     params: &Params,
     is_shadow: impl Fn(usize, &Component) -> bool,
-) -> Result<(), Error> {
+) -> Result<bool, Error> {
     let share = |n: usize| n as f64 / components.len() as f64;
     let busy = |found: &&Vec<Component>| {
         found.iter().map(|c| c.area).sum::<u64>() as f64 > BUSY_AREA * n_px as f64
@@ -34,30 +33,19 @@ pub(super) fn judge(
     if share(components.iter().filter(busy).count()) > OFTEN {
         return Err(Error::BackgroundNotStatic);
     }
-    let mut areas: Vec<u64> = components
-        .iter()
-        .filter_map(|found| found.iter().map(|c| c.area).max())
-        .filter(|&area| area >= LEAST_AREA_PX)
-        .collect();
-    if share(areas.len()) < MOVING_SHARE {
+    let moves = |found: &&Vec<Component>| found.iter().any(|c| c.area >= LEAST_AREA_PX);
+    if share(components.iter().filter(moves).count()) < MOVING_SHARE {
         return Err(Error::NothingMoves);
-    }
-    let middle = areas.len() / 2;
-    let area = *areas.select_nth_unstable(middle).1;
-    if area < u64::from(LEAST_SPRITE_AREA_PX) {
-        return Err(Error::AnimalTooSmall {
-            area_px: area as f64,
-            least_px: LEAST_SPRITE_AREA_PX,
-        });
     }
     let several = components
         .iter()
         .enumerate()
         .filter(|(k, found)| shows_several(found, |c| is_shadow(*k, c)));
-    if params.follow == Follow::One && share(several.count()) > OFTEN {
+    let several = share(several.count()) > OFTEN;
+    if several && params.follow == Follow::One {
         return Err(Error::SeveralAnimals);
     }
-    Ok(())
+    Ok(several)
 }
 
 /// Whether two components of comparable area lie farther apart than either is long, neither of them
@@ -99,7 +87,7 @@ mod tests {
         }
     }
 
-    fn judged(frames: &[Vec<Component>]) -> Result<(), Error> {
+    fn judged(frames: &[Vec<Component>]) -> Result<bool, Error> {
         judge(frames, 10_000, &Params::default(), |_, _| false)
     }
 
@@ -120,10 +108,19 @@ mod tests {
             judged(&vec![vec![component(0, 0, 50)]; 10]),
             Err(Error::BackgroundNotStatic)
         ));
-        assert!(matches!(
-            judged(&vec![vec![component(0, 0, 4)]; 10]),
-            Err(Error::AnimalTooSmall { .. })
-        ));
+    }
+
+    #[test]
+    fn several_animals_are_told_of_when_the_largest_is_to_be_followed() {
+        let two = vec![component(10, 10, 10), component(60, 10, 9)];
+        let params = Params {
+            follow: Follow::Largest,
+            ..Params::default()
+        };
+        let judged = |frames: &[Vec<Component>]| judge(frames, 10_000, &params, |_, _| false);
+        assert!(matches!(judged(&vec![two; 10]), Ok(true)));
+        let one = vec![component(10, 10, 10)];
+        assert!(matches!(judged(&vec![one; 10]), Ok(false)));
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! of it count when they hang together with a certain one.
 
 mod blocks;
+pub mod parting;
 pub mod shadow;
 
 pub use blocks::Blocks;

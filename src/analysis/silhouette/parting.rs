@@ -1,0 +1,205 @@
+//! Two things in one silhouette taken apart: the animal and its mirror image in a wall while they touch,
+//! or two animals (ALGORITHMS.md 2.6).
+//!
+//! Both stand out from the background for themselves, and where they meet there is less to be seen:
+//! blurred, the difference from the plate has two summits and a pass between them. A thin tail is no
+//! summit once blurred, and a fin only falls off from the body. Pixels go to the summit from which
+//! they are reached without climbing (watershed; Vincent & Soille 1991).
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::Difference;
+use crate::raster::Mask;
+use crate::raster::runs::{self, Component};
+
+/// A summit is at least this large, as a share of the animal's usual area.
+const LEAST_SHARE: f64 = 0.15;
+/// The pass lies below this share of the lower summit.
+const PASS: f64 = 0.7;
+/// How many heights are tried for the pass.
+const N_HEIGHTS: usize = 24;
+
+/// The part of a component that holds what is nearest `place_px`, where two summits show; `None` where the
+/// component is one thing. `difference` is that of the component's box, `usual_area` the animal's area
+/// before, pixels.
+pub fn part_at(
+    component: &Component,
+    difference: &Difference,
+    usual_area: f64,
+    place_px: [f64; 2],
+) -> Option<Component> {
+    let mask = component.mask(difference.rect);
+    let heights = blurred(&mask, difference, (0.02 * usual_area.sqrt()) as usize);
+    let summits = summits(&mask, &heights, LEAST_SHARE * usual_area)?;
+    let off = |summit: &Component| {
+        let rect = summit.rect;
+        let x = f64::from(rect.x) + f64::from(rect.w) / 2.0;
+        let y = f64::from(rect.y) + f64::from(rect.h) / 2.0;
+        libm::hypot(x - place_px[0], y - place_px[1])
+    };
+    let mine = (0..summits.len()).min_by(|&a, &b| off(&summits[a]).total_cmp(&off(&summits[b])))?;
+    let labels = flooded(&mask, &heights, &summits);
+    let part = Mask {
+        rect: mask.rect,
+        bits: labels
+            .into_iter()
+            .map(|label| u8::from(label == Some(mine)))
+            .collect(),
+    };
+    runs::components(&part)
+        .into_iter()
+        .reduce(|all, part| all.joined(part))
+}
+
+/// The mask's differences, each the mean over a square of 2 `radius` + 1 pixels a side; 0 outside.
+fn blurred(mask: &Mask, difference: &Difference, radius: usize) -> Vec<f32> {
+    let (w, h) = (mask.width(), mask.height());
+    let radius = radius.clamp(1, 4);
+    let masked = difference.levels.iter().zip(&mask.bits);
+    let mut values: Vec<f32> = masked
+        .map(|(&level, &bit)| f32::from(level * bit))
+        .collect();
+    // Along rows, then along columns; past the edge the edge goes on, for the picture ends there.
+    let mean = |line: &[f32], at: usize| {
+        let sum: f32 = (0..=2 * radius)
+            .map(|k| line[(at + k).saturating_sub(radius).min(line.len() - 1)])
+            .sum();
+        sum / (2 * radius + 1) as f32
+    };
+    for row in values.chunks_exact_mut(w) {
+        let line = row.to_vec();
+        for (x, value) in row.iter_mut().enumerate() {
+            *value = mean(&line, x);
+        }
+    }
+    for x in 0..w {
+        let line: Vec<f32> = (0..h).map(|y| values[y * w + x]).collect();
+        for y in 0..h {
+            values[y * w + x] = mean(&line, y);
+        }
+    }
+    values
+}
+
+/// The parts above the lowest height at which there are several large ones, all of which rise far
+/// above it; `None` when there is no such height.
+fn summits(mask: &Mask, heights: &[f32], least_area: f64) -> Option<Vec<Component>> {
+    let highest = heights.iter().copied().fold(0.0, f32::max);
+    let above = |height: f32| {
+        let high = heights.iter().zip(&mask.bits);
+        let bits = high.map(|(&h, &bit)| bit * u8::from(h > height)).collect();
+        let rect = mask.rect;
+        let mut parts = runs::components(&Mask { rect, bits });
+        parts.retain(|part| part.area as f64 >= least_area);
+        parts
+    };
+    let top = |part: &Component| {
+        let part = part.mask(mask.rect);
+        let inside = heights.iter().zip(&part.bits).filter(|(_, bit)| **bit == 1);
+        inside.map(|(&height, _)| height).fold(0.0, f32::max)
+    };
+    for step in 1..N_HEIGHTS {
+        let height = highest * step as f32 / N_HEIGHTS as f32;
+        let parts = above(height);
+        if parts.len() > 1 {
+            let lowest = parts.iter().map(top).fold(f32::MAX, f32::min);
+            return (f64::from(height) < PASS * f64::from(lowest)).then_some(parts);
+        }
+    }
+    None
+}
+
+/// For each pixel of the mask the summit that it belongs to: the highest pixels beside a labeled one
+/// are labeled first.
+fn flooded(mask: &Mask, heights: &[f32], summits: &[Component]) -> Vec<Option<usize>> {
+    let (w, h) = (mask.width(), mask.height());
+    let mut labels: Vec<Option<usize>> = vec![None; mask.bits.len()];
+    let mut open = BinaryHeap::new();
+    // Heights are never negative, so their bits are in their order.
+    let entry = |at: usize| (heights[at].to_bits(), Reverse(at));
+    for (label, summit) in summits.iter().enumerate() {
+        let bits = summit.mask(mask.rect).bits;
+        for at in (0..bits.len()).filter(|&at| bits[at] == 1) {
+            labels[at] = Some(label);
+            open.push(entry(at));
+        }
+    }
+    while let Some((_, Reverse(at))) = open.pop() {
+        let (x, y) = (at % w, at / w);
+        for ny in y.saturating_sub(1)..=(y + 1).min(h - 1) {
+            for nx in x.saturating_sub(1)..=(x + 1).min(w - 1) {
+                let other = ny * w + nx;
+                if mask.bits[other] == 1 && labels[other].is_none() {
+                    labels[other] = labels[at];
+                    open.push(entry(other));
+                }
+            }
+        }
+    }
+    labels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rect;
+    use crate::raster::RgbImage;
+
+    /// What the difference is at each pixel of a picture 90 x 90, and the component of what is above 10.
+    fn scene(level: impl Fn(f64, f64) -> f64) -> (Component, Difference) {
+        let rect = Rect::of_size(90, 90);
+        let at = |k: u32| level(f64::from(k % 90), f64::from(k / 90)).clamp(0.0, 255.0) as u8;
+        let levels: Vec<u8> = (0..90 * 90).map(at).collect();
+        let bits = levels.iter().map(|&level| u8::from(level > 10)).collect();
+        let component = runs::components(&Mask { rect, bits })
+            .into_iter()
+            .max_by_key(|c| c.area);
+        let rgb = RgbImage::new(90, 90);
+        (component.unwrap(), Difference { rect, rgb, levels })
+    }
+
+    fn ellipse(x: f64, y: f64, center: [f64; 2], radii: [f64; 2]) -> bool {
+        ((x - center[0]) / radii[0]).powi(2) + ((y - center[1]) / radii[1]).powi(2) < 1.0
+    }
+
+    fn animal(x: f64, y: f64) -> bool {
+        ellipse(x, y, [45.0, 60.0], [25.0, 12.0])
+    }
+
+    #[test]
+    fn a_fainter_mirror_image_that_touches_is_left_out() {
+        let (both, difference) = scene(|x, y| {
+            let image = ellipse(x, y, [45.0, 30.0], [25.0, 12.0]);
+            let bridge = (40.0..50.0).contains(&x) && (38.0..52.0).contains(&y);
+            if animal(x, y) {
+                180.0
+            } else if image {
+                70.0
+            } else {
+                f64::from(u8::from(bridge)) * 25.0
+            }
+        });
+        let usual_area = std::f64::consts::PI * 25.0 * 12.0;
+        assert!(both.area as f64 > 1.9 * usual_area);
+        let part = part_at(&both, &difference, usual_area, [45.0, 58.0]).expect("two things");
+        let share = part.area as f64 / usual_area;
+        assert!((0.95..1.15).contains(&share) && part.rect.y > 38, "{share}");
+    }
+
+    #[test]
+    fn an_animal_with_a_thin_tail_and_a_faint_fin_is_one_thing() {
+        let (whole, difference) = scene(|x, y| {
+            let tail = (70.0..88.0).contains(&x) && (58.0..62.0).contains(&y);
+            let fin = ellipse(x, y, [40.0, 47.0], [12.0, 9.0]);
+            if animal(x, y) {
+                180.0
+            } else if tail {
+                120.0
+            } else {
+                f64::from(u8::from(fin)) * 60.0
+            }
+        });
+        assert!(part_at(&whole, &difference, 900.0, [45.0, 60.0]).is_none());
+    }
+}

@@ -1,0 +1,221 @@
+//! Each reason to refuse a footage, raised by a film made on the spot (ALGORITHMS.md 2.9), and films that
+//! come near it but are let pass.
+
+use super::params::{CutSprites, Follow};
+use super::{Error, Params, analyze};
+use crate::code::Code;
+use crate::cpu::Level;
+use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use crate::library::Library;
+use crate::progress::Silent;
+use crate::random;
+use crate::raster::{ColorSpec, Frame};
+
+const WIDTH: u32 = 192;
+const HEIGHT: u32 = 144;
+
+/// Something that is drawn over the scene: a dark disc.
+#[derive(Clone, Copy)]
+struct Disc {
+    center_px: [f64; 2],
+    radius_px: f64,
+}
+
+/// What one frame shows.
+struct Picture {
+    /// How far the camera has moved.
+    camera_px: [f64; 2],
+    /// How bright the light is.
+    light: f64,
+    discs: Vec<Disc>,
+}
+
+impl Picture {
+    fn of(discs: Vec<Disc>) -> Picture {
+        Picture {
+            camera_px: [0.0; 2],
+            light: 1.0,
+            discs,
+        }
+    }
+}
+
+/// A film drawn frame by frame, with a little noise.
+struct Film<F> {
+    n_frames: usize,
+    picture: F,
+}
+
+impl<F: Fn(usize) -> Picture + Send + Sync> FrameSource for Film<F> {
+    fn format(&self) -> FootageFormat {
+        FootageFormat {
+            width: WIDTH,
+            height: HEIGHT,
+            fps: 30.0,
+            n_frames_hint: self.n_frames,
+            color: ColorSpec::default(),
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(Reel {
+            film: self,
+            frame_idx: 0,
+        }))
+    }
+}
+
+struct Reel<'a, F> {
+    film: &'a Film<F>,
+    frame_idx: usize,
+}
+
+impl<F: Fn(usize) -> Picture> FrameStream for Reel<'_, F> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        if self.frame_idx == self.film.n_frames {
+            return Ok(None);
+        }
+        *frame = drawn(&(self.film.picture)(self.frame_idx), self.frame_idx as u64);
+        self.frame_idx += 1;
+        Ok(Some((self.frame_idx - 1) as f64 / 30.0))
+    }
+}
+
+/// A wall of gray stones, six pixels wide with soft edges, and the discs before it.
+fn drawn(picture: &Picture, noise_key: u64) -> Frame {
+    let mut frame = Frame::new(WIDTH, HEIGHT, ColorSpec::default());
+    frame.planes.fill(128);
+    let stone = |x: i64, y: i64| 130.0 + 60.0 * random::unit(6, &[x as u64, y as u64]);
+    let wall = |x: f64, y: f64| {
+        let (x, y) = (x / 6.0 + 1000.0, y / 6.0 + 1000.0);
+        let (fx, fy) = (x.fract(), y.fract());
+        let (x, y) = (x as i64, y as i64);
+        let row = |y: i64| stone(x, y) * (1.0 - fx) + stone(x + 1, y) * fx;
+        row(y) * (1.0 - fy) + row(y + 1) * fy
+    };
+    for at in 0..(WIDTH * HEIGHT) as usize {
+        let (x, y) = (
+            (at as u32 % WIDTH) as f64 + 0.5,
+            (at as u32 / WIDTH) as f64 + 0.5,
+        );
+        let inside = |d: &&Disc| libm::hypot(x - d.center_px[0], y - d.center_px[1]) < d.radius_px;
+        let [dx, dy] = picture.camera_px;
+        let level = match picture.discs.iter().find(inside) {
+            Some(_) => 40.0,
+            None => wall(x + dx, y + dy),
+        };
+        let noise = random::normal(8, &[noise_key, at as u64]);
+        frame.planes[at] = (level * picture.light + noise).clamp(16.0, 235.0) as u8;
+    }
+    frame
+}
+
+fn analyzed(
+    n_frames: usize,
+    params: &Params,
+    picture: impl Fn(usize) -> Picture + Send + Sync,
+) -> Result<Library, Error> {
+    let film = Film { n_frames, picture };
+    analyze(&film, None, params, Level::detect(), &Silent)
+}
+
+/// Why the film is refused.
+fn refusal(n_frames: usize, picture: impl Fn(usize) -> Picture + Send + Sync) -> (Code, String) {
+    let error = analyzed(n_frames, &Params::default(), picture).expect_err("it cannot be analyzed");
+    (error.code(), error.to_string())
+}
+
+/// A disc on its way around the middle of the picture.
+fn swimmer(frame_idx: usize, turn: f64, radius_px: f64) -> Disc {
+    let angle = frame_idx as f64 * 0.13 + turn;
+    Disc {
+        center_px: [
+            96.0 + 60.0 * libm::cos(angle),
+            72.0 + 45.0 * libm::sin(angle),
+        ],
+        radius_px,
+    }
+}
+
+#[test]
+fn footage_in_which_nothing_moves_is_refused() {
+    let (code, sentence) = refusal(40, |_| Picture::of(vec![]));
+    assert_eq!(code, Code::NothingMoves, "{sentence}");
+}
+
+#[test]
+fn footage_of_a_trembling_camera_is_refused() {
+    let (code, sentence) = refusal(40, |k| Picture {
+        camera_px: [
+            random::unit(1, &[k as u64]) * 6.0,
+            random::unit(2, &[k as u64]) * 6.0,
+        ],
+        ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
+    });
+    assert_eq!(code, Code::BackgroundNotStatic, "{sentence}");
+}
+
+#[test]
+fn footage_of_a_camera_that_pans_slowly_is_refused() {
+    let (code, sentence) = refusal(40, |k| Picture {
+        camera_px: [0.2 * k as f64, 0.0],
+        ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
+    });
+    assert_eq!(code, Code::BackgroundNotStatic, "{sentence}");
+}
+
+#[test]
+fn a_still_camera_in_changing_light_is_let_pass() {
+    let library = analyzed(60, &Params::default(), |k| Picture {
+        light: 1.0 + 0.15 * libm::sin(k as f64 * 0.3),
+        ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
+    });
+    assert_eq!(
+        library.expect("the camera stands still").stats.n_detected,
+        60
+    );
+}
+
+#[test]
+fn two_animals_are_refused_unless_the_largest_is_to_be_followed() {
+    let two = |k: usize| Picture::of(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
+    let (code, sentence) = refusal(60, two);
+    assert_eq!(code, Code::SeveralAnimals, "{sentence}");
+    assert!(sentence.contains("set follow to largest"));
+    let params = Params {
+        follow: Follow::Largest,
+        ..Params::default()
+    };
+    let library = analyzed(60, &params, two).expect("the largest is followed");
+    assert!(library.stats.several_animals);
+    for (k, pose) in library.poses.frames.iter().enumerate() {
+        let (found, largest) = (pose.centroid_px.unwrap(), swimmer(k, 0.0, 10.0).center_px);
+        assert!((found[0] - largest[0]).hypot(found[1] - largest[1]) < 2.0);
+    }
+}
+
+#[test]
+fn a_tiny_animal_is_tracked_but_has_no_sprites_unless_asked_for() {
+    let tiny = |k: usize| Picture::of(vec![swimmer(k, 0.0, 2.4)]);
+    let library = analyzed(60, &Params::default(), tiny).expect("it can be tracked");
+    assert!(library.stats.animal_too_small && library.stats.n_detected > 50);
+    assert!((0..60).all(|k| !library.sprites.is_present(k)));
+    assert!(library.playback.component.is_empty());
+    let params = Params {
+        sprites: CutSprites::Always,
+        ..Params::default()
+    };
+    let library = analyzed(60, &params, tiny).expect("sprites were asked for");
+    assert!(!library.stats.animal_too_small);
+    assert!((20..60).any(|k| library.sprites.is_present(k)));
+}
+
+#[test]
+fn a_film_of_a_few_frames_is_refused() {
+    let (code, sentence) = refusal(12, |k| Picture::of(vec![swimmer(k, 0.0, 9.0)]));
+    assert_eq!(code, Code::TooFewFrames);
+    assert_eq!(
+        sentence,
+        "the footage has 12 frames, at least 16 are needed"
+    );
+}
