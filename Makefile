@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit page-test docs deny bench papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit page-test docs deny bench accuracy papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -57,9 +57,12 @@ deny: ## licences, bans and sources of the dependencies, offline
 bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
 	@target/bench-venv/bin/python -c "import numpy, scipy, cv2" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless
-	target/bench-venv/bin/python bench/analyze.py $(RELEASE)
+	-target/bench-venv/bin/python bench/analyze.py $(RELEASE)
 	python3 bench/run.py $(RELEASE)
 	target/bench-venv/bin/python bench/distance.py
+
+accuracy: build ## the poses against the truth of a film generator: make accuracy GENERATOR=goldfish.py
+	python3 bench/accuracy.py $(RELEASE) $(GENERATOR)
 
 papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md
 	python3 bench/papers.py $(RELEASE)

@@ -20,12 +20,9 @@ pub mod sprite;
 pub mod tracking;
 
 // What it did.
-pub mod depth;
 pub mod direction;
-pub mod heading;
 pub mod midline;
 pub mod pose;
-pub mod smooth;
 
 // Which moments look alike.
 pub mod distance;

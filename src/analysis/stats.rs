@@ -1,7 +1,7 @@
 //! What is worth knowing about a library: how much was found, how the animal moves, what it covers.
 
 use super::pose;
-use super::smooth::smooth;
+use super::pose::smooth::smooth;
 use super::transition::Connections;
 use crate::geometry::wrap_rad;
 use crate::library::{LibraryStats, Poses};

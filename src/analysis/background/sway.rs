@@ -146,7 +146,7 @@ mod tests {
 
     #[test]
     fn where_a_stalk_sways_its_color_is_known_and_a_resting_animal_is_not_scenery() {
-        let sways = |k: usize| if k % 8 == 0 { 43 } else { 40 };
+        let sways = |k: usize| if k.is_multiple_of(8) { 43 } else { 40 };
         let samples: Vec<Frame> = (0..32).map(|k| scene(sways(k), k % 4 == 1)).collect();
         let other = other_color(&samples, &scene(40, false), |_| u32::MAX.into());
         let other = other.expect("the stalk sways");

@@ -72,7 +72,7 @@ impl Normal {
             for value in &row[1..] {
                 sum -= value * value;
             }
-            if !(sum > 0.0) {
+            if sum.is_nan() || sum <= 0.0 {
                 return None;
             }
             row[0] = sum.sqrt();

@@ -167,7 +167,7 @@ impl<'a> Energy<'a> {
         state: &State,
         axes: &Axes,
         (view, outline): (&View, &Outline),
-        add: &mut dyn FnMut(f64, &[(usize, f64)]),
+        add: &mut AddOne,
     ) {
         let flatten = 1.0 / self.views.medium_index;
         let body = self.shape.body(state.sway());
@@ -196,13 +196,7 @@ impl<'a> Energy<'a> {
         }
     }
 
-    fn upright(
-        &self,
-        k: usize,
-        state: &State,
-        outline: &Outline,
-        add: &mut dyn FnMut(f64, &[(usize, f64)]),
-    ) {
+    fn upright(&self, k: usize, state: &State, outline: &Outline, add: &mut AddOne) {
         let (extent_m, by_pitch) = self.shape.upright_m(state.pitch());
         let noise = self.shape.upright_noise;
         let shown = libm::log(self.views.focal_px * extent_m) - state.log_z();
@@ -213,14 +207,7 @@ impl<'a> Energy<'a> {
     }
 
     /// The way from one frame to the next against speed along forward.
-    fn motion(
-        &self,
-        start: usize,
-        k: usize,
-        states: &[State],
-        axes: [&Axes; 2],
-        add: &mut dyn FnMut(f64, &[(usize, f64)]),
-    ) {
+    fn motion(&self, start: usize, k: usize, states: &[State], axes: [&Axes; 2], add: &mut AddOne) {
         let views = self.views;
         let both = [&views.frames[start + k], &views.frames[start + k + 1]];
         let pair = [&states[k], &states[k + 1]];
@@ -260,7 +247,7 @@ impl<'a> Energy<'a> {
     }
 
     /// What animals rarely do.
-    fn habits(&self, k: usize, states: &[State], add: &mut dyn FnMut(f64, &[(usize, f64)])) {
+    fn habits(&self, k: usize, states: &[State], add: &mut AddOne) {
         let dt = self.views.dt;
         let root = dt.sqrt();
         let at = |m: usize, part: usize| (k + m) * N_STATE + part;
@@ -307,6 +294,9 @@ impl<'a> Energy<'a> {
         add((b.sway() - bend) * scale, &terms);
     }
 }
+
+/// Takes a residual and its derivatives.
+type AddOne<'a> = dyn FnMut(f64, &[(usize, f64)]) + 'a;
 
 /// Takes a residual, its weight, whether it is a measurement, and its derivatives.
 type Add<'a> = dyn FnMut(f64, f64, bool, &[(usize, f64)]) + 'a;

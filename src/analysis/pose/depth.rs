@@ -4,8 +4,8 @@
 //! is seen at that depth. N leaves open whether the animal comes or goes; alone, a frame can only be
 //! compared with the one before. These are the raw values; `direction` gives the best estimate.
 
-use super::Params;
-use super::params::Eq7;
+use crate::analysis::Params;
+use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
 use crate::library::{Animal, Poses, Raw};
 

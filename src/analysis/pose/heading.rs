@@ -6,7 +6,7 @@
 //! that turns the head by more than a quarter circle costs much while the animal is seen at length.
 //! The cheapest sequence is found by Viterbi, its certainty by the forward-backward algorithm.
 
-use super::pose::Axes;
+use super::Axes;
 
 /// Speed at which the direction of motion decides, lengths a second.
 const DECISIVE_SPEED: f64 = 0.45;

@@ -3,14 +3,18 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
+pub mod depth;
+pub mod heading;
+pub mod smooth;
+
+use super::Params;
 use super::direction::{self, Seen};
 use super::params::AxisAndHead;
-use super::smooth::{Smoothed, smooth};
 use super::tracking::{Sighting, Tracked};
-use super::{Params, depth, heading};
 use crate::footage::FootageFormat;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
+use smooth::{Smoothed, smooth};
 
 /// The side view keeps its length axis unless the other one is nearer the horizontal by this much.
 const MEMORY_RAD: f64 = 10.0 * PI / 180.0;

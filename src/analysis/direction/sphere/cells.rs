@@ -1,0 +1,156 @@
+//! The sphere of directions cut into cells, what the body looks like from each, and what one frame
+//! costs each (ALGORITHMS.md 4).
+
+use std::f64::consts::{PI, TAU};
+
+use super::super::Outline;
+use super::super::body::{Axes, form};
+use super::super::shape::Shape;
+
+pub(super) const N_YAW: usize = 36;
+pub(super) const N_PITCH: usize = 13;
+pub(super) const N_CELL: usize = N_YAW * N_PITCH;
+/// From one yaw, and one pitch, to the next.
+pub(super) const YAW_STEP_RAD: f64 = TAU / N_YAW as f64;
+pub(super) const PITCH_STEP_RAD: f64 = 2.0 * STEEPEST_RAD / (N_PITCH - 1) as f64;
+/// The steepest pitch.
+const STEEPEST_RAD: f64 = PI / 3.0;
+/// Noise of the motion in the picture and in depth, lengths a second.
+const MOTION_BL: [f64; 3] = [0.25, 0.25, 0.6];
+/// Usual pitch, radians.
+const PITCH: f64 = 0.4;
+/// Squared deviations beyond nine count linearly.
+const ROBUST: f64 = 3.0;
+
+/// The cells of the sphere, and what the body looks like from each.
+pub(super) struct Cells {
+    pub(super) axes: Vec<Axes>,
+    pitch: [f64; N_PITCH],
+    /// Projected moments, square metres.
+    moments: Vec<[f64; 3]>,
+    /// Inverse of their covariance: xx, xy, xz, yy, yz, zz; and half the logarithm of its determinant.
+    inverse: Vec<[f64; 6]>,
+    half_log_det: Vec<f64>,
+    /// The upright extent by pitch, metres.
+    upright_m: [f64; N_PITCH],
+}
+
+impl Cells {
+    pub(super) fn of(shape: &Shape) -> Cells {
+        let pitch: [f64; N_PITCH] =
+            std::array::from_fn(|j| -STEEPEST_RAD + PITCH_STEP_RAD * j as f64);
+        let mut cells = Cells {
+            axes: Vec::with_capacity(N_CELL),
+            pitch,
+            moments: Vec::with_capacity(N_CELL),
+            inverse: Vec::with_capacity(N_CELL),
+            half_log_det: Vec::with_capacity(N_CELL),
+            upright_m: pitch.map(|p| shape.upright_m(p).0),
+        };
+        let body = shape.body(0.0);
+        for yaw in (0..N_YAW).map(|i| (i as f64 + 0.5) * YAW_STEP_RAD) {
+            for pitch in pitch {
+                let axes = Axes::of(yaw, pitch);
+                let seen = axes.seen([0.0; 2], 1.0);
+                let pairs = [(0, 0), (0, 1), (1, 1)];
+                let moments = pairs.map(|(i, j)| form(&seen[i], &seen[j], &body));
+                let sway = pairs
+                    .map(|(i, j)| seen[i][0] * seen[j][2] + seen[i][2] * seen[j][0])
+                    .map(|v| v * shape.sway_sd);
+                let (inverse, half_log_det) = precision(moments, sway, shape);
+                cells.axes.push(axes);
+                cells.moments.push(moments);
+                cells.inverse.push(inverse);
+                cells.half_log_det.push(half_log_det);
+            }
+        }
+        cells
+    }
+
+    /// What the motion, metres a second about the line of sight, costs each cell.
+    pub(super) fn motion_costs(&self, velocity: [f64; 3], length_m: f64) -> Vec<f64> {
+        let noise = MOTION_BL.map(|bl| bl * length_m);
+        let moved: [f64; 3] = std::array::from_fn(|c| velocity[c] / noise[c]);
+        let one = |(k, axes): (usize, &Axes)| {
+            let along: [f64; 3] = std::array::from_fn(|c| axes.forward[c] / noise[c]);
+            let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+            // The speed that explains most of it; animals do not swim backward.
+            let speed = (dot(&along, &moved) / dot(&along, &along)).max(0.0);
+            let rest: [f64; 3] = std::array::from_fn(|c| moved[c] - speed * along[c]);
+            let pitch = self.pitch[k % N_PITCH] / PITCH;
+            0.5 * robust(dot(&rest, &rest)) + 0.5 * pitch * pitch
+        };
+        self.axes.iter().enumerate().map(one).collect()
+    }
+
+    /// What the silhouette's moments cost each cell, its scale being that of the upright extent.
+    pub(super) fn add_moment_costs(&self, outline: &Outline, costs: &mut [f64]) {
+        let scale = self.upright_m.map(|m| (m / outline.upright_px).powi(2));
+        for (k, cost) in costs.iter_mut().enumerate() {
+            let r: [f64; 3] = std::array::from_fn(|c| {
+                outline.covariance_px2[c] * scale[k % N_PITCH] - self.moments[k][c]
+            });
+            let [a, b, c, d, e, f] = self.inverse[k];
+            let square = a * r[0] * r[0]
+                + d * r[1] * r[1]
+                + f * r[2] * r[2]
+                + 2.0 * (b * r[0] * r[1] + c * r[0] * r[2] + e * r[1] * r[2]);
+            *cost += 0.5 * robust(square) + self.half_log_det[k];
+        }
+    }
+
+    /// The mean direction of the posterior within 50 degrees of a cell.
+    pub(super) fn mean_near(&self, posterior: &[f32], cell: usize) -> [f64; 3] {
+        const COS_50: f64 = 0.642_787_609_686_539_4;
+        let center = self.axes[cell].forward;
+        let mut sum = [0.0; 3];
+        for (axes, &p) in self.axes.iter().zip(posterior) {
+            let f = axes.forward;
+            if f[0] * center[0] + f[1] * center[1] + f[2] * center[2] > COS_50 {
+                for c in 0..3 {
+                    sum[c] += f64::from(p) * f[c];
+                }
+            }
+        }
+        let norm = (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]).sqrt();
+        if norm > 1e-6 {
+            sum.map(|c| c / norm)
+        } else {
+            center
+        }
+    }
+}
+
+/// The inverse covariance of measured moments about those of a cell, and half the logarithm of its
+/// determinant: noise of each, of the common scale, and whatever the sway.
+fn precision(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], f64) {
+    let mean = (m[0] * m[2]).max(0.0).sqrt();
+    let noise = [0.08 * m[0] + 0.04 * mean, 0.08 * mean, 0.08 * m[2]]
+        .map(|n| n * shape.moment_noise.max(1.0));
+    // The scale is that of the upright extent; moments go with its square.
+    let scale = (2.0 * shape.upright_noise).powi(2);
+    let entry = |i: usize, j: usize| {
+        let own = if i == j { noise[i] * noise[i] } else { 0.0 };
+        own + scale * m[i] * m[j] + sway[i] * sway[j]
+    };
+    let (a, b, c) = (entry(0, 0), entry(0, 1), entry(0, 2));
+    let (d, e, f) = (entry(1, 1), entry(1, 2), entry(2, 2));
+    let minors = [
+        d * f - e * e,
+        c * e - b * f,
+        b * e - c * d,
+        a * f - c * c,
+        b * c - a * e,
+        a * d - b * b,
+    ];
+    let det = (a * minors[0] + b * minors[1] + c * minors[2]).max(1e-300);
+    (minors.map(|v| v / det), 0.5 * libm::log(det))
+}
+
+fn robust(square: f64) -> f64 {
+    if square > ROBUST * ROBUST {
+        ROBUST * (2.0 * square.sqrt() - ROBUST)
+    } else {
+        square
+    }
+}

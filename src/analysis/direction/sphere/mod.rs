@@ -1,0 +1,191 @@
+//! A histogram filter on the sphere of directions: which way the animal points in every frame, decided
+//! over the whole footage.
+//!
+//! The sphere is cut into cells of yaw and pitch about the line of sight. A cell is likely in a frame when
+//! the body's projected moments are those seen there, whatever the sway, and when the animal moves that way;
+//! neighbors in time must be neighbors on the sphere. The likeliest course (Viterbi) picks one of the
+//! mirrored ways; the posterior about it (forward-backward) gives its mean and its certainty. This replaces
+//! the two separate decisions of ALGORITHMS.md 4 (head or tail, toward or away) where a camera is calibrated:
+//! one course must satisfy both at once.
+
+mod cells;
+mod chain;
+
+use super::energy::State;
+use super::shape::Shape;
+use super::{States, Views};
+use crate::geometry::wrap_rad;
+use cells::Cells;
+use chain::{posterior, viterbi};
+
+/// What a frame says counts this much at 30 frames a second: neighbors say nearly the same.
+const EVIDENCE: f64 = 0.35;
+/// Cost of pointing away from where the head is known to be.
+const PINNED: f64 = 1e4;
+
+/// The decoded course.
+pub(super) struct Course {
+    /// Mean direction of the posterior near the likeliest course, in the camera frame.
+    forward: Vec<[f64; 3]>,
+    posterior: Vec<Vec<f32>>,
+    cells: Cells,
+    z_apparent_m: Vec<f64>,
+    slopes: Vec<[f64; 2]>,
+}
+
+/// Decodes the course of the animal.
+pub(super) fn decode(views: &Views, shape: &Shape) -> Course {
+    let cells = Cells::of(shape);
+    let z_apparent_m = rough_depth_m(views, shape);
+    let velocity = velocity_m_s(views, &z_apparent_m);
+    let slopes: Vec<[f64; 2]> = views.frames.iter().map(|v| v.slope).collect();
+    let tempered = EVIDENCE * (30.0 * views.dt).min(2.0);
+    let costs: Vec<Vec<f64>> = (0..views.frames.len())
+        .map(|k| {
+            let along = about_sight(slopes[k], velocity[k]);
+            let mut cost = cells.motion_costs(along, shape.length_m);
+            if let Some(outline) = &views.frames[k].outline {
+                cells.add_moment_costs(outline, &mut cost);
+            }
+            let toward = views.frames[k].toward;
+            let pinned = |cell: usize| match toward {
+                Some([x, y]) => {
+                    let forward = cells.axes[cell].forward;
+                    if x * forward[0] + y * forward[1] < 0.0 {
+                        PINNED
+                    } else {
+                        0.0
+                    }
+                }
+                None => 0.0,
+            };
+            let weighed = cost.iter().enumerate();
+            weighed.map(|(k, c)| c * tempered + pinned(k)).collect()
+        })
+        .collect();
+    let path = viterbi(&costs);
+    let posterior = posterior(&costs);
+    let forward = (0..costs.len())
+        .map(|k| camera_frame(slopes[k], cells.mean_near(&posterior[k], path[k])))
+        .collect();
+    Course {
+        forward,
+        posterior,
+        cells,
+        z_apparent_m,
+        slopes,
+    }
+}
+
+impl Course {
+    /// Where the best estimate starts.
+    pub(super) fn states(&self, views: &Views, shape: &Shape) -> States {
+        let mut last_yaw = 0.0;
+        (0..views.frames.len())
+            .map(|k| {
+                let [x, y, z] = self.forward[k];
+                let yaw = last_yaw + wrap_rad(libm::atan2(z, x) - last_yaw);
+                last_yaw = yaw;
+                let pitch = libm::asin(y.clamp(-1.0, 1.0));
+                State([
+                    libm::log(self.z_apparent_m[k]),
+                    yaw,
+                    pitch,
+                    shape.length_m,
+                    0.0,
+                ])
+            })
+            .collect()
+    }
+
+    /// How sure the filter is of the head's side in the picture, and of the sign of depth, of a
+    /// direction in a frame: 0.5..=1.
+    pub(super) fn confidence(&self, idx: usize, forward: [f64; 3]) -> [f64; 2] {
+        let along = about_sight(self.slopes[idx], forward);
+        let (mut head, mut depth, mut all) = (0.0, 0.0, 0.0);
+        for (cell, &p) in self.cells.axes.iter().zip(&self.posterior[idx]) {
+            let (there, p) = (cell.forward, f64::from(p));
+            all += p;
+            if there[0] * along[0] + there[1] * along[1] > 0.0 {
+                head += p;
+            }
+            if there[2] * along[2] > 0.0 {
+                depth += p;
+            }
+        }
+        [head, depth].map(|p| (p / all).clamp(0.5, 1.0))
+    }
+}
+
+/// A vector of the camera frame about the line of sight to a place of the picture.
+fn about_sight([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    normalized_like([x, y, z], [x - tx * z, y - ty * z, z + tx * x + ty * y])
+}
+
+/// Back again.
+fn camera_frame([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    normalized_like([x, y, z], [x + tx * z, y + ty * z, z - tx * x - ty * y])
+}
+
+/// `b` with the length of `a`.
+fn normalized_like(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    let norm = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let scale = if norm(b) > 0.0 {
+        norm(a) / norm(b)
+    } else {
+        1.0
+    };
+    b.map(|c| c * scale)
+}
+
+/// The depth that the upright extent shows, over half a second, metres.
+fn rough_depth_m(views: &Views, shape: &Shape) -> Vec<f64> {
+    let seen: Vec<(usize, f64)> = views
+        .frames
+        .iter()
+        .enumerate()
+        .filter_map(|(k, v)| Some((k, shape.level_depth_m(views, v.outline.as_ref()?))))
+        .collect();
+    let mut depth = vec![seen[0].1; views.frames.len()];
+    for pair in seen.windows(2) {
+        let [(a, from), (b, to)] = [pair[0], pair[1]];
+        for k in a..=b {
+            depth[k] = from + (to - from) * (k - a) as f64 / (b - a) as f64;
+        }
+    }
+    if let Some(&(last, value)) = seen.last() {
+        depth[last..].fill(value);
+    }
+    running_mean(&depth, views, 0.5)
+}
+
+/// Metres a second in the camera frame.
+fn velocity_m_s(views: &Views, z_apparent_m: &[f64]) -> Vec<[f64; 3]> {
+    let n = views.frames.len();
+    let part = |c: usize, over_s: f64| {
+        let place = |k: usize| match c {
+            2 => views.medium_index * z_apparent_m[k],
+            _ => views.frames[k].slope[c] * z_apparent_m[k],
+        };
+        let rate: Vec<f64> = (0..n)
+            .map(|k| {
+                let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
+                (place(b) - place(a)) / ((b - a).max(1) as f64 * views.dt)
+            })
+            .collect();
+        running_mean(&rate, views, over_s)
+    };
+    let (x, y, z) = (part(0, 0.23), part(1, 0.23), part(2, 0.3));
+    (0..n).map(|k| [x[k], y[k], z[k]]).collect()
+}
+
+/// The mean over a window of `over_s` seconds around each value; shorter at the ends.
+fn running_mean(values: &[f64], views: &Views, over_s: f64) -> Vec<f64> {
+    let half = (over_s / views.dt / 2.0).round() as usize;
+    (0..values.len())
+        .map(|k| {
+            let window = &values[k.saturating_sub(half)..(k + half + 1).min(values.len())];
+            window.iter().sum::<f64>() / window.len() as f64
+        })
+        .collect()
+}
