@@ -281,6 +281,19 @@ fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
     }
 }
 
+/// How far the middle two thirds of values spread about their median, as a share of it.
+fn variation(mut values: Vec<f64>) -> f64 {
+    let at = |values: &mut [f64], sixth: usize| {
+        let rank = (values.len() * sixth / 6).min(values.len().saturating_sub(1));
+        *values.select_nth_unstable_by(rank, f64::total_cmp).1
+    };
+    if values.is_empty() {
+        return 0.0;
+    }
+    let [low, middle, high] = [1, 3, 5].map(|sixth| at(&mut values, sixth));
+    (high - low) / (2.0 * middle.max(1e-9))
+}
+
 /// The upper median; 0 of nothing.
 fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
@@ -300,10 +313,10 @@ fn half_circle(angle_rad: f64) -> f64 {
     }
 }
 
-/// From the side an animal has a back and a belly: the skew across its length keeps its sign. From
-/// above it has a left and a right: the skew varies about zero as it bends, and it lies at any angle.
-/// Measured on films and recordings from the side: |median| 0.09 to 0.6, above half its spread; from
-/// above: below 0.05.
+/// From the side an animal has a back and a belly (the skew across its length keeps its sign), and stays
+/// as tall when it turns. From above it has a left and a right, bends, and lies at any angle. Measured on
+/// films and recordings: skew from the side 0.09 to 0.6 beside half its spread, from above below 0.05;
+/// height varies a quarter as much as length in fish from the side, as much or more from above.
 fn guess_view(track: &[Tracked]) -> View {
     const LEVEL: f64 = PI / 3.0;
     let sightings: Vec<&Sighting> = track.iter().filter_map(|t| t.sighting.as_ref()).collect();
@@ -330,14 +343,21 @@ fn guess_view(track: &[Tracked]) -> View {
     // Medians: silhouettes that went wrong in a tenth of the frames must not show a back.
     let usual = median(across.clone());
     let spread = 1.4826 * median(across.iter().map(|skew| (skew - usual).abs()).collect());
-    let has_back_and_belly = usual.abs() >= (0.5 * spread).max(0.06);
+    let has_back_and_belly = usual.abs() >= (0.5 * spread).max(0.2);
+    // Turning toward the camera shortens it and leaves it as tall.
+    let sizes = |c: usize| {
+        sightings
+            .iter()
+            .map(move |s| s.moments.covariance_px2[c].sqrt())
+    };
+    let stands_upright = variation(sizes(2).collect()) < 0.5 * variation(sizes(0).collect());
     let square = across
         .iter()
         .map(|skew| (skew - usual).powi(2))
         .sum::<f64>();
     let deviation = (square / across.len().max(1) as f64).sqrt();
     let bends_or_turns = deviation > 0.12 || steep_share > 0.15;
-    if !has_back_and_belly && bends_or_turns {
+    if !has_back_and_belly && !stands_upright && bends_or_turns {
         View::Top
     } else {
         View::Side
