@@ -93,6 +93,3 @@ pub fn analyze(
         stats,
     })
 }
-
-#[cfg(test)]
-mod tests;

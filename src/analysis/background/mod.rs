@@ -332,3 +332,6 @@ fn fill_with(
         ..plate_of(frame, std::mem::take(&mut plate.sigma), params)
     };
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,4 +1,5 @@
 //! Accuracy against known truth, on generated films (ALGORITHMS.md 9).
 
 mod accuracy;
+mod reproduce;
 mod sample;

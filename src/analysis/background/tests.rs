@@ -1,8 +1,8 @@
 //! Each reason to refuse a footage, raised by a film made on the spot (ALGORITHMS.md 2.9), and films that
 //! come near it but are let pass.
 
-use super::params::{CutSprites, Follow};
-use super::{Error, Params, analyze};
+use crate::analysis::params::{CutSprites, Follow};
+use crate::analysis::{Error, Params, analyze};
 use crate::code::Code;
 use crate::cpu::Level;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
