@@ -5,12 +5,17 @@
 //! or right). Each such stretch is mirrored, settled, and kept so when its energy is clearly less.
 
 use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use rayon::prelude::*;
 
 use super::States;
 use super::energy::{Energy, State};
 use super::solve;
 use crate::geometry::wrap_rad;
 
+/// Times all stretches are tried.
+const SWEEPS: usize = 2;
 /// Frames around a stretch that settle with it.
 const MARGIN: usize = 20;
 /// Longest stretch, seconds.
@@ -31,19 +36,55 @@ enum Plane {
 
 /// Mirrors whatever stretches become likelier by it.
 pub(super) fn improve(energy: &Energy, states: &mut States) {
-    for _ in 0..2 {
+    for _ in 0..SWEEPS {
         let mut changed = false;
         for plane in [Plane::Picture, Plane::Sight] {
-            let meetings = meetings(states, plane);
             for n_turns in [1, 2] {
-                for ends in meetings.windows(n_turns + 1) {
-                    changed |= try_mirrored(energy, states, plane, ends[0], ends[n_turns]);
-                }
+                let meetings = meetings(states, plane);
+                let better: Vec<Trial> = meetings
+                    .par_windows(n_turns + 1)
+                    .filter_map(|ends| mirrored(energy, states, plane, ends[0]..ends[n_turns]))
+                    .collect();
+                changed |= !better.is_empty();
+                accept(states, better);
             }
         }
         if !changed {
             break;
         }
+    }
+}
+
+/// A stretch that became likelier, with what lies around it.
+struct Trial {
+    start: usize,
+    states: States,
+}
+
+/// Takes over the trials in order; one that overlaps an earlier one waits for the next sweep.
+fn accept(states: &mut States, trials: Vec<Trial>) {
+    let mut free_from = 0;
+    for Trial {
+        start,
+        states: trial,
+    } in trials
+    {
+        if start < free_from {
+            continue;
+        }
+        let end = start + trial.len();
+        // Yaws may be whole turns off: before the stretch by an earlier trial, after it by this one.
+        let whole = |gap: f64| TAU * (gap / TAU).round();
+        let offset = whole(states[start].yaw() - trial[0].yaw());
+        let turns = whole(trial[trial.len() - 1].yaw() + offset - states[end - 1].yaw());
+        for (state, mut settled) in states[start..end].iter_mut().zip(trial) {
+            settled.0[1] += offset;
+            *state = settled;
+        }
+        for state in &mut states[end..] {
+            state.0[1] += turns;
+        }
+        free_from = end;
     }
 }
 
@@ -68,16 +109,21 @@ fn meetings(states: &[State], plane: Plane) -> Vec<usize> {
     meetings
 }
 
-/// Mirrors the frames `a..b` if the course becomes likelier by it.
-fn try_mirrored(energy: &Energy, states: &mut States, plane: Plane, a: usize, b: usize) -> bool {
-    let dt = energy.views.dt;
-    if (b - a) as f64 * dt > LONGEST_S {
-        return false;
+/// The frames of a stretch mirrored, if the course becomes likelier by it.
+fn mirrored(
+    energy: &Energy,
+    states: &[State],
+    plane: Plane,
+    stretch: Range<usize>,
+) -> Option<Trial> {
+    if stretch.len() as f64 * energy.views.dt > LONGEST_S {
+        return None;
     }
-    let (start, end) = (a.saturating_sub(MARGIN), (b + MARGIN).min(states.len()));
+    let start = stretch.start.saturating_sub(MARGIN);
+    let end = (stretch.end + MARGIN).min(states.len());
     let before = energy.cost(start, &states[start..end]);
     let mut trial: States = states[start..end].to_vec();
-    for state in &mut trial[a - start..b - start] {
+    for state in &mut trial[stretch.start - start..stretch.end - start] {
         state.0[1] = match plane {
             Plane::Picture => -state.yaw(),
             Plane::Sight => PI - state.yaw(),
@@ -85,17 +131,11 @@ fn try_mirrored(energy: &Energy, states: &mut States, plane: Plane, a: usize, b:
         state.0[4] = -state.sway();
     }
     unwrap(&mut trial);
-    if solve::stretch(energy, start, &mut trial) >= before - GAIN {
-        return false;
-    }
-    // The yaw after the stretch may be whole turns off what it was.
-    let turns = trial[trial.len() - 1].yaw() - states[end - 1].yaw();
-    let turns = TAU * (turns / TAU).round();
-    states[start..end].copy_from_slice(&trial);
-    for state in &mut states[end..] {
-        state.0[1] += turns;
-    }
-    true
+    let wanted = before - GAIN;
+    (solve::stretch(energy, start, &mut trial, wanted) < wanted).then_some(Trial {
+        start,
+        states: trial,
+    })
 }
 
 /// Makes the yaw continuous from the first frame on.

@@ -83,8 +83,6 @@ pub struct Direction {
     pub depth_sign_confidence: f64,
 }
 
-/// Rounds of estimating states and learning the shape, after a first look.
-const ROUNDS: usize = 2;
 /// Longest gap between sightings that is bridged, seconds.
 const BRIDGE_S: f64 = 0.5;
 
@@ -110,13 +108,10 @@ pub fn estimate(
     shape = shape.learned(&views, &states);
     let course = sphere::decode(&views, &shape);
     states = course.states(&views, &shape);
-    for _ in 0..ROUNDS {
-        let energy = Energy::new(&views, &shape);
-        solve::whole(&energy, &mut states);
-        mirror::improve(&energy, &mut states);
-        solve::whole(&energy, &mut states);
-        shape = shape.learned(&views, &states);
-    }
+    let energy = Energy::new(&views, &shape);
+    solve::whole(&energy, &mut states);
+    mirror::improve(&energy, &mut states);
+    solve::whole(&energy, &mut states);
     (0..seen.len())
         .map(|k| {
             let idx = k.checked_sub(views.first)?;
