@@ -33,6 +33,10 @@ pub(super) struct Shape {
     pub(super) moment_noise: f64,
 }
 
+/// Half the time over which the way of an animal is measured, seconds.
+const STRIDE_S: f64 = 0.1;
+/// Slower than this, lengths a second, the way says nothing.
+const LEAST_SPEED_BL: f64 = 0.4;
 /// Sway of an unknown animal, against its second moment along forward.
 const FIRST_SWAY: f64 = 0.15;
 /// And never less than this.
@@ -63,11 +67,7 @@ impl Shape {
         let long = || outlines.iter().filter(|(_, o)| ratio(o) >= broadside);
         let down_m2 = median(outlines.iter().map(|(_, o)| moment(o, 2)))?;
         let along_m2 = 1.03 * median(long().map(|(_, o)| moment(o, 0)))?;
-        let slant_m2 = median(long().map(|&(k, o)| {
-            let next = views.frames[(k + 1).min(views.frames.len() - 1)].slope[0];
-            let last = views.frames[k.saturating_sub(1)].slope[0];
-            moment(o, 1) * (next - last).signum()
-        }))?;
+        let slant_m2 = slant(views, animal, along_m2 - down_m2, long()).unwrap_or(0.0);
         Some(Shape {
             length_m: animal.length_m,
             height_m: animal.height_m,
@@ -109,7 +109,7 @@ impl Shape {
 
     /// The shape that explains the moments best where the states are right: robust linear least squares.
     pub(super) fn learned(&self, views: &Views, states: &[State]) -> Shape {
-        let rows: Vec<([f64; 5], f64)> = views
+        let rows: Vec<([f64; 4], f64)> = views
             .frames
             .iter()
             .enumerate()
@@ -122,7 +122,7 @@ impl Shape {
         let near = |value: f64, first: f64| value.clamp(first / TRUST, first * TRUST);
         let along_m2 = near(found[0], self.along_m2);
         let down_m2 = near(found[1], self.down_m2);
-        let bend = found[4];
+        let bend = found[3];
         let sway = median(
             (0..states.len())
                 .map(|k| (states[k].sway() - bend * turn_rate(views, states, k)).abs()),
@@ -131,7 +131,6 @@ impl Shape {
             along_m2,
             down_m2,
             side_m2: found[2].clamp(0.02 * down_m2, down_m2),
-            slant_m2: found[3],
             bend,
             sway_sd: (1.4826 * sway.unwrap_or(0.0)).max(LEAST_SWAY * along_m2),
             ..*self
@@ -173,15 +172,15 @@ impl Shape {
         })
     }
 
-    /// The three moments of one frame as rows of a linear system for (along, down, side, slant, bend),
-    /// in standard deviations; the sway beside the bend is taken out.
+    /// The three moments of one frame as rows of a linear system for (along, down, side, bend), in standard
+    /// deviations; the slant and the sway beside the bend are taken out.
     fn rows(
         &self,
         views: &Views,
         states: &[State],
         k: usize,
         (view, outline): (&View, &Outline),
-    ) -> [([f64; 5], f64); 3] {
+    ) -> [([f64; 4], f64); 3] {
         let state = &states[k];
         let rate = turn_rate(views, states, k);
         let seen = Axes::of(state.yaw(), state.pitch()).seen(view.slope, 1.0 / views.medium_index);
@@ -194,10 +193,37 @@ impl Shape {
             let by = |m: usize| scale * form(&seen[i], &seen[j], &unit(m)) / noise[c];
             let pixel = if i == j { 1.0 / 12.0 } else { 0.0 };
             let rest = (outline.covariance_px2[c] - pixel) / noise[c];
-            let swayed = by(4) * (state.sway() - self.bend * rate);
-            ([by(0), by(1), by(2), by(3), by(4) * rate], rest - swayed)
+            let known = by(3) * self.slant_m2 + by(4) * (state.sway() - self.bend * rate);
+            ([by(0), by(1), by(2), by(4) * rate], rest - known)
         })
     }
+}
+
+/// How the body's length and depth vary together, in square metres, of an animal that swims the way it
+/// points: its silhouettes seen at length are slanted against its motion by that much. Learning it from
+/// states would not do, for their pitch follows it.
+fn slant<'a>(
+    views: &Views,
+    animal: &Animal,
+    excess_m2: f64,
+    long: impl Iterator<Item = &'a (usize, &'a Outline)>,
+) -> Option<f64> {
+    let reach = ((STRIDE_S / views.dt).round() as usize).max(1);
+    median(long.filter_map(|&(k, outline)| {
+        let (last, next) = (k.checked_sub(reach)?, k + reach);
+        let (from, to) = (views.frames[last].slope, views.frames.get(next)?.slope);
+        let [x, y] = [to[0] - from[0], to[1] - from[1]];
+        let length = outline.upright_px / views.focal_px * animal.length_m / animal.height_m;
+        let way = libm::hypot(x, y);
+        if way / length < LEAST_SPEED_BL * (next - last) as f64 * views.dt {
+            return None;
+        }
+        // Nose down by so much, whichever way it faces.
+        let (sin, cos) = (y / way, x.abs() / way);
+        let scale = (animal.height_m / outline.upright_px).powi(2);
+        let shown = outline.covariance_px2[1] * scale * x.signum();
+        (cos > 0.8).then(|| (shown - excess_m2 * sin * cos) / (cos * cos - sin * sin))
+    }))
 }
 
 /// Radians a second, limited to what bends the body.
@@ -208,10 +234,10 @@ fn turn_rate(views: &Views, states: &[State], k: usize) -> f64 {
 }
 
 /// Least squares with Huber weights beyond two standard deviations.
-fn robust_fit(rows: &[([f64; 5], f64)]) -> Option<[f64; 5]> {
-    let mut found = [0.0; 5];
+fn robust_fit(rows: &[([f64; 4], f64)]) -> Option<[f64; 4]> {
+    let mut found = [0.0; 4];
     for round in 0..5 {
-        let mut normal = [[0.0; 6]; 5];
+        let mut normal = [[0.0; 5]; 4];
         for (row, value) in rows {
             let error: f64 = row.iter().zip(&found).map(|(a, x)| a * x).sum::<f64>() - value;
             let weight = if round > 0 && error.abs() > 2.0 {
@@ -219,11 +245,11 @@ fn robust_fit(rows: &[([f64; 5], f64)]) -> Option<[f64; 5]> {
             } else {
                 1.0
             };
-            for i in 0..5 {
-                for j in 0..5 {
+            for i in 0..4 {
+                for j in 0..4 {
                     normal[i][j] += weight * row[i] * row[j];
                 }
-                normal[i][5] += weight * row[i] * value;
+                normal[i][4] += weight * row[i] * value;
             }
         }
         found = eliminate(normal)?;
@@ -231,31 +257,31 @@ fn robust_fit(rows: &[([f64; 5], f64)]) -> Option<[f64; 5]> {
     Some(found)
 }
 
-/// Solves five equations with their right side in the last column; `None` when they say too little.
-fn eliminate(mut a: [[f64; 6]; 5]) -> Option<[f64; 5]> {
-    let scale: [f64; 5] = std::array::from_fn(|k| a[k][k].sqrt().max(1e-300));
-    for i in 0..5 {
-        for j in 0..5 {
+/// Solves four equations with their right side in the last column; `None` when they say too little.
+fn eliminate(mut a: [[f64; 5]; 4]) -> Option<[f64; 4]> {
+    let scale: [f64; 4] = std::array::from_fn(|k| a[k][k].sqrt().max(1e-300));
+    for i in 0..4 {
+        for j in 0..4 {
             a[i][j] /= scale[i] * scale[j];
         }
-        a[i][5] /= scale[i];
+        a[i][4] /= scale[i];
     }
-    for k in 0..5 {
+    for k in 0..4 {
         // Symmetric and scaled: a small pivot means that an unknown is not determined.
         if a[k][k] < 1e-6 {
             return None;
         }
-        for i in k + 1..5 {
+        for i in k + 1..4 {
             let factor = a[i][k] / a[k][k];
-            for j in k..6 {
+            for j in k..5 {
                 a[i][j] -= factor * a[k][j];
             }
         }
     }
-    let mut x = [0.0; 5];
-    for k in (0..5).rev() {
-        let known: f64 = (k + 1..5).map(|j| a[k][j] * x[j]).sum();
-        x[k] = (a[k][5] - known) / a[k][k];
+    let mut x = [0.0; 4];
+    for k in (0..4).rev() {
+        let known: f64 = (k + 1..4).map(|j| a[k][j] * x[j]).sum();
+        x[k] = (a[k][4] - known) / a[k][k];
     }
     Some(std::array::from_fn(|k| x[k] / scale[k]))
 }
