@@ -3,12 +3,12 @@
 //!
 //! N measures direction from two extents of one silhouette, and stops being able to where the animal is
 //! foreshortened, pitched or bent. Here the second moments of every silhouette are read as those of a
-//! body that is the same in all frames ([`shape`]): an ellipsoid whose outline under projection has
+//! body that is the same in all frames (`shape`): an ellipsoid whose outline under projection has
 //! exactly the projected moments, with a tail that sways sideways. Three steps: a histogram filter on
 //! the sphere of directions decides head or tail and toward or away over the whole footage
-//! ([`sphere`]); Gauss-Newton over all frames finds the likeliest depth, yaw, pitch, speed and sway
-//! ([`energy`], [`solve`]); and every turn that could also have gone the mirrored way is tried that way
-//! ([`mirror`]). The body's shape is learned from the footage itself between two such rounds.
+//! (`sphere`); Gauss-Newton over all frames finds the likeliest depth, yaw, pitch, speed and sway
+//! (`energy`, `solve`); and every turn that could also have gone the mirrored way is tried that way
+//! (`mirror`). The body's shape is learned from the footage itself between two such rounds.
 
 mod banded;
 mod body;
@@ -83,6 +83,8 @@ pub struct Direction {
     pub depth_sign_confidence: f64,
 }
 
+/// Rounds of mirroring and learning anew, after a first look.
+const ROUNDS: usize = 2;
 /// Longest gap between sightings that is bridged, seconds.
 const BRIDGE_S: f64 = 0.5;
 
@@ -108,10 +110,13 @@ pub fn estimate(
     shape = shape.learned(&views, &states);
     let course = sphere::decode(&views, &shape);
     states = course.states(&views, &shape);
-    let energy = Energy::new(&views, &shape);
-    solve::whole(&energy, &mut states);
-    mirror::improve(&energy, &mut states);
-    solve::whole(&energy, &mut states);
+    for _ in 0..ROUNDS {
+        let energy = Energy::new(&views, &shape);
+        solve::whole(&energy, &mut states);
+        mirror::improve(&energy, &mut states);
+        solve::whole(&energy, &mut states);
+        shape = shape.learned(&views, &states);
+    }
     (0..seen.len())
         .map(|k| {
             let idx = k.checked_sub(views.first)?;

@@ -109,7 +109,7 @@ impl Shape {
 
     /// The shape that explains the moments best where the states are right: robust linear least squares.
     pub(super) fn learned(&self, views: &Views, states: &[State]) -> Shape {
-        let rows: Vec<([f64; 4], f64)> = views
+        let rows: Vec<([f64; 3], f64)> = views
             .frames
             .iter()
             .enumerate()
@@ -122,7 +122,7 @@ impl Shape {
         let near = |value: f64, first: f64| value.clamp(first / TRUST, first * TRUST);
         let along_m2 = near(found[0], self.along_m2);
         let down_m2 = near(found[1], self.down_m2);
-        let bend = found[3];
+        let bend = bend(views, states);
         let sway = median(
             (0..states.len())
                 .map(|k| (states[k].sway() - bend * turn_rate(views, states, k)).abs()),
@@ -172,17 +172,16 @@ impl Shape {
         })
     }
 
-    /// The three moments of one frame as rows of a linear system for (along, down, side, bend), in standard
-    /// deviations; the slant and the sway beside the bend are taken out.
+    /// The three moments of one frame as rows of a linear system for (along, down, side), in standard
+    /// deviations; the slant and the sway are taken out.
     fn rows(
         &self,
         views: &Views,
         states: &[State],
         k: usize,
         (view, outline): (&View, &Outline),
-    ) -> [([f64; 4], f64); 3] {
+    ) -> [([f64; 3], f64); 3] {
         let state = &states[k];
-        let rate = turn_rate(views, states, k);
         let seen = Axes::of(state.yaw(), state.pitch()).seen(view.slope, 1.0 / views.medium_index);
         let scale = (views.focal_px * libm::exp(-state.log_z())).powi(2);
         let noise = moment_noise(outline.covariance_px2);
@@ -193,8 +192,8 @@ impl Shape {
             let by = |m: usize| scale * form(&seen[i], &seen[j], &unit(m)) / noise[c];
             let pixel = if i == j { 1.0 / 12.0 } else { 0.0 };
             let rest = (outline.covariance_px2[c] - pixel) / noise[c];
-            let known = by(3) * self.slant_m2 + by(4) * (state.sway() - self.bend * rate);
-            ([by(0), by(1), by(2), by(4) * rate], rest - known)
+            let known = by(3) * self.slant_m2 + by(4) * state.sway();
+            ([by(0), by(1), by(2)], rest - known)
         })
     }
 }
@@ -226,6 +225,21 @@ fn slant<'a>(
     }))
 }
 
+/// How far the body sways for each radian a second of turning: least squares over the frames in which sway
+/// shows, the animal being seen between broadside and head-on.
+fn bend(views: &Views, states: &[State]) -> f64 {
+    let (mut product, mut square) = (0.0, 0.0);
+    for (k, state) in states.iter().enumerate() {
+        let shows = libm::sin(2.0 * state.yaw()).abs() > 0.6;
+        if shows && views.frames[k].outline.is_some() {
+            let rate = turn_rate(views, states, k);
+            product += rate * state.sway();
+            square += rate * rate;
+        }
+    }
+    if square > 0.0 { product / square } else { 0.0 }
+}
+
 /// Radians a second, limited to what bends the body.
 fn turn_rate(views: &Views, states: &[State], k: usize) -> f64 {
     let (a, b) = (k.saturating_sub(1), (k + 1).min(states.len() - 1));
@@ -234,10 +248,10 @@ fn turn_rate(views: &Views, states: &[State], k: usize) -> f64 {
 }
 
 /// Least squares with Huber weights beyond two standard deviations.
-fn robust_fit(rows: &[([f64; 4], f64)]) -> Option<[f64; 4]> {
-    let mut found = [0.0; 4];
+fn robust_fit(rows: &[([f64; 3], f64)]) -> Option<[f64; 3]> {
+    let mut found = [0.0; 3];
     for round in 0..5 {
-        let mut normal = [[0.0; 5]; 4];
+        let mut normal = [[0.0; 4]; 3];
         for (row, value) in rows {
             let error: f64 = row.iter().zip(&found).map(|(a, x)| a * x).sum::<f64>() - value;
             let weight = if round > 0 && error.abs() > 2.0 {
@@ -245,11 +259,11 @@ fn robust_fit(rows: &[([f64; 4], f64)]) -> Option<[f64; 4]> {
             } else {
                 1.0
             };
-            for i in 0..4 {
-                for j in 0..4 {
+            for i in 0..3 {
+                for j in 0..3 {
                     normal[i][j] += weight * row[i] * row[j];
                 }
-                normal[i][4] += weight * row[i] * value;
+                normal[i][3] += weight * row[i] * value;
             }
         }
         found = eliminate(normal)?;
@@ -257,31 +271,31 @@ fn robust_fit(rows: &[([f64; 4], f64)]) -> Option<[f64; 4]> {
     Some(found)
 }
 
-/// Solves four equations with their right side in the last column; `None` when they say too little.
-fn eliminate(mut a: [[f64; 5]; 4]) -> Option<[f64; 4]> {
-    let scale: [f64; 4] = std::array::from_fn(|k| a[k][k].sqrt().max(1e-300));
-    for i in 0..4 {
-        for j in 0..4 {
+/// Solves three equations with their right side in the last column; `None` when they say too little.
+fn eliminate(mut a: [[f64; 4]; 3]) -> Option<[f64; 3]> {
+    let scale: [f64; 3] = std::array::from_fn(|k| a[k][k].sqrt().max(1e-300));
+    for i in 0..3 {
+        for j in 0..3 {
             a[i][j] /= scale[i] * scale[j];
         }
-        a[i][4] /= scale[i];
+        a[i][3] /= scale[i];
     }
-    for k in 0..4 {
+    for k in 0..3 {
         // Symmetric and scaled: a small pivot means that an unknown is not determined.
         if a[k][k] < 1e-6 {
             return None;
         }
-        for i in k + 1..4 {
+        for i in k + 1..3 {
             let factor = a[i][k] / a[k][k];
-            for j in k..5 {
+            for j in k..4 {
                 a[i][j] -= factor * a[k][j];
             }
         }
     }
-    let mut x = [0.0; 4];
-    for k in (0..4).rev() {
-        let known: f64 = (k + 1..4).map(|j| a[k][j] * x[j]).sum();
-        x[k] = (a[k][4] - known) / a[k][k];
+    let mut x = [0.0; 3];
+    for k in (0..3).rev() {
+        let known: f64 = (k + 1..3).map(|j| a[k][j] * x[j]).sum();
+        x[k] = (a[k][3] - known) / a[k][k];
     }
     Some(std::array::from_fn(|k| x[k] / scale[k]))
 }
