@@ -22,6 +22,7 @@ pub mod tracking;
 // What it did.
 pub mod direction;
 pub mod midline;
+pub mod order;
 pub mod pose;
 
 // Which moments look alike.

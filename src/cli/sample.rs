@@ -8,7 +8,7 @@ use super::{Error, Listener, Summary};
 use crate::fish::sample::{SampleFilm, SampleParams};
 use crate::footage::FrameSource;
 use crate::formats::poses_json;
-use crate::media::{VideoFormat, VideoWriter};
+use crate::media::VideoWriter;
 use crate::progress::Progress;
 use crate::raster::Frame;
 
@@ -62,15 +62,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 fn write_video(film: &SampleFilm, args: &Args, listener: &Listener) -> Result<(), Error> {
-    let format = film.format();
-    let video = VideoFormat {
-        width: format.width,
-        height: format.height,
-        fps: format.fps,
-        color: format.color,
-    };
     let refused = |e: crate::media::Error| Error::work(e.code(), &e);
-    let mut writer = VideoWriter::create(&args.output, &video).map_err(refused)?;
+    let mut writer = VideoWriter::create(&args.output, &film.format().into()).map_err(refused)?;
     let mut stream = film.open().map_err(|e| Error::work(e.code, &e))?;
     let mut frame = Frame::default();
     for frame_idx in 0.. {

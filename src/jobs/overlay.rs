@@ -6,7 +6,7 @@ use super::Error;
 use crate::footage::FrameSource;
 use crate::formats::overlay::Overlay;
 use crate::library::Poses;
-use crate::media::{VideoFormat, VideoWriter};
+use crate::media::VideoWriter;
 use crate::progress::Progress;
 use crate::raster::Frame;
 
@@ -17,14 +17,7 @@ pub fn film(
     path: &Path,
     progress: &dyn Progress,
 ) -> Result<(), Error> {
-    let format = source.format();
-    let video = VideoFormat {
-        width: format.width,
-        height: format.height,
-        fps: format.fps,
-        color: format.color,
-    };
-    let mut writer = VideoWriter::create(path, &video)?;
+    let mut writer = VideoWriter::create(path, &source.format().into())?;
     let mut overlay = Overlay::new(poses);
     let mut stream = source.open()?;
     let mut frame = Frame::default();

@@ -11,7 +11,7 @@ use super::{Context, Error, analysis, flock};
 use crate::fish::sample::{SampleFilm, SampleParams};
 use crate::footage::FrameSource;
 use crate::ids::FootageId;
-use crate::media::{VideoFormat, VideoWriter};
+use crate::media::VideoWriter;
 use crate::raster::Frame;
 use crate::store::footage::{Added, VIDEO};
 use crate::store::{BlobFile, Draft};
@@ -64,16 +64,7 @@ fn film(draft: Draft, stopped: impl Fn() -> bool) -> Result<Arrival, Error> {
 }
 
 fn write(film: &SampleFilm, path: &Path, stopped: impl Fn() -> bool) -> Result<(), Error> {
-    let format = film.format();
-    let mut writer = VideoWriter::create(
-        path,
-        &VideoFormat {
-            width: format.width,
-            height: format.height,
-            fps: format.fps,
-            color: format.color,
-        },
-    )?;
+    let mut writer = VideoWriter::create(path, &film.format().into())?;
     let mut stream = film.open()?;
     let mut frame = Frame::default();
     while stream.next_frame(&mut frame)?.is_some() {

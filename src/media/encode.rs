@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use super::error::Error;
 use super::gate::{Child, Order, Tool};
 use super::limits::Limits;
+use crate::footage::FootageFormat;
 use crate::raster::{ColorSpec, Frame, Matrix, Range};
 
 /// What all frames of a video have in common.
@@ -24,6 +25,18 @@ pub struct VideoFormat {
     pub fps: f64,
     /// How the values of the frames are to be read; written into the file.
     pub color: ColorSpec,
+}
+
+/// The format in which a footage would be written again.
+impl From<FootageFormat> for VideoFormat {
+    fn from(footage: FootageFormat) -> VideoFormat {
+        VideoFormat {
+            width: footage.width,
+            height: footage.height,
+            fps: footage.fps,
+            color: footage.color,
+        }
+    }
 }
 
 /// How well to encode.

@@ -21,6 +21,7 @@ mod sphere;
 use crate::geometry::Camera;
 use crate::library::Animal;
 
+use super::order::percentile;
 use energy::{Energy, State};
 use shape::Shape;
 
@@ -59,11 +60,7 @@ pub fn usual_animal(seen: &[Option<Seen>]) -> Animal {
     let mut ratios: Vec<f64> = whole
         .map(|s| 4.0 * s.covariance_px2[0].max(0.0).sqrt() / s.upright_px)
         .collect();
-    let rank = ratios.len() * 9 / 10;
-    let length_m = match ratios.len() {
-        0 => 1.0,
-        _ => *ratios.select_nth_unstable_by(rank, f64::total_cmp).1,
-    };
+    let length_m = percentile(&mut ratios, 0.9).unwrap_or(1.0);
     Animal {
         length_m,
         height_m: 1.0,
@@ -73,6 +70,8 @@ pub fn usual_animal(seen: &[Option<Seen>]) -> Animal {
 /// The direction of one frame, and what belongs to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
+    /// Where the centroid is in the picture; between its neighbors in a gap.
+    pub centroid_px: [f64; 2],
     /// Apparent depth (before refraction is taken out), metres.
     pub z_apparent_m: f64,
     /// The unit vector in which the head points: x right, y down, z away.
@@ -110,12 +109,14 @@ pub fn estimate(
     shape = shape.learned(&views, &states);
     let course = sphere::decode(&views, &shape);
     states = course.states(&views, &shape);
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
+        if round > 0 {
+            shape = shape.learned(&views, &states);
+        }
         let energy = Energy::new(&views, &shape);
         solve::whole(&energy, &mut states);
         mirror::improve(&energy, &mut states);
         solve::whole(&energy, &mut states);
-        shape = shape.learned(&views, &states);
     }
     (0..seen.len())
         .map(|k| {
@@ -123,7 +124,9 @@ pub fn estimate(
             let state = states.get(idx).filter(|_| views.bridged[idx])?;
             let forward = body::Axes::of(state.yaw(), state.pitch()).forward;
             let [head, depth] = course.confidence(idx, forward);
+            let slope = views.frames[idx].slope;
             Some(Direction {
+                centroid_px: [0, 1].map(|c| camera.center_px[c] + slope[c] * views.focal_px),
                 z_apparent_m: libm::exp(state.log_z()),
                 forward,
                 head_confidence: head,

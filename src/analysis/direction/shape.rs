@@ -2,12 +2,13 @@
 //! the footage.
 //!
 //! The silhouette of an ellipsoid under parallel projection is an ellipse whose second moments are
-//! the projected moments of the body. Fish are near enough to it: on generated films the moments are met
-//! within 3 to 6 percent at any direction once the sway of the tail is an unknown of its own.
+//! the projected moments of the body. Fish are near enough to it once the sway of the tail is an unknown
+//! of its own.
 
 use super::body::{Axes, form};
 use super::energy::{BEND_RATE, State, moment_noise};
 use super::{Outline, View, Views};
+use crate::analysis::order::{median, percentile};
 use crate::library::Animal;
 
 /// The body's constants, metres.
@@ -45,7 +46,7 @@ const LEAST_SWAY: f64 = 0.1;
 const FIRST_UPRIGHT_NOISE: f64 = 0.03;
 /// Residuals are smaller than the noise, for the states follow it.
 const FOLLOWED: f64 = 1.2;
-/// The learned moments stay within this factor of the first guess.
+/// Learning changes a moment by at most this factor at a time.
 const TRUST: f64 = 1.25;
 
 impl Shape {
@@ -119,7 +120,7 @@ impl Shape {
         let Some(found) = robust_fit(&rows) else {
             return *self;
         };
-        let near = |value: f64, first: f64| value.clamp(first / TRUST, first * TRUST);
+        let near = |value: f64, before: f64| value.clamp(before / TRUST, before * TRUST);
         let along_m2 = near(found[0], self.along_m2);
         let down_m2 = near(found[1], self.down_m2);
         let bend = bend(views, states);
@@ -298,13 +299,4 @@ fn eliminate(mut a: [[f64; 4]; 3]) -> Option<[f64; 3]> {
         x[k] = (a[k][3] - known) / a[k][k];
     }
     Some(std::array::from_fn(|k| x[k] / scale[k]))
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    percentile(&mut values.collect::<Vec<f64>>(), 0.5)
-}
-
-fn percentile(values: &mut [f64], share: f64) -> Option<f64> {
-    let rank = (share * values.len().saturating_sub(1) as f64).round() as usize;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
 }

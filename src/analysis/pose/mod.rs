@@ -6,6 +6,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 pub mod depth;
 pub mod heading;
 pub mod smooth;
+mod view;
 
 use super::Params;
 use super::direction::{self, Seen};
@@ -42,7 +43,7 @@ impl Axes {
 
 /// The poses of a track.
 pub fn measure(track: &[Tracked], format: &FootageFormat, params: &Params) -> Poses {
-    let view = params.view().unwrap_or_else(|| guess_view(track));
+    let view = params.view().unwrap_or_else(|| view::guess(track));
     let axes = length_axes(track, view, params.axis_and_head);
     let motion = Motion::of(track, format.fps);
     let reference_px = reference_length_px(&axes);
@@ -129,16 +130,15 @@ fn best_estimate(poses: &mut Poses, track: &[Tracked], params: &Params) {
     });
     let directions = direction::estimate(&seen, &camera, &animal, poses.fps);
     for (pose, direction) in poses.frames.iter_mut().zip(directions) {
-        let (Some(direction), Some(centroid)) = (direction, pose.centroid_px) else {
-            continue;
-        };
+        let Some(direction) = direction else { continue };
         pose.head_confidence = Some(direction.head_confidence);
         if known.is_none() {
             let [x, y, _] = direction.forward;
             pose.heading_rad = Some(libm::atan2(y, x));
             continue;
         }
-        pose.position_m = Some(camera.point_in_camera(centroid, direction.z_apparent_m));
+        let (centroid, depth) = (direction.centroid_px, direction.z_apparent_m);
+        pose.position_m = Some(camera.point_in_camera(centroid, depth));
         pose.depth_sign_confidence = Some(direction.depth_sign_confidence);
         point_along(pose, direction.forward);
     }
@@ -281,28 +281,6 @@ fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
     }
 }
 
-/// How far the middle two thirds of values spread about their median, as a share of it.
-fn variation(mut values: Vec<f64>) -> f64 {
-    let at = |values: &mut [f64], sixth: usize| {
-        let rank = (values.len() * sixth / 6).min(values.len().saturating_sub(1));
-        *values.select_nth_unstable_by(rank, f64::total_cmp).1
-    };
-    if values.is_empty() {
-        return 0.0;
-    }
-    let [low, middle, high] = [1, 3, 5].map(|sixth| at(&mut values, sixth));
-    (high - low) / (2.0 * middle.max(1e-9))
-}
-
-/// The upper median; 0 of nothing.
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
 /// An axis's angle folded into (-pi/2, pi/2].
 fn half_circle(angle_rad: f64) -> f64 {
     let folded = wrap_rad(2.0 * angle_rad) / 2.0;
@@ -310,56 +288,5 @@ fn half_circle(angle_rad: f64) -> f64 {
         FRAC_PI_2
     } else {
         folded
-    }
-}
-
-/// From the side an animal has a back and a belly (the skew across its length keeps its sign), and stays
-/// as tall when it turns. From above it has a left and a right, bends, and lies at any angle. Measured on
-/// films and recordings: skew from the side 0.09 to 0.6 beside half its spread, from above below 0.05;
-/// height varies a quarter as much as length in fish from the side, as much or more from above.
-fn guess_view(track: &[Tracked]) -> View {
-    const LEVEL: f64 = PI / 3.0;
-    let sightings: Vec<&Sighting> = track.iter().filter_map(|t| t.sighting.as_ref()).collect();
-    let mut lengths: Vec<f64> = sightings.iter().map(|s| s.extent_px[0]).collect();
-    if lengths.is_empty() {
-        return View::Side;
-    }
-    let rank = lengths.len() * 9 / 10;
-    let long = 0.7 * *lengths.select_nth_unstable_by(rank, f64::total_cmp).1;
-    let at_length = sightings.iter().filter(|s| s.extent_px[0] >= long);
-    let seen: Vec<(f64, f64)> = at_length
-        .filter_map(|s| Some((s.moments.major_rad?, s.moments.skew[1])))
-        .collect();
-    let steep = seen
-        .iter()
-        .filter(|(axis, _)| axis.abs() > FRAC_PI_4)
-        .count();
-    let steep_share = steep as f64 / seen.len().max(1) as f64;
-    let across: Vec<f64> = seen
-        .iter()
-        .filter(|(axis, _)| axis.abs() < LEVEL)
-        .map(|(_, skew)| *skew)
-        .collect();
-    // Medians: silhouettes that went wrong in a tenth of the frames must not show a back.
-    let usual = median(across.clone());
-    let spread = 1.4826 * median(across.iter().map(|skew| (skew - usual).abs()).collect());
-    let has_back_and_belly = usual.abs() >= (0.5 * spread).max(0.2);
-    // Turning toward the camera shortens it and leaves it as tall.
-    let sizes = |c: usize| {
-        sightings
-            .iter()
-            .map(move |s| s.moments.covariance_px2[c].sqrt())
-    };
-    let stands_upright = variation(sizes(2).collect()) < 0.5 * variation(sizes(0).collect());
-    let square = across
-        .iter()
-        .map(|skew| (skew - usual).powi(2))
-        .sum::<f64>();
-    let deviation = (square / across.len().max(1) as f64).sqrt();
-    let bends_or_turns = deviation > 0.12 || steep_share > 0.15;
-    if !has_back_and_belly && !stands_upright && bends_or_turns {
-        View::Top
-    } else {
-        View::Side
     }
 }

@@ -4,7 +4,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use flockreel::footage::FrameSource;
-use flockreel::media::{Limits, Video, VideoFormat, VideoWriter};
+use flockreel::media::{Limits, Video, VideoWriter};
 use flockreel::raster::Frame;
 
 use crate::common::film::Films;
@@ -38,14 +38,8 @@ fn reading_and_writing_against_plain_ffmpeg() {
 }
 
 fn write(films: &Films, video: &Video) {
-    let format = video.format();
-    let format = VideoFormat {
-        width: format.width,
-        height: format.height,
-        fps: format.fps,
-        color: format.color,
-    };
-    let mut writer = VideoWriter::create(&films.path("out.mp4"), &format).expect("an encoder");
+    let mut writer =
+        VideoWriter::create(&films.path("out.mp4"), &video.format().into()).expect("an encoder");
     let mut stream = FrameSource::open(video).expect("a decoder");
     let mut frame = Frame::default();
     for _ in 0..400 {

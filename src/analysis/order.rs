@@ -1,0 +1,25 @@
+//! Order statistics: what a tenth of wrong values cannot move.
+
+/// The value below which a share (0..=1) of the values lies: the nearest rank; `None` of nothing.
+pub fn percentile(values: &mut [f64], share: f64) -> Option<f64> {
+    let rank = (share * values.len().saturating_sub(1) as f64).round() as usize;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
+}
+
+/// The middle value; `None` of nothing.
+pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    percentile(&mut values.collect::<Vec<f64>>(), 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_are_counted_from_the_least_to_the_most() {
+        let mut values = [3.0, 1.0, 2.0, 5.0, 4.0];
+        let at = [0.0, 0.25, 0.5, 1.0].map(|share| percentile(&mut values, share));
+        assert_eq!(at, [Some(1.0), Some(2.0), Some(3.0), Some(5.0)]);
+        assert_eq!(median(std::iter::empty()), None);
+    }
+}
