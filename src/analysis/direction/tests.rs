@@ -169,3 +169,46 @@ fn too_little_is_no_direction() {
             .all(Option::is_none)
     );
 }
+
+/// Makes the yaw continuous.
+fn unwrapped(states: &mut [State]) {
+    for k in 1..states.len() {
+        let last = states[k - 1].yaw();
+        states[k].0[1] = last + crate::geometry::wrap_rad(states[k].yaw() - last);
+    }
+}
+
+#[test]
+fn a_turn_taken_for_its_mirror_image_is_set_right() {
+    let (truth, seen) = wandering(800, &CAMERA);
+    let views = Views::of(&seen, &CAMERA, 30.0).expect("seen");
+    let shape = Shape::first(&views, &ANIMAL).expect("seen");
+    let energy = Energy::new(&views, &shape);
+    let mut right = sphere::decode(&views, &shape).states(&views, &shape);
+    for (state, truth) in right.iter_mut().zip(&truth) {
+        state.0[1] = libm::atan2(truth.forward[2], truth.forward[0]);
+        state.0[2] = libm::asin(truth.forward[1]);
+    }
+    unwrapped(&mut right);
+    solve::whole(&energy, &mut right);
+    let away = |state: &State| libm::sin(state.yaw()) > 0.0;
+    let ends: Vec<usize> = (1..800)
+        .filter(|&k| away(&right[k]) != away(&right[k - 1]))
+        .collect();
+    let turns = ends.windows(2).map(|pair| pair[0]..pair[1]);
+    let stretch = turns
+        .min_by_key(|turn| turn.len().abs_diff(60))
+        .expect("it turns");
+    let mut wrong = right.clone();
+    for state in &mut wrong[stretch.clone()] {
+        state.0[1] = -state.yaw();
+    }
+    unwrapped(&mut wrong);
+    solve::whole(&energy, &mut wrong);
+    let middle = stretch.start.midpoint(stretch.end);
+    assert_ne!(away(&wrong[middle]), away(&right[middle]), "still mirrored");
+    mirror::improve(&energy, &mut wrong);
+    assert_eq!(away(&wrong[middle]), away(&right[middle]));
+    solve::whole(&energy, &mut wrong);
+    assert!(energy.cost(0, &wrong) < 1.01 * energy.cost(0, &right));
+}
