@@ -9,6 +9,7 @@
 )]
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use flockreel::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
@@ -17,6 +18,7 @@ use flockreel::cpu::Level;
 use flockreel::formats::npy;
 use flockreel::library::{Pose, Poses, Sprites, View};
 use flockreel::progress::Silent;
+use flockreel::scratch::{Full, InMemory};
 
 fn main() {
     let arguments: Vec<String> = std::env::args()
@@ -31,7 +33,7 @@ fn main() {
     let clip_frames = clip_frames.parse().expect("a number of frames");
     let (sprites, poses) = read(Path::new(path), size);
     let start = Instant::now();
-    let pixels = ComparedSprites::new(&sprites, &poses, Planes::Rgba);
+    let pixels = ComparedSprites::new(&sprites, &poses, Planes::Rgba).expect("memory has room");
     let prepare_s = start.elapsed().as_secs_f64();
     let n_threads = rayon::current_num_threads();
     let one = time(&pixels, clip_frames, 1);
@@ -57,10 +59,12 @@ fn read(path: &Path, [width, height]: [u32; 2]) -> (Sprites, Poses) {
     let bytes = std::fs::read(path).expect("the sprites");
     let n_bytes = (width * height * 4) as usize;
     let n_frames = bytes.len() / n_bytes;
-    let mut sprites = Sprites::missing(width, height, n_frames);
-    for (frame_idx, sprite) in bytes.chunks_exact(n_bytes).enumerate() {
-        sprites.fill(frame_idx).copy_from_slice(sprite);
-    }
+    let scratch = Arc::new(InMemory::default());
+    let sprites = Sprites::drawn([width, height], n_frames, scratch, |frame_idx, rgba| {
+        rgba.copy_from_slice(&bytes[frame_idx * n_bytes..][..n_bytes]);
+        Ok::<_, Full>(true)
+    });
+    let sprites = sprites.expect("memory has room");
     let poses = Poses {
         tail_beat: None,
         fps: 30.0,

@@ -9,10 +9,11 @@ pub mod cpu; // which vector instructions to use
 pub mod footage; // what the algorithms ask of a video
 pub mod geometry; // angles, rectangles, the pinhole camera
 pub mod ids; // identifiers of stored things
-pub mod library;
+pub mod library; // the value in the middle: poses, sprites, transitions, patches
 pub mod progress; // how far a computation is, and whether to go on
 pub mod random; // counter-based random numbers
-pub mod raster; // frames, images, masks, components, resampling, blending // the value in the middle: poses, sprites, transitions, patches
+pub mod raster; // frames, images, masks, components, resampling, blending
+pub mod scratch; // bytes put aside
 
 // Ring 2, algorithms: one folder per job, command and API noun.
 pub mod analysis; // footage -> library

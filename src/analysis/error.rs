@@ -2,6 +2,7 @@
 
 use crate::code::Code;
 use crate::footage::SourceError;
+use crate::scratch::Full;
 
 /// The reasons, one variant each (ALGORITHMS.md 2.9).
 #[derive(Debug, thiserror::Error)]
@@ -34,6 +35,9 @@ pub enum Error {
     /// Two components of comparable area, each persistent.
     #[error("more than one animal moves in the footage: film one alone, or set follow to largest")]
     SeveralAnimals,
+    /// The animal's pictures found no room.
+    #[error(transparent)]
+    Full(#[from] Full),
     /// Somebody cancelled.
     #[error("the analysis was cancelled")]
     Cancelled,
@@ -49,6 +53,7 @@ impl Error {
             Error::NothingMoves => Code::NothingMoves,
             Error::BackgroundNotStatic => Code::BackgroundNotStatic,
             Error::SeveralAnimals => Code::SeveralAnimals,
+            Error::Full(error) => error.code(),
             Error::Cancelled => Code::Cancelled,
         }
     }

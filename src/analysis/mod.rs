@@ -16,6 +16,7 @@ pub mod silhouette;
 pub mod matte;
 pub mod moments;
 pub mod read_ahead;
+pub mod sighting;
 pub mod sprite;
 pub mod tracking;
 
@@ -35,11 +36,14 @@ pub use error::Error;
 use params::CutSprites;
 pub use params::Params;
 
+use std::sync::Arc;
+
 use crate::cpu;
 use crate::footage::FrameSource;
 use crate::library::{Library, LibraryStats};
 use crate::progress::Progress;
 use crate::raster::RgbImage;
+use crate::scratch::Scratch;
 
 /// Fewer frames than these are no footage of an animal that moves.
 pub const LEAST_FRAMES: usize = 16;
@@ -47,7 +51,8 @@ pub const LEAST_FRAMES: usize = 16;
 /// Analyses a footage: the scene without the animal, the animal's pose in every frame, its sprites,
 /// and which of its moments may follow which.
 ///
-/// `background` is a picture of the empty scene, if there is one. The same footage and parameters
+/// `background` is a picture of the empty scene, if there is one; the animal's pictures are put aside in
+/// `scratch`, where the library finds them. The same footage and parameters
 /// give the same library on any machine and any number of threads.
 ///
 /// Fails with a reason of ALGORITHMS.md 2.9 when the footage cannot become a library, and with
@@ -57,21 +62,22 @@ pub fn analyze(
     background: Option<&RgbImage>,
     params: &Params,
     cpu: cpu::Level,
+    scratch: &Arc<dyn Scratch>,
     progress: &dyn Progress,
 ) -> Result<Library, Error> {
     let n_frames = source.format().n_frames_hint;
     let (plate, track) = read_ahead::while_reading(source, |batches| {
         let plate = background::estimate(source, background, params, progress)?;
-        let track = tracking::follow(batches, n_frames, &plate, params, progress)?;
+        let track = tracking::follow(batches, n_frames, &plate, params, scratch, progress)?;
         Ok::<_, Error>((plate, track))
     })?;
-    let mut poses = pose::measure(&track, &source.format(), params);
+    let mut poses = pose::measure(&track.frames, &source.format(), params);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
     let animal_too_small = params.sprites == CutSprites::Auto && stats::is_too_small(&poses);
     let sprites = match animal_too_small {
-        true => sprite::none(track.len()),
-        false => sprite::align(&track, poses.view),
+        true => sprite::none(track.frames.len()),
+        false => sprite::align(&track, poses.view)?,
     };
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;

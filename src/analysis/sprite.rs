@@ -1,10 +1,12 @@
 //! Mattes made into sprites: one size, the centroid at the middle (O 3.1; ALGORITHMS.md 5).
 
-use rayon::prelude::*;
+use std::sync::Arc;
 
-use super::tracking::{Sighting, Tracked};
+use super::sighting::Sighting;
+use super::tracking::{Track, Tracked};
 use crate::library::{Sprites, View};
 use crate::raster::RgbaImage;
+use crate::scratch::Full;
 
 /// Room around the largest silhouette.
 const MARGIN_PX: f64 = 4.0;
@@ -15,20 +17,17 @@ const MULTIPLE: u32 = 8;
 /// which the animal is not cut off; from above it is a square that holds the animal at any turn.
 ///
 /// The centroid's sub-pixel rest is resampled bilinearly in premultiplied alpha.
-pub fn align(track: &[Tracked], view: View) -> Sprites {
-    let [width, height] = common_size(track, view);
-    let mut sprites = Sprites::missing(width, height, track.len());
-    let present = track.iter().map(|t| t.sighting.is_some()).collect();
-    sprites
-        .fill_all(present)
-        .zip(track)
-        .par_bridge()
-        .for_each(|(sprite, tracked)| {
-            if let Some(sighting) = &tracked.sighting {
-                draw(sprite, [width, height], sighting);
-            }
-        });
-    sprites
+pub fn align(track: &Track, view: View) -> Result<Sprites, Full> {
+    let size = common_size(&track.frames, view);
+    let n_frames = track.frames.len();
+    let scratch = Arc::clone(&track.scratch);
+    Sprites::drawn(size, n_frames, scratch, |frame_idx, sprite| {
+        let sighting = track.frames[frame_idx].sighting.as_ref();
+        if let Some(sighting) = sighting {
+            draw(sprite, size, sighting, &track.image(sighting));
+        }
+        Ok(sighting.is_some())
+    })
 }
 
 /// The sprites of an animal that none are cut of: all missing.
@@ -39,13 +38,15 @@ pub fn none(n_frames: usize) -> Sprites {
 fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
     let all = || track.iter().filter_map(|t| t.sighting.as_ref());
     let reach = |sightings: &mut dyn Iterator<Item = &Sighting>| {
-        sightings.map(reach_px).fold([0.0f64; 3], |most, reach| {
-            [
-                most[0].max(reach[0]),
-                most[1].max(reach[1]),
-                most[2].max(reach[2]),
-            ]
-        })
+        sightings
+            .map(|s| s.reach_px)
+            .fold([0.0f64; 3], |most, reach| {
+                [
+                    most[0].max(reach[0]),
+                    most[1].max(reach[1]),
+                    most[2].max(reach[2]),
+                ]
+            })
     };
     let whole = reach(&mut all().filter(|s| !s.cut));
     // An animal that is never seen whole has sprites all the same.
@@ -61,43 +62,9 @@ fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
     }
 }
 
-/// How far the alpha reaches from the centroid: horizontally, vertically, in any direction.
-fn reach_px(sighting: &Sighting) -> [f64; 3] {
-    let rect = sighting.matte.rect;
-    let [cx, cy] = sighting.moments.centroid_px;
-    let mut most = [0.0f64; 3];
-    let columns = rect.w.max(1) as usize;
-    let rows = sighting
-        .matte
-        .image
-        .pixels
-        .as_chunks::<4>()
-        .0
-        .chunks_exact(columns);
-    let inside = |rgba: &[u8; 4]| rgba[3] > 0;
-    for (row, y) in rows.zip(rect.y..) {
-        // The ends of a row lie farthest from any centroid.
-        let ends = row
-            .iter()
-            .position(inside)
-            .into_iter()
-            .chain(row.iter().rposition(inside));
-        for column in ends {
-            let dx = (f64::from(rect.x + column as u32) + 0.5 - cx).abs() + 0.5;
-            let dy = (f64::from(y) + 0.5 - cy).abs() + 0.5;
-            most = [
-                most[0].max(dx),
-                most[1].max(dy),
-                most[2].max(libm::hypot(dx, dy)),
-            ];
-        }
-    }
-    most
-}
-
 /// Draws a matte into a sprite, its centroid at the middle.
-fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting) {
-    let (rect, image) = (sighting.matte.rect, &sighting.matte.image);
+fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting, image: &RgbaImage) {
+    let rect = sighting.rect;
     let [cx, cy] = sighting.moments.centroid_px;
     // Sprite column c shows the matte at column c + left, whole and fractional part.
     let left = cx - f64::from(width) / 2.0 - f64::from(rect.x);

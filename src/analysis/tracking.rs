@@ -10,20 +10,22 @@
 //! same, so is all that follows; and when nothing there fits, both look everywhere in that same frame,
 //! which makes a search of the whole frame every so often needless.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::background::Plate;
 use super::light::{self, Gain};
-use super::matte::{self, Matte};
-use super::moments::{self, Moments};
 use super::params::Search;
 use super::read_ahead::Batches;
+use super::sighting::{Choice, Scene, Sighting};
 use super::silhouette::{self, parting};
 use super::{Error, LEAST_FRAMES, Params};
 use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
-use crate::raster::{Frame, Mask};
+use crate::raster::{Frame, RgbaImage};
+use crate::scratch::{Full, Scratch};
 
 /// Components smaller than this are noise.
 const LEAST_AREA_PX: u64 = 12;
@@ -34,23 +36,6 @@ const MERGED: f64 = 1.2;
 /// ... if the usual area is known from this many silhouettes.
 const LEAST_AREAS: usize = 8;
 
-/// What was seen of the animal in one frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Sighting {
-    /// The animal cut out.
-    pub matte: Matte,
-    /// Its moments, weighed by alpha.
-    pub moments: Moments,
-    /// Extents along the major axis and across it, of the pixels that are more animal than background.
-    pub extent_px: [f64; 2],
-    /// Extent of the same pixels from the topmost to the lowest.
-    pub upright_px: f64,
-    /// Bounding box of the silhouette.
-    pub box_px: Rect,
-    /// The silhouette touches the border of the frame.
-    pub cut: bool,
-}
-
 /// One frame of the track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracked {
@@ -60,10 +45,22 @@ pub struct Tracked {
     pub sighting: Option<Sighting>,
 }
 
-/// The component taken for the animal in one frame, and its mended form.
-struct Choice {
-    component: Component,
-    silhouette: Mask,
+/// All frames of a footage, and where what was cut out of them lies.
+#[derive(Debug)]
+pub struct Track {
+    /// In order.
+    pub frames: Vec<Tracked>,
+    /// Holds the pixels of the animal.
+    pub scratch: Arc<dyn Scratch>,
+}
+
+impl Track {
+    /// The animal cut out: straight alpha, of the size of the sighting's `rect`.
+    pub fn image(&self, sighting: &Sighting) -> RgbaImage {
+        let mut image = RgbaImage::new(sighting.rect.w, sighting.rect.h);
+        self.scratch.get(sighting.at, &mut image.pixels);
+        image
+    }
 }
 
 /// Follows the animal through the footage: one entry a frame.
@@ -75,10 +72,11 @@ pub fn follow(
     n_frames_hint: usize,
     plate: &Plate,
     params: &Params,
+    scratch: &Arc<dyn Scratch>,
     progress: &dyn Progress,
-) -> Result<Vec<Tracked>, Error> {
+) -> Result<Track, Error> {
     let mut tracker = Tracker::new(plate, params);
-    let mut track = Vec::with_capacity(n_frames_hint);
+    let mut frames = Vec::with_capacity(n_frames_hint);
     while let Some(batch) = batches.next_batch()? {
         let gains: Vec<Gain> = batch
             .par_iter()
@@ -90,26 +88,35 @@ pub fn follow(
             .map(|((_, frame), gain)| tracker.step(frame, gain))
             .collect();
         let looks = batch.par_iter().zip(&gains).zip(choices);
-        track.par_extend(looks.map(|(((time_s, frame), gain), choice)| Tracked {
-            time_s: *time_s,
-            sighting: choice.and_then(|choice| see(frame, plate, gain, &choice)),
-        }));
+        let seen: Vec<Tracked> = looks
+            .map(|(((time_s, frame), gain), choice)| {
+                let (time_s, view) = (*time_s, Scene { frame, plate, gain });
+                let sighting = choice.map(|choice| view.look(&choice, &**scratch));
+                let sighting = sighting.transpose()?.flatten();
+                Ok(Tracked { time_s, sighting })
+            })
+            .collect::<Result<_, Full>>()?;
+        frames.extend(seen);
         batches.give_back(batch);
-        progress.report("tracking", track.len() as f64 / n_frames_hint.max(1) as f64);
+        progress.report(
+            "tracking",
+            frames.len() as f64 / n_frames_hint.max(1) as f64,
+        );
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
     }
-    if track.len() < LEAST_FRAMES {
+    if frames.len() < LEAST_FRAMES {
         return Err(Error::TooFewFrames {
-            n_frames: track.len(),
+            n_frames: frames.len(),
             least: LEAST_FRAMES,
         });
     }
-    if track.iter().all(|t| t.sighting.is_none()) {
+    if frames.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);
     }
-    Ok(track)
+    let scratch = Arc::clone(scratch);
+    Ok(Track { frames, scratch })
 }
 
 struct Tracker<'a> {
@@ -298,47 +305,5 @@ impl<'a> Tracker<'a> {
             self.areas.remove(0);
         }
         self.areas.push(component.area as f64);
-    }
-}
-
-/// Cuts the animal out and measures it.
-fn see(frame: &Frame, plate: &Plate, gain: &Gain, choice: &Choice) -> Option<Sighting> {
-    let rect = choice.component.rect;
-    let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
-    let matte = matte::pull(frame, plate, gain, &choice.silhouette, length_px);
-    let pixels = matte.image.pixels.as_chunks::<4>().0;
-    let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
-    let moments = moments::moments(matte.rect, &weights)?;
-    let axis = moments.major_rad.unwrap_or(0.0);
-    let solid = solid(&matte);
-    let across = axis + std::f64::consts::FRAC_PI_2;
-    let extent_px = [
-        moments::extent_px(&solid, axis),
-        moments::extent_px(&solid, across),
-    ];
-    let cut =
-        rect.x == 0 || rect.y == 0 || rect.right() == frame.width || rect.bottom() == frame.height;
-    Some(Sighting {
-        matte,
-        moments,
-        extent_px,
-        upright_px: moments::extent_px(&solid, std::f64::consts::FRAC_PI_2),
-        box_px: rect,
-        cut,
-    })
-}
-
-/// The pixels that are more animal than background. The silhouette itself is wider: its threshold is
-/// low, so that no fin is lost.
-fn solid(matte: &Matte) -> Mask {
-    let bits = matte
-        .image
-        .pixels
-        .chunks_exact(4)
-        .map(|rgba| u8::from(rgba[3] >= 128))
-        .collect();
-    Mask {
-        rect: matte.rect,
-        bits,
     }
 }

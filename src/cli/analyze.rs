@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
@@ -15,6 +16,8 @@ use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::overlay;
 use crate::library::Library;
 use crate::media::{Limits, Video, read_image};
+use crate::scratch::Scratch;
+use crate::store::Spill;
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
@@ -72,7 +75,11 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let background = background.transpose().map_err(media)?;
     let progress = Listener::new();
     let level = cpu::Level::detect();
-    let library = analysis::analyze(&video, background.as_ref(), &params, level, &progress)
+    std::fs::create_dir_all(&args.output)
+        .map_err(Error::io(format!("cannot make {}", args.output.display())))?;
+    let scratch: Arc<dyn Scratch> = Arc::new(Spill::into(&args.output));
+    let background = background.as_ref();
+    let library = analysis::analyze(&video, background, &params, level, &scratch, &progress)
         .map_err(|error| Error::work(error.code(), &error))?;
     let footage = footage_summary(&args.video)?;
     library_dir::write(&args.output, &library, &params, &footage)

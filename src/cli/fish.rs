@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{Error, Listener, Summary};
 use crate::fish::{self, Film, Motion, Palette, Params, side_by_side};
-use crate::formats::{glb, library_dir};
+use crate::formats::glb;
 use crate::library::Library;
 use crate::media::{VideoFormat, VideoWriter};
 use crate::progress::Progress;
@@ -36,8 +36,7 @@ pub struct Args {
 /// Makes the virtual fish.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
-    let stored = library_dir::read(&args.library)
-        .map_err(|e| Error::Usage(format!("{}: {e}", args.library.display())))?;
+    let stored = super::read_library(&args.library, &args.output)?;
     let motion =
         fish::drive(&stored.library.poses, &params).map_err(|e| Error::work(e.code(), &e))?;
     let n_visible = motion.frames.iter().filter(|p| p.visible).count();

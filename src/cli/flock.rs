@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Error, Listener, Summary};
 use crate::flock::{Compositor, Flock, Params, plan_flock};
-use crate::formats::{flock_json, library_dir, params};
+use crate::formats::{flock_json, params};
 use crate::library::Library;
 use crate::media::{self, VideoFormat, VideoWriter};
 use crate::progress::Progress;
@@ -44,14 +44,7 @@ pub struct Args {
 /// Plans and films a flock.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = args.params()?;
-    let library = library_dir::read(&args.library)
-        .map_err(|cause| {
-            Error::Usage(format!(
-                "not a library: {}: {cause}",
-                args.library.display()
-            ))
-        })?
-        .library;
+    let library = super::read_library(&args.library, &args.output)?.library;
     let progress = Listener::new();
     let flock = plan_flock(&library, &params, &progress)
         .map_err(|error| Error::work(error.code(), &error))?;

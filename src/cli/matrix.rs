@@ -9,7 +9,7 @@ use super::{Error, Listener, Summary};
 use crate::analysis::distance::{Cancelled, ComparedSprites, DistanceMatrix, Distances, Side};
 use crate::code::Code;
 use crate::cpu::Level;
-use crate::formats::{distance_map, library_dir, npy};
+use crate::formats::{distance_map, npy};
 
 /// Arguments of `matrix`.
 #[derive(Debug, clap::Args)]
@@ -28,10 +28,10 @@ pub struct Args {
 /// Writes the distance matrix.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let format = Format::of(&args.output)?;
-    let stored = library_dir::read(&args.library)
-        .map_err(|error| Error::Usage(format!("{}: {error}", args.library.display())))?;
+    let stored = super::read_library(&args.library, &args.output)?;
     let library = stored.library;
-    let pixels = ComparedSprites::new(&library.sprites, &library.poses, stored.params.planes);
+    let pixels = ComparedSprites::new(&library.sprites, &library.poses, stored.params.planes)
+        .map_err(|error| Error::work(error.code(), &error))?;
     let distances = Distances {
         pixels: &pixels,
         clip_frames: library.clip_frames,

@@ -14,7 +14,9 @@ pub mod serve;
 pub mod sprites;
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use serde_json::Value;
@@ -22,6 +24,9 @@ use tracing_subscriber::EnvFilter;
 
 pub use error::Error;
 pub use progress::Listener;
+
+use crate::formats::library_dir::{self, StoredLibrary};
+use crate::store::Spill;
 
 /// flockreel: film one animal, get a flock of it.
 #[derive(Debug, Parser)]
@@ -83,6 +88,17 @@ fn run(command: Command) -> Result<Option<Summary>, Error> {
         Command::Sprites(args) => sprites::run(args),
         Command::Sample(args) => sample::run(args),
     }
+}
+
+/// Reads a library for a command whose output goes to `output`, beside which there is room for what memory
+/// should not hold.
+fn read_library(folder: &Path, output: &Path) -> Result<StoredLibrary, Error> {
+    let beside = match output.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    library_dir::read(folder, Arc::new(Spill::into(beside)))
+        .map_err(|error| Error::Usage(format!("not a library: {}: {error}", folder.display())))
 }
 
 /// Logs go to stderr: everything worth knowing of a service, only warnings of the other commands.

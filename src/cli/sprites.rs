@@ -20,12 +20,7 @@ pub struct Args {
 
 /// Writes the sprites.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
-    let stored = library_dir::read(&args.library).map_err(|error| {
-        Error::Usage(format!(
-            "cannot read the library {}: {error}",
-            args.library.display()
-        ))
-    })?;
+    let stored = super::read_library(&args.library, &args.output)?;
     let sprites = &stored.library.sprites;
     let folder = &args.output;
     std::fs::create_dir_all(folder)
@@ -35,7 +30,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .collect();
     present.par_iter().try_for_each(|&idx| {
         let path = folder.join(library_dir::sprite_name(idx));
-        let bytes = picture::write_rgba(sprites.width(), sprites.height(), sprites.sprite(idx));
+        let bytes = picture::write_rgba(sprites.width(), sprites.height(), &sprites.sprite(idx));
         std::fs::write(&path, bytes).map_err(Error::io(format!("cannot write {}", path.display())))
     })?;
     Ok(Some(Summary(json!({

@@ -45,9 +45,8 @@ fn real_frame(library: &Library, frame_idx: usize) -> RgbImage {
     };
     let left = (cx - f64::from(sprites.width()) / 2.0).round() as i64;
     let top = (cy - f64::from(sprites.height()) / 2.0).round() as i64;
-    let rows = sprites
-        .sprite(frame_idx)
-        .chunks_exact(sprites.width().max(1) as usize * 4);
+    let sprite = sprites.sprite(frame_idx);
+    let rows = sprite.chunks_exact(sprites.width().max(1) as usize * 4);
     for (y, row) in (top..).zip(rows) {
         for (x, rgba) in (left..).zip(row.chunks_exact(4)) {
             let inside = (0..i64::from(image.width)).contains(&x)

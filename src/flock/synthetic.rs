@@ -2,6 +2,7 @@
 //! known without looking at pixels.
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use crate::flock::boids::vector::unit;
 use crate::geometry::angle::mirrored_rad;
@@ -10,6 +11,7 @@ use crate::library::{
     Jump, Library, LibraryStats, Patch, Playback, Pose, Poses, Sprites, Transition, View,
 };
 use crate::raster::RgbImage;
+use crate::scratch::{Full, InMemory};
 
 /// Length of the animal when seen from the side.
 pub(crate) const LENGTH_PX: f64 = 40.0;
@@ -22,11 +24,13 @@ const SIZE_PX: [u32; 2] = [320, 240];
 /// An animal that turns now this way, now that: seen from above, or from the side with its length
 /// shrinking as it turns away. It may jump where it points, turns and beats alike.
 pub(crate) fn library(view: View) -> Library {
-    let mut sprites = Sprites::missing(56, 56, N_FRAMES as usize);
     let frames = poses(view);
-    for (idx, pose) in frames.iter().enumerate() {
-        draw(sprites.fill(idx), pose, idx as u32);
-    }
+    let scratch = Arc::new(InMemory::default());
+    let sprites = Sprites::drawn([56, 56], frames.len(), scratch, |idx, rgba| {
+        draw(rgba, &frames[idx], idx as u32);
+        Ok::<_, Full>(true)
+    });
+    let sprites = sprites.expect("memory has room");
     let jumps = jumps(view);
     let first = jumps.iter().map(|jump| jump.to).min().unwrap_or(0);
     let last = jumps.iter().map(|jump| jump.from).max().unwrap_or(0);

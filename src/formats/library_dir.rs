@@ -4,9 +4,11 @@
 //!
 //! The only file of ring 2 that touches the file system.
 
-use std::fs;
-use std::io::{self, Cursor, Read, Write};
+use std::fs::{self, File};
+use std::io::{self, BufReader, BufWriter, Write};
+use std::os::unix::fs::FileExt;
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use zip::write::SimpleFileOptions;
@@ -15,6 +17,7 @@ use super::library_json::{self, FootageSummary};
 use super::{picture, poses_json};
 use crate::analysis::Params;
 use crate::library::{Library, Sprites};
+use crate::scratch::{Full, Scratch};
 
 /// Why a folder is not a library.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +49,9 @@ pub enum Error {
     /// sprites.zip is damaged.
     #[error("sprites.zip: {0}")]
     Zip(#[from] zip::result::ZipError),
+    /// The sprites found no room beside the folder.
+    #[error(transparent)]
+    Full(#[from] Full),
     /// The files do not belong together.
     #[error("the files do not belong together: {0}")]
     Mismatch(&'static str),
@@ -79,12 +85,13 @@ pub fn write(
     };
     put(POSES, &poses_json::write(&library.poses, Some(params)))?;
     put(BACKGROUND, &picture::write_rgb(&library.background))?;
-    put(SPRITES, &sprites_zip(&library.sprites)?)?;
+    write_sprites(&dir.join(SPRITES), &library.sprites)?;
     put(LIBRARY, &library_json::write(library, params, footage))
 }
 
 /// Reads a library from a folder.
-pub fn read(dir: &Path) -> Result<StoredLibrary, Error> {
+/// The sprites are put aside in `scratch`.
+pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Error> {
     let get =
         |file: &'static str| fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause });
     let json = |file| move |cause| Error::Json { file, cause };
@@ -99,7 +106,9 @@ pub fn read(dir: &Path) -> Result<StoredLibrary, Error> {
             "background.png and poses.json differ in size",
         ));
     }
-    let sprites = read_sprites(&get(SPRITES)?, summary.sprite_size_px, poses.frames.len())?;
+    let archive = File::open(dir.join(SPRITES)).map_err(sprites_io)?;
+    let size = summary.sprite_size_px;
+    let sprites = read_sprites(archive, size, poses.frames.len(), scratch)?;
     let n_frames = poses.frames.len() as u32;
     let jumps = summary.playback.jumps.iter();
     if jumps
@@ -135,65 +144,89 @@ pub fn sprite_name(frame_idx: usize) -> String {
     format!("{frame_idx:06}.png")
 }
 
-fn sprites_zip(sprites: &Sprites) -> Result<Vec<u8>, Error> {
-    let pictures: Vec<(usize, Vec<u8>)> = (0..sprites.n_frames())
-        .into_par_iter()
-        .filter(|&idx| sprites.is_present(idx))
-        .map(|idx| {
-            (
-                idx,
-                picture::write_rgba(sprites.width(), sprites.height(), sprites.sprite(idx)),
-            )
-        })
-        .collect();
-    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+/// Sprites encoded at a time, on all threads: what is held in memory.
+const BATCH: usize = 256;
+
+fn write_sprites(path: &Path, sprites: &Sprites) -> Result<(), Error> {
+    let file = BufWriter::new(File::create(path).map_err(sprites_io)?);
+    let mut archive = zip::ZipWriter::new(file);
     let stored = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-    for (idx, bytes) in &pictures {
-        archive.start_file(sprite_name(*idx), stored)?;
-        archive.write_all(bytes).map_err(|cause| Error::Io {
-            file: SPRITES,
-            cause,
-        })?;
+    let present: Vec<usize> = (0..sprites.n_frames())
+        .filter(|&idx| sprites.is_present(idx))
+        .collect();
+    let encode = |&idx: &usize| {
+        let (width, height) = (sprites.width(), sprites.height());
+        picture::write_rgba(width, height, &sprites.sprite(idx))
+    };
+    for batch in present.chunks(BATCH) {
+        let pictures: Vec<Vec<u8>> = batch.par_iter().map(encode).collect();
+        for (&idx, bytes) in batch.iter().zip(pictures) {
+            archive.start_file(sprite_name(idx), stored)?;
+            archive.write_all(&bytes).map_err(sprites_io)?;
+        }
     }
-    Ok(archive.finish()?.into_inner())
+    let mut file = archive.finish()?;
+    file.flush().map_err(sprites_io)
+}
+
+fn sprites_io(cause: io::Error) -> Error {
+    let file = SPRITES;
+    Error::Io { file, cause }
+}
+
+/// Where a sprite's PNG lies in the archive.
+struct Entry {
+    at: u64,
+    n_bytes: usize,
 }
 
 fn read_sprites(
-    bytes: &[u8],
-    [width, height]: [u32; 2],
+    file: File,
+    size: [u32; 2],
     n_frames: usize,
+    scratch: Arc<dyn Scratch>,
 ) -> Result<Sprites, Error> {
-    let mut archive = zip::ZipArchive::new(Cursor::new(bytes))?;
-    let mut pictures: Vec<Option<Vec<u8>>> = vec![None; n_frames];
-    for entry in 0..archive.len() {
-        let mut file = archive.by_index(entry)?;
-        let frame_idx = file
-            .name()?
-            .strip_suffix(".png")
-            .and_then(|stem| stem.parse::<usize>().ok());
-        let slot = frame_idx
-            .and_then(|idx| pictures.get_mut(idx))
-            .ok_or(Error::Mismatch(
-                "sprites.zip has an entry that is no frame of the footage",
-            ))?;
-        let mut picture = Vec::new();
-        file.read_to_end(&mut picture).map_err(|cause| Error::Io {
-            file: SPRITES,
-            cause,
-        })?;
-        *slot = Some(picture);
+    let entries = entries(&file, n_frames)?;
+    Sprites::drawn(size, n_frames, scratch, |frame_idx, sprite| {
+        let Some(entry) = &entries[frame_idx] else {
+            return Ok(false);
+        };
+        let mut bytes = vec![0; entry.n_bytes];
+        file.read_exact_at(&mut bytes, entry.at)
+            .map_err(sprites_io)?;
+        read_sprite(&bytes, size, sprite)?;
+        Ok(true)
+    })
+}
+
+/// The entries of the archive, by frame.
+fn entries(file: &File, n_frames: usize) -> Result<Vec<Option<Entry>>, Error> {
+    let n_bytes_all = file.metadata().map_err(sprites_io)?.len();
+    let mut archive = zip::ZipArchive::new(BufReader::new(file))?;
+    let mut entries: Vec<Option<Entry>> = std::iter::repeat_with(|| None).take(n_frames).collect();
+    for idx in 0..archive.len() {
+        let entry = archive.by_index(idx)?;
+        let frame_idx = (entry.name()?.strip_suffix(".png")).and_then(|stem| stem.parse().ok());
+        let slot = frame_idx.and_then(|idx: usize| entries.get_mut(idx));
+        let slot = slot.ok_or(Error::Mismatch(
+            "sprites.zip has an entry that is no frame of the footage",
+        ))?;
+        let stored = entry.compression() == zip::CompressionMethod::Stored;
+        let at = entry.data_start().filter(|at| {
+            stored
+                && at
+                    .checked_add(entry.size())
+                    .is_some_and(|end| end <= n_bytes_all)
+        });
+        let at = at.ok_or(Error::Mismatch(
+            "an entry of sprites.zip is compressed or cut off",
+        ))?;
+        *slot = Some(Entry {
+            at,
+            n_bytes: entry.size() as usize,
+        });
     }
-    let mut sprites = Sprites::missing(width, height, n_frames);
-    let present = pictures.iter().map(Option::is_some).collect();
-    sprites
-        .fill_all(present)
-        .zip(pictures)
-        .par_bridge()
-        .try_for_each(|(sprite, bytes)| match bytes {
-            None => Ok(()),
-            Some(bytes) => read_sprite(&bytes, [width, height], sprite),
-        })?;
-    Ok(sprites)
+    Ok(entries)
 }
 
 fn read_sprite(bytes: &[u8], size: [u32; 2], sprite: &mut [u8]) -> Result<(), Error> {
@@ -216,14 +249,16 @@ mod tests {
     use crate::library::{Jump, Transition};
     use crate::library::{LibraryStats, Patch, Playback, Pose, Poses, View};
     use crate::raster::RgbImage;
+    use crate::scratch::InMemory;
 
     fn small_library() -> Library {
-        let mut sprites = Sprites::missing(8, 8, 3);
-        sprites
-            .fill(1)
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, byte)| *byte = k as u8);
+        let draw = |frame_idx, rgba: &mut [u8]| {
+            let bytes = rgba.iter_mut().enumerate();
+            bytes.for_each(|(k, byte)| *byte = k as u8);
+            Ok::<_, Full>(frame_idx == 1)
+        };
+        let scratch = Arc::new(InMemory::default());
+        let sprites = Sprites::drawn([8, 8], 3, scratch, draw).expect("memory has room");
         Library {
             poses: Poses {
                 tail_beat: None,
@@ -284,7 +319,7 @@ mod tests {
         };
         let dir = tempfile::tempdir().expect("a temporary folder");
         write(dir.path(), &library, &Params::default(), &footage).expect("written");
-        let back = read(dir.path()).expect("read");
+        let back = read(dir.path(), Arc::new(InMemory::default())).expect("read");
         assert_eq!(back.library, library);
         assert_eq!((back.params, back.footage), (Params::default(), footage));
     }

@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use super::{Attempt, Context, Error, Product, Stages, clock, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
-use crate::analysis::{Params, analyze};
+use crate::analysis::{self, Params, analyze};
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, distance_map, library_dir, svg};
 use crate::ids::{FootageId, JobId, LibraryId};
@@ -93,7 +93,8 @@ impl Input {
         };
         let level = cpu::Level::detect();
         let progress = attempt.listener;
-        let library = analyze(&video, background.as_ref(), &self.params, level, progress)?;
+        let (background, scratch) = (background.as_ref(), attempt.scratch());
+        let library = analyze(&video, background, &self.params, level, &scratch, progress)?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
             &video,
@@ -130,7 +131,8 @@ impl Input {
 
 impl Input {
     fn distance_map(&self, attempt: &Attempt, library: &Library) -> Result<Vec<u8>, Error> {
-        let pixels = ComparedSprites::new(&library.sprites, &library.poses, self.params.planes);
+        let pixels = ComparedSprites::new(&library.sprites, &library.poses, self.params.planes)
+            .map_err(analysis::Error::from)?;
         let distances = Distances {
             pixels: &pixels,
             clip_frames: library.clip_frames,

@@ -1,14 +1,16 @@
 //! What one run of a job is given, and what it gives back.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use super::{Error, Listener};
 use crate::ids::{FootageId, LibraryId};
+use crate::scratch::Scratch;
 use crate::store::jobs::finish::Made;
-use crate::store::{Blobs, Draft, Store, footage, libraries};
+use crate::store::{Blobs, Draft, Spill, Store, footage, libraries};
 
 /// One run of a job: where to write, how to load, whom to report to.
 pub struct Attempt<'a> {
@@ -52,6 +54,11 @@ impl<'a> Attempt<'a> {
     /// The folder that this run's files go to; fresh, and thrown away unless the run is finished.
     pub fn folder(&self) -> &Path {
         self.draft.path()
+    }
+
+    /// Where the run may put aside what memory should not hold.
+    pub fn scratch(&self) -> Arc<dyn Scratch> {
+        Arc::new(Spill::into(self.folder()))
     }
 
     /// A footage's row; must be called on a blocking thread.

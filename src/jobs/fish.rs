@@ -67,7 +67,7 @@ impl Input {
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let (_, folder) = attempt.library(self.library_id)?;
         attempt.listener.report("loading", 0.0);
-        let library = library_dir::read(&folder)?.library;
+        let library = library_dir::read(&folder, attempt.scratch())?.library;
         let motion = drive(&library.poses, &self.params)?;
         std::fs::write(attempt.folder().join("model.glb"), glb::write(&motion))?;
         let summary = Summary {

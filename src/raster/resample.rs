@@ -47,10 +47,11 @@ pub struct Resampled {
 
 impl Premultiplied {
     /// Takes a straight-alpha RGBA sprite, reusing memory. `bounds` as `bounds_of` found them.
-    pub fn fill(&mut self, rgba: &[u8], [width, height]: [u32; 2], bounds: [usize; 4]) {
+    pub fn fill(&mut self, rgba: &[u8], [width, height]: [u32; 2], bounds: Rect) {
         (self.width, self.height) = (width as usize, height as usize);
-        self.bounds = bounds;
-        let [left, top, right, bottom] = bounds;
+        let edges = [bounds.x, bounds.y, bounds.right(), bounds.bottom()];
+        self.bounds = edges.map(|edge| edge as usize);
+        let [left, top, right, bottom] = self.bounds;
         let (stride, n_rows) = (right - left + 2 * PAD, bottom - top + 2 * PAD);
         self.pixels.clear();
         self.pixels.resize(stride * n_rows, [0.0; 4]);
@@ -113,9 +114,8 @@ impl Premultiplied {
     }
 }
 
-/// Where a straight-alpha RGBA sprite of `width` columns has any alpha: left, top, right, bottom; all
-/// 0 when it has none.
-pub fn bounds_of(rgba: &[u8], width: u32) -> [usize; 4] {
+/// Where a straight-alpha RGBA sprite of `width` columns has any alpha; empty when it has none.
+pub fn bounds_of(rgba: &[u8], width: u32) -> Rect {
     let mut bounds = [usize::MAX, usize::MAX, 0, 0];
     for (y, row) in rgba.chunks_exact(width.max(1) as usize * 4).enumerate() {
         let opaque = |pixel: &[u8]| pixel[3] > 0;
@@ -128,7 +128,11 @@ pub fn bounds_of(rgba: &[u8], width: u32) -> [usize; 4] {
             bounds[3] = y + 1;
         }
     }
-    if bounds[2] > 0 { bounds } else { [0; 4] }
+    let [left, top, right, bottom] = bounds.map(|edge| edge as i64);
+    match bounds[2] {
+        0 => Rect::default(),
+        _ => Rect::clipped(left, top, right, bottom, u32::MAX, u32::MAX),
+    }
 }
 
 /// The floor of a sprite coordinate, which is above -REACH; without a call where the baseline

@@ -14,6 +14,7 @@ pub mod footage;
 pub mod intake;
 pub mod jobs;
 pub mod libraries;
+pub mod spill;
 pub mod sweep;
 
 use std::fs::{File, TryLockError};
@@ -29,6 +30,7 @@ use sqlx::sqlite::{
 
 pub use blobs::{BlobFile, Blobs, Draft};
 pub use error::Error;
+pub use spill::Spill;
 
 static MIGRATIONS: Migrator = sqlx::migrate!("migrations/sqlite");
 const READERS: u32 = 4;

@@ -1,6 +1,8 @@
 //! Each reason to refuse a footage, raised by a film made on the spot (ALGORITHMS.md 2.9), and films that
 //! come near it but are let pass.
 
+use std::sync::Arc;
+
 use crate::analysis::params::{CutSprites, Follow};
 use crate::analysis::{Error, Params, analyze};
 use crate::code::Code;
@@ -10,6 +12,7 @@ use crate::library::Library;
 use crate::progress::Silent;
 use crate::random;
 use crate::raster::{ColorSpec, Frame};
+use crate::scratch::{InMemory, Scratch};
 
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 144;
@@ -116,7 +119,8 @@ fn analyzed(
     picture: impl Fn(usize) -> Picture + Send + Sync,
 ) -> Result<Library, Error> {
     let film = Film { n_frames, picture };
-    analyze(&film, None, params, Level::detect(), &Silent)
+    let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+    analyze(&film, None, params, Level::detect(), &scratch, &Silent)
 }
 
 /// Why the film is refused.

@@ -21,6 +21,12 @@ impl DistanceMatrix {
         Ok(DistanceMatrix { n_clips, triangle })
     }
 
+    /// A matrix of given numbers.
+    #[cfg(test)]
+    pub(crate) fn of_triangle(n_clips: usize, triangle: Vec<u64>) -> Self {
+        DistanceMatrix { n_clips, triangle }
+    }
+
     /// Rows and columns: N - f + 1.
     pub fn n_clips(&self) -> usize {
         self.n_clips

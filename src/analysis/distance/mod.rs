@@ -2,7 +2,7 @@
 //!
 //! d(i, j) is the sum over pixels and planes of |U_i - U_j|, D(i, j) its sum over the f frames of
 //! two clips; the mirrored Dm compares i with j mirrored. Both are symmetric, so only j >= i is
-//! computed. The rows stream by in order, in panels of 48: no N x N matrix is held here.
+//! computed. The rows stream by in order, in panels of 4 times 48: no N x N matrix is held here.
 
 mod kernel;
 mod matrix;
@@ -23,8 +23,11 @@ use rayon::prelude::*;
 use crate::cpu::Level;
 use crate::progress::Progress;
 use kernel::Tile;
-use pixels::{GROUP, GroupMemory};
+use pixels::{GROUP, Group, GroupMemory};
 use window::WindowSums;
+
+/// Groups of rows in a panel: so many tiles are computed for each group of columns that is looked at.
+const PANEL: usize = 4;
 
 /// What is compared with clip i: clip j as it is, or clip j mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,8 +71,8 @@ impl Distances<'_> {
     ) -> Result<(), Cancelled> {
         let n_frames = self.pixels.n_frames();
         let mut window = WindowSums::new(self.clip_frames, n_frames);
-        let mut row = vec![0; n_frames];
-        for panel_idx in 0..self.pixels.n_groups() {
+        let mut row: Vec<u64> = Vec::with_capacity(n_frames);
+        for panel_idx in (0..self.pixels.n_groups()).step_by(PANEL) {
             if progress.cancelled() {
                 return Err(Cancelled);
             }
@@ -78,10 +81,11 @@ impl Distances<'_> {
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
             let tiles = self.panel(panel_idx);
-            for r in first..n_frames.min(first + GROUP) {
-                let of_tiles = tiles.iter().flat_map(|tile| tile[r - first]);
+            for r in first..n_frames.min(first + PANEL * GROUP) {
+                let (group, line) = ((r - first) / GROUP, (r - first) % GROUP);
+                let of_tiles = tiles[group..].iter().flat_map(|column| column[group][line]);
                 row.clear();
-                row.extend(of_tiles.skip(r - first).take(n_frames - r));
+                row.extend(of_tiles.skip(line).take(n_frames - r));
                 if let Some((clip_idx, sums)) = window.push(&row) {
                     on_row(clip_idx, sums);
                 }
@@ -91,22 +95,33 @@ impl Distances<'_> {
         Ok(())
     }
 
-    /// The tiles of a panel of 48 rows, from the diagonal to the right.
-    fn panel(&self, panel_idx: usize) -> Vec<Box<kernel::SadTile>> {
-        let mut memory = GroupMemory::default();
-        let rows = match self.side {
-            Side::Plain => self.pixels.group(panel_idx),
-            Side::Mirrored => self.pixels.mirrored_group(panel_idx, &mut memory),
-        };
-        (panel_idx..self.pixels.n_groups())
+    /// The tiles of a panel of groups of rows, from the diagonal to the right: for every group of columns
+    /// one for each group of rows not below it.
+    fn panel(&self, first: usize) -> Vec<Vec<Box<kernel::SadTile>>> {
+        let n_groups = self.pixels.n_groups();
+        let mut memory: [GroupMemory; PANEL] = Default::default();
+        let rows: Vec<Group<'_>> = (first..n_groups.min(first + PANEL))
+            .zip(&mut memory)
+            .map(|(group_idx, memory)| match self.side {
+                Side::Plain => self.pixels.group(group_idx, memory),
+                Side::Mirrored => self.pixels.mirrored_group(group_idx, memory),
+            })
+            .collect();
+        (first..n_groups)
             .into_par_iter()
-            .map(|column_idx| {
-                let tile = Tile {
+            .map_init(GroupMemory::default, |memory, column_idx| {
+                let columns = self.pixels.group(column_idx, memory);
+                let above = &rows[..rows.len().min(column_idx + 1 - first)];
+                let tile = |(row_idx, &rows)| Tile {
                     rows,
-                    columns: self.pixels.group(column_idx),
-                    diagonal: column_idx == panel_idx,
+                    columns,
+                    diagonal: column_idx == row_idx,
                 };
-                kernel::sad_tile(self.cpu, tile)
+                (first..)
+                    .zip(above)
+                    .map(tile)
+                    .map(|tile| kernel::sad_tile(self.cpu, tile))
+                    .collect()
             })
             .collect()
     }

@@ -7,11 +7,14 @@
 //! cache conflicts of sprites whose size is a multiple of 4 KB. Bytes beyond the last sprite and
 //! beyond the last pixel, up to whole blocks, are 0.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::upright::Canvas;
 use crate::analysis::params::Planes;
 use crate::library::{Poses, Sprites, View};
+use crate::scratch::{Full, Scratch};
 
 /// Sprites in a group: the side of a tile of distances.
 pub(super) const GROUP: usize = 48;
@@ -40,13 +43,27 @@ pub(super) enum Flip {
     Rows,
 }
 
+/// Bytes of all blocks up to which they stay in memory; those of a longer footage are put aside.
+const HELD_BYTES: usize = 64 << 20;
+
 /// Every frame's U.
 pub struct ComparedSprites {
     n_frames: usize,
     width: usize,
     height: usize,
     flip: Flip,
-    memory: GroupMemory,
+    groups: Vec<Stored>,
+    scratch: Arc<dyn Scratch>,
+}
+
+/// Where a group is.
+enum Stored {
+    Held(GroupMemory),
+    /// The sums, and those blocks that are not blank.
+    Aside {
+        sums: Vec<u32>,
+        at: u64,
+    },
 }
 
 /// The blocks of some groups, and what the bytes of each add up to.
@@ -54,6 +71,7 @@ pub struct ComparedSprites {
 pub(super) struct GroupMemory {
     blocks: Vec<Block>,
     sums: Vec<u32>,
+    packed: Vec<u8>,
 }
 
 impl GroupMemory {
@@ -62,6 +80,44 @@ impl GroupMemory {
         self.blocks.resize(n_blocks, BLANK);
         self.sums.clear();
         self.sums.resize(n_blocks, 0);
+    }
+
+    fn lend(&self, n_sprites: usize) -> Group<'_> {
+        Group {
+            n_sprites,
+            blocks: &self.blocks,
+            sums: &self.sums,
+        }
+    }
+
+    /// Puts the blocks that are not blank aside.
+    fn put_aside(mut self, scratch: &dyn Scratch) -> Result<Stored, Full> {
+        self.packed.clear();
+        for (block, &sum) in self.blocks.iter().zip(&self.sums) {
+            if sum > 0 {
+                self.packed.extend_from_slice(&block.0);
+            }
+        }
+        let at = scratch.put(&self.packed)?;
+        let sums = self.sums;
+        Ok(Stored::Aside { sums, at })
+    }
+
+    /// Has the blocks back.
+    fn have_back(&mut self, sums: &[u32], at: u64, scratch: &dyn Scratch) {
+        self.clear(sums.len());
+        self.sums.copy_from_slice(sums);
+        let n_packed = sums.iter().filter(|&&sum| sum > 0).count();
+        self.packed.resize(n_packed * BLOCK, 0);
+        scratch.get(at, &mut self.packed);
+        let kept = self
+            .blocks
+            .iter_mut()
+            .zip(sums)
+            .filter(|(_, sum)| **sum > 0);
+        for ((block, _), packed) in kept.zip(self.packed.as_chunks::<BLOCK>().0) {
+            block.0 = *packed;
+        }
     }
 }
 
@@ -84,7 +140,17 @@ impl ComparedSprites {
     /// U of every frame: as the sprites stand in side view, turned to heading 0 in top view.
     ///
     /// Missing sprites are blank; so are, in top view, those of unknown heading.
-    pub fn new(sprites: &Sprites, poses: &Poses, planes: Planes) -> ComparedSprites {
+    pub fn new(sprites: &Sprites, poses: &Poses, planes: Planes) -> Result<Self, Full> {
+        ComparedSprites::holding(HELD_BYTES, sprites, poses, planes)
+    }
+
+    /// As `new`, with the blocks in memory only if they take no more than `held_bytes`.
+    pub(super) fn holding(
+        held_bytes: usize,
+        sprites: &Sprites,
+        poses: &Poses,
+        planes: Planes,
+    ) -> Result<Self, Full> {
         let canvas = match poses.view {
             View::Side => None,
             View::Top => Some(Canvas::around(sprites, poses)),
@@ -97,39 +163,47 @@ impl ComparedSprites {
             ),
             Some(canvas) => (canvas.width, canvas.height, Flip::Rows),
         };
-        let n_frames = sprites.n_frames();
         let mut compared = ComparedSprites {
-            n_frames,
+            n_frames: sprites.n_frames(),
             width,
             height,
             flip,
-            memory: GroupMemory::default(),
+            groups: Vec::new(),
+            scratch: Arc::clone(sprites.scratch()),
         };
-        let n_blocks = compared.n_blocks();
-        let n_groups = compared.n_groups();
-        compared.memory.clear(n_groups * GROUP * n_blocks);
-        let per_group = (GROUP * n_blocks).max(1);
-        let GroupMemory { blocks, sums } = &mut compared.memory;
-        let groups = blocks
-            .par_chunks_mut(per_group)
-            .zip(sums.par_chunks_mut(per_group));
-        groups.enumerate().for_each(|(group_idx, (group, sums))| {
-            let mut bytes = vec![0; width * height * 4];
-            let mut plain = vec![0; sprites.n_bytes()];
-            let first = group_idx * GROUP;
-            for frame_idx in first..n_frames.min(first + GROUP) {
-                match &canvas {
-                    None => premultiply(sprites.sprite(frame_idx), planes, &mut bytes),
-                    Some(canvas) => {
-                        premultiply(sprites.sprite(frame_idx), planes, &mut plain);
-                        canvas.turn(&plain, poses.frames[frame_idx].heading_rad, &mut bytes);
-                    }
+        let n_groups = compared.n_frames.div_ceil(GROUP);
+        let held = n_groups * GROUP * compared.n_blocks() * BLOCK <= held_bytes;
+        let source = Source {
+            sprites,
+            poses,
+            planes,
+            canvas: canvas.as_ref(),
+        };
+        compared.groups = (0..n_groups)
+            .into_par_iter()
+            .map(|group_idx| {
+                let group = compared.gathered(group_idx, &source);
+                match held {
+                    true => Ok(Stored::Held(group)),
+                    false => group.put_aside(&*compared.scratch),
                 }
-                scatter(&bytes, width, frame_idx - first, group);
-            }
-            sum_up(group, sums);
-        });
-        compared
+            })
+            .collect::<Result<_, Full>>()?;
+        Ok(compared)
+    }
+
+    /// The blocks of one group, made of its sprites.
+    fn gathered(&self, group_idx: usize, source: &Source<'_>) -> GroupMemory {
+        let mut group = GroupMemory::default();
+        group.clear(GROUP * self.n_blocks());
+        let mut bytes = vec![0; self.n_bytes()];
+        let first = group_idx * GROUP;
+        for frame_idx in first..self.n_frames.min(first + GROUP) {
+            source.draw(frame_idx, &mut bytes);
+            scatter(&bytes, self.width, frame_idx - first, &mut group.blocks);
+        }
+        sum_up(&group.blocks, &mut group.sums);
+        group
     }
 
     /// Frames of the footage.
@@ -142,27 +216,37 @@ impl ComparedSprites {
         self.width * self.height * 4
     }
 
-    /// d(i, j): the sum of absolute differences of two frames.
-    pub fn sad(&self, i: usize, j: usize) -> u64 {
-        let (a, b) = (self.group(i / GROUP), self.group(j / GROUP));
-        (0..self.n_blocks())
-            .map(|block| {
-                let (a, b) = (a.block(block, i % GROUP), b.block(block, j % GROUP));
-                super::kernel::scalar::sad_block(a, b)
-            })
-            .sum()
+    /// d(i, i + 1) of every frame but the last.
+    pub fn steps(&self) -> Vec<u64> {
+        let of_group = |group_idx: usize| {
+            let (mut one, mut other) = (GroupMemory::default(), GroupMemory::default());
+            let group = self.group(group_idx, &mut one);
+            let mut steps: Vec<u64> = (1..group.n_sprites)
+                .map(|k| sad(group, k - 1, group, k))
+                .collect();
+            if group_idx + 1 < self.n_groups() {
+                let next = self.group(group_idx + 1, &mut other);
+                steps.push(sad(group, GROUP - 1, next, 0));
+            }
+            steps
+        };
+        let steps: Vec<Vec<u64>> = (0..self.n_groups()).into_par_iter().map(of_group).collect();
+        steps.concat()
     }
 
     pub(super) fn n_groups(&self) -> usize {
-        self.n_frames.div_ceil(GROUP)
+        self.groups.len()
     }
 
-    pub(super) fn group(&self, group_idx: usize) -> Group<'_> {
-        let n = GROUP * self.n_blocks();
-        Group {
-            n_sprites: self.n_sprites(group_idx),
-            blocks: &self.memory.blocks[group_idx * n..][..n],
-            sums: &self.memory.sums[group_idx * n..][..n],
+    /// A group, in memory that the caller lends if it was put aside.
+    pub(super) fn group<'a>(&'a self, group_idx: usize, memory: &'a mut GroupMemory) -> Group<'a> {
+        let n_sprites = self.n_sprites(group_idx);
+        match &self.groups[group_idx] {
+            Stored::Held(group) => group.lend(n_sprites),
+            Stored::Aside { sums, at } => {
+                memory.have_back(sums, *at, &*self.scratch);
+                memory.lend(n_sprites)
+            }
         }
     }
 
@@ -172,7 +256,8 @@ impl ComparedSprites {
         group_idx: usize,
         memory: &'a mut GroupMemory,
     ) -> Group<'a> {
-        let group = self.group(group_idx);
+        let mut aside = GroupMemory::default();
+        let group = self.group(group_idx, &mut aside);
         memory.clear(GROUP * self.n_blocks());
         let mut bytes = vec![0; self.n_bytes()];
         for sprite in 0..group.n_sprites {
@@ -181,11 +266,7 @@ impl ComparedSprites {
             scatter(&bytes, self.width, sprite, &mut memory.blocks);
         }
         sum_up(&memory.blocks, &mut memory.sums);
-        Group {
-            n_sprites: group.n_sprites,
-            blocks: &memory.blocks,
-            sums: &memory.sums,
-        }
+        memory.lend(group.n_sprites)
     }
 
     fn n_sprites(&self, group_idx: usize) -> usize {
@@ -211,6 +292,36 @@ impl ComparedSprites {
 
     fn n_blocks(&self) -> usize {
         self.width.div_ceil(SIDE) * self.height.div_ceil(SIDE)
+    }
+}
+
+/// d of a sprite of one group and a sprite of another.
+fn sad(a: Group<'_>, i: usize, b: Group<'_>, j: usize) -> u64 {
+    (0..a.n_blocks())
+        .map(|block| super::kernel::scalar::sad_block(a.block(block, i), b.block(block, j)))
+        .sum()
+}
+
+/// What U is made of.
+struct Source<'a> {
+    sprites: &'a Sprites,
+    poses: &'a Poses,
+    planes: Planes,
+    canvas: Option<&'a Canvas>,
+}
+
+impl Source<'_> {
+    /// U of a frame.
+    fn draw(&self, frame_idx: usize, bytes: &mut [u8]) {
+        let sprite = self.sprites.sprite(frame_idx);
+        match self.canvas {
+            None => premultiply(&sprite, self.planes, bytes),
+            Some(canvas) => {
+                let mut plain = vec![0; sprite.len()];
+                premultiply(&sprite, self.planes, &mut plain);
+                canvas.turn(&plain, self.poses.frames[frame_idx].heading_rad, bytes);
+            }
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 //! D against its definition, written out pixel by pixel, at every level that the machine has.
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 
 use super::*;
@@ -7,16 +9,33 @@ use crate::analysis::params::Planes;
 use crate::library::{Pose, Poses, Sprites, View};
 use crate::progress::Silent;
 use crate::random;
+use crate::scratch::{Full, InMemory};
 
 /// Noise: every byte of every sprite at random, alpha included.
 fn noise(width: u32, height: u32, n_frames: usize, seed: u64) -> Sprites {
-    let mut sprites = Sprites::missing(width, height, n_frames);
-    for frame_idx in 0..n_frames {
-        for (k, byte) in sprites.fill(frame_idx).iter_mut().enumerate() {
+    drawn([width, height], n_frames, |frame_idx, rgba| {
+        for (k, byte) in rgba.iter_mut().enumerate() {
             *byte = random::bits(seed, &[frame_idx as u64, k as u64]) as u8;
         }
-    }
-    sprites
+    })
+}
+
+/// A sprite for every frame.
+pub(crate) fn drawn(
+    size: [u32; 2],
+    n_frames: usize,
+    draw: impl Fn(usize, &mut [u8]) + Sync,
+) -> Sprites {
+    let scratch = Arc::new(InMemory::default());
+    let sprites = Sprites::drawn(size, n_frames, scratch, |frame_idx, rgba| {
+        draw(frame_idx, rgba);
+        Ok::<_, Full>(true)
+    });
+    sprites.expect("memory has room")
+}
+
+fn compared(sprites: &Sprites, poses: &Poses, planes: Planes) -> ComparedSprites {
+    ComparedSprites::new(sprites, poses, planes).expect("memory has room")
 }
 
 fn poses(view: View, headings_rad: impl IntoIterator<Item = Option<f64>>) -> Poses {
@@ -41,13 +60,12 @@ fn from_the_side(sprites: &Sprites) -> Poses {
 
 /// D for f = 1 of sprites that are `n_pixels` opaque grays in a row, one level a frame.
 pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMatrix {
-    let mut sprites = Sprites::missing(n_pixels, 1, levels.len());
-    for (frame_idx, &level) in levels.iter().enumerate() {
-        let pixels = sprites.fill(frame_idx).as_chunks_mut::<4>().0;
-        pixels.fill([level, level, level, 255]);
-    }
+    let sprites = drawn([n_pixels, 1], levels.len(), |frame_idx, rgba| {
+        let level = levels[frame_idx];
+        rgba.as_chunks_mut::<4>().0.fill([level, level, level, 255]);
+    });
     let distances = Distances {
-        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
         clip_frames: 1,
         side: Side::Plain,
         cpu: Level::detect(),
@@ -57,8 +75,12 @@ pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMat
 
 /// The engine's upper triangle.
 fn triangle(sprites: &Sprites, poses: &Poses, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
+    triangle_of(&compared(sprites, poses, Planes::Rgba), f, side, cpu)
+}
+
+fn triangle_of(pixels: &ComparedSprites, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
     let distances = Distances {
-        pixels: &ComparedSprites::new(sprites, poses, Planes::Rgba),
+        pixels,
         clip_frames: f,
         side,
         cpu,
@@ -134,8 +156,8 @@ fn every_level_gives_the_sums_of_the_definition_at_the_edges_of_its_tiles() {
 
 #[test]
 fn the_largest_possible_differences_do_not_overflow() {
-    let mut sprites = Sprites::missing(64, 64, 2);
-    sprites.fill(1).fill(255);
+    let draw = |frame_idx, rgba: &mut [u8]| rgba.fill(255 * frame_idx as u8);
+    let sprites = drawn([64, 64], 2, draw);
     for cpu in Level::available() {
         let found = triangle(&sprites, &from_the_side(&sprites), 1, Side::Plain, cpu);
         assert_eq!(found, [vec![0, 64 * 64 * 4 * 255], vec![0]]);
@@ -175,21 +197,46 @@ fn one_thread_and_two_give_the_same() {
 }
 
 #[test]
-fn rgb_planes_leave_alpha_out() {
-    let mut sprites = Sprites::missing(1, 1, 2);
-    sprites.fill(0).copy_from_slice(&[0, 0, 0, 255]);
-    sprites.fill(1).copy_from_slice(&[200, 0, 0, 51]);
+fn blocks_put_aside_are_compared_as_those_in_memory() {
+    // Five groups, so two panels; a corner of every other sprite is empty.
+    let sprites = drawn([40, 24], 200, |frame_idx, rgba| {
+        let n = if frame_idx % 2 == 0 { 2000 } else { 3840 };
+        for (k, byte) in rgba[..n].iter_mut().enumerate() {
+            *byte = random::bits(5, &[frame_idx as u64, k as u64]) as u8;
+        }
+    });
     let poses = from_the_side(&sprites);
-    let d = |planes| ComparedSprites::new(&sprites, &poses, planes).sad(0, 1);
-    assert_eq!(d(Planes::Rgb), 40);
-    assert_eq!(d(Planes::Rgba), 40 + 204);
+    let aside = ComparedSprites::holding(0, &sprites, &poses, Planes::Rgba);
+    let aside = aside.expect("memory has room");
+    assert_eq!(
+        aside.steps(),
+        compared(&sprites, &poses, Planes::Rgba).steps()
+    );
+    for side in [Side::Plain, Side::Mirrored] {
+        let held = triangle(&sprites, &poses, 3, side, Level::detect());
+        assert!(
+            triangle_of(&aside, 3, side, Level::detect()) == held,
+            "{side:?}"
+        );
+    }
+}
+
+#[test]
+fn rgb_planes_leave_alpha_out() {
+    let colors = [[0, 0, 0, 255], [200, 0, 0, 51]];
+    let sprites = drawn([1, 1], 2, |frame_idx, rgba| {
+        rgba.copy_from_slice(&colors[frame_idx])
+    });
+    let poses = from_the_side(&sprites);
+    let d = |planes| compared(&sprites, &poses, planes).steps();
+    assert_eq!(d(Planes::Rgb), [40]);
+    assert_eq!(d(Planes::Rgba), [40 + 204]);
 }
 
 /// An L of three pixels about the center of an 8 x 8 sprite, turned by quarter turns: its long arm
 /// points along the heading, its short arm to the left of it (or to the right).
 fn letter(quarter_turns: u32, short_arm: i32) -> (Sprites, Option<f64>) {
-    let mut sprites = Sprites::missing(8, 8, 1);
-    let bytes = sprites.fill(0);
+    let mut bytes = [0; 256];
     for (x, y, red) in [(1, 1, 9), (3, 1, 90), (5, 1, 200), (1, 3 * short_arm, 50)] {
         // Odd half pixels about the center; a quarter turn takes (x, y) to (-y, x).
         let (mut x, mut y) = (x, y);
@@ -199,17 +246,15 @@ fn letter(quarter_turns: u32, short_arm: i32) -> (Sprites, Option<f64>) {
         let at = (((y + 7) / 2) * 8 + (x + 7) / 2) as usize * 4;
         bytes[at..at + 4].copy_from_slice(&[red, 255 - red, 30, 255]);
     }
-    (
-        sprites,
-        Some(f64::from(quarter_turns) * 0.5 * std::f64::consts::PI),
-    )
+    let heading_rad = f64::from(quarter_turns) * 0.5 * std::f64::consts::PI;
+    let sprites = drawn([8, 8], 1, |_, rgba| rgba.copy_from_slice(&bytes));
+    (sprites, Some(heading_rad))
 }
 
 fn top_view(letters: &[(Sprites, Option<f64>)]) -> (Sprites, Poses) {
-    let mut sprites = Sprites::missing(8, 8, letters.len());
-    for (frame_idx, (letter, _)) in letters.iter().enumerate() {
-        sprites.fill(frame_idx).copy_from_slice(letter.sprite(0));
-    }
+    let sprites = drawn([8, 8], letters.len(), |frame_idx, rgba| {
+        rgba.copy_from_slice(&letters[frame_idx].0.sprite(0));
+    });
     let headings = letters.iter().map(|(_, heading_rad)| *heading_rad);
     let poses = poses(View::Top, headings.collect::<Vec<_>>());
     (sprites, poses)
@@ -226,11 +271,13 @@ fn from_above_an_animal_looks_the_same_wherever_it_points() {
 #[test]
 fn from_above_the_mirror_is_across_the_animals_own_axis() {
     // Pixels stand at odd half offsets, so the mirror of y = 1 is y = -1.
-    let (mut mirror_image, heading_rad) = letter(0, 1);
-    let rows = mirror_image.sprite(0).to_vec();
-    for (y, row) in rows.chunks_exact(32).enumerate() {
-        mirror_image.fill(0)[(7 - y) * 32..][..32].copy_from_slice(row);
-    }
+    let (image, heading_rad) = letter(0, 1);
+    let rows = image.sprite(0);
+    let mirror_image = drawn([8, 8], 1, |_, rgba| {
+        for (y, row) in rows.chunks_exact(32).enumerate() {
+            rgba[(7 - y) * 32..][..32].copy_from_slice(row);
+        }
+    });
     let (sprites, poses) = top_view(&[letter(3, 1), (mirror_image, heading_rad)]);
     assert_eq!(
         triangle(&sprites, &poses, 1, Side::Mirrored, Level::Scalar)[0][1],
@@ -253,7 +300,7 @@ fn cancelling_stops_at_the_next_panel() {
     }
     let sprites = noise(8, 8, 5, 3);
     let distances = Distances {
-        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
         clip_frames: 1,
         side: Side::Plain,
         cpu: Level::Scalar,
@@ -279,7 +326,7 @@ fn the_matrix_holds_every_distance_both_ways_round() {
 fn pooling_keeps_the_least_distance_of_each_cell() {
     let sprites = noise(4, 4, 29, 5);
     let distances = Distances {
-        pixels: &ComparedSprites::new(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
         clip_frames: 3,
         side: Side::Plain,
         cpu: Level::Scalar,

@@ -35,7 +35,7 @@ impl Canvas {
                 continue;
             };
             let (c, s) = (libm::cos(heading), libm::sin(heading));
-            for corner in outline(sprites.sprite(frame_idx), w) {
+            for corner in outline(&sprites.sprite(frame_idx), w) {
                 let (x, y) = (corner[0] - w as f64 / 2.0, corner[1] - h as f64 / 2.0);
                 half_width = half_width.max((c * x + s * y).abs());
                 half_height = half_height.max((c * y - s * x).abs());

@@ -13,9 +13,11 @@ mod walk;
 
 use rayon::prelude::*;
 
-use super::tracking::{Sighting, Tracked};
+use super::sighting::Sighting;
+use super::tracking::Track;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
+use crate::raster::RgbaImage;
 
 /// Points of a midline, head and tail tip included.
 pub const N_POINTS: usize = 11;
@@ -27,15 +29,18 @@ const LEAST_REACH: f64 = 0.8;
 const ACROSS: f64 = 0.25;
 
 /// Fills in the midline, from head to tail, and the bend of every pose whose heading is known.
-pub fn trace(poses: &mut Poses, track: &[Tracked]) {
+pub fn trace(poses: &mut Poses, track: &Track) {
     if poses.view == View::Side && !is_long(&poses.frames) {
         return;
     }
     let traced: Vec<Option<Traced>> = poses
         .frames
         .par_iter()
-        .zip(track)
-        .map(|(pose, tracked)| midline(tracked.sighting.as_ref()?, pose))
+        .zip(&track.frames)
+        .map(|(pose, tracked)| {
+            let sighting = tracked.sighting.as_ref()?;
+            midline(sighting, &track.image(sighting), pose)
+        })
         .collect();
     let mut last: Option<[f64; 2]> = None;
     for (pose, traced) in poses.frames.iter_mut().zip(traced) {
@@ -86,13 +91,11 @@ struct Traced {
     unsure: bool,
 }
 
-fn midline(sighting: &Sighting, pose: &Pose) -> Option<Traced> {
+fn midline(sighting: &Sighting, image: &RgbaImage, pose: &Pose) -> Option<Traced> {
     let heading = pose.heading_rad?;
     let toward = [libm::cos(heading), libm::sin(heading)];
-    let alpha: Vec<u8> = (sighting.matte.image.pixels.chunks_exact(4))
-        .map(|rgba| rgba[3])
-        .collect();
-    let rect = sighting.matte.rect;
+    let alpha: Vec<u8> = image.pixels.chunks_exact(4).map(|rgba| rgba[3]).collect();
+    let rect = sighting.rect;
     let outline = outline::outline(rect, &alpha)?;
     let [one, other] = ends::ends(&outline);
     let span = [0, 1].map(|c| outline[one][c] - outline[other][c]);

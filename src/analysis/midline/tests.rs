@@ -1,11 +1,13 @@
 //! What a midline promises, on soft sausages bent by a known amount.
 
 use super::*;
-use crate::analysis::matte::Matte;
 use crate::analysis::moments::moments;
+use crate::analysis::tracking::Tracked;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
+use crate::scratch::{InMemory, Scratch};
 use proptest::prelude::*;
+use std::sync::Arc;
 
 /// A fish from above: a circular arc of length 80 that turns by `turn` over its length, thick ahead,
 /// tapering to the tail; the head at `start`, pointing against `away`.
@@ -33,7 +35,7 @@ impl Sausage {
         8.0 * (1.0 - s).powf(0.7) * (1.0 - (1.0 - s / 0.15).clamp(0.0, 1.0).powi(2)).sqrt() + 0.9
     }
 
-    fn sighting(&self) -> Sighting {
+    fn sighting(&self) -> (Sighting, RgbaImage) {
         let rect = Rect {
             x: 20,
             y: 10,
@@ -57,23 +59,23 @@ impl Sausage {
             pixel[3] = (255.0 * (depth + 0.5).clamp(0.0, 1.0)) as u8;
         }
         let alpha: Vec<u8> = image.pixels.chunks_exact(4).map(|p| p[3]).collect();
-        Sighting {
+        let sighting = Sighting {
             moments: moments(rect, &alpha).expect("it is opaque"),
-            matte: Matte {
-                rect,
-                image,
-                contrast: 100.0,
-            },
+            rect,
+            at: 0,
+            reach_px: [0.0; 3],
+            contrast: 100.0,
             extent_px: [LENGTH, 16.0],
             upright_px: f64::from(rect.h),
             box_px: rect,
             cut: false,
-        }
+        };
+        (sighting, image)
     }
 
     /// The pose as the analysis would find it: heading along the major axis.
     fn pose(&self) -> Pose {
-        let axis = self.sighting().moments.major_rad.expect("it is long");
+        let axis = self.sighting().0.moments.major_rad.expect("it is long");
         let (head, tail) = (self.at(0.0), self.at(1.0));
         let lead = (head[0] - tail[0]) * axis.cos() + (head[1] - tail[1]) * axis.sin();
         Pose {
@@ -89,8 +91,10 @@ impl Sausage {
     }
 
     fn traced(&self) -> Vec<[f64; 2]> {
-        let (sighting, pose) = (self.sighting(), self.pose());
-        midline(&sighting, &pose).expect("it has an outline").points
+        let (sighting, image) = self.sighting();
+        midline(&sighting, &image, &self.pose())
+            .expect("it has an outline")
+            .points
     }
 
     /// Root mean square distance of the found points from the true curve, led on to the surface.
@@ -134,11 +138,16 @@ fn poses(view: View, pose: Pose) -> Poses {
     }
 }
 
-fn tracked(sausage: &Sausage) -> Tracked {
-    Tracked {
+fn track(sausage: &Sausage) -> Track {
+    let (mut sighting, image) = sausage.sighting();
+    let scratch = Arc::new(InMemory::default());
+    sighting.at = scratch.put(&image.pixels).expect("memory has room");
+    let sighting = Some(sighting);
+    let frames = vec![Tracked {
         time_s: 0.0,
-        sighting: Some(sausage.sighting()),
-    }
+        sighting,
+    }];
+    Track { frames, scratch }
 }
 
 const BENT: Sausage = Sausage {
@@ -155,7 +164,7 @@ fn from_the_side_only_an_animal_far_longer_than_high_has_a_midline() {
     };
     for (pose, has_one) in [(high, false), (BENT.pose(), true)] {
         let mut poses = poses(View::Side, pose);
-        trace(&mut poses, &[tracked(&BENT)]);
+        trace(&mut poses, &track(&BENT));
         assert_eq!(poses.frames[0].midline_px.is_some(), has_one);
         assert_eq!(poses.frames[0].bend_rad.is_some(), has_one);
     }
@@ -168,7 +177,7 @@ fn an_unknown_heading_leaves_the_midline_unknown() {
         ..BENT.pose()
     };
     let mut poses = poses(View::Top, pose);
-    trace(&mut poses, &[tracked(&BENT)]);
+    trace(&mut poses, &track(&BENT));
     assert_eq!(poses.frames[0].midline_px, None);
 }
 
@@ -179,7 +188,8 @@ fn an_outline_whose_ends_cannot_be_told_falls_back_to_its_cross_sections() {
         length_px: Some(1000.0),
         ..BENT.pose()
     };
-    let found = midline(&BENT.sighting(), &pose).expect("it has sections");
+    let (sighting, image) = BENT.sighting();
+    let found = midline(&sighting, &image, &pose).expect("it has sections");
     assert_eq!(found.points.len(), N_POINTS);
     assert!(BENT.error_px(&found.points) < 3.0);
     assert!(distance(found.points[0], BENT.at(0.0)) < 10.0, "head first");
@@ -206,15 +216,15 @@ fn a_head_broad_with_eyes_begins_between_them() {
         let depth = eyes[0].max(eyes[1]).max(head).max(tail);
         pixel[3] = (255.0 * (depth + 0.5).clamp(0.0, 1.0)) as u8;
     }
-    let mut sighting = BENT.sighting();
-    sighting.matte.rect = rect;
-    sighting.matte.image = image;
+    let (mut sighting, _) = BENT.sighting();
+    sighting.rect = rect;
     let pose = Pose {
         heading_rad: Some(0.0),
         length_px: Some(95.0),
         ..Pose::default()
     };
-    let found = midline(&sighting, &pose).expect("it has an outline").points;
+    let found = midline(&sighting, &image, &pose);
+    let found = found.expect("it has an outline").points;
     assert!((found[0][1] - 30.0).abs() < 2.0, "head: {:?}", found[0]);
     assert!(
         distance(found[10], [7.0, 30.0]) < 3.0,

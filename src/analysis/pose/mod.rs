@@ -11,7 +11,8 @@ mod view;
 use super::Params;
 use super::direction::{self, Seen};
 use super::params::AxisAndHead;
-use super::tracking::{Sighting, Tracked};
+use super::sighting::Sighting;
+use super::tracking::Tracked;
 use crate::footage::FootageFormat;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
@@ -208,7 +209,7 @@ fn seen(tracked: &Tracked, params: &Params) -> Pose {
     if let Some(sighting) = &tracked.sighting {
         pose.cut = sighting.cut;
         // Certain when the silhouette differs, on average, by three thresholds or more.
-        let contrast = sighting.matte.contrast / f64::from(params.threshold);
+        let contrast = sighting.contrast / f64::from(params.threshold);
         pose.confidence = Some((contrast / 3.0).clamp(0.0, 1.0));
         pose.centroid_px = Some(sighting.moments.centroid_px);
         pose.box_px = Some(sighting.box_px);

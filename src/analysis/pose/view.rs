@@ -3,7 +3,8 @@
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use crate::analysis::order::{median, percentile};
-use crate::analysis::tracking::{Sighting, Tracked};
+use crate::analysis::sighting::Sighting;
+use crate::analysis::tracking::Tracked;
 use crate::library::View;
 
 /// From the side an animal has a back and a belly (the skew across its length keeps its sign), and stays

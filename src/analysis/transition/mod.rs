@@ -63,7 +63,7 @@ pub fn connect(
     progress: &dyn Progress,
 ) -> Result<Connections, Error> {
     let clip_frames = params.clip_frames_at(poses.fps);
-    let pixels = ComparedSprites::new(sprites, poses, params.planes);
+    let pixels = ComparedSprites::new(sprites, poses, params.planes)?;
     let clips = Clips::new(sprites, poses, clip_frames);
     let steps = natural_steps(&pixels, &clips);
     let rungs = rungs(params, steps);
@@ -125,10 +125,8 @@ struct NaturalSteps {
 }
 
 fn natural_steps(pixels: &ComparedSprites, clips: &Clips) -> NaturalSteps {
-    let steps: Vec<u64> = (1..pixels.n_frames())
-        .map(|frame_idx| pixels.sad(frame_idx - 1, frame_idx))
-        .collect();
-    let mut of_clips: Vec<u64> = steps
+    let mut of_clips: Vec<u64> = pixels
+        .steps()
         .windows(clips.clip_frames)
         .zip(clips.all_present.windows(2))
         .filter(|(_, present)| present[0] && present[1])

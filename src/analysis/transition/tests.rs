@@ -1,9 +1,12 @@
 //! Transitions of small films whose likenesses are known.
 
+use std::sync::Arc;
+
 use super::*;
 use crate::geometry::angle::mirrored_rad;
 use crate::library::{Pose, View};
 use crate::progress::Silent;
+use crate::scratch::{Full, InMemory};
 use libm::{cos, sin};
 
 const FPS: f64 = 10.0;
@@ -14,21 +17,22 @@ type Moment = (f64, f64);
 /// A bright dot that circles about the middle of a 16 x 16 sprite by the phase of the stroke,
 /// left-right mirrored where the animal heads left. `None` where it was not found.
 fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
-    let mut sprites = Sprites::missing(16, 16, moments.len());
-    for (frame_idx, moment) in moments.iter().enumerate() {
-        let &Some((phase, heading_rad)) = moment else {
-            continue;
+    let draw = |frame_idx: usize, rgba: &mut [u8]| {
+        let Some((phase, heading_rad)) = moments[frame_idx] else {
+            return Ok::<_, Full>(false);
         };
         let turn = std::f64::consts::TAU * phase;
         let side = cos(heading_rad).signum();
         let (dot_x, dot_y) = (side * 5.0 * cos(turn), 3.0 * sin(turn));
-        let pixels = sprites.fill(frame_idx).as_chunks_mut::<4>().0;
-        for (k, pixel) in pixels.iter_mut().enumerate() {
+        for (k, pixel) in rgba.as_chunks_mut::<4>().0.iter_mut().enumerate() {
             let (x, y) = ((k % 16) as f64 - 7.5 - dot_x, (k / 16) as f64 - 7.5 - dot_y);
             let light = 250.0 * libm::exp(-(x * x + y * y) / 8.0);
             *pixel = [light as u8, light as u8, 20, 255];
         }
-    }
+        Ok(true)
+    };
+    let scratch = Arc::new(InMemory::default());
+    let sprites = Sprites::drawn([16, 16], moments.len(), scratch, draw).expect("memory has room");
     let pose = |moment: &Option<Moment>| Pose {
         heading_rad: moment.map(|(_, heading_rad)| heading_rad),
         ..Pose::default()

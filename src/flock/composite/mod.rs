@@ -13,7 +13,7 @@ use super::individual::{Fade, Individual};
 use super::{Flock, Library};
 use crate::geometry::Rect;
 use crate::raster::blend::{mix, over};
-use crate::raster::resample::{Placement, Premultiplied, Resampled, bounds_of};
+use crate::raster::resample::{Placement, Premultiplied, Resampled};
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock, any of them from any thread.
@@ -21,8 +21,6 @@ pub struct Compositor<'a> {
     library: &'a Library,
     flock: &'a Flock,
     plate: Frame,
-    /// Per source frame: where its sprite shows anything.
-    bounds: Vec<[usize; 4]>,
     /// Per individual and output frame: which of its fades concerns it.
     fade_at: Vec<Vec<Option<u32>>>,
     canvases: Mutex<Vec<Canvas>>,
@@ -32,6 +30,7 @@ pub struct Compositor<'a> {
 struct Canvas {
     image: RgbImage,
     dirty: Vec<Rect>,
+    straight: Vec<u8>,
     sprite: Premultiplied,
     main: Resampled,
     second: Resampled,
@@ -55,10 +54,6 @@ impl<'a> Compositor<'a> {
             library,
             flock,
             plate,
-            bounds: (0..library.sprites.n_frames())
-                .into_par_iter()
-                .map(|frame| bounds_of(library.sprites.sprite(frame), library.sprites.width()))
-                .collect(),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
             canvases: Mutex::new(Vec::new()),
         }
@@ -135,6 +130,7 @@ impl<'a> Compositor<'a> {
         spare.unwrap_or_else(|| Canvas {
             image: self.library.background.clone(),
             dirty: Vec::new(),
+            straight: Vec::new(),
             sprite: Premultiplied::default(),
             main: Resampled::default(),
             second: Resampled::default(),
@@ -156,14 +152,14 @@ impl<'a> Compositor<'a> {
             mirrored: individual.mirrored[t],
         };
         let size = [canvas.image.width, canvas.image.height];
-        self.premultiply(individual.source_frame[t], &mut canvas.sprite);
+        self.premultiply(individual.source_frame[t], canvas);
         canvas.main.draw(&canvas.sprite, &place, size);
         let fade = self.fade_at[individual.id as usize][t];
         if let Some(fade) = fade.map(|idx| &individual.fades[idx as usize]) {
             let k = t - fade.start as usize;
             place.rotation_rad = fade.rotation_rad[k];
             place.mirrored = fade.mirrored;
-            self.premultiply(fade.source_frame[k], &mut canvas.sprite);
+            self.premultiply(fade.source_frame[k], canvas);
             canvas.second.draw(&canvas.sprite, &place, size);
             mix(&mut canvas.main, &canvas.second, fade.weight[k] as f32);
         }
@@ -173,11 +169,13 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    fn premultiply(&self, frame: u32, sprite: &mut Premultiplied) {
-        let sprites = &self.library.sprites;
-        let rgba = sprites.sprite(frame as usize);
+    fn premultiply(&self, frame: u32, canvas: &mut Canvas) {
+        let (sprites, idx) = (&self.library.sprites, frame as usize);
+        sprites.read(idx, &mut canvas.straight);
         let size = [sprites.width(), sprites.height()];
-        sprite.fill(rgba, size, self.bounds[frame as usize]);
+        canvas
+            .sprite
+            .fill(&canvas.straight, size, sprites.bounds(idx));
     }
 }
 

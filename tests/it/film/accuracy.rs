@@ -2,6 +2,8 @@
 //! (ALGORITHMS.md 9). The film is the virtual fish's; its pixels and its truth share no code with
 //! the analysis.
 
+use std::sync::Arc;
+
 use flockreel::analysis::params::Search;
 use flockreel::analysis::{self, analyze};
 use flockreel::cpu::Level;
@@ -10,6 +12,7 @@ use flockreel::formats::poses_json;
 use flockreel::geometry::wrap_rad;
 use flockreel::library::{Library, Pose};
 use flockreel::progress::Silent;
+use flockreel::scratch::{InMemory, Scratch};
 
 use super::sample::{filmed, median};
 
@@ -75,7 +78,9 @@ fn searching_everywhere_finds_what_the_window_found_on_any_number_of_threads() {
         .num_threads(1)
         .build()
         .unwrap();
-    let full = pool.install(|| analyze(film, None, &params, Level::detect(), &Silent).unwrap());
+    let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+    let analyze = || analyze(film, None, &params, Level::detect(), &scratch, &Silent).unwrap();
+    let full = pool.install(analyze);
     let bytes = |library: &Library| poses_json::write(&library.poses, None);
     assert!(bytes(&full) == bytes(library), "poses.json differs");
     assert!(full.sprites == library.sprites, "the sprites differ");

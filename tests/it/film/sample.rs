@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use flockreel::analysis::params::{AnimalParams, CameraParams};
 use flockreel::analysis::{self, analyze};
@@ -16,6 +16,7 @@ use flockreel::formats::library_json::FootageSummary;
 use flockreel::library::Library;
 use flockreel::media::{Limits, Video};
 use flockreel::progress::Silent;
+use flockreel::scratch::{InMemory, Scratch};
 
 const N_FRAMES: usize = 180;
 
@@ -42,8 +43,9 @@ pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
             }),
             ..analysis::Params::default()
         };
-        let library =
-            analyze(&film, None, &params, Level::detect(), &Silent).expect("it can be analysed");
+        let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+        let library = analyze(&film, None, &params, Level::detect(), &scratch, &Silent);
+        let library = library.expect("it can be analysed");
         (film, library, params)
     })
 }

@@ -1,7 +1,7 @@
 //! Who may import whom: the table, and the reader that finds what a file imports.
 
 pub(super) const VALUES: &[&str] = &[
-    "geometry", "raster", "random", "cpu", "progress", "code", "ids",
+    "geometry", "raster", "random", "cpu", "progress", "code", "ids", "scratch",
 ];
 pub(super) const MIDDLE: &[&str] = &["library", "footage"];
 pub(super) const ALGORITHMS: &[&str] = &["analysis", "flock", "fish"];
@@ -18,7 +18,7 @@ pub(super) fn may_use(file: &str, module: &str, used: &str) -> bool {
             "formats" => within(&[VALUES, MIDDLE, ALGORITHMS]),
             "config" => false,
             "media" => ["raster", "footage", "progress", "code", "config"].contains(&used),
-            "store" => ["ids", "code", "config"].contains(&used),
+            "store" => ["ids", "code", "scratch", "config"].contains(&used),
             "jobs" => !["api", "cli"].contains(&used),
             "api" => used != "cli",
             "cli" => used != "api" || file == "cli/serve.rs",

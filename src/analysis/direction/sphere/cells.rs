@@ -100,7 +100,7 @@ impl Cells {
     }
 
     /// The mean direction of the posterior within 50 degrees of a cell.
-    pub(super) fn mean_near(&self, posterior: &[f32], cell: usize) -> [f64; 3] {
+    pub(super) fn mean_near(&self, posterior: &[f64], cell: usize) -> [f64; 3] {
         const COS_50: f64 = 0.642_787_609_686_539_4;
         let center = self.axes[cell].forward;
         let mut sum = [0.0; 3];
@@ -108,7 +108,7 @@ impl Cells {
             let f = axes.forward;
             if f[0] * center[0] + f[1] * center[1] + f[2] * center[2] > COS_50 {
                 for c in 0..3 {
-                    sum[c] += f64::from(p) * f[c];
+                    sum[c] += p * f[c];
                 }
             }
         }

@@ -1,6 +1,8 @@
 //! The chain of directions over time: the likeliest course (Viterbi) and the posterior of every cell
 //! (forward-backward), from the costs of every cell in every frame.
 
+use rayon::prelude::*;
+
 use super::cells::{N_CELL, N_PITCH, N_YAW, PITCH_STEP_RAD, YAW_STEP_RAD};
 
 /// Cells that the yaw, and the pitch, may go in one frame.
@@ -9,23 +11,85 @@ const PITCH_REACH: usize = 2;
 /// Cost of turning, per radian: of the whole way, whatever the frame rate.
 const TURN_COST: f64 = 5.8;
 
-/// The likeliest cell of every frame.
-pub(super) fn viterbi(costs: &[Vec<f64>]) -> Vec<usize> {
-    let mut best = costs[0].clone();
-    let mut came_from: Vec<Vec<u16>> = Vec::with_capacity(costs.len());
-    for cost in &costs[1..] {
-        let mut from: Vec<u16> = (0..N_CELL as u16).collect();
-        best = reach(&best, &mut from);
-        best.iter_mut().zip(cost).for_each(|(b, c)| *b += c);
-        came_from.push(from);
+/// Frames whose costs are held at a time: memory for a whole long footage is kept for the way back
+/// through it alone, two bytes a cell.
+const BLOCK: usize = 512;
+
+/// Decodes a course of `n` >= 1 frames from what every cell costs in each (`cost`, frame after frame of a
+/// range): `on_frame` is told of every frame, from the last to the first, its cell of the
+/// likeliest course and the posterior of all cells.
+pub(super) fn decode(
+    n: usize,
+    cost: impl Fn(usize) -> Vec<f64> + Sync,
+    mut on_frame: impl FnMut(usize, usize, &[f64]),
+) {
+    let costs_of = |block_idx: usize| -> Vec<Vec<f64>> {
+        let frames = block_idx * BLOCK..n.min((block_idx + 1) * BLOCK);
+        frames.into_par_iter().map(&cost).collect()
+    };
+    let n_blocks = n.div_ceil(BLOCK);
+    let mut likeliest = Likeliest::default();
+    // What is carried into each block from before it.
+    let mut carried = vec![vec![1.0; N_CELL]];
+    for block_idx in 0..n_blocks {
+        let costs = costs_of(block_idx);
+        let ((), ahead) = rayon::join(
+            || likeliest.go_on(&costs),
+            || ahead(&carried[block_idx], &likelihoods(&costs)),
+        );
+        carried.extend(ahead.last().map(|last| spread(last)));
     }
-    let mut cell = (0..N_CELL).fold(0, |a, b| if best[b] < best[a] { b } else { a });
-    let mut path = vec![cell; costs.len()];
-    for (k, from) in came_from.iter().enumerate().rev() {
-        cell = usize::from(from[cell]);
-        path[k] = cell;
+    let path = likeliest.path();
+    let mut behind = vec![1.0; N_CELL];
+    for block_idx in (0..n_blocks).rev() {
+        let likely = likelihoods(&costs_of(block_idx));
+        let ahead = ahead(&carried[block_idx], &likely);
+        for (k, (ahead, likely)) in ahead.iter().zip(&likely).enumerate().rev() {
+            let mut mass: Vec<f64> = ahead.iter().zip(&behind).map(|(a, b)| a * b).collect();
+            scale_to_one(&mut mass);
+            let frame_idx = block_idx * BLOCK + k;
+            on_frame(frame_idx, path[frame_idx], &mass);
+            behind.iter_mut().zip(likely).for_each(|(b, l)| *b *= l);
+            behind = spread(&behind);
+            scale_to_one(&mut behind);
+        }
     }
-    path
+}
+
+/// The likeliest course (Viterbi).
+#[derive(Default)]
+struct Likeliest {
+    /// The least cost of being in each cell now; empty before the first frame.
+    best: Vec<f64>,
+    came_from: Vec<Vec<u16>>,
+}
+
+impl Likeliest {
+    /// Takes the costs of the next frames.
+    fn go_on(&mut self, costs: &[Vec<f64>]) {
+        for cost in costs {
+            if self.best.is_empty() {
+                self.best.clone_from(cost);
+                continue;
+            }
+            let mut from: Vec<u16> = (0..N_CELL as u16).collect();
+            self.best = reach(&self.best, &mut from);
+            self.best.iter_mut().zip(cost).for_each(|(b, c)| *b += c);
+            self.came_from.push(from);
+        }
+    }
+
+    /// The cell of every frame.
+    fn path(self) -> Vec<usize> {
+        let best = &self.best;
+        let mut cell = (0..N_CELL).fold(0, |a, b| if best[b] < best[a] { b } else { a });
+        let mut path = vec![cell; self.came_from.len() + 1];
+        for (k, from) in self.came_from.iter().enumerate().rev() {
+            cell = usize::from(from[cell]);
+            path[k] = cell;
+        }
+        path
+    }
 }
 
 /// The least cost of reaching each cell, and from which one: pitch after yaw.
@@ -63,36 +127,24 @@ fn reach(best: &[f64], from: &mut [u16]) -> Vec<f64> {
     pitched
 }
 
-/// The posterior of every cell in every frame.
-pub(super) fn posterior(costs: &[Vec<f64>]) -> Vec<Vec<f32>> {
-    let likely: Vec<Vec<f64>> = costs
-        .iter()
-        .map(|cost| {
-            let least = cost.iter().copied().fold(f64::INFINITY, f64::min);
-            cost.iter().map(|c| libm::exp(least - c)).collect()
-        })
-        .collect();
-    let mut ahead: Vec<Vec<f64>> = Vec::with_capacity(costs.len());
-    for k in 0..costs.len() {
-        let mut mass = match ahead.last() {
-            Some(last) => spread(last),
-            None => vec![1.0; N_CELL],
-        };
-        mass.iter_mut().zip(&likely[k]).for_each(|(m, l)| *m *= l);
+fn likelihoods(costs: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let of_frame = |cost: &Vec<f64>| {
+        let least = cost.iter().copied().fold(f64::INFINITY, f64::min);
+        cost.iter().map(|c| libm::exp(least - c)).collect()
+    };
+    costs.par_iter().map(of_frame).collect()
+}
+
+/// The probability of every cell in the frames of a block, given them and those before.
+fn ahead(carried: &[f64], likely: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut ahead: Vec<Vec<f64>> = Vec::with_capacity(likely.len());
+    for likely in likely {
+        let mut mass = ahead.last().map_or(carried.to_vec(), |last| spread(last));
+        mass.iter_mut().zip(likely).for_each(|(m, l)| *m *= l);
         scale_to_one(&mut mass);
         ahead.push(mass);
     }
-    let mut behind = vec![1.0; N_CELL];
-    let mut posterior = vec![Vec::new(); costs.len()];
-    for k in (0..costs.len()).rev() {
-        let mut mass: Vec<f64> = ahead[k].iter().zip(&behind).map(|(a, b)| a * b).collect();
-        scale_to_one(&mut mass);
-        posterior[k] = mass.iter().map(|&m| m as f32).collect();
-        behind.iter_mut().zip(&likely[k]).for_each(|(b, l)| *b *= l);
-        behind = spread(&behind);
-        scale_to_one(&mut behind);
-    }
-    posterior
+    ahead
 }
 
 /// Probability carried to the neighbors of every cell.

@@ -16,10 +16,11 @@ use super::shape::Shape;
 use super::{States, Views};
 use crate::geometry::wrap_rad;
 use cells::Cells;
-use chain::{posterior, viterbi};
 
 /// What a frame says counts this much at 30 frames a second: neighbors say nearly the same.
 const EVIDENCE: f64 = 0.35;
+/// A cell less likely than this tells nothing of how sure the course is.
+const NEGLIGIBLE: f64 = 1e-6;
 /// Cost of pointing away from where the head is known to be.
 const PINNED: f64 = 1e4;
 
@@ -27,7 +28,8 @@ const PINNED: f64 = 1e4;
 pub(super) struct Course {
     /// Mean direction of the posterior near the likeliest course, in the camera frame.
     forward: Vec<[f64; 3]>,
-    posterior: Vec<Vec<f32>>,
+    /// The cells of each frame that are not all but impossible, with their probabilities.
+    posterior: Vec<Vec<(u16, f32)>>,
     cells: Cells,
     z_apparent_m: Vec<f64>,
     slopes: Vec<[f64; 2]>,
@@ -40,34 +42,33 @@ pub(super) fn decode(views: &Views, shape: &Shape) -> Course {
     let velocity = velocity_m_s(views, &z_apparent_m);
     let slopes: Vec<[f64; 2]> = views.frames.iter().map(|v| v.slope).collect();
     let tempered = EVIDENCE * (30.0 * views.dt).min(2.0);
-    let costs: Vec<Vec<f64>> = (0..views.frames.len())
-        .map(|k| {
-            let along = about_sight(slopes[k], velocity[k]);
-            let mut cost = cells.motion_costs(along, shape.length_m);
-            if let Some(outline) = &views.frames[k].outline {
-                cells.add_moment_costs(outline, &mut cost);
-            }
-            let toward = views.frames[k].toward;
-            let pinned = |cell: usize| match toward {
-                Some([x, y]) => {
-                    let forward = cells.axes[cell].forward;
-                    if x * forward[0] + y * forward[1] < 0.0 {
-                        PINNED
-                    } else {
-                        0.0
-                    }
-                }
-                None => 0.0,
-            };
-            let weighed = cost.iter().enumerate();
-            weighed.map(|(k, c)| c * tempered + pinned(k)).collect()
-        })
-        .collect();
-    let path = viterbi(&costs);
-    let posterior = posterior(&costs);
-    let forward = (0..costs.len())
-        .map(|k| camera_frame(slopes[k], cells.mean_near(&posterior[k], path[k])))
-        .collect();
+    let cost = |k: usize| {
+        let along = about_sight(slopes[k], velocity[k]);
+        let mut cost = cells.motion_costs(along, shape.length_m);
+        if let Some(outline) = &views.frames[k].outline {
+            cells.add_moment_costs(outline, &mut cost);
+        }
+        let toward = views.frames[k].toward;
+        for (cost, axes) in cost.iter_mut().zip(&cells.axes) {
+            let points_away = toward.is_some_and(|[x, y]| {
+                let forward = axes.forward;
+                x * forward[0] + y * forward[1] < 0.0
+            });
+            *cost = *cost * tempered + if points_away { PINNED } else { 0.0 };
+        }
+        cost
+    };
+    let n = views.frames.len();
+    let mut forward = vec![[0.0; 3]; n];
+    let mut posterior = vec![Vec::new(); n];
+    chain::decode(n, cost, |k, cell, probability| {
+        forward[k] = camera_frame(slopes[k], cells.mean_near(probability, cell));
+        posterior[k] = (0..)
+            .zip(probability)
+            .filter(|(_, p)| **p > NEGLIGIBLE)
+            .map(|(cell, &p)| (cell, p as f32))
+            .collect();
+    });
     Course {
         forward,
         posterior,
@@ -103,8 +104,8 @@ impl Course {
     pub(super) fn confidence(&self, idx: usize, forward: [f64; 3]) -> [f64; 2] {
         let along = about_sight(self.slopes[idx], forward);
         let (mut head, mut depth, mut all) = (0.0, 0.0, 0.0);
-        for (cell, &p) in self.cells.axes.iter().zip(&self.posterior[idx]) {
-            let (there, p) = (cell.forward, f64::from(p));
+        for &(cell, p) in &self.posterior[idx] {
+            let (there, p) = (self.cells.axes[usize::from(cell)].forward, f64::from(p));
             all += p;
             if there[0] * along[0] + there[1] * along[1] > 0.0 {
                 head += p;

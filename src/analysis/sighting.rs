@@ -1,0 +1,128 @@
+//! What is seen of the animal in one frame: cut out, put aside and measured (N 4; ALGORITHMS.md 2.7, 4).
+
+use super::background::Plate;
+use super::light::Gain;
+use super::matte::{self, Matte};
+use super::moments::{self, Moments};
+use crate::geometry::Rect;
+use crate::raster::runs::Component;
+use crate::raster::{Frame, Mask};
+use crate::scratch::{Full, Scratch};
+
+/// What was seen of the animal in one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sighting {
+    /// Where the animal cut out lies in the frame.
+    pub rect: Rect,
+    /// Where its pixels are put aside.
+    pub at: u64,
+    /// How far they reach from the centroid: horizontally, vertically, in any direction.
+    pub reach_px: [f64; 3],
+    /// Mean difference of the silhouette from the plate, levels of 255.
+    pub contrast: f64,
+    /// Its moments, weighed by alpha.
+    pub moments: Moments,
+    /// Extents along the major axis and across it, of the pixels that are more animal than background.
+    pub extent_px: [f64; 2],
+    /// Extent of the same pixels from the topmost to the lowest.
+    pub upright_px: f64,
+    /// Bounding box of the silhouette.
+    pub box_px: Rect,
+    /// The silhouette touches the border of the frame.
+    pub cut: bool,
+}
+
+/// The component taken for the animal in one frame, and its mended form.
+pub struct Choice {
+    /// As it was found.
+    pub component: Component,
+    /// Without holes and specks.
+    pub silhouette: Mask,
+}
+
+/// A frame before its plate.
+pub struct Scene<'a> {
+    /// The picture.
+    pub frame: &'a Frame,
+    /// The scene without the animal.
+    pub plate: &'a Plate,
+    /// How much brighter than the plate the frame is.
+    pub gain: &'a Gain,
+}
+
+impl Scene<'_> {
+    /// Cuts the animal out, puts it aside and measures it; `None` when nothing of it is opaque.
+    pub fn look(&self, choice: &Choice, scratch: &dyn Scratch) -> Result<Option<Sighting>, Full> {
+        let rect = choice.component.rect;
+        let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
+        let silhouette = &choice.silhouette;
+        let matte = matte::pull(self.frame, self.plate, self.gain, silhouette, length_px);
+        let pixels = matte.image.pixels.as_chunks::<4>().0;
+        let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
+        let Some(moments) = moments::moments(matte.rect, &weights) else {
+            return Ok(None);
+        };
+        let axis = moments.major_rad.unwrap_or(0.0);
+        let solid = solid(&matte);
+        let extent_px = |along_rad| moments::extent_px(&solid, along_rad);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        Ok(Some(Sighting {
+            rect: matte.rect,
+            at: scratch.put(&matte.image.pixels)?,
+            reach_px: reach_px(&matte, moments.centroid_px),
+            contrast: matte.contrast,
+            moments,
+            extent_px: [extent_px(axis), extent_px(axis + quarter)],
+            upright_px: extent_px(quarter),
+            box_px: rect,
+            cut: self.touches_border(rect),
+        }))
+    }
+
+    fn touches_border(&self, rect: Rect) -> bool {
+        let (right, bottom) = (self.frame.width, self.frame.height);
+        rect.x == 0 || rect.y == 0 || rect.right() == right || rect.bottom() == bottom
+    }
+}
+
+/// The pixels that are more animal than background. The silhouette itself is wider: its threshold is
+/// low, so that no fin is lost.
+fn solid(matte: &Matte) -> Mask {
+    let bits = matte
+        .image
+        .pixels
+        .chunks_exact(4)
+        .map(|rgba| u8::from(rgba[3] >= 128))
+        .collect();
+    Mask {
+        rect: matte.rect,
+        bits,
+    }
+}
+
+/// How far the alpha reaches from the centroid: horizontally, vertically, in any direction.
+fn reach_px(matte: &Matte, [cx, cy]: [f64; 2]) -> [f64; 3] {
+    let rect = matte.rect;
+    let mut most = [0.0f64; 3];
+    let columns = rect.w.max(1) as usize;
+    let rows = matte.image.pixels.as_chunks::<4>().0.chunks_exact(columns);
+    let inside = |rgba: &[u8; 4]| rgba[3] > 0;
+    for (row, y) in rows.zip(rect.y..) {
+        // The ends of a row lie farthest from any centroid.
+        let ends = row
+            .iter()
+            .position(inside)
+            .into_iter()
+            .chain(row.iter().rposition(inside));
+        for column in ends {
+            let dx = (f64::from(rect.x + column as u32) + 0.5 - cx).abs() + 0.5;
+            let dy = (f64::from(y) + 0.5 - cy).abs() + 0.5;
+            most = [
+                most[0].max(dx),
+                most[1].max(dy),
+                most[2].max(libm::hypot(dx, dy)),
+            ];
+        }
+    }
+    most
+}

@@ -1,0 +1,116 @@
+//! Bytes put aside in memory up to a budget, beyond it in a file that has no name (RELIABILITY.md:
+//! memory is bounded however long the footage, and nothing is left behind whatever happens).
+
+use std::fs::File;
+use std::io;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{OnceLock, PoisonError, RwLock};
+
+use crate::scratch::{Full, Scratch};
+
+/// Bytes held in memory.
+const BUDGET: usize = 48 << 20;
+
+/// The first bytes in memory, the others in a file of `folder`, made when it is needed.
+#[derive(Debug)]
+pub struct Spill {
+    folder: PathBuf,
+    held: RwLock<Vec<u8>>,
+    budget: usize,
+    file: OnceLock<File>,
+    /// Bytes in the file, those that are still being written included.
+    spilled: AtomicU64,
+}
+
+impl Spill {
+    /// For a folder on a disk with room; it must exist when the budget is reached.
+    pub fn into(folder: &Path) -> Spill {
+        Spill::with_budget(folder, BUDGET)
+    }
+
+    fn with_budget(folder: &Path, budget: usize) -> Spill {
+        Spill {
+            folder: folder.to_owned(),
+            held: RwLock::default(),
+            budget,
+            file: OnceLock::new(),
+            spilled: AtomicU64::new(0),
+        }
+    }
+
+    /// Where the bytes lie in memory, if there is room for them.
+    fn hold(&self, bytes: &[u8]) -> Option<u64> {
+        let mut held = self.held.write().unwrap_or_else(PoisonError::into_inner);
+        if held.len() + bytes.len() > self.budget {
+            return None;
+        }
+        let at = held.len() as u64;
+        held.extend_from_slice(bytes);
+        Some(at)
+    }
+
+    fn file(&self) -> io::Result<&File> {
+        if let Some(file) = self.file.get() {
+            return Ok(file);
+        }
+        let file = tempfile::tempfile_in(&self.folder)?;
+        // Of two threads that come here at once one is second, and its file goes.
+        Ok(self.file.get_or_init(|| file))
+    }
+}
+
+impl Scratch for Spill {
+    fn put(&self, bytes: &[u8]) -> Result<u64, Full> {
+        if let Some(at) = self.hold(bytes) {
+            return Ok(at);
+        }
+        let at = self
+            .spilled
+            .fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        self.file()?.write_all_at(bytes, at)?;
+        Ok(self.budget as u64 + at)
+    }
+
+    fn get(&self, at: u64, bytes: &mut [u8]) {
+        let Some(at_in_file) = at.checked_sub(self.budget as u64) else {
+            let held = self.held.read().unwrap_or_else(PoisonError::into_inner);
+            return bytes.copy_from_slice(&held[at as usize..][..bytes.len()]);
+        };
+        self.file()
+            .and_then(|file| file.read_exact_at(bytes, at_in_file))
+            .expect("what was put aside can be read back");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_come_back_from_memory_and_from_the_file_which_has_no_name() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let spill = Spill::with_budget(folder.path(), 10);
+        let pieces: Vec<Vec<u8>> = (0..9u8).map(|k| vec![k; usize::from(k)]).collect();
+        let places: Vec<u64> = pieces
+            .iter()
+            .map(|piece| spill.put(piece).expect("there is room"))
+            .collect();
+        for (piece, at) in pieces.iter().zip(places) {
+            let mut back = vec![99; piece.len()];
+            spill.get(at, &mut back);
+            assert_eq!(&back, piece);
+        }
+        assert!(spill.spilled.load(Ordering::Relaxed) > 20);
+        let names = std::fs::read_dir(folder.path()).expect("it is there");
+        assert_eq!(names.count(), 0);
+    }
+
+    #[test]
+    fn a_folder_that_takes_no_file_is_an_error() {
+        let spill = Spill::with_budget(Path::new("/nowhere/at/all"), 0);
+        let error = spill.put(b"bytes").expect_err("there is no folder");
+        assert_eq!(error.code(), crate::code::Code::Internal);
+    }
+}
