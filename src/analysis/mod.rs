@@ -71,14 +71,22 @@ pub fn analyze(
         let track = tracking::follow(batches, n_frames, &plate, params, scratch, progress)?;
         Ok::<_, Error>((plate, track))
     })?;
-    let mut poses = pose::measure(&track.frames, &source.format(), params);
-    midline::trace(&mut poses, &track);
-    poses.tail_beat = midline::tail_beat::measure(&poses);
-    let animal_too_small = params.sprites == CutSprites::Auto && stats::is_too_small(&poses);
-    let sprites = match animal_too_small {
-        true => sprite::none(track.frames.len()),
-        false => sprite::align(&track, poses.view)?,
-    };
+    let view = pose::view(&track.frames, params);
+    let animal_too_small =
+        params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
+    let (poses, sprites) = rayon::join(
+        || {
+            let mut poses = pose::measure(&track.frames, view, &source.format(), params);
+            midline::trace(&mut poses, &track);
+            poses.tail_beat = midline::tail_beat::measure(&poses);
+            poses
+        },
+        || match animal_too_small {
+            true => Ok(sprite::none(track.frames.len())),
+            false => sprite::align(&track, view),
+        },
+    );
+    let sprites = sprites?;
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {

@@ -11,7 +11,7 @@ use crate::footage::{FrameSource, SourceError};
 use crate::raster::Frame;
 
 /// Bytes of frames that may wait, about; at least two batches of one frame.
-const RING_BYTES: usize = 64 << 20;
+const RING_BYTES: usize = 128 << 20;
 /// Bytes of a batch, about.
 const BATCH_BYTES: usize = 4 << 20;
 /// Most frames of a batch.

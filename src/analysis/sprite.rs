@@ -10,6 +10,8 @@ use crate::scratch::Full;
 
 /// Room around the largest silhouette.
 const MARGIN_PX: f64 = 4.0;
+/// An animal of a smaller median area is too small to be looked at.
+const LEAST_AREA_PX: f64 = 24.0;
 /// Sides are multiples of this.
 const MULTIPLE: u32 = 8;
 
@@ -28,6 +30,16 @@ pub fn align(track: &Track, view: View) -> Result<Sprites, Full> {
         }
         Ok(sighting.is_some())
     })
+}
+
+/// Whether the animal covers, in the median, fewer pixels than are worth looking at.
+pub fn is_too_small(track: &[Tracked]) -> bool {
+    let sightings = track.iter().filter_map(|t| t.sighting.as_ref());
+    let mut areas_px: Vec<f64> = sightings.map(|s| s.moments.area_px).collect();
+    areas_px.sort_by(f64::total_cmp);
+    areas_px
+        .get(areas_px.len() / 2)
+        .is_some_and(|&area_px| area_px < LEAST_AREA_PX)
 }
 
 /// The sprites of an animal that none are cut of: all missing.

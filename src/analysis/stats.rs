@@ -6,8 +6,6 @@ use super::transition::Connections;
 use crate::geometry::wrap_rad;
 use crate::library::{LibraryStats, Poses};
 
-/// An animal of a smaller median area is too small to be looked at.
-const LEAST_SPRITE_AREA_PX: f64 = 24.0;
 /// Bins of the heading histogram: 10 degrees each, from -180.
 const N_BINS: usize = 36;
 
@@ -28,15 +26,6 @@ pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
         length_px,
         ..LibraryStats::default()
     }
-}
-
-/// Whether the animal covers, in the median, fewer pixels than a sprite needs.
-pub(super) fn is_too_small(poses: &Poses) -> bool {
-    let mut areas: Vec<f64> = poses.frames.iter().filter_map(|p| p.area_px).collect();
-    areas.sort_by(f64::total_cmp);
-    areas
-        .get(areas.len() / 2)
-        .is_some_and(|&area_px| area_px < LEAST_SPRITE_AREA_PX)
 }
 
 fn length_px(poses: &Poses) -> Option<f64> {

@@ -75,7 +75,9 @@ impl Video {
             ]
             .map(Into::into),
         );
-        args.extend(["-vf", &filters, "-f", "rawvideo", "pipe:1"].map(Into::into));
+        args.extend(["-vf", &filters, "-f", "rawvideo"].map(Into::into));
+        // A frame is written at once, not copied into a buffer first.
+        args.extend(["-avioflags", "direct", "pipe:1"].map(Into::into));
         args
     }
 

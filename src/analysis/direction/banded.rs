@@ -54,36 +54,30 @@ impl Normal {
                 }
             }
         }
+        // From here on the diagonal holds its reciprocal: a division waits long.
         for i in 0..n {
             let (done, rest) = factor.split_at_mut(i);
             let row = &mut rest[0];
             let reach = BAND.min(i + 1);
             for back in (1..reach).rev() {
                 // Column j = i - back: dot product of rows i and j left of j.
-                let j = i - back;
-                let other = &done[j];
-                let mut sum = row[back];
-                for m in 1..BAND - back {
-                    sum -= row[back + m] * other[m];
-                }
-                row[back] = sum / other[0];
+                let other = &done[i - back];
+                let sum = row[back] - dot(&row[back + 1..], &other[1..BAND - back]);
+                row[back] = sum * other[0];
             }
-            let mut sum = row[0];
-            for value in &row[1..] {
-                sum -= value * value;
-            }
+            let sum = row[0] - dot(&row[1..], &row[1..]);
             if sum.is_nan() || sum <= 0.0 {
                 return None;
             }
-            row[0] = sum.sqrt();
+            row[0] = 1.0 / sum.sqrt();
             for back in 1..reach {
                 let known = x[i - back];
                 x[i] -= row[back] * known;
             }
-            x[i] /= row[0];
+            x[i] *= row[0];
         }
         for i in (0..n).rev() {
-            let solved = x[i] / factor[i][0];
+            let solved = x[i] * factor[i][0];
             x[i] = solved;
             for back in 1..BAND.min(i + 1) {
                 x[i - back] -= factor[i][back] * solved;
@@ -91,6 +85,22 @@ impl Normal {
         }
         Some(x)
     }
+}
+
+/// The dot product, in four sums that need not wait for each other.
+#[inline]
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..4 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    for (k, (a, b)) in a_rest.iter().zip(b_rest).enumerate() {
+        sums[k] += a * b;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
 #[cfg(test)]

@@ -42,9 +42,13 @@ impl Axes {
     }
 }
 
+/// From where the animal is seen: as asked for, or guessed.
+pub fn view(track: &[Tracked], params: &Params) -> View {
+    params.view().unwrap_or_else(|| view::guess(track))
+}
+
 /// The poses of a track.
-pub fn measure(track: &[Tracked], format: &FootageFormat, params: &Params) -> Poses {
-    let view = params.view().unwrap_or_else(|| view::guess(track));
+pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &Params) -> Poses {
     let axes = length_axes(track, view, params.axis_and_head);
     let motion = Motion::of(track, format.fps);
     let reference_px = reference_length_px(&axes);
