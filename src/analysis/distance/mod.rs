@@ -4,10 +4,12 @@
 //! two clips; the mirrored Dm compares i with j mirrored. Both are symmetric, so only j >= i is
 //! computed. The rows stream by in order, in panels of 4 times 48: no N x N matrix is held here.
 
+mod bounds;
 mod kernel;
 mod matrix;
 mod minima;
 mod pixels;
+mod pruned;
 mod upright;
 mod window;
 
@@ -17,6 +19,7 @@ pub(crate) mod tests;
 pub use matrix::{DistanceMatrix, PooledMatrix};
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;
+pub use pruned::NOT_BELOW;
 
 use rayon::prelude::*;
 
@@ -102,27 +105,35 @@ impl Distances<'_> {
         let mut memory: [GroupMemory; PANEL] = Default::default();
         let rows: Vec<Group<'_>> = (first..n_groups.min(first + PANEL))
             .zip(&mut memory)
-            .map(|(group_idx, memory)| match self.side {
-                Side::Plain => self.pixels.group(group_idx, memory),
-                Side::Mirrored => self.pixels.mirrored_group(group_idx, memory),
-            })
+            .map(|(group_idx, memory)| self.row_group(group_idx, memory))
             .collect();
         (first..n_groups)
             .into_par_iter()
             .map_init(GroupMemory::default, |memory, column_idx| {
                 let columns = self.pixels.group(column_idx, memory);
                 let above = &rows[..rows.len().min(column_idx + 1 - first)];
-                let tile = |(row_idx, &rows)| Tile {
-                    rows,
-                    columns,
-                    diagonal: column_idx == row_idx,
+                let tile = |(row_idx, &rows)| {
+                    let wanted = match column_idx == row_idx {
+                        true => kernel::upper(rows, columns),
+                        false => kernel::all(rows, columns),
+                    };
+                    let tile = Tile {
+                        rows,
+                        columns,
+                        wanted: &wanted,
+                    };
+                    kernel::sad_tile(self.cpu, tile)
                 };
-                (first..)
-                    .zip(above)
-                    .map(tile)
-                    .map(|tile| kernel::sad_tile(self.cpu, tile))
-                    .collect()
+                (first..).zip(above).map(tile).collect()
             })
             .collect()
+    }
+
+    /// A group of rows: as it is compared.
+    fn row_group<'b>(&'b self, group_idx: usize, memory: &'b mut GroupMemory) -> Group<'b> {
+        match self.side {
+            Side::Plain => self.pixels.group(group_idx, memory),
+            Side::Mirrored => self.pixels.mirrored_group(group_idx, memory),
+        }
     }
 }

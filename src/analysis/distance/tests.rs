@@ -221,6 +221,49 @@ fn blocks_put_aside_are_compared_as_those_in_memory() {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Soft spots that wander about: some pairs are alike, some are not.
+    #[test]
+    fn pruned_distances_are_all_those_below_the_limit(
+        (w, h, n_frames, f) in (1u32..40, 1u32..40, 1usize..220, 1usize..6),
+        (seed, percent) in (any::<u64>(), 0usize..=110),
+        from_above: bool,
+    ) {
+        let sprites = drawn([w, h], n_frames, |frame_idx, rgba| {
+            let at = |c: u64| (random::bits(seed, &[frame_idx as u64 / 9, c]) % 40) as f64;
+            for (k, pixel) in rgba.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                let (x, y) = ((k % w as usize) as f64 - at(0), (k / w as usize) as f64 - at(1));
+                let light = 255.0 * libm::exp(-(x * x + y * y) / 90.0);
+                *pixel = [light as u8, 255 - light as u8, (frame_idx % 9 * 3) as u8, light as u8];
+            }
+        });
+        let poses = match from_above {
+            true => poses(View::Top, (0..n_frames).map(|k| Some(k as f64 * 0.7))),
+            false => from_the_side(&sprites),
+        };
+        let pixels = compared(&sprites, &poses, Planes::Rgba);
+        for side in [Side::Plain, Side::Mirrored] {
+            let whole = triangle_of(&pixels, f, side, Level::detect());
+            let mut all: Vec<u64> = whole.iter().flatten().copied().collect();
+            all.sort_unstable();
+            // From nothing to everything.
+            let limit = all.get(all.len() * percent / 100).copied().unwrap_or(u64::MAX);
+            for cpu in [Level::Scalar, Level::detect()] {
+                let distances = Distances { pixels: &pixels, clip_frames: f, side, cpu };
+                let mut rows = Vec::new();
+                let push = |_: usize, row: &[u64]| rows.push(row.to_vec());
+                distances.for_each_row_below(limit, &Silent, push).expect("nobody cancels");
+                let below = |&d: &u64| if d < limit { d } else { NOT_BELOW };
+                let wanted: Vec<Vec<u64>> =
+                    whole.iter().map(|row| row.iter().map(below).collect()).collect();
+                prop_assert!(rows == wanted, "{:?} {:?} {}", side, cpu, limit);
+            }
+        }
+    }
+}
+
 #[test]
 fn rgb_planes_leave_alpha_out() {
     let colors = [[0, 0, 0, 255], [200, 0, 0, 51]];

@@ -78,10 +78,19 @@ pub fn connect(
         gate: Gate::new(poses, clip_frames, params),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
-    let found = search
-        .run(&rungs, params.mirror, progress)
-        .map_err(|Cancelled| Error::Cancelled)?;
-    Ok(choose(found, &rungs, &clips, steps.median, poses.fps))
+    let mut connections = None;
+    for rung in &rungs {
+        let found = search
+            .run(rung, params.mirror, progress)
+            .map_err(|Cancelled| Error::Cancelled)?;
+        let found = found.connections(rung, &clips, steps.median);
+        let long_enough = found.playback.component.len() as f64 >= LEAST_COMPONENT_S * poses.fps;
+        connections = Some(found);
+        if long_enough {
+            break;
+        }
+    }
+    Ok(connections.expect("there is always a first rung"))
 }
 
 /// Which frames and clips can be used.
@@ -181,27 +190,20 @@ struct Search<'a> {
     least_gap: usize,
 }
 
-/// What a search found below the last rung's epsilon.
+/// What a search found below an epsilon.
+#[derive(Default)]
 struct Found {
     transitions: Vec<Transition>,
-    /// Raw pairs below each rung's epsilon.
-    n_candidates: Vec<u64>,
+    /// Raw pairs.
+    n_candidates: u64,
 }
 
 impl Search<'_> {
-    fn run(
-        &self,
-        rungs: &[Rung],
-        mirror: bool,
-        progress: &dyn Progress,
-    ) -> Result<Found, Cancelled> {
-        let mut found = Found {
-            transitions: Vec::new(),
-            n_candidates: vec![0; rungs.len()],
-        };
-        self.one_side(Side::Plain, rungs, progress, &mut found)?;
+    fn run(&self, rung: &Rung, mirror: bool, progress: &dyn Progress) -> Result<Found, Cancelled> {
+        let mut found = Found::default();
+        self.one_side(Side::Plain, rung.epsilon, progress, &mut found)?;
         if mirror {
-            self.one_side(Side::Mirrored, rungs, progress, &mut found)?;
+            self.one_side(Side::Mirrored, rung.epsilon, progress, &mut found)?;
         }
         let key = |t: &Transition| (t.from, t.to, t.mirrored);
         found.transitions.sort_unstable_by_key(key);
@@ -211,17 +213,15 @@ impl Search<'_> {
     fn one_side(
         &self,
         side: Side,
-        rungs: &[Rung],
+        epsilon: u64,
         progress: &dyn Progress,
         found: &mut Found,
     ) -> Result<(), Cancelled> {
-        let limit = rungs.iter().map(|rung| rung.epsilon).max().unwrap_or(0);
-        let least_gap = if side == Side::Plain {
-            self.least_gap
-        } else {
-            0
+        let least_gap = match side {
+            Side::Plain => self.least_gap,
+            Side::Mirrored => 0,
         };
-        let mut minima = LocalMinima::new(&self.clips.usable, least_gap, limit);
+        let mut minima = LocalMinima::new(&self.clips.usable, least_gap, epsilon);
         let distances = Distances {
             side,
             ..self.distances
@@ -230,23 +230,16 @@ impl Search<'_> {
             transitions,
             n_candidates,
         } = found;
-        distances.for_each_row(progress, |i, row| {
+        distances.for_each_row_below(epsilon, progress, |i, row| {
             if side == Side::Plain && self.clips.all_present[i] {
-                self.count(i, row, limit, rungs, n_candidates);
+                let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
+                let alike = others.filter(|(d, present)| **d < epsilon && **present);
+                *n_candidates += alike.count() as u64;
             }
             minima.push(row, |pair| transitions.extend(self.transition(pair, side)));
         })?;
         minima.finish(|pair| transitions.extend(self.transition(pair, side)));
         Ok(())
-    }
-
-    fn count(&self, i: usize, row: &[u64], limit: u64, rungs: &[Rung], n_candidates: &mut [u64]) {
-        let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
-        for (&distance, _) in others.filter(|(d, present)| **d < limit && **present) {
-            for (n, rung) in n_candidates.iter_mut().zip(rungs) {
-                *n += u64::from(distance < rung.epsilon);
-            }
-        }
     }
 
     fn transition(&self, pair: ClipPair, side: Side) -> Option<Transition> {
@@ -262,32 +255,21 @@ impl Search<'_> {
     }
 }
 
-/// The first rung whose component lasts long enough, else the last.
-fn choose(found: Found, rungs: &[Rung], clips: &Clips, natural_step: u64, fps: f64) -> Connections {
-    let n_frames = clips.shown.len();
-    let mut chosen = None;
-    for (rung, &n_candidates) in rungs.iter().zip(&found.n_candidates) {
-        let alike = found.transitions.iter();
-        let transitions: Vec<Transition> = alike
-            .filter(|t| t.distance < rung.epsilon)
-            .copied()
-            .collect();
-        let playback = playback::playback(&transitions, &clips.shown, clips.clip_frames);
-        let long_enough = playback.component.len() as f64 >= LEAST_COMPONENT_S * fps;
-        chosen = Some(Connections {
+impl Found {
+    /// What these transitions make of the footage.
+    fn connections(self, rung: &Rung, clips: &Clips, natural_step: u64) -> Connections {
+        let playback = playback::playback(&self.transitions, &clips.shown, clips.clip_frames);
+        let n_frames = clips.shown.len();
+        Connections {
             clip_frames: clips.clip_frames,
             epsilon: rung.epsilon,
             natural_step,
             kappa_used: rung.kappa,
-            n_candidates,
+            n_candidates: self.n_candidates,
             component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
             patches: playback::patches(&playback),
-            transitions,
+            transitions: self.transitions,
             playback,
-        });
-        if long_enough {
-            break;
         }
     }
-    chosen.expect("there is always a first rung")
 }

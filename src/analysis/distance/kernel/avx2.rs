@@ -22,19 +22,18 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx2")]
 fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
+    // Groups are padded to 48 sprites, so blocks of 4 and 2 never leave them.
+    let corners = tile.corners::<4, 2>();
     for block in 0..tile.rows.n_blocks() {
-        // Groups are padded to 48 sprites, so steps of 4 and 2 never leave them.
-        for row in (0..tile.rows.n_sprites).step_by(4) {
+        for &[row, column] in &corners {
+            if tile.add_blank::<4, 2>([block, row, column], sums) {
+                continue;
+            }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
-            for column in tile.columns_of(row).step_by(2) {
-                if tile.add_blank::<4, 2>([block, row, column], sums) {
-                    continue;
-                }
-                let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
-                for (k, sums_of_column) in sad_4x2(a, b).into_iter().enumerate() {
-                    for (r, sum) in sums_of_column.into_iter().enumerate() {
-                        sums[row + r][column + k] += u64::from(sum);
-                    }
+            let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
+            for (k, sums_of_column) in sad_4x2(a, b).into_iter().enumerate() {
+                for (r, sum) in sums_of_column.into_iter().enumerate() {
+                    sums[row + r][column + k] += u64::from(sum);
                 }
             }
         }

@@ -5,13 +5,14 @@ use crate::analysis::distance::pixels::Block;
 
 /// Adds d of every pair of the tile.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
+    let corners = tile.corners::<1, 1>();
     for block in 0..tile.rows.n_blocks() {
-        for (row, sums) in sums.iter_mut().enumerate().take(tile.rows.n_sprites) {
-            let a = tile.rows.block(block, row);
-            for column in tile.columns_of(row) {
-                let b = tile.columns.block(block, column);
-                sums[column] += sad_block(a, b);
-            }
+        for &[row, column] in &corners {
+            let (a, b) = (
+                tile.rows.block(block, row),
+                tile.columns.block(block, column),
+            );
+            sums[row][column] += sad_block(a, b);
         }
     }
 }
