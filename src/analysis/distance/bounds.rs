@@ -3,16 +3,15 @@
 //! that differ in their sums differ by no less in their pixels.
 //!
 //! Sums are taken over squares of 8 and of 16 pixels, one for each plane; those of the mirrored sprite
-//! are its own, counted from the other edge.
-#![expect(unsafe_code, reason = "the call into code for AVX2 and AVX-512")]
+//! are its own, counted from the other edge. Those of 16 pixels are kept halved, so that a signed 16-bit lane
+//! holds their differences: what rounding may add is taken off the bound again.
 
+use super::kernel::{LANES, least_differences};
 use super::pixels::Flip;
 use crate::cpu::Level;
 
 /// Side of a fine square, pixels: its sum is at most 64 * 255.
 const FINE: usize = 8;
-/// Values at a time: rows of them are padded with zeros.
-const LANES: usize = 16;
 
 /// Sums over the squares of every sprite.
 #[derive(Clone, Debug, Default)]
@@ -20,6 +19,8 @@ pub(super) struct SquareSums {
     /// Values of one sprite: squares, by rows, times 4 planes, padded.
     n_values: usize,
     values: Vec<u16>,
+    /// The values are halves, rounded down.
+    halved: bool,
 }
 
 /// Both sizes of squares, of sprites as they are or mirrored.
@@ -118,22 +119,26 @@ impl Bounds {
     /// Of all sprites, one after the other.
     pub(super) fn of(sums: &[Sums]) -> Bounds {
         Bounds {
-            coarse: SquareSums::of(sums.iter().map(|s| &s.coarse[..])),
-            fine: SquareSums::of(sums.iter().map(|s| &s.fine[..])),
+            coarse: SquareSums::of(sums.iter().map(|s| &s.coarse[..]), true),
+            fine: SquareSums::of(sums.iter().map(|s| &s.fine[..]), false),
         }
     }
 }
 
 impl SquareSums {
-    fn of<'a>(sprites: impl Iterator<Item = &'a [u16]> + Clone) -> SquareSums {
+    fn of<'a>(sprites: impl Iterator<Item = &'a [u16]> + Clone, halved: bool) -> SquareSums {
         let longest = sprites.clone().map(<[u16]>::len).max().unwrap_or(0);
         let n_values = longest.next_multiple_of(LANES);
         let mut values = Vec::with_capacity(n_values * sprites.clone().count());
         for sprite in sprites {
-            values.extend_from_slice(sprite);
+            values.extend(sprite.iter().map(|sum| sum >> u32::from(halved)));
             values.resize(values.len().next_multiple_of(n_values.max(1)), 0);
         }
-        SquareSums { n_values, values }
+        SquareSums {
+            n_values,
+            values,
+            halved,
+        }
     }
 
     fn row(&self, frame_idx: usize) -> &[u16] {
@@ -151,53 +156,21 @@ impl SquareSums {
         least: &mut [u32],
     ) {
         let others = &columns.values[first_column * columns.n_values..];
-        sum_each(cpu, self.row(row), others, least);
+        least_differences(cpu, self.row(row), others, least);
+        if self.halved {
+            // Of two halves rounded down the difference may be half too large.
+            let rounding = self.n_values as u32;
+            for sum in least {
+                *sum = sum.saturating_mul(2).saturating_sub(rounding);
+            }
+        }
     }
 
     /// At least what the row sprite (of these) differs by from one column sprite.
     pub(super) fn pair(&self, cpu: Level, row: usize, columns: &SquareSums, column: usize) -> u32 {
         let mut least = [0];
-        sum_each(cpu, self.row(row), columns.row(column), &mut least);
+        self.against(cpu, row, columns, column, &mut least);
         least[0]
-    }
-}
-
-/// The sums of absolute differences of one row of values and each of many.
-fn sum_each(cpu: Level, row: &[u16], columns: &[u16], sums: &mut [u32]) {
-    match cpu {
-        #[cfg(target_arch = "x86_64")]
-        Level::Avx2 | Level::Avx512 if std::arch::is_x86_feature_detected!("avx2") => {
-            // SAFETY: AVX2 is there, which is all that the callee asks for.
-            unsafe { sum_each_avx2(row, columns, sums) }
-        }
-        _ => sum_each_plain(row, columns, sums),
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sum_each_avx2(row: &[u16], columns: &[u16], sums: &mut [u32]) {
-    sum_each_plain(row, columns, sums);
-}
-
-/// Written so that the compiler may use whatever vectors its caller allows.
-#[inline(always)]
-fn sum_each_plain(row: &[u16], columns: &[u16], sums: &mut [u32]) {
-    let columns = columns.chunks_exact(row.len().max(1));
-    for (sum, column) in sums.iter_mut().zip(columns) {
-        let mut lanes = [0u32; LANES];
-        let pairs = row
-            .as_chunks::<LANES>()
-            .0
-            .iter()
-            .zip(column.as_chunks::<LANES>().0);
-        for (a, b) in pairs {
-            for k in 0..LANES {
-                lanes[k] += u32::from(a[k].abs_diff(b[k]));
-            }
-        }
-        let total: u64 = lanes.iter().map(|&lane| u64::from(lane)).sum();
-        *sum = u32::try_from(total).unwrap_or(u32::MAX);
     }
 }
 

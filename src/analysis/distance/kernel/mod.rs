@@ -24,6 +24,19 @@ pub(super) struct Tile<'a> {
     pub(super) wanted: &'a Wanted,
 }
 
+/// Values at a time of [`least_differences`].
+pub(super) const LANES: usize = 16;
+
+/// The sums of absolute differences of a row of values, each below 2^15, and each of many rows. All are
+/// of the same length, a multiple of [`LANES`]; what exceeds 32 bits is cut off there.
+pub(super) fn least_differences(cpu: Level, row: &[u16], others: &[u16], sums: &mut [u32]) {
+    match cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => avx2::least_differences(row, others, sums),
+        _ => scalar::least_differences(row, others, sums),
+    }
+}
+
 /// Which columns of a tile are asked for in each of its rows: bit k is column k.
 pub(super) type Wanted = [u64; GROUP];
 

@@ -22,3 +22,15 @@ pub(in crate::analysis::distance) fn sad_block(a: &Block, b: &Block) -> u64 {
     let differences = a.0.iter().zip(&b.0).map(|(a, b)| u32::from(a.abs_diff(*b)));
     u64::from(differences.sum::<u32>())
 }
+
+/// The sums of |a - b| over a row of values and each of many.
+pub(in crate::analysis::distance) fn least_differences(
+    row: &[u16],
+    others: &[u16],
+    sums: &mut [u32],
+) {
+    for (sum, other) in sums.iter_mut().zip(others.chunks_exact(row.len().max(1))) {
+        let differences = row.iter().zip(other).map(|(a, b)| a.abs_diff(*b));
+        *sum = differences.fold(0, |sum, d| sum.saturating_add(d.into()));
+    }
+}
