@@ -70,7 +70,7 @@ fn times(
     let pool = pool.expect("threads can be made");
     let distances = Distances {
         pixels,
-        clip_frames: library.clip_frames,
+        clip: Params::default().clip(library.clip_frames),
         side,
         cpu: Level::detect(),
     };

@@ -20,6 +20,7 @@ pub use matrix::{DistanceMatrix, PooledMatrix};
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;
 pub use pruned::NOT_BELOW;
+pub use window::Clip;
 
 use rayon::prelude::*;
 
@@ -50,8 +51,8 @@ pub struct Cancelled;
 pub struct Distances<'a> {
     /// The sprites compared.
     pub pixels: &'a ComparedSprites,
-    /// f, at least 1.
-    pub clip_frames: usize,
+    /// What is added up.
+    pub clip: Clip,
     /// Plain or mirrored.
     pub side: Side,
     /// The instructions to use; the result is the same with any.
@@ -61,7 +62,7 @@ pub struct Distances<'a> {
 impl Distances<'_> {
     /// N - f + 1, or 0 where the footage is shorter than a clip.
     pub fn n_clips(&self) -> usize {
-        (self.pixels.n_frames() + 1).saturating_sub(self.clip_frames)
+        (self.pixels.n_frames() + 1).saturating_sub(self.clip.frames)
     }
 
     /// Calls `on_row(i, D(i, i..))` for every clip i in order: entry k is D(i, i + k).
@@ -73,7 +74,7 @@ impl Distances<'_> {
         mut on_row: impl FnMut(usize, &[u64]),
     ) -> Result<(), Cancelled> {
         let n_frames = self.pixels.n_frames();
-        let mut window = WindowSums::new(self.clip_frames, n_frames);
+        let mut window = WindowSums::new(self.clip, n_frames);
         let mut row: Vec<u64> = Vec::with_capacity(n_frames);
         for panel_idx in (0..self.pixels.n_groups()).step_by(PANEL) {
             if progress.cancelled() {
@@ -89,8 +90,8 @@ impl Distances<'_> {
                 let of_tiles = tiles[group..].iter().flat_map(|column| column[group][line]);
                 row.clear();
                 row.extend(of_tiles.skip(line).take(n_frames - r));
-                if let Some((clip_idx, sums)) = window.push(&row) {
-                    on_row(clip_idx, sums);
+                if let Some(sums) = window.push(&row) {
+                    on_row(r + 1 - self.clip.frames, sums);
                 }
             }
         }

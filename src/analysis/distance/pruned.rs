@@ -66,7 +66,7 @@ impl<'a> Panel<'a> {
         let n_frames = distances.pixels.n_frames();
         let rows = &distances.pixels.bounds(distances.side).coarse;
         let columns = &distances.pixels.bounds(super::Side::Plain).coarse;
-        let least = (first..first + n_clips + distances.clip_frames - 1)
+        let least = (first..first + n_clips + distances.clip.frames - 1)
             .into_par_iter()
             .map(|row| {
                 let mut least = vec![0; n_frames - row];
@@ -89,10 +89,11 @@ impl<'a> Panel<'a> {
         self.look_closer(&self.frames_of(&near));
         let near = self.near();
         let tiles = Tiles::of(&self, &self.frames_of(&near));
+        let weights = self.distances.clip.weights();
         let one = |(clip, near): (usize, &Vec<bool>)| {
             let exact = |(offset, &near): (usize, &bool)| match near {
                 false => NOT_BELOW,
-                true => self.exact(&tiles, clip, offset),
+                true => self.exact(&tiles, &weights, [clip, offset]),
             };
             near.iter().enumerate().map(exact).collect()
         };
@@ -101,14 +102,15 @@ impl<'a> Panel<'a> {
 
     /// Which pairs of clips the bounds leave below the limit.
     fn near(&self) -> Vec<Vec<bool>> {
-        let f = self.distances.clip_frames;
+        let weights = self.distances.clip.weights();
         let all_clips = self.distances.n_clips();
         let of_clip = |clip: usize| {
-            let mut sums = self.least[clip].clone();
-            sums.truncate(all_clips - self.first - clip);
-            for row in &self.least[clip + 1..clip + f] {
-                let both = sums.iter_mut().zip(row);
-                both.for_each(|(sum, least)| *sum = sum.saturating_add(*least));
+            let mut sums = vec![0u32; all_clips - self.first - clip];
+            for (&weight, row) in weights.iter().zip(&self.least[clip..]) {
+                let weight = u32::try_from(weight).unwrap_or(u32::MAX);
+                for (sum, least) in sums.iter_mut().zip(row) {
+                    *sum = sum.saturating_add(least.saturating_mul(weight));
+                }
             }
             sums.iter()
                 .map(|&sum| u64::from(sum) < self.limit)
@@ -119,7 +121,7 @@ impl<'a> Panel<'a> {
 
     /// Which pairs of frames those pairs of clips consist of.
     fn frames_of(&self, near: &[Vec<bool>]) -> Vec<Vec<bool>> {
-        let f = self.distances.clip_frames;
+        let f = self.distances.clip.frames;
         let of_frame = |row: usize| {
             let mut wanted = vec![false; self.least[row].len()];
             for clip in &near[(row + 1).saturating_sub(f)..self.n_clips.min(row + 1)] {
@@ -152,10 +154,12 @@ impl<'a> Panel<'a> {
         rows.enumerate().for_each(of_frame);
     }
 
-    fn exact(&self, tiles: &Tiles, clip: usize, offset: usize) -> u64 {
+    fn exact(&self, tiles: &Tiles, weights: &[u64], [clip, offset]: [usize; 2]) -> u64 {
         let first = self.first + clip;
-        let frames = first..first + self.distances.clip_frames;
-        let sum = frames.map(|row| tiles.sad(row, row + offset)).sum();
+        let weighed = (first..).zip(weights);
+        let sum = weighed
+            .map(|(row, w)| w * tiles.sad(row, row + offset))
+            .sum();
         if sum < self.limit { sum } else { NOT_BELOW }
     }
 }

@@ -65,12 +65,13 @@ pub fn connect(
     let clip_frames = params.clip_frames_at(poses.fps);
     let pixels = ComparedSprites::new(sprites, poses, params.planes)?;
     let clips = Clips::new(sprites, poses, clip_frames);
-    let steps = natural_steps(&pixels, &clips);
+    let clip = params.clip(clip_frames);
+    let steps = natural_steps(&pixels, &clips, &clip.weights());
     let rungs = rungs(params, steps);
     let search = Search {
         distances: Distances {
             pixels: &pixels,
-            clip_frames,
+            clip,
             side: Side::Plain,
             cpu,
         },
@@ -133,13 +134,13 @@ struct NaturalSteps {
     p99: u64,
 }
 
-fn natural_steps(pixels: &ComparedSprites, clips: &Clips) -> NaturalSteps {
+fn natural_steps(pixels: &ComparedSprites, clips: &Clips, weights: &[u64]) -> NaturalSteps {
     let mut of_clips: Vec<u64> = pixels
         .steps()
         .windows(clips.clip_frames)
         .zip(clips.all_present.windows(2))
         .filter(|(_, present)| present[0] && present[1])
-        .map(|(steps, _)| steps.iter().sum())
+        .map(|(steps, _)| steps.iter().zip(weights).map(|(d, w)| d * w).sum())
         .collect();
     of_clips.sort_unstable();
     let at = |percent: usize| {
