@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use super::background::Plate;
 use super::light::{self, Gain};
+use super::order;
 use super::params::Search;
 use super::read_ahead::Batches;
 use super::sighting::{Choice, Scene, Sighting};
@@ -31,6 +32,8 @@ use crate::scratch::{Full, Scratch};
 const LEAST_AREA_PX: u64 = 12;
 /// Frames without the animal before it is looked for anew, anywhere.
 const MISSES: u32 = 5;
+/// A box so many times as long as the animal's usual one is not the animal's.
+const HUGE: f64 = 4.0;
 /// A component of this many times the usual area may be the animal and something else ...
 const MERGED: f64 = 1.2;
 /// ... if the usual area is known from this many silhouettes.
@@ -112,11 +115,24 @@ pub fn follow(
             least: LEAST_FRAMES,
         });
     }
+    drop_huge(&mut frames);
     if frames.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);
     }
     let scratch = Arc::clone(scratch);
     Ok(Track { frames, scratch })
+}
+
+/// Takes out what is far larger than the animal mostly is: a line of the scene that moved before the animal
+/// was first seen, say. It may have the animal's area; its box tells.
+fn drop_huge(frames: &mut [Tracked]) {
+    let diagonal = |s: &Sighting| libm::hypot(f64::from(s.box_px.w), f64::from(s.box_px.h));
+    let seen = frames.iter().filter_map(|t| t.sighting.as_ref());
+    let usual = order::median(seen.map(diagonal));
+    for tracked in frames {
+        let huge = |s: &Sighting| usual.is_some_and(|usual| diagonal(s) > HUGE * usual);
+        tracked.sighting.take_if(|s| huge(s));
+    }
 }
 
 struct Tracker<'a> {

@@ -215,6 +215,21 @@ fn a_tiny_animal_is_tracked_but_has_no_sprites_unless_asked_for() {
 }
 
 #[test]
+fn what_is_far_larger_than_the_animal_is_not_taken_for_it() {
+    let shadow = Disc {
+        center_px: [90.0, 70.0],
+        radius_px: 55.0,
+    };
+    let picture = |k: usize| {
+        let shown = if k < 3 { shadow } else { swimmer(k, 0.0, 8.0) };
+        Picture::of(vec![shown])
+    };
+    let library = analyzed(60, &Params::default(), picture).expect("it can be tracked");
+    let found = |k: usize| library.poses.frames[k].detected();
+    assert!((0..3).all(|k| !found(k)) && (10..60).all(found));
+}
+
+#[test]
 fn a_film_of_a_few_frames_is_refused() {
     let (code, sentence) = refusal(12, |k| Picture::of(vec![swimmer(k, 0.0, 9.0)]));
     assert_eq!(code, Code::TooFewFrames);
