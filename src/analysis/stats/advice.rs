@@ -15,8 +15,10 @@ use crate::library::{Library, Poses, View};
 const LEAST_MOTION_S: f64 = 0.5;
 /// Up and down begin so far off the horizontal, in bins of 10 degrees.
 const LEVEL_BINS: usize = 3;
-/// Turning more slowly than the playback's gate can tell is going straight.
+/// Turning more slowly than the playback's gate can tell is going straight; a turn is so fast that it
+/// is no jitter of the heading.
 const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
+const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
 /// Slower than this is rest, lengths a second; measured over so long either way.
 const REST_BL_PER_S: f64 = 0.1;
 const REACH_S: f64 = 0.1;
@@ -60,9 +62,9 @@ pub enum Motion {
     Up,
     /// From the side: more than 30 degrees below the horizontal.
     Down,
-    /// From above: by more than 20 degrees a second.
+    /// From above: by more than 45 degrees a second.
     TurningLeft,
-    /// From above: by more than 20 degrees a second.
+    /// From above: by more than 45 degrees a second.
     TurningRight,
     /// From above, mirrors counted: either way.
     Turning,
@@ -101,6 +103,26 @@ impl Motion {
             Motion::TurningRight => ("lacks_right_turn", "turning right"),
             Motion::Turning => ("lacks_turn", "turning"),
             Motion::Straight => ("lacks_straight", "moving straight on"),
+        }
+    }
+
+    fn lacking(self, f: &mut fmt::Formatter<'_>, playable_s: f64, filmed_s: f64) -> fmt::Result {
+        let words = self.names().1;
+        match (playable_s > 0.0, filmed_s > 0.0) {
+            (false, false) => write!(
+                f,
+                "this footage never shows the animal {words}: film longer"
+            ),
+            (false, true) => write!(
+                f,
+                "this footage shows the animal {words} for {filmed_s:.1} s, but never where playback can go \
+                 on: film longer"
+            ),
+            (true, _) => write!(
+                f,
+                "only {:.1} s of what can be played show the animal {words}: film longer",
+                (10.0 * playable_s).ceil() / 10.0
+            ),
         }
     }
 }
@@ -152,23 +174,7 @@ impl fmt::Display for Advice {
                 percent(share)
             ),
             Advice::Lacks(motion, playable_s, filmed_s) => {
-                let words = motion.names().1;
-                match (*playable_s > 0.0, *filmed_s > 0.0) {
-                    (false, false) => write!(
-                        f,
-                        "this footage never shows the animal {words}: film longer"
-                    ),
-                    (false, true) => write!(
-                        f,
-                        "this footage shows the animal {words} for {filmed_s:.1} s, but never where playback can go \
-                         on: film longer"
-                    ),
-                    (true, _) => write!(
-                        f,
-                        "only {:.1} s of what can be played show the animal {words}: film longer",
-                        (10.0 * playable_s).ceil() / 10.0
-                    ),
-                }
+                motion.lacking(f, *playable_s, *filmed_s)
             }
         }
     }
@@ -290,8 +296,8 @@ fn of_turns(library: &Library, motion: &[FrameMotion], mirror: bool) -> Vec<Advi
         )
     };
     // y runs down: a rising heading turns to the animal's right.
-    let right = count(&|frame| frame.turn_rad_per_s > STRAIGHT_RAD_PER_S);
-    let left = count(&|frame| frame.turn_rad_per_s < -STRAIGHT_RAD_PER_S);
+    let right = count(&|frame| frame.turn_rad_per_s > TURNING_RAD_PER_S);
+    let left = count(&|frame| frame.turn_rad_per_s < -TURNING_RAD_PER_S);
     let straight = count(&|frame| frame.moves && frame.turn_rad_per_s.abs() <= STRAIGHT_RAD_PER_S);
     let turns = match mirror {
         true => vec![(Motion::Turning, left.0 + right.0, left.1 + right.1)],

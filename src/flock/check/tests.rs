@@ -131,7 +131,8 @@ fn a_longer_dwell_than_was_kept_is_missed() {
 fn every_part_of_the_cost_is_recomputed() {
     let (library, flock) = planned(View::Side, "school");
     let turn = 1.0 / Turns::PER_RAD;
-    let spoil: [(&str, fn(&mut crate::flock::PlanCost) -> &mut f64); 5] = [
+    type Part = fn(&mut crate::flock::PlanCost) -> &mut f64;
+    let spoil: [(&str, Part); 5] = [
         ("cost.heading", |cost| &mut cost.heading),
         ("cost.speed", |cost| &mut cost.speed),
         ("cost.transition", |cost| &mut cost.transition),

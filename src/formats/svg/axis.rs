@@ -49,7 +49,10 @@ impl Axis {
                 0.0 => format!("{} 0", self.unit),
                 label => format!("{label}"),
             };
-            sheet.text("soft", "middle", [self.x(at), bottom + 20.0], &label);
+            // The last one keeps inside the picture.
+            let half = 4.2 * label.chars().count() as f64;
+            let x = self.x(at).min(super::WIDTH - half - 2.0);
+            sheet.text("soft", "middle", [x, bottom + 20.0], &label);
         }
     }
 

@@ -10,18 +10,22 @@ use crate::library::{Jump, Library};
 
 /// The top of the highest arc.
 const TOP: f64 = 64.0;
-/// How high an arc over the whole footage is.
+/// How high an arc over the whole footage would be.
 const HIGHEST: f64 = 250.0;
 /// Height of the axis with its patches.
 const BAND: f64 = 20.0;
 /// More arcs than these nobody can tell apart: the cheapest are drawn.
 const MOST_ARCS: usize = 4000;
 
+/// So many arcs are drawn with the pens below; of more each is thinner, of fewer stronger.
+const USUAL_ARCS: f64 = 500.0;
+
 /// Costs up to this share of epsilon, and how they are drawn.
 struct Class {
     most: f64,
     role: &'static str,
-    pen: &'static str,
+    width: f64,
+    opacity: f64,
     name: &'static str,
 }
 
@@ -30,38 +34,59 @@ const CLASSES: [Class; 4] = [
     Class {
         most: f64::INFINITY,
         role: "soft",
-        pen: "stroke-width=\"0.5\" stroke-opacity=\"0.4\"",
+        width: 0.6,
+        opacity: 0.45,
         name: "above 0.8",
     },
     Class {
         most: 0.8,
         role: "water",
-        pen: "stroke-width=\"0.7\" stroke-opacity=\"0.65\"",
+        width: 0.8,
+        opacity: 0.65,
         name: "0.6 to 0.8",
     },
     Class {
         most: 0.6,
         role: "water",
-        pen: "stroke-width=\"1.5\"",
+        width: 1.5,
+        opacity: 0.9,
         name: "0.4 to 0.6",
     },
     Class {
         most: 0.4,
         role: "accent",
-        pen: "stroke-width=\"1.9\"",
+        width: 1.9,
+        opacity: 1.0,
         name: "0.4 or less",
     },
 ];
+
+impl Class {
+    fn pen(&self, n_arcs: usize) -> String {
+        let strength = (USUAL_ARCS / n_arcs.max(1) as f64).sqrt().clamp(0.3, 1.6);
+        format!(
+            "stroke-width=\"{:.2}\" stroke-opacity=\"{:.2}\"",
+            self.width * strength,
+            (self.opacity * strength.max(0.8)).min(1.0)
+        )
+    }
+}
 
 /// The jumps of a library as an SVG picture 960 wide.
 pub fn transitions(library: &Library) -> String {
     let playback = &library.playback;
     let n_mirrored = playback.jumps.iter().filter(|jump| jump.mirrored).count();
     let axis = Axis::of_frames(library.poses.frames.len(), [LEFT, RIGHT]);
-    let below = if n_mirrored > 0 { HIGHEST } else { 0.0 };
-    let band = [TOP + HIGHEST, TOP + HIGHEST + BAND];
-    let bottom = band[1] + below + 6.0;
     let jumps = cheapest(&playback.jumps);
+    // Room for the highest arc either side, and for the words beside it.
+    let highest = |mirrored: bool| {
+        let of_side = jumps.iter().filter(|jump| jump.mirrored == mirrored);
+        let rises = of_side.map(|jump| rise(jump, &axis) + 6.0);
+        rises.reduce(f64::max).map(|highest| highest.max(28.0))
+    };
+    let above = TOP + highest(false).unwrap_or(28.0);
+    let band = [above, above + BAND];
+    let bottom = band[1] + highest(true).unwrap_or(0.0) + 6.0;
     let said = summary(library, n_mirrored, jumps.len());
     let mut sheet = Sheet::new(bottom + 66.0, "What may follow what", &said);
     sheet.text("ink", "start", [16.0, 26.0], "What may follow what");
@@ -73,7 +98,7 @@ pub fn transitions(library: &Library) -> String {
     }
     arcs(&mut sheet, library, &jumps, &axis, band);
     patches(&mut sheet, library, &axis, band);
-    key(&mut sheet, bottom + 48.0);
+    key(&mut sheet, jumps.len(), bottom + 48.0);
     sheet.finish()
 }
 
@@ -101,6 +126,11 @@ fn cheapest(jumps: &[Jump]) -> Vec<Jump> {
     jumps
 }
 
+/// How high an arc is: short ones keep some height.
+fn rise(jump: &Jump, axis: &Axis) -> f64 {
+    HIGHEST * libm::pow(f64::from(jump.from.abs_diff(jump.to)) / axis.end, 0.75)
+}
+
 /// Arcs of one class are one path: they do not darken each other.
 fn arcs(sheet: &mut Sheet, library: &Library, jumps: &[Jump], axis: &Axis, band: [f64; 2]) {
     let mut paths: [String; CLASSES.len()] = Default::default();
@@ -111,8 +141,7 @@ fn arcs(sheet: &mut Sheet, library: &Library, jumps: &[Jump], axis: &Axis, band:
         let (first, last) = (jump.from.min(jump.to), jump.from.max(jump.to));
         let [x0, x1] = [first, last].map(|frame| axis.x(f64::from(frame) + 0.5));
         let rx = (x1 - x0) / 2.0;
-        // Short arcs keep some height.
-        let ry = HIGHEST * libm::pow(f64::from(last - first) / axis.end, 0.75);
+        let ry = rise(jump, axis);
         let (y, sweep) = match jump.mirrored {
             false => (band[0], 1),
             true => (band[1], 0),
@@ -121,7 +150,7 @@ fn arcs(sheet: &mut Sheet, library: &Library, jumps: &[Jump], axis: &Axis, band:
         paths[class].write_fmt(arc).expect("memory");
     }
     for (class, path) in CLASSES.iter().zip(paths) {
-        sheet.stroke(class.role, &path, class.pen);
+        sheet.stroke(class.role, &path, &class.pen(jumps.len()));
     }
 }
 
@@ -144,7 +173,7 @@ fn patches(sheet: &mut Sheet, library: &Library, axis: &Axis, band: [f64; 2]) {
     }
 }
 
-fn key(sheet: &mut Sheet, y: f64) {
+fn key(sheet: &mut Sheet, n_arcs: usize, y: f64) {
     sheet.text(
         "soft",
         "start",
@@ -156,7 +185,7 @@ fn key(sheet: &mut Sheet, y: f64) {
         sheet.put(format_args!(
             "<path {} {} fill=\"none\" d=\"M{x} {}h26\"/>\n",
             stroke(class.role),
-            class.pen,
+            class.pen(n_arcs),
             y - 4.5
         ));
         sheet.text("soft", "start", [x + 33.0, y], class.name);
