@@ -15,6 +15,9 @@ use crate::library::Library;
 /// How far from a whole number of turns 6 decimals of a radian may be.
 const ROUNDING_TURNS: f64 = 0.02;
 
+/// Nearer in the footage than this looks the same (ALGORITHMS.md 6, crowd).
+const LOOKALIKE_S: f64 = 0.3;
+
 /// What everything costs.
 pub(super) struct Ledger<'a> {
     flock: &'a Flock,
@@ -142,7 +145,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// What showing each state of the graph costs at frame `t`, turns, with the crowd or without.
-    pub(super) fn row(&self, bill: &Bill, t: usize, with_crowd: bool) -> Vec<u64> {
+    pub(super) fn row(&self, graph: &Graph, bill: &Bill, t: usize, with_crowd: bool) -> Vec<u64> {
         let mut crowd = vec![[0u32; 1]; self.trellis.n_states()];
         if with_crowd {
             self.crowd

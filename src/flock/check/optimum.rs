@@ -35,7 +35,7 @@ pub(super) fn check(
     let since = since_jump(graph, ledger.dwell, states);
     // What the plan costs if from each frame on it goes the cheapest way.
     let mut at_best = vec![0; n_frames];
-    let row = |t: usize| ledger.row(bill, t, true);
+    let row = |t: usize| ledger.row(graph, bill, t, true);
     let cheapest = search.cheapest(n_frames, row, |t, column| {
         at_best[t] = bill.before[t] + column[since[t] - 1][states[t]];
     })?;
@@ -49,7 +49,7 @@ pub(super) fn check(
         });
     }
     let alone = match bill.has_crowd() {
-        true => search.cheapest(n_frames, |t| ledger.row(bill, t, false), |_, _| {})?,
+        true => search.cheapest(n_frames, |t| ledger.row(graph, bill, t, false), |_, _| {})?,
         false => cheapest,
     };
     let said = ledger.lower_bound(id)?;
