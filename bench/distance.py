@@ -4,7 +4,8 @@
 
 Makes sprites, lets `benches/distance.rs` time the engine alone, recomputes d with
 scipy.spatial.distance.cdist(..., "cityblock") on one core from the same RGBA bytes by ALGORITHMS.md 5,
-checks that d and the window sums D are equal, and prints one line of JSON. Fails when they are
+checks that d and the window sums D are equal, compares with FAISS (L1, one core, 32-bit floats) where that is
+installed, and prints one line of JSON. Fails when they are
 not, or when the engine is less than 60 times faster. Needs numpy and scipy.
 """
 
@@ -42,6 +43,7 @@ def main():
         engine = run_engine(args, width, height, folder)
         d, clips = np.load(folder / "d.npy"), np.load(folder / "D.npy")
     seconds, wanted = scipy_distances(sprites)
+    faiss_s = faiss_seconds(sprites)
     equal = bool(
         np.array_equal(d, wanted) and np.array_equal(clips, window_sums(wanted, args.clip_frames))
     )
@@ -52,6 +54,8 @@ def main():
         "equal": equal,
         "scipy_s": round(seconds, 3),
         "times_faster_one_thread": round(seconds / engine["one_thread_s"], 1),
+        "faiss_s": faiss_s and round(faiss_s, 3),
+        "times_faster_than_faiss": faiss_s and round(faiss_s / engine["one_thread_s"], 1),
         "share_of_psadbw_peak": round(
             engine["one_thread_gb_per_s"] / engine["psadbw_peak_gb_per_s"], 3
         ),
@@ -85,14 +89,32 @@ def run_engine(args, width, height, folder):
     return json.loads(done.stdout.splitlines()[-1])
 
 
+def faiss_seconds(sprites):
+    """Seconds that FAISS takes for the same matrix; None where it is not installed."""
+    try:
+        import faiss
+    except ImportError:
+        return None
+    faiss.omp_set_num_threads(1)
+    u = premultiplied(sprites).astype(np.float32)
+    start = time.perf_counter()
+    faiss.pairwise_distances(u, u, metric=faiss.METRIC_L1)
+    return time.perf_counter() - start
+
+
 def scipy_distances(sprites):
     """Seconds that cdist takes, and d as whole numbers."""
-    alpha = sprites[..., 3:].astype(np.int64)
-    color = (alpha * sprites[..., :3] + 127) // 255
-    u = np.concatenate([color, alpha], axis=-1).reshape(len(sprites), -1).astype(np.float64)
+    u = premultiplied(sprites).astype(np.float64)
     start = time.perf_counter()
     d = cdist(u, u, "cityblock")
     return time.perf_counter() - start, d.astype(np.int64)
+
+
+def premultiplied(sprites):
+    """U of every sprite, a row each."""
+    alpha = sprites[..., 3:].astype(np.int64)
+    color = (alpha * sprites[..., :3] + 127) // 255
+    return np.concatenate([color, alpha], axis=-1).reshape(len(sprites), -1)
 
 
 def window_sums(d, clip_frames):

@@ -12,6 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use flockreel::analysis::Params;
 use flockreel::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
 use flockreel::analysis::params::Planes;
 use flockreel::cpu::Level;
@@ -80,7 +81,7 @@ fn read(path: &Path, [width, height]: [u32; 2]) -> (Sprites, Poses) {
 fn distances(pixels: &ComparedSprites, clip_frames: usize) -> Distances<'_> {
     Distances {
         pixels,
-        clip_frames,
+        clip: Params::default().clip(clip_frames),
         side: Side::Plain,
         cpu: Level::detect(),
     }

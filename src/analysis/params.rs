@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::distance::Clip;
 use crate::geometry::Camera;
 use crate::library::{Animal, View};
 
@@ -30,6 +31,8 @@ pub struct Params {
     pub smooth: bool,
     /// f: frames in a clip, 1..=120; null = 8 at 30 frames a second, in proportion to the rate.
     pub clip_frames: Option<u32>,
+    /// How much each frame of two clips counts in their distance.
+    pub clip_weights: ClipWeights,
     /// Clips nearer than this are alike; null = kappa times the natural step.
     pub epsilon: Option<u64>,
     /// Multiple of the natural step, > 0, when epsilon is null.
@@ -123,6 +126,17 @@ pub enum CutSprites {
     Always,
 }
 
+/// How much each frame of a clip counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ClipWeights {
+    /// All the same: O (2).
+    Uniform,
+    /// Frame k of f by the binomial coefficient of k out of f - 1, so that the middle, where playback jumps,
+    /// counts most (Schoedl et al., Video Textures, 2000). f must be at most 24.
+    Binomial,
+}
+
 /// Which planes are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -167,6 +181,7 @@ impl Default for Params {
             head: None,
             smooth: true,
             clip_frames: None,
+            clip_weights: ClipWeights::Uniform,
             epsilon: None,
             kappa: 2.0,
             heading_gate_deg: 15.0,
@@ -195,8 +210,16 @@ impl Params {
     pub fn clip_frames_at(&self, fps: f64) -> usize {
         match self.clip_frames {
             Some(frames) => frames as usize,
-            None => ((fps * 8.0 / 30.0).round() as usize).clamp(2, 120),
+            None => {
+                ((fps * 8.0 / 30.0).round() as usize).clamp(2, self.most_clip_frames() as usize)
+            }
         }
+    }
+
+    /// A clip of so many frames, weighed as asked for.
+    pub fn clip(&self, frames: usize) -> Clip {
+        let weights = self.clip_weights;
+        Clip { frames, weights }
     }
 
     /// The camera for an image of the given size, if one was set.
@@ -227,6 +250,14 @@ impl Params {
         })
     }
 
+    /// Binomial coefficients of longer clips would exceed what sums of distances hold.
+    fn most_clip_frames(&self) -> u32 {
+        match self.clip_weights {
+            ClipWeights::Uniform => 120,
+            ClipWeights::Binomial => 24,
+        }
+    }
+
     /// Checks every range; the sentence says which parameter is out of which range.
     pub fn check(&self) -> Result<(), String> {
         let positive = |name: &str, value: f64| {
@@ -245,9 +276,10 @@ impl Params {
             return Err(format!("threshold must lie in 1..=254: {}", self.threshold));
         }
         if let Some(frames) = self.clip_frames
-            && !(1..=120).contains(&frames)
+            && !(1..=self.most_clip_frames()).contains(&frames)
         {
-            return Err(format!("clip_frames must lie in 1..=120: {frames}"));
+            let most = self.most_clip_frames();
+            return Err(format!("clip_frames must lie in 1..={most}: {frames}"));
         }
         if let Some(camera) = self.camera {
             positive("camera.z_min_m", camera.z_min_m)?;

@@ -49,6 +49,9 @@ pub struct Args {
     /// Frames in a clip.
     #[arg(long, value_name = "F")]
     clip_frames: Option<u32>,
+    /// How much each frame of a clip counts: uniform or binomial.
+    #[arg(long, value_name = "uniform|binomial")]
+    clip_weights: Option<String>,
     /// Clips nearer than this are alike; a multiple of the natural step when absent.
     #[arg(long, value_name = "E")]
     epsilon: Option<u64>,
@@ -120,6 +123,8 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     put("view", args.view.as_ref().map(|view| json!(view)));
     put("follow", args.follow_largest.then(|| json!("largest")));
     put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
+    let weights = args.clip_weights.as_ref();
+    put("clip_weights", weights.map(|weights| json!(weights)));
     put("epsilon", args.epsilon.map(|epsilon| json!(epsilon)));
     let animal = args.animal_length.zip(args.animal_height);
     put(

@@ -44,7 +44,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .map_err(|error| Error::work(error.code(), &error))?;
     let distances = Distances {
         pixels: &pixels,
-        clip_frames: library.clip_frames,
+        clip: stored.params.clip(library.clip_frames),
         side: if args.mirrored {
             Side::Mirrored
         } else {

@@ -239,7 +239,7 @@ mod tests {
         let pixels = pixels.expect("memory has room");
         let distances = Distances {
             pixels: &pixels,
-            clip_frames: library.clip_frames,
+            clip: crate::analysis::Params::default().clip(library.clip_frames),
             side: Side::Plain,
             cpu: Level::detect(),
         };

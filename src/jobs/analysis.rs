@@ -146,7 +146,7 @@ impl Input {
             .map_err(analysis::Error::from)?;
         let distances = Distances {
             pixels: &pixels,
-            clip_frames: library.clip_frames,
+            clip: self.params.clip(library.clip_frames),
             side: Side::Plain,
             cpu: cpu::Level::detect(),
         };

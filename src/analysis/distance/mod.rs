@@ -4,10 +4,12 @@
 //! two clips; the mirrored Dm compares i with j mirrored. Both are symmetric, so only j >= i is
 //! computed. The rows stream by in order, in panels of 4 times 48: no N x N matrix is held here.
 
+mod bounds;
 mod kernel;
 mod matrix;
 mod minima;
 mod pixels;
+mod pruned;
 mod upright;
 mod window;
 
@@ -17,6 +19,8 @@ pub(crate) mod tests;
 pub use matrix::{DistanceMatrix, PooledMatrix};
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;
+pub use pruned::NOT_BELOW;
+pub use window::Clip;
 
 use rayon::prelude::*;
 
@@ -47,8 +51,8 @@ pub struct Cancelled;
 pub struct Distances<'a> {
     /// The sprites compared.
     pub pixels: &'a ComparedSprites,
-    /// f, at least 1.
-    pub clip_frames: usize,
+    /// What is added up.
+    pub clip: Clip,
     /// Plain or mirrored.
     pub side: Side,
     /// The instructions to use; the result is the same with any.
@@ -58,7 +62,7 @@ pub struct Distances<'a> {
 impl Distances<'_> {
     /// N - f + 1, or 0 where the footage is shorter than a clip.
     pub fn n_clips(&self) -> usize {
-        (self.pixels.n_frames() + 1).saturating_sub(self.clip_frames)
+        (self.pixels.n_frames() + 1).saturating_sub(self.clip.frames)
     }
 
     /// Calls `on_row(i, D(i, i..))` for every clip i in order: entry k is D(i, i + k).
@@ -70,7 +74,7 @@ impl Distances<'_> {
         mut on_row: impl FnMut(usize, &[u64]),
     ) -> Result<(), Cancelled> {
         let n_frames = self.pixels.n_frames();
-        let mut window = WindowSums::new(self.clip_frames, n_frames);
+        let mut window = WindowSums::new(self.clip, n_frames);
         let mut row: Vec<u64> = Vec::with_capacity(n_frames);
         for panel_idx in (0..self.pixels.n_groups()).step_by(PANEL) {
             if progress.cancelled() {
@@ -86,8 +90,8 @@ impl Distances<'_> {
                 let of_tiles = tiles[group..].iter().flat_map(|column| column[group][line]);
                 row.clear();
                 row.extend(of_tiles.skip(line).take(n_frames - r));
-                if let Some((clip_idx, sums)) = window.push(&row) {
-                    on_row(clip_idx, sums);
+                if let Some(sums) = window.push(&row) {
+                    on_row(r + 1 - self.clip.frames, sums);
                 }
             }
         }
@@ -102,27 +106,35 @@ impl Distances<'_> {
         let mut memory: [GroupMemory; PANEL] = Default::default();
         let rows: Vec<Group<'_>> = (first..n_groups.min(first + PANEL))
             .zip(&mut memory)
-            .map(|(group_idx, memory)| match self.side {
-                Side::Plain => self.pixels.group(group_idx, memory),
-                Side::Mirrored => self.pixels.mirrored_group(group_idx, memory),
-            })
+            .map(|(group_idx, memory)| self.row_group(group_idx, memory))
             .collect();
         (first..n_groups)
             .into_par_iter()
             .map_init(GroupMemory::default, |memory, column_idx| {
                 let columns = self.pixels.group(column_idx, memory);
                 let above = &rows[..rows.len().min(column_idx + 1 - first)];
-                let tile = |(row_idx, &rows)| Tile {
-                    rows,
-                    columns,
-                    diagonal: column_idx == row_idx,
+                let tile = |(row_idx, &rows)| {
+                    let wanted = match column_idx == row_idx {
+                        true => kernel::upper(rows, columns),
+                        false => kernel::all(rows, columns),
+                    };
+                    let tile = Tile {
+                        rows,
+                        columns,
+                        wanted: &wanted,
+                    };
+                    kernel::sad_tile(self.cpu, tile)
                 };
-                (first..)
-                    .zip(above)
-                    .map(tile)
-                    .map(|tile| kernel::sad_tile(self.cpu, tile))
-                    .collect()
+                (first..).zip(above).map(tile).collect()
             })
             .collect()
+    }
+
+    /// A group of rows: as it is compared.
+    fn row_group<'b>(&'b self, group_idx: usize, memory: &'b mut GroupMemory) -> Group<'b> {
+        match self.side {
+            Side::Plain => self.pixels.group(group_idx, memory),
+            Side::Mirrored => self.pixels.mirrored_group(group_idx, memory),
+        }
     }
 }

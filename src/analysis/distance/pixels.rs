@@ -11,6 +11,8 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::Side;
+use super::bounds::{Bounds, Sums};
 use super::upright::Canvas;
 use crate::analysis::params::Planes;
 use crate::library::{Poses, Sprites, View};
@@ -53,6 +55,10 @@ pub struct ComparedSprites {
     height: usize,
     flip: Flip,
     groups: Vec<Stored>,
+    /// Of the sprites as they are.
+    plain: Bounds,
+    /// Of the sprites mirrored.
+    mirrored: Bounds,
     scratch: Arc<dyn Scratch>,
 }
 
@@ -169,6 +175,8 @@ impl ComparedSprites {
             height,
             flip,
             groups: Vec::new(),
+            plain: Bounds::default(),
+            mirrored: Bounds::default(),
             scratch: Arc::clone(sprites.scratch()),
         };
         let n_groups = compared.n_frames.div_ceil(GROUP);
@@ -179,31 +187,40 @@ impl ComparedSprites {
             planes,
             canvas: canvas.as_ref(),
         };
-        compared.groups = (0..n_groups)
+        let gathered = (0..n_groups)
             .into_par_iter()
             .map(|group_idx| {
-                let group = compared.gathered(group_idx, &source);
-                match held {
-                    true => Ok(Stored::Held(group)),
-                    false => group.put_aside(&*compared.scratch),
-                }
+                let (group, sums) = compared.gathered(group_idx, &source);
+                let stored = match held {
+                    true => Stored::Held(group),
+                    false => group.put_aside(&*compared.scratch)?,
+                };
+                Ok((stored, sums))
             })
-            .collect::<Result<_, Full>>()?;
+            .collect::<Result<Vec<_>, Full>>()?;
+        let (groups, sums): (Vec<_>, Vec<_>) = gathered.into_iter().unzip();
+        let (plain, mirrored): (Vec<_>, Vec<_>) = sums.into_iter().flatten().unzip();
+        compared.groups = groups;
+        compared.plain = Bounds::of(&plain);
+        compared.mirrored = Bounds::of(&mirrored);
         Ok(compared)
     }
 
-    /// The blocks of one group, made of its sprites.
-    fn gathered(&self, group_idx: usize, source: &Source<'_>) -> GroupMemory {
+    /// The blocks of one group, made of its sprites, and the sums of each, as it is and mirrored.
+    fn gathered(&self, group_idx: usize, source: &Source<'_>) -> (GroupMemory, Vec<(Sums, Sums)>) {
         let mut group = GroupMemory::default();
         group.clear(GROUP * self.n_blocks());
         let mut bytes = vec![0; self.n_bytes()];
+        let mut sums = Vec::with_capacity(GROUP);
         let first = group_idx * GROUP;
         for frame_idx in first..self.n_frames.min(first + GROUP) {
             source.draw(frame_idx, &mut bytes);
             scatter(&bytes, self.width, frame_idx - first, &mut group.blocks);
+            let mirrored = Sums::of_mirrored(&bytes, self.width, self.flip);
+            sums.push((Sums::of(&bytes, self.width), mirrored));
         }
         sum_up(&group.blocks, &mut group.sums);
-        group
+        (group, sums)
     }
 
     /// Frames of the footage.
@@ -232,6 +249,14 @@ impl ComparedSprites {
         };
         let steps: Vec<Vec<u64>> = (0..self.n_groups()).into_par_iter().map(of_group).collect();
         steps.concat()
+    }
+
+    /// The sums over squares of all sprites, as they are or mirrored.
+    pub(super) fn bounds(&self, side: Side) -> &Bounds {
+        match side {
+            Side::Plain => &self.plain,
+            Side::Mirrored => &self.mirrored,
+        }
     }
 
     pub(super) fn n_groups(&self) -> usize {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use super::*;
-use crate::analysis::params::Planes;
+use crate::analysis::params::{ClipWeights, Planes};
 use crate::library::{Pose, Poses, Sprites, View};
 use crate::progress::Silent;
 use crate::random;
@@ -32,6 +32,11 @@ pub(crate) fn drawn(
         Ok::<_, Full>(true)
     });
     sprites.expect("memory has room")
+}
+
+fn uniform(frames: usize) -> Clip {
+    let weights = ClipWeights::Uniform;
+    Clip { frames, weights }
 }
 
 fn compared(sprites: &Sprites, poses: &Poses, planes: Planes) -> ComparedSprites {
@@ -66,7 +71,7 @@ pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMat
     });
     let distances = Distances {
         pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
-        clip_frames: 1,
+        clip: uniform(1),
         side: Side::Plain,
         cpu: Level::detect(),
     };
@@ -75,13 +80,18 @@ pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMat
 
 /// The engine's upper triangle.
 fn triangle(sprites: &Sprites, poses: &Poses, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
-    triangle_of(&compared(sprites, poses, Planes::Rgba), f, side, cpu)
+    triangle_of(
+        &compared(sprites, poses, Planes::Rgba),
+        uniform(f),
+        side,
+        cpu,
+    )
 }
 
-fn triangle_of(pixels: &ComparedSprites, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
+fn triangle_of(pixels: &ComparedSprites, clip: Clip, side: Side, cpu: Level) -> Vec<Vec<u64>> {
     let distances = Distances {
         pixels,
-        clip_frames: f,
+        clip,
         side,
         cpu,
     };
@@ -215,9 +225,55 @@ fn blocks_put_aside_are_compared_as_those_in_memory() {
     for side in [Side::Plain, Side::Mirrored] {
         let held = triangle(&sprites, &poses, 3, side, Level::detect());
         assert!(
-            triangle_of(&aside, 3, side, Level::detect()) == held,
+            triangle_of(&aside, uniform(3), side, Level::detect()) == held,
             "{side:?}"
         );
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Soft spots that wander about: some pairs are alike, some are not.
+    #[test]
+    fn pruned_distances_are_all_those_below_the_limit(
+        (w, h, n_frames, f) in (1u32..40, 1u32..40, 1usize..220, 1usize..6),
+        (seed, percent) in (any::<u64>(), 0usize..=110),
+        from_above: bool,
+        binomial: bool,
+    ) {
+        let weights = if binomial { ClipWeights::Binomial } else { ClipWeights::Uniform };
+        let clip = Clip { frames: f, weights };
+        let sprites = drawn([w, h], n_frames, |frame_idx, rgba| {
+            let at = |c: u64| (random::bits(seed, &[frame_idx as u64 / 9, c]) % 40) as f64;
+            for (k, pixel) in rgba.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                let (x, y) = ((k % w as usize) as f64 - at(0), (k / w as usize) as f64 - at(1));
+                let light = 255.0 * libm::exp(-(x * x + y * y) / 90.0);
+                *pixel = [light as u8, 255 - light as u8, (frame_idx % 9 * 3) as u8, light as u8];
+            }
+        });
+        let poses = match from_above {
+            true => poses(View::Top, (0..n_frames).map(|k| Some(k as f64 * 0.7))),
+            false => from_the_side(&sprites),
+        };
+        let pixels = compared(&sprites, &poses, Planes::Rgba);
+        for side in [Side::Plain, Side::Mirrored] {
+            let whole = triangle_of(&pixels, clip, side, Level::detect());
+            let mut all: Vec<u64> = whole.iter().flatten().copied().collect();
+            all.sort_unstable();
+            // From nothing to everything.
+            let limit = all.get(all.len() * percent / 100).copied().unwrap_or(u64::MAX);
+            for cpu in [Level::Scalar, Level::detect()] {
+                let distances = Distances { pixels: &pixels, clip, side, cpu };
+                let mut rows = Vec::new();
+                let push = |_: usize, row: &[u64]| rows.push(row.to_vec());
+                distances.for_each_row_below(limit, &Silent, push).expect("nobody cancels");
+                let below = |&d: &u64| if d < limit { d } else { NOT_BELOW };
+                let wanted: Vec<Vec<u64>> =
+                    whole.iter().map(|row| row.iter().map(below).collect()).collect();
+                prop_assert!(rows == wanted, "{:?} {:?} {}", side, cpu, limit);
+            }
+        }
     }
 }
 
@@ -301,7 +357,7 @@ fn cancelling_stops_at_the_next_panel() {
     let sprites = noise(8, 8, 5, 3);
     let distances = Distances {
         pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
-        clip_frames: 1,
+        clip: uniform(1),
         side: Side::Plain,
         cpu: Level::Scalar,
     };
@@ -327,7 +383,7 @@ fn pooling_keeps_the_least_distance_of_each_cell() {
     let sprites = noise(4, 4, 29, 5);
     let distances = Distances {
         pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
-        clip_frames: 3,
+        clip: uniform(3),
         side: Side::Plain,
         cpu: Level::Scalar,
     };

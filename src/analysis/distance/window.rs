@@ -1,30 +1,81 @@
-//! From distances of frames to distances of clips: D(i, j) = sum over k < f of d(i + k, j + k),
-//! O (2), by sums that slide along the diagonals (ALGORITHMS.md 5).
+//! From distances of frames to distances of clips: D(i, j) = sum over k < f of w(k) d(i + k, j + k),
+//! O (2) where every w is 1, by sums that slide along the diagonals (ALGORITHMS.md 5).
 //!
 //! Rows are held by their offset j - i, so that a diagonal is a column: sliding along it is one
-//! addition and one subtraction, and f rows of d are all that is remembered.
+//! addition and one subtraction, and f rows of d are all that is remembered. Binomial weights, which let the
+//! middle of the clip count most (Schoedl et al., Video Textures, 2000), are f - 1 sums of two, one after the other.
+
+use crate::analysis::params::ClipWeights;
+
+/// What is added up to the distance of two clips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clip {
+    /// f, at least 1.
+    pub frames: usize,
+    /// How much each of them counts.
+    pub weights: ClipWeights,
+}
+
+impl Clip {
+    /// w(k) for every k < f: 1, or the binomial coefficient of k out of f - 1.
+    pub fn weights(&self) -> Vec<u64> {
+        let next = |w: &mut u64, k: usize| {
+            let this = *w;
+            *w = match self.weights {
+                ClipWeights::Uniform => 1,
+                ClipWeights::Binomial => this * (self.frames - 1 - k) as u64 / (k + 1) as u64,
+            };
+            Some(this)
+        };
+        (0..self.frames).scan(1, next).collect()
+    }
+}
 
 /// Slides over the rows of d, from the first, and yields the rows of D.
 pub(super) struct WindowSums {
+    slides: Vec<Slide>,
+}
+
+impl WindowSums {
+    /// For clips of a footage of `n_frames` frames.
+    pub(super) fn new(clip: Clip, n_frames: usize) -> WindowSums {
+        let [n_slides, n_rows] = match clip.weights {
+            ClipWeights::Uniform => [1, clip.frames],
+            ClipWeights::Binomial => [clip.frames - 1, 2],
+        };
+        let slide = || Slide::new(n_rows, n_frames);
+        WindowSums {
+            slides: std::iter::repeat_with(slide).take(n_slides).collect(),
+        }
+    }
+
+    /// Takes d(r, r..) for the next r. From r = f - 1 on it returns D(i, i..) for i = r - f + 1.
+    pub(super) fn push<'a>(&'a mut self, row: &'a [u64]) -> Option<&'a [u64]> {
+        self.slides
+            .iter_mut()
+            .try_fold(row, |row, slide| slide.push(row))
+    }
+}
+
+/// Sums of some rows in succession.
+struct Slide {
     ring: Vec<Vec<u64>>,
     sums: Vec<u64>,
     n_pushed: usize,
 }
 
-impl WindowSums {
-    /// For windows of `clip_frames` >= 1 over `n_frames` frames.
-    pub(super) fn new(clip_frames: usize, n_frames: usize) -> WindowSums {
-        WindowSums {
-            ring: vec![Vec::new(); clip_frames],
+impl Slide {
+    fn new(n_rows: usize, n_frames: usize) -> Slide {
+        Slide {
+            ring: vec![Vec::new(); n_rows],
             sums: vec![0; n_frames],
             n_pushed: 0,
         }
     }
 
-    /// Takes d(r, r..) for the next r. From r = f - 1 on it returns D(i, i..) for i = r - f + 1.
-    pub(super) fn push(&mut self, row: &[u64]) -> Option<(usize, &[u64])> {
-        let clip_frames = self.ring.len();
-        let oldest = &mut self.ring[self.n_pushed % clip_frames];
+    fn push(&mut self, row: &[u64]) -> Option<&[u64]> {
+        let n_rows = self.ring.len();
+        let oldest = &mut self.ring[self.n_pushed % n_rows];
         for (sum, old) in self.sums.iter_mut().zip(oldest.iter()) {
             *sum -= old;
         }
@@ -34,8 +85,7 @@ impl WindowSums {
         oldest.clear();
         oldest.extend_from_slice(row);
         self.n_pushed += 1;
-        let clip_idx = self.n_pushed.checked_sub(clip_frames)?;
-        Some((clip_idx, &self.sums[..row.len()]))
+        (self.n_pushed >= n_rows).then(|| &self.sums[..row.len()])
     }
 }
 
@@ -43,20 +93,41 @@ impl WindowSums {
 mod tests {
     use super::*;
 
+    fn clip(frames: usize, weights: ClipWeights) -> Clip {
+        Clip { frames, weights }
+    }
+
     #[test]
     fn the_rows_of_d_become_sums_along_diagonals() {
         // d(i, j) = 10 i + j over 4 frames, f = 2: D(i, j) = d(i, j) + d(i + 1, j + 1).
-        let mut window = WindowSums::new(2, 4);
+        let mut window = WindowSums::new(clip(2, ClipWeights::Uniform), 4);
         assert_eq!(window.push(&[0, 1, 2, 3]), None);
-        assert_eq!(window.push(&[11, 12, 13]), Some((0, &[11, 13, 15][..])));
-        assert_eq!(window.push(&[22, 23]), Some((1, &[33, 35][..])));
-        assert_eq!(window.push(&[33]), Some((2, &[55][..])));
+        assert_eq!(window.push(&[11, 12, 13]), Some(&[11, 13, 15][..]));
+        assert_eq!(window.push(&[22, 23]), Some(&[33, 35][..]));
+        assert_eq!(window.push(&[33]), Some(&[55][..]));
     }
 
     #[test]
     fn a_window_of_one_frame_changes_nothing() {
-        let mut window = WindowSums::new(1, 2);
-        assert_eq!(window.push(&[0, 7]), Some((0, &[0, 7][..])));
-        assert_eq!(window.push(&[0]), Some((1, &[0][..])));
+        for weights in [ClipWeights::Uniform, ClipWeights::Binomial] {
+            let mut window = WindowSums::new(clip(1, weights), 2);
+            assert_eq!(window.push(&[0, 7]), Some(&[0, 7][..]));
+            assert_eq!(window.push(&[0]), Some(&[0][..]));
+        }
+    }
+
+    #[test]
+    fn binomial_weights_are_those_of_pascals_triangle() {
+        let clip = clip(5, ClipWeights::Binomial);
+        assert_eq!(clip.weights(), [1, 4, 6, 4, 1]);
+        let mut window = WindowSums::new(clip, 6);
+        let rows: [&[u64]; 6] = [&[1; 6], &[0; 5], &[0; 4], &[10; 3], &[0; 2], &[0]];
+        let sums: Vec<_> = rows
+            .iter()
+            .map(|row| window.push(row).map(<[u64]>::to_vec))
+            .collect();
+        assert_eq!(sums[3], None);
+        assert_eq!(sums[4], Some(vec![1 + 4 * 10; 2]));
+        assert_eq!(sums[5], Some(vec![6 * 10]));
     }
 }

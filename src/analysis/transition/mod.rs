@@ -65,12 +65,13 @@ pub fn connect(
     let clip_frames = params.clip_frames_at(poses.fps);
     let pixels = ComparedSprites::new(sprites, poses, params.planes)?;
     let clips = Clips::new(sprites, poses, clip_frames);
-    let steps = natural_steps(&pixels, &clips);
+    let clip = params.clip(clip_frames);
+    let steps = natural_steps(&pixels, &clips, &clip.weights());
     let rungs = rungs(params, steps);
     let search = Search {
         distances: Distances {
             pixels: &pixels,
-            clip_frames,
+            clip,
             side: Side::Plain,
             cpu,
         },
@@ -78,10 +79,19 @@ pub fn connect(
         gate: Gate::new(poses, clip_frames, params),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
-    let found = search
-        .run(&rungs, params.mirror, progress)
-        .map_err(|Cancelled| Error::Cancelled)?;
-    Ok(choose(found, &rungs, &clips, steps.median, poses.fps))
+    let mut connections = None;
+    for rung in &rungs {
+        let found = search
+            .run(rung, params.mirror, progress)
+            .map_err(|Cancelled| Error::Cancelled)?;
+        let found = found.connections(rung, &clips, steps.median);
+        let long_enough = found.playback.component.len() as f64 >= LEAST_COMPONENT_S * poses.fps;
+        connections = Some(found);
+        if long_enough {
+            break;
+        }
+    }
+    Ok(connections.expect("there is always a first rung"))
 }
 
 /// Which frames and clips can be used.
@@ -124,13 +134,13 @@ struct NaturalSteps {
     p99: u64,
 }
 
-fn natural_steps(pixels: &ComparedSprites, clips: &Clips) -> NaturalSteps {
+fn natural_steps(pixels: &ComparedSprites, clips: &Clips, weights: &[u64]) -> NaturalSteps {
     let mut of_clips: Vec<u64> = pixels
         .steps()
         .windows(clips.clip_frames)
         .zip(clips.all_present.windows(2))
         .filter(|(_, present)| present[0] && present[1])
-        .map(|(steps, _)| steps.iter().sum())
+        .map(|(steps, _)| steps.iter().zip(weights).map(|(d, w)| d * w).sum())
         .collect();
     of_clips.sort_unstable();
     let at = |percent: usize| {
@@ -181,27 +191,20 @@ struct Search<'a> {
     least_gap: usize,
 }
 
-/// What a search found below the last rung's epsilon.
+/// What a search found below an epsilon.
+#[derive(Default)]
 struct Found {
     transitions: Vec<Transition>,
-    /// Raw pairs below each rung's epsilon.
-    n_candidates: Vec<u64>,
+    /// Raw pairs.
+    n_candidates: u64,
 }
 
 impl Search<'_> {
-    fn run(
-        &self,
-        rungs: &[Rung],
-        mirror: bool,
-        progress: &dyn Progress,
-    ) -> Result<Found, Cancelled> {
-        let mut found = Found {
-            transitions: Vec::new(),
-            n_candidates: vec![0; rungs.len()],
-        };
-        self.one_side(Side::Plain, rungs, progress, &mut found)?;
+    fn run(&self, rung: &Rung, mirror: bool, progress: &dyn Progress) -> Result<Found, Cancelled> {
+        let mut found = Found::default();
+        self.one_side(Side::Plain, rung.epsilon, progress, &mut found)?;
         if mirror {
-            self.one_side(Side::Mirrored, rungs, progress, &mut found)?;
+            self.one_side(Side::Mirrored, rung.epsilon, progress, &mut found)?;
         }
         let key = |t: &Transition| (t.from, t.to, t.mirrored);
         found.transitions.sort_unstable_by_key(key);
@@ -211,17 +214,15 @@ impl Search<'_> {
     fn one_side(
         &self,
         side: Side,
-        rungs: &[Rung],
+        epsilon: u64,
         progress: &dyn Progress,
         found: &mut Found,
     ) -> Result<(), Cancelled> {
-        let limit = rungs.iter().map(|rung| rung.epsilon).max().unwrap_or(0);
-        let least_gap = if side == Side::Plain {
-            self.least_gap
-        } else {
-            0
+        let least_gap = match side {
+            Side::Plain => self.least_gap,
+            Side::Mirrored => 0,
         };
-        let mut minima = LocalMinima::new(&self.clips.usable, least_gap, limit);
+        let mut minima = LocalMinima::new(&self.clips.usable, least_gap, epsilon);
         let distances = Distances {
             side,
             ..self.distances
@@ -230,23 +231,16 @@ impl Search<'_> {
             transitions,
             n_candidates,
         } = found;
-        distances.for_each_row(progress, |i, row| {
+        distances.for_each_row_below(epsilon, progress, |i, row| {
             if side == Side::Plain && self.clips.all_present[i] {
-                self.count(i, row, limit, rungs, n_candidates);
+                let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
+                let alike = others.filter(|(d, present)| **d < epsilon && **present);
+                *n_candidates += alike.count() as u64;
             }
             minima.push(row, |pair| transitions.extend(self.transition(pair, side)));
         })?;
         minima.finish(|pair| transitions.extend(self.transition(pair, side)));
         Ok(())
-    }
-
-    fn count(&self, i: usize, row: &[u64], limit: u64, rungs: &[Rung], n_candidates: &mut [u64]) {
-        let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
-        for (&distance, _) in others.filter(|(d, present)| **d < limit && **present) {
-            for (n, rung) in n_candidates.iter_mut().zip(rungs) {
-                *n += u64::from(distance < rung.epsilon);
-            }
-        }
     }
 
     fn transition(&self, pair: ClipPair, side: Side) -> Option<Transition> {
@@ -262,32 +256,21 @@ impl Search<'_> {
     }
 }
 
-/// The first rung whose component lasts long enough, else the last.
-fn choose(found: Found, rungs: &[Rung], clips: &Clips, natural_step: u64, fps: f64) -> Connections {
-    let n_frames = clips.shown.len();
-    let mut chosen = None;
-    for (rung, &n_candidates) in rungs.iter().zip(&found.n_candidates) {
-        let alike = found.transitions.iter();
-        let transitions: Vec<Transition> = alike
-            .filter(|t| t.distance < rung.epsilon)
-            .copied()
-            .collect();
-        let playback = playback::playback(&transitions, &clips.shown, clips.clip_frames);
-        let long_enough = playback.component.len() as f64 >= LEAST_COMPONENT_S * fps;
-        chosen = Some(Connections {
+impl Found {
+    /// What these transitions make of the footage.
+    fn connections(self, rung: &Rung, clips: &Clips, natural_step: u64) -> Connections {
+        let playback = playback::playback(&self.transitions, &clips.shown, clips.clip_frames);
+        let n_frames = clips.shown.len();
+        Connections {
             clip_frames: clips.clip_frames,
             epsilon: rung.epsilon,
             natural_step,
             kappa_used: rung.kappa,
-            n_candidates,
+            n_candidates: self.n_candidates,
             component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
             patches: playback::patches(&playback),
-            transitions,
+            transitions: self.transitions,
             playback,
-        });
-        if long_enough {
-            break;
         }
     }
-    chosen.expect("there is always a first rung")
 }

@@ -7,7 +7,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{SadTile, Tile};
+use super::{LANES, SadTile, Tile};
 use crate::analysis::distance::pixels::{BLOCK, Block};
 
 /// Loads of 32 bytes in a block.
@@ -22,19 +22,18 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx2")]
 fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
+    // Groups are padded to 48 sprites, so blocks of 4 and 2 never leave them.
+    let corners = tile.corners::<4, 2>();
     for block in 0..tile.rows.n_blocks() {
-        // Groups are padded to 48 sprites, so steps of 4 and 2 never leave them.
-        for row in (0..tile.rows.n_sprites).step_by(4) {
+        for &[row, column] in &corners {
+            if tile.add_blank::<4, 2>([block, row, column], sums) {
+                continue;
+            }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
-            for column in tile.columns_of(row).step_by(2) {
-                if tile.add_blank::<4, 2>([block, row, column], sums) {
-                    continue;
-                }
-                let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
-                for (k, sums_of_column) in sad_4x2(a, b).into_iter().enumerate() {
-                    for (r, sum) in sums_of_column.into_iter().enumerate() {
-                        sums[row + r][column + k] += u64::from(sum);
-                    }
+            let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
+            for (k, sums_of_column) in sad_4x2(a, b).into_iter().enumerate() {
+                for (r, sum) in sums_of_column.into_iter().enumerate() {
+                    sums[row + r][column + k] += u64::from(sum);
                 }
             }
         }
@@ -89,4 +88,38 @@ fn load(block: &Block, step: usize) -> __m256i {
     // SAFETY: callers count `step` below STEPS, so the 32 bytes lie inside the block, which stands
     // on a boundary of 64.
     unsafe { _mm256_load_si256(block.0.as_ptr().cast::<__m256i>().add(step)) }
+}
+
+/// As `scalar::least_differences`. Panics where AVX2 is missing.
+pub(super) fn least_differences(row: &[u16], others: &[u16], sums: &mut [u32]) {
+    assert!(is_x86_feature_detected!("avx2"), "this machine has no AVX2");
+    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+    unsafe { least_differences_avx2(row.as_chunks().0, others, sums) }
+}
+
+#[target_feature(enable = "avx2")]
+fn least_differences_avx2(row: &[[u16; LANES]], others: &[u16], sums: &mut [u32]) {
+    let ones = _mm256_set1_epi16(1);
+    let others = others.as_chunks().0.chunks_exact(row.len().max(1));
+    for (sum, other) in sums.iter_mut().zip(others) {
+        // Eight lanes, each of fewer than 2^15 differences below 2^16.
+        let mut lanes = _mm256_setzero_si256();
+        for (a, b) in row.iter().zip(other) {
+            let difference = _mm256_abs_epi16(_mm256_sub_epi16(values(a), values(b)));
+            lanes = _mm256_add_epi32(lanes, _mm256_madd_epi16(difference, ones));
+        }
+        let mut each = [0u32; 8];
+        // SAFETY: `each` is 32 bytes long and the store needs no alignment.
+        unsafe { _mm256_storeu_si256(each.as_mut_ptr().cast(), lanes) };
+        let total: u64 = each.iter().map(|&lane| u64::from(lane)).sum();
+        *sum = u32::try_from(total).unwrap_or(u32::MAX);
+    }
+}
+
+/// Sixteen values.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn values(values: &[u16; LANES]) -> __m256i {
+    // SAFETY: 32 bytes are there, and the load needs no alignment.
+    unsafe { _mm256_loadu_si256(values.as_ptr().cast()) }
 }

@@ -25,19 +25,18 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx512f,avx512bw")]
 fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
+    // Groups are padded to 48 sprites, so blocks of 4 and 4 never leave them.
+    let corners = tile.corners::<4, 4>();
     for block in 0..tile.rows.n_blocks() {
-        // Groups are padded to 48 sprites, so steps of 4 never leave them.
-        for row in (0..tile.rows.n_sprites).step_by(4) {
+        for &[row, column] in &corners {
+            if tile.add_blank::<4, 4>([block, row, column], sums) {
+                continue;
+            }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
-            for column in tile.columns_of(row).step_by(4) {
-                if tile.add_blank::<4, 4>([block, row, column], sums) {
-                    continue;
-                }
-                let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
-                for (r, totals) in sad_4x4(a, b).into_iter().enumerate() {
-                    for (k, total) in totals.into_iter().enumerate() {
-                        sums[row + r][column + k] += total;
-                    }
+            let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
+            for (r, totals) in sad_4x4(a, b).into_iter().enumerate() {
+                for (k, total) in totals.into_iter().enumerate() {
+                    sums[row + r][column + k] += total;
                 }
             }
         }

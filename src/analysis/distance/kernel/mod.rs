@@ -9,8 +9,6 @@ mod avx512;
 mod neon;
 pub(super) mod scalar;
 
-use std::ops::Range;
-
 use super::pixels::{GROUP, Group};
 use crate::cpu::Level;
 
@@ -22,15 +20,53 @@ pub(super) type SadTile = [[u64; GROUP]; GROUP];
 pub(super) struct Tile<'a> {
     pub(super) rows: Group<'a>,
     pub(super) columns: Group<'a>,
-    /// Only pairs with column >= row are asked for: the tile lies on the matrix's diagonal.
-    pub(super) diagonal: bool,
+    /// The columns asked for in each row, as bits.
+    pub(super) wanted: &'a Wanted,
+}
+
+/// Values at a time of [`least_differences`].
+pub(super) const LANES: usize = 16;
+
+/// The sums of absolute differences of a row of values, each below 2^15, and each of many rows. All are
+/// of the same length, a multiple of [`LANES`]; what exceeds 32 bits is cut off there.
+pub(super) fn least_differences(cpu: Level, row: &[u16], others: &[u16], sums: &mut [u32]) {
+    match cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => avx2::least_differences(row, others, sums),
+        _ => scalar::least_differences(row, others, sums),
+    }
+}
+
+/// Which columns of a tile are asked for in each of its rows: bit k is column k.
+pub(super) type Wanted = [u64; GROUP];
+
+/// Every pair of two groups of so many sprites.
+pub(super) fn all(rows: Group<'_>, columns: Group<'_>) -> Wanted {
+    let bits = (1 << columns.n_sprites) - 1;
+    std::array::from_fn(|row| if row < rows.n_sprites { bits } else { 0 })
+}
+
+/// The pairs with column >= row of one group with itself: a tile on the matrix's diagonal.
+pub(super) fn upper(rows: Group<'_>, columns: Group<'_>) -> Wanted {
+    let mut wanted = all(rows, columns);
+    (0..)
+        .zip(&mut wanted)
+        .for_each(|(row, bits)| *bits &= u64::MAX << row);
+    wanted
 }
 
 impl Tile<'_> {
-    /// The columns asked for in a row.
-    fn columns_of(&self, row: usize) -> Range<usize> {
-        let first = if self.diagonal { row } else { 0 };
-        first..self.columns.n_sprites
+    /// The corners of the blocks of `R` rows and `C` columns in which anything is asked for.
+    fn corners<const R: usize, const C: usize>(&self) -> Vec<[usize; 2]> {
+        let rows = (0..self.rows.n_sprites).step_by(R);
+        rows.flat_map(|row| {
+            let wanted = self.wanted[row..row + R].iter().fold(0, |a, b| a | b);
+            (0..self.columns.n_sprites)
+                .step_by(C)
+                .filter(move |column| wanted >> column & ((1 << C) - 1) != 0)
+                .map(move |column| [row, column])
+        })
+        .collect()
     }
 
     /// Adds d of `R` rows and `C` columns in a block that is blank in all those rows or in all those

@@ -5,13 +5,14 @@ use crate::analysis::distance::pixels::Block;
 
 /// Adds d of every pair of the tile.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
+    let corners = tile.corners::<1, 1>();
     for block in 0..tile.rows.n_blocks() {
-        for (row, sums) in sums.iter_mut().enumerate().take(tile.rows.n_sprites) {
-            let a = tile.rows.block(block, row);
-            for column in tile.columns_of(row) {
-                let b = tile.columns.block(block, column);
-                sums[column] += sad_block(a, b);
-            }
+        for &[row, column] in &corners {
+            let (a, b) = (
+                tile.rows.block(block, row),
+                tile.columns.block(block, column),
+            );
+            sums[row][column] += sad_block(a, b);
         }
     }
 }
@@ -20,4 +21,16 @@ pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile
 pub(in crate::analysis::distance) fn sad_block(a: &Block, b: &Block) -> u64 {
     let differences = a.0.iter().zip(&b.0).map(|(a, b)| u32::from(a.abs_diff(*b)));
     u64::from(differences.sum::<u32>())
+}
+
+/// The sums of |a - b| over a row of values and each of many.
+pub(in crate::analysis::distance) fn least_differences(
+    row: &[u16],
+    others: &[u16],
+    sums: &mut [u32],
+) {
+    for (sum, other) in sums.iter_mut().zip(others.chunks_exact(row.len().max(1))) {
+        let differences = row.iter().zip(other).map(|(a, b)| a.abs_diff(*b));
+        *sum = differences.fold(0, |sum, d| sum.saturating_add(d.into()));
+    }
 }
