@@ -146,13 +146,30 @@ impl<'a> Ledger<'a> {
 
     /// What showing each state of the graph costs at frame `t`, turns, with the crowd or without.
     pub(super) fn row(&self, graph: &Graph, bill: &Bill, t: usize, with_crowd: bool) -> Vec<u64> {
-        let mut crowd = vec![[0u32; 1]; self.trellis.n_states()];
+        let mut crowd = vec![0; self.names.len()];
         if with_crowd {
-            self.crowd
-                .add_to_row(&self.trellis, &bill.lookalikes[t], &mut crowd);
+            for near in &bill.lookalikes[t] {
+                self.add_lookalike(graph, near, &mut crowd);
+            }
         }
-        let price = |&name: &u32| self.price(bill.wanted[t], name, crowd[name as usize][0]);
-        self.names.iter().map(price).collect()
+        let price = |(&name, crowd)| self.price(bill.wanted[t], name, crowd);
+        self.names.iter().zip(crowd).map(price).collect()
+    }
+
+    /// Every state on the same side less than 0.3 s away looks like it.
+    fn add_lookalike(&self, graph: &Graph, near: &Lookalike, crowd: &mut [u32]) {
+        let Some((frame, side)) = self.trellis.shown(near.state as usize) else {
+            return;
+        };
+        let alike = |gap: &u32| f64::from(*gap) < LOOKALIKE_S * self.flock.fps;
+        for gap in (0..).take_while(alike) {
+            let before = frame.checked_sub(gap).filter(|_| gap > 0);
+            for frame in before.into_iter().chain([frame + gap]) {
+                if let Some(state) = graph.state(frame, side) {
+                    crowd[state] += u32::from(near.cost);
+                }
+            }
+        }
     }
 
     fn price(&self, wanted: Feature, name: u32, crowd: u32) -> u64 {
