@@ -29,7 +29,7 @@ pub mod pose;
 // Which moments look alike.
 pub mod distance;
 pub mod playback;
-mod stats;
+pub mod stats;
 pub mod transition;
 
 pub use error::Error;

@@ -23,6 +23,7 @@ use crate::store::flocks::Flock;
 
 const FILES: Files = &[
     ("flock.json", "application/json"),
+    ("plan.svg", "image/svg+xml"),
     ("video.mp4", "video/mp4"),
 ];
 
@@ -111,7 +112,7 @@ pub(super) async fn get_flock(
     Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
 }
 
-/// A file of a flock: flock.json, video.mp4.
+/// A file of a flock: flock.json, plan.svg, video.mp4.
 #[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -128,6 +129,7 @@ pub(super) async fn get_flock_file(
     let flock = find(&state, id).await?;
     let label = match name {
         "video.mp4" => format!("flock-{id}.mp4"),
+        "plan.svg" => format!("flock-{id}-plan.svg"),
         _ => format!("flock-{id}.json"),
     };
     let download = Download {

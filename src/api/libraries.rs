@@ -24,9 +24,11 @@ const FILES: Files = &[
     ("poses.csv", "text/csv; charset=utf-8"),
     ("background.png", "image/png"),
     ("distance.png", "image/png"),
+    ("candidates.png", "image/png"),
     ("headings.svg", "image/svg+xml"),
     ("trajectory.svg", "image/svg+xml"),
     ("confidence.svg", "image/svg+xml"),
+    ("transitions.svg", "image/svg+xml"),
     ("overlay.mp4", "video/mp4"),
     ("sprites.zip", "application/zip"),
 ];
@@ -79,7 +81,7 @@ pub(super) async fn get_library(
 }
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,
-/// headings.svg, trajectory.svg, confidence.svg, overlay.mp4, sprites.zip.
+/// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),

@@ -13,6 +13,7 @@ use crate::analysis::{self, Params};
 use crate::cpu;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
+use crate::jobs::analysis::Advice;
 use crate::jobs::overlay;
 use crate::library::Library;
 use crate::media::{Limits, Video, read_image};
@@ -92,13 +93,17 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         overlay::film(&video, &library.poses, path, &progress)
             .map_err(|error| Error::work(error.code(), &error))?;
     }
-    Ok(Some(summary(&library, &args.output)))
+    let advice = Advice::all(&library, &params);
+    for Advice { code, sentence } in &advice {
+        super::say(&format!("{sentence} ({code})"));
+    }
+    Ok(Some(summary(&library, &args.output, &advice)))
 }
 
 /// What people look at: the table and the pictures.
 fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
     let table = ("poses.csv", csv::write_poses(&library.poses));
-    for (name, text) in svg::pictures(&library.poses).into_iter().chain([table]) {
+    for (name, text) in svg::pictures(library).into_iter().chain([table]) {
         let path = folder.join(name);
         std::fs::write(&path, text)
             .map_err(Error::io(format!("cannot write {}", path.display())))?;
@@ -167,7 +172,7 @@ fn footage_summary(path: &Path) -> Result<FootageSummary, Error> {
     }
 }
 
-fn summary(library: &Library, output: &Path) -> Summary {
+fn summary(library: &Library, output: &Path, advice: &[Advice]) -> Summary {
     let stats = &library.stats;
     Summary(json!({
         "library": output.display().to_string(),
@@ -176,5 +181,6 @@ fn summary(library: &Library, output: &Path) -> Summary {
         "n_transitions": stats.n_transitions,
         "component_share": stats.component_share,
         "sprite_size_px": [library.sprites.width(), library.sprites.height()],
+        "advice": advice,
     }))
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::{Error, Listener, Summary};
 use crate::flock::{Compositor, Flock, Params, plan_flock};
-use crate::formats::{flock_json, params};
+use crate::formats::{flock_json, params, svg};
 use crate::library::Library;
 use crate::media::{self, VideoFormat, VideoWriter};
 use crate::progress::Progress;
@@ -39,6 +39,9 @@ pub struct Args {
     /// Write the plan, flock.json, here.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
+    /// Draw what the boids ask for against what is shown here, as SVG.
+    #[arg(long, value_name = "SVG")]
+    plan_picture: Option<PathBuf>,
 }
 
 /// Plans and films a flock.
@@ -52,11 +55,18 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         std::fs::write(path, flock_json::write(&flock))
             .map_err(Error::io(format!("writing the plan: {}", path.display())))?;
     }
+    if let Some(path) = &args.plan_picture {
+        std::fs::write(path, svg::plan(&flock)).map_err(Error::io(format!(
+            "writing the picture: {}",
+            path.display()
+        )))?;
+    }
     film(&library, &flock, &args.output, &progress)
         .map_err(|error| Error::work(error.code(), &error))?;
     Ok(Some(Summary(json!({
         "video": args.output,
         "plan": args.plan,
+        "plan_picture": args.plan_picture,
         "count": params.count,
         "frames": params.frames,
         "seed": params.seed,

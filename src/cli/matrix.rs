@@ -9,7 +9,8 @@ use super::{Error, Listener, Summary};
 use crate::analysis::distance::{Cancelled, ComparedSprites, DistanceMatrix, Distances, Side};
 use crate::code::Code;
 use crate::cpu::Level;
-use crate::formats::{distance_map, npy};
+use crate::formats::distance_map::DistanceMap;
+use crate::formats::npy;
 
 /// Arguments of `matrix`.
 #[derive(Debug, clap::Args)]
@@ -23,11 +24,20 @@ pub struct Args {
     /// Compare each clip with the others' mirror images.
     #[arg(long)]
     mirrored: bool,
+    /// Draw the pairs nearer than epsilon, and over them the transitions that were kept.
+    #[arg(long)]
+    candidates: bool,
 }
 
 /// Writes the distance matrix.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let format = Format::of(&args.output)?;
+    if args.candidates && matches!(format, Format::Numbers) {
+        return Err(Error::Usage(format!(
+            "--candidates is a picture, its name must end in .png: {}",
+            args.output.display()
+        )));
+    }
     let stored = super::read_library(&args.library, &args.output)?;
     let library = stored.library;
     let pixels = ComparedSprites::new(&library.sprites, &library.poses, stored.params.planes)
@@ -44,7 +54,15 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     };
     match format {
         Format::Numbers => write_numbers(&distances, &args.output)?,
-        Format::Picture => write_picture(&distances, &args.output)?,
+        Format::Picture => {
+            let map = DistanceMap::of(&distances, &library, &Listener::new()).map_err(cancelled)?;
+            let png = match args.candidates {
+                true => map.draw_candidates(&library),
+                false => map.draw_distances(),
+            };
+            std::fs::write(&args.output, png)
+                .map_err(Error::io(format!("cannot write {}", args.output.display())))?;
+        }
     }
     Ok(Some(Summary(serde_json::json!({
         "output": args.output,
@@ -81,11 +99,6 @@ fn write_numbers(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
         file.flush()
     };
     write().map_err(Error::io(format!("cannot write {}", path.display())))
-}
-
-fn write_picture(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
-    let png = distance_map::draw(distances, &Listener::new()).map_err(cancelled)?;
-    std::fs::write(path, png).map_err(Error::io(format!("cannot write {}", path.display())))
 }
 
 fn cancelled(_: Cancelled) -> Error {

@@ -4,6 +4,7 @@
 //! stdout. Exit codes: 0; 2 for bad usage or input; 1 for a failure inside.
 
 pub mod analyze;
+pub mod check_plan;
 pub mod error;
 pub mod fish;
 pub mod flock;
@@ -52,6 +53,8 @@ enum Command {
     Analyze(analyze::Args),
     /// Make a flock out of a library, as a video.
     Flock(flock::Args),
+    /// Check a flock's plan: every step, every cost, and that nothing cheaper exists.
+    CheckPlan(check_plan::Args),
     /// Let the virtual fish swim as the animal swam, as a video or a model.
     Fish(fish::Args),
     /// Write the distance matrix of a library, as numbers or as a picture.
@@ -83,6 +86,7 @@ fn run(command: Command) -> Result<Option<Summary>, Error> {
         Command::Serve(args) => serve::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Flock(args) => flock::run(args),
+        Command::CheckPlan(args) => check_plan::run(args),
         Command::Fish(args) => fish::run(args),
         Command::Matrix(args) => matrix::run(args),
         Command::Sprites(args) => sprites::run(args),

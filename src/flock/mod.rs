@@ -2,6 +2,7 @@
 //! the picture, and composite them (O 4 and 5; ALGORITHMS.md 6 to 8).
 
 pub mod boids;
+pub mod check;
 pub mod composite;
 pub mod error;
 pub mod individual;

@@ -1,24 +1,153 @@
-//! `distance.png`: the distance matrix as a picture, near = black, far = white (O's figure 2).
+//! `distance.png` and `candidates.png`: which clips are near which, from one pass over the distances
+//! (O's figures 2 and 3).
 //!
-//! At most 1024 x 1024; a longer footage is min-pooled, so that a single like moment still shows.
-//! Gray levels are round(255 D / largest D drawn): whoever wants numbers takes `distance.npy`.
+//! The first shows D, near = black, far = white: gray levels are round(255 D / largest D drawn);
+//! whoever wants numbers takes `distance.npy`. The second shows the pairs with D < epsilon, faintly,
+//! and over them the transitions that were kept, mirrored ones in another color. At most 1024 x 1024:
+//! of a longer footage a cell shows the least of its pairs, so that a single like moment still shows.
 
 use super::picture;
-use crate::analysis::distance::{Cancelled, Distances, PooledMatrix};
+use crate::analysis::distance::{Cancelled, Distances};
+use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
 /// Rows and columns at most.
 pub const LARGEST_SIDE: usize = 1024;
 
-/// Computes and draws the distances, as the bytes of a PNG. A footage shorter than a clip gives a
-/// single white pixel.
-pub fn draw(distances: &Distances<'_>, progress: &dyn Progress) -> Result<Vec<u8>, Cancelled> {
-    let matrix = PooledMatrix::of(distances, LARGEST_SIDE, progress)?;
-    let side = matrix.side as u32;
-    Ok(match side {
-        0 => picture::write_gray(1, 1, &[255]),
-        _ => picture::write_gray(side, side, &levels(&matrix.cells)),
-    })
+/// From this side on a transition is a mark of 3 x 3 cells, else a single cell.
+const LARGE_SIDE: usize = 256;
+
+const PAPER: [u8; 3] = [0xfd, 0xfc, 0xf9];
+/// A pair with D < epsilon.
+const ALIKE: [u8; 3] = [0xc2, 0xc6, 0xbf];
+/// A transition.
+const KEPT: [u8; 3] = [0xc8, 0x3c, 0x08];
+/// A transition to the mirror image.
+const MIRRORED: [u8; 3] = [0x12, 0x5c, 0x96];
+
+/// What both pictures are drawn from: the distances pooled to a picture's size.
+pub struct DistanceMap {
+    side: usize,
+    n_clips: usize,
+    /// Row by row, symmetric: the least D of a cell's pairs.
+    least: Vec<u64>,
+    /// Likewise: whether one of them, with every sprite present, has D < epsilon.
+    alike: Vec<bool>,
+}
+
+impl DistanceMap {
+    /// Computes the distances, and pools D(i, j) into cell (i side / n, j side / n), divisions rounded
+    /// down, with `side` = min(n, 1024).
+    pub fn of(
+        distances: &Distances<'_>,
+        library: &Library,
+        progress: &dyn Progress,
+    ) -> Result<DistanceMap, Cancelled> {
+        let present = whole_clips(&library.sprites, library.clip_frames);
+        let mut map = DistanceMap::empty(distances.n_clips());
+        distances.for_each_row(progress, |i, row| {
+            map.pool(i, row, &present, library.epsilon);
+        })?;
+        map.mirror_triangle();
+        Ok(map)
+    }
+
+    /// `distance.png`. A footage shorter than a clip gives a single white pixel.
+    pub fn draw_distances(&self) -> Vec<u8> {
+        let side = self.side as u32;
+        match side {
+            0 => picture::write_gray(1, 1, &[255]),
+            _ => picture::write_gray(side, side, &levels(&self.least)),
+        }
+    }
+
+    /// `candidates.png`, with the library's transitions. A footage shorter than a clip gives a single pixel.
+    pub fn draw_candidates(&self, library: &Library) -> Vec<u8> {
+        let side = self.side.max(1);
+        let mut pixels = vec![PAPER; side * side];
+        for (pixel, _) in pixels.iter_mut().zip(&self.alike).filter(|cell| *cell.1) {
+            *pixel = ALIKE;
+        }
+        // The plain ones come last: where both meet, they are seen.
+        for mirrored in [true, false] {
+            let color = if mirrored { MIRRORED } else { KEPT };
+            for transition in library
+                .transitions
+                .iter()
+                .filter(|t| t.mirrored == mirrored)
+            {
+                let pair = [transition.from, transition.to].map(|clip| clip as usize);
+                self.mark(&mut pixels, pair, color);
+            }
+        }
+        let image = crate::raster::RgbImage {
+            width: side as u32,
+            height: side as u32,
+            pixels: pixels.concat(),
+        };
+        picture::write_rgb(&image)
+    }
+
+    fn empty(n_clips: usize) -> DistanceMap {
+        let side = n_clips.min(LARGEST_SIDE);
+        DistanceMap {
+            side,
+            n_clips,
+            least: vec![u64::MAX; side * side],
+            alike: vec![false; side * side],
+        }
+    }
+
+    fn pool(&mut self, i: usize, row: &[u64], present: &[bool], epsilon: u64) {
+        let first = self.cell(i) * self.side;
+        let present_too = |j: usize| present[i] && present[j];
+        for (j, &distance) in (i..).zip(row) {
+            let at = first + self.cell(j);
+            self.least[at] = distance.min(self.least[at]);
+            self.alike[at] |= distance < epsilon && present_too(j);
+        }
+    }
+
+    fn mirror_triangle(&mut self) {
+        for row in 0..self.side {
+            for column in 0..row {
+                let (to, from) = (row * self.side + column, column * self.side + row);
+                self.least[to] = self.least[from];
+                self.alike[to] = self.alike[from];
+            }
+        }
+    }
+
+    fn cell(&self, clip_idx: usize) -> usize {
+        clip_idx * self.side / self.n_clips
+    }
+
+    /// On both sides of the diagonal.
+    fn mark(&self, pixels: &mut [[u8; 3]], [from, to]: [usize; 2], color: [u8; 3]) {
+        if from.max(to) >= self.n_clips {
+            return;
+        }
+        let reach = usize::from(self.side >= LARGE_SIDE);
+        let around = |clip_idx: usize| {
+            let cell = self.cell(clip_idx);
+            cell.saturating_sub(reach)..(cell + reach + 1).min(self.side)
+        };
+        for row in around(from) {
+            for column in around(to) {
+                pixels[row * self.side + column] = color;
+                pixels[column * self.side + row] = color;
+            }
+        }
+    }
+}
+
+/// Which clips have all their sprites: frames without the animal are alike, but nothing to see.
+fn whole_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
+    let present: Vec<bool> = (0..sprites.n_frames())
+        .map(|frame_idx| sprites.is_present(frame_idx))
+        .collect();
+    let clips = present.windows(clip_frames.max(1));
+    clips.map(|clip| clip.iter().all(|&frame| frame)).collect()
 }
 
 fn levels(cells: &[u64]) -> Vec<u8> {
@@ -30,10 +159,100 @@ fn levels(cells: &[u64]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::analysis::distance::{ComparedSprites, Side};
+    use crate::analysis::params::Planes;
+    use crate::cpu::Level;
+    use crate::flock::synthetic;
+    use crate::library::{Transition, View};
+    use crate::progress::Silent;
 
     #[test]
     fn near_is_black_and_far_is_white() {
         assert_eq!(levels(&[0, 50, 200, 100]), [0, 64, 255, 128]);
         assert_eq!(levels(&[0, 0]), [0, 0]);
+    }
+
+    /// `n_clips` clips, all far from each other but for the pairs given.
+    fn map(n_clips: usize, near: &[(usize, usize)], present: &[bool]) -> DistanceMap {
+        let mut map = DistanceMap::empty(n_clips);
+        for i in 0..n_clips {
+            let distance = |j| if near.contains(&(i, j)) { 5 } else { 10 };
+            let row: Vec<u64> = (i..n_clips).map(distance).collect();
+            map.pool(i, &row, present, 10);
+        }
+        map.mirror_triangle();
+        map
+    }
+
+    fn transition(from: u32, to: u32, mirrored: bool) -> Transition {
+        Transition {
+            from,
+            to,
+            mirrored,
+            distance: 5,
+            heading_gap_rad: 0.0,
+        }
+    }
+
+    fn colors(map: &DistanceMap, transitions: Vec<Transition>) -> Vec<[u8; 3]> {
+        let mut library = synthetic::library(View::Side);
+        library.transitions = transitions;
+        let image = picture::read_rgb(&map.draw_candidates(&library)).expect("our own PNG");
+        let pixels = image.pixels.chunks_exact(3);
+        pixels.map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect()
+    }
+
+    #[test]
+    fn what_is_kept_and_what_is_mirrored_stands_out_from_what_is_only_alike() {
+        let map = map(4, &[(0, 2), (1, 3)], &[true; 4]);
+        let pixels = colors(&map, vec![transition(0, 2, false), transition(0, 3, true)]);
+        let (p, a, k, m) = (PAPER, ALIKE, KEPT, MIRRORED);
+        assert_eq!(
+            pixels,
+            [p, p, k, m, p, p, p, a, k, p, p, p, m, a, p, p],
+            "symmetric"
+        );
+    }
+
+    #[test]
+    fn a_single_like_pair_of_a_long_footage_is_still_seen() {
+        let map = map(3000, &[(700, 2999)], &[true; 3000]);
+        assert_eq!(
+            (map.side, map.alike.iter().filter(|&&cell| cell).count()),
+            (1024, 2)
+        );
+        assert!(map.alike[(700 * 1024 / 3000) * 1024 + 1023]);
+        assert_eq!(map.least.iter().filter(|&&least| least == 5).count(), 2);
+    }
+
+    #[test]
+    fn frames_without_the_animal_are_not_alike() {
+        let map = map(4, &[(0, 2), (1, 3)], &[true, true, true, false]);
+        assert_eq!(map.alike.iter().filter(|&&cell| cell).count(), 2);
+    }
+
+    #[test]
+    fn the_pairs_drawn_are_those_counted_from_the_distances_themselves() {
+        let mut library = synthetic::library(View::Side);
+        library.transitions.clear();
+        let pixels = ComparedSprites::new(&library.sprites, &library.poses, Planes::Rgba);
+        let pixels = pixels.expect("memory has room");
+        let distances = Distances {
+            pixels: &pixels,
+            clip: crate::analysis::Params::default().clip(library.clip_frames),
+            side: Side::Plain,
+            cpu: Level::detect(),
+        };
+        let mut all = Vec::new();
+        let collect = |_: usize, row: &[u64]| all.extend_from_slice(&row[1..]);
+        distances
+            .for_each_row(&Silent, collect)
+            .expect("nobody cancels");
+        all.sort_unstable();
+        library.epsilon = all[all.len() / 50];
+        let n_below = all.iter().filter(|&&d| d < library.epsilon).count();
+        let map = DistanceMap::of(&distances, &library, &Silent).expect("nobody cancels");
+        let drawn = map.alike.iter().filter(|&&cell| cell).count();
+        assert_eq!(drawn, 2 * n_below + distances.n_clips());
     }
 }

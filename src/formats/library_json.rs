@@ -5,6 +5,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
+use crate::analysis::stats::{Advice, advice};
 use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Transition};
 
 /// The schema's name and version.
@@ -54,7 +55,7 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
         natural_step: library.natural_step,
-        stats: StatsFile::of(&library.stats),
+        stats: StatsFile::of(&library.stats, &advice(library, params)),
         transitions: library.transitions.iter().map(TransitionFile::of).collect(),
         playback: library.playback.jumps.iter().map(JumpFile::of).collect(),
         component: library.playback.component.clone(),
@@ -220,6 +221,9 @@ struct StatsFile {
     speed_bl_per_s: Option<[f64; 3]>,
     turn_rate_rad_per_s: Option<f64>,
     length_px: Option<f64>,
+    /// For people and programs that read the file; the library itself is asked anew.
+    #[serde(default, skip_deserializing)]
+    advice: Vec<AdviceFile>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -227,8 +231,23 @@ struct BackgroundStats {
     never_seen_px: u64,
 }
 
+#[derive(Serialize)]
+struct AdviceFile {
+    code: &'static str,
+    sentence: String,
+}
+
+impl AdviceFile {
+    fn of(advice: &Advice) -> AdviceFile {
+        AdviceFile {
+            code: advice.code(),
+            sentence: advice.to_string(),
+        }
+    }
+}
+
 impl StatsFile {
-    fn of(stats: &LibraryStats) -> StatsFile {
+    fn of(stats: &LibraryStats, advice: &[Advice]) -> StatsFile {
         let digits = |n: i32| move |value: f64| super::poses_json::round(value, n);
         StatsFile {
             n_frames: stats.n_frames,
@@ -246,6 +265,7 @@ impl StatsFile {
             speed_bl_per_s: stats.speed_bl_per_s.map(|s| s.map(digits(4))),
             turn_rate_rad_per_s: stats.turn_rate_rad_per_s.map(digits(4)),
             length_px: stats.length_px.map(digits(3)),
+            advice: advice.iter().map(AdviceFile::of).collect(),
         }
     }
 
@@ -265,5 +285,32 @@ impl StatsFile {
             turn_rate_rad_per_s: self.turn_rate_rad_per_s,
             length_px: self.length_px,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::synthetic;
+    use crate::library::View;
+
+    #[test]
+    fn advice_is_written_and_an_older_file_without_it_is_read() {
+        let mut library = synthetic::library(View::Side);
+        library.playback.jumps.clear();
+        let footage = FootageSummary {
+            sha256: "ab".into(),
+            n_bytes: 9,
+        };
+        let bytes = write(&library, &Params::default(), &footage);
+        let mut file: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+        assert_eq!(file["stats"]["advice"][0]["code"], "no_transitions");
+        let stats = file["stats"].as_object_mut().expect("an object");
+        stats.remove("advice").expect("just seen");
+        let older = serde_json::to_vec(&file).expect("JSON");
+        assert_eq!(
+            read(&older).expect("a library").stats,
+            read(&bytes).expect("a library").stats
+        );
     }
 }

@@ -8,8 +8,9 @@ use uuid::Uuid;
 use super::{Attempt, Context, Error, Product, Stages, clock, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
+use crate::formats::distance_map::DistanceMap;
 use crate::formats::library_json::FootageSummary;
-use crate::formats::{csv, distance_map, library_dir, svg};
+use crate::formats::{csv, library_dir, svg};
 use crate::ids::{FootageId, JobId, LibraryId};
 use crate::library::{Library, View};
 use crate::media::{Limits, Video, read_image};
@@ -59,6 +60,18 @@ pub struct Summary {
     pub clip_frames: usize,
     /// Length of the animal when seen at length (80th percentile), pixels.
     pub length_px: Option<f64>,
+    /// What the library lacks and how to film better, the gravest first; empty for a good library.
+    #[serde(default)]
+    pub advice: Vec<Advice>,
+}
+
+/// One thing that a library lacks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Advice {
+    /// Its stable name, such as `little_playback` or `lacks_up`.
+    pub code: String,
+    /// The same for people.
+    pub sentence: String,
 }
 
 /// Queues an analysis; the library will have the id given back.
@@ -105,7 +118,7 @@ impl Input {
         Ok(Product {
             made: Made::Library(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
-            summary: serde_json::to_string(&Summary::of(&library))?,
+            summary: serde_json::to_string(&Summary::of(&library, &self.params))?,
         })
     }
 
@@ -118,19 +131,17 @@ impl Input {
         };
         library_dir::write(folder, library, &self.params, &source)?;
         std::fs::write(folder.join("poses.csv"), csv::write_poses(&library.poses))?;
-        for (name, picture) in svg::pictures(&library.poses) {
+        for (name, picture) in svg::pictures(library) {
             std::fs::write(folder.join(name), picture)?;
         }
-        std::fs::write(
-            folder.join("distance.png"),
-            self.distance_map(attempt, library)?,
-        )?;
+        let map = self.distance_map(attempt, library)?;
+        std::fs::write(folder.join("distance.png"), map.draw_distances())?;
+        let candidates = map.draw_candidates(library);
+        std::fs::write(folder.join("candidates.png"), candidates)?;
         Ok(())
     }
-}
 
-impl Input {
-    fn distance_map(&self, attempt: &Attempt, library: &Library) -> Result<Vec<u8>, Error> {
+    fn distance_map(&self, attempt: &Attempt, library: &Library) -> Result<DistanceMap, Error> {
         let pixels = ComparedSprites::new(&library.sprites, &library.poses, self.params.planes)
             .map_err(analysis::Error::from)?;
         let distances = Distances {
@@ -139,12 +150,13 @@ impl Input {
             side: Side::Plain,
             cpu: cpu::Level::detect(),
         };
-        distance_map::draw(&distances, attempt.listener).map_err(|_cancelled| Error::Cancelled)
+        DistanceMap::of(&distances, library, attempt.listener)
+            .map_err(|_cancelled| Error::Cancelled)
     }
 }
 
 impl Summary {
-    fn of(library: &Library) -> Summary {
+    fn of(library: &Library, params: &Params) -> Summary {
         let stats = &library.stats;
         Summary {
             fps: library.poses.fps,
@@ -159,6 +171,19 @@ impl Summary {
             component_share: stats.component_share,
             clip_frames: library.clip_frames,
             length_px: stats.length_px,
+            advice: Advice::all(library, params),
         }
+    }
+}
+
+impl Advice {
+    /// What a library lacks, the gravest first.
+    pub fn all(library: &Library, params: &Params) -> Vec<Advice> {
+        let all = analysis::stats::advice(library, params);
+        let plain = |advice: &analysis::stats::Advice| Advice {
+            code: advice.code().to_owned(),
+            sentence: advice.to_string(),
+        };
+        all.iter().map(plain).collect()
     }
 }

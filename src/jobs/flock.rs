@@ -1,4 +1,5 @@
-//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json` and `video.mp4`.
+//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json`, `plan.svg` and
+//! `video.mp4`.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,7 +7,7 @@ use uuid::Uuid;
 
 use super::{Attempt, Context, Error, Product, Stages, clock};
 use crate::flock::{Compositor, Flock, Params, plan_flock};
-use crate::formats::{flock_json, library_dir};
+use crate::formats::{flock_json, library_dir, svg};
 use crate::ids::{FlockId, JobId, LibraryId};
 use crate::library::Library;
 use crate::media::{VideoFormat, VideoWriter};
@@ -76,10 +77,9 @@ impl Input {
         attempt.listener.report("loading", 0.0);
         let library = library_dir::read(&folder, attempt.scratch())?.library;
         let flock = plan_flock(&library, &self.params, attempt.listener)?;
-        std::fs::write(
-            attempt.folder().join("flock.json"),
-            flock_json::write(&flock),
-        )?;
+        let folder = attempt.folder();
+        std::fs::write(folder.join("flock.json"), flock_json::write(&flock))?;
+        std::fs::write(folder.join("plan.svg"), svg::plan(&flock))?;
         render(attempt, &library, &flock)?;
         let summary = Summary {
             fps: flock.fps,

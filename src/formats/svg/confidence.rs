@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{LEFT, RIGHT, Sheet, TimeAxis, fill, rimmed, runs};
+use super::axis::Axis;
+use super::{LEFT, RIGHT, Sheet, fill, rimmed, runs};
 use crate::library::{Pose, Poses};
 
 const TOP: f64 = 44.0;
@@ -11,7 +12,7 @@ const STRIP: [f64; 2] = [30.0, 10.0];
 
 /// How sure the measurement is, frame by frame, as an SVG picture 960 wide.
 pub fn confidence(poses: &Poses) -> String {
-    let axis = TimeAxis::of(poses);
+    let axis = Axis::of_time(poses);
     let cut = poses.frames.iter().filter(|pose| pose.cut).count();
     let found = poses.frames.iter().filter(|pose| pose.detected()).count();
     let with_depth = poses
@@ -26,7 +27,7 @@ pub fn confidence(poses: &Poses) -> String {
         &format!(
             "Frame by frame over {:.1} seconds: the animal was found in {found} of {} frames, {cut} of them \
              at the border of the picture.",
-            axis.end_s,
+            axis.end,
             poses.frames.len()
         ),
     );
@@ -52,7 +53,7 @@ pub fn confidence(poses: &Poses) -> String {
 struct Rows<'a> {
     sheet: &'a mut Sheet,
     poses: &'a Poses,
-    axis: &'a TimeAxis,
+    axis: &'a Axis,
     y: f64,
 }
 

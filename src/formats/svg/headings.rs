@@ -1,13 +1,13 @@
 //! headings.svg: the heading over time (O's figure 5), as degrees on the page; up is above.
 //!
-//! Where the heading passes from +180 to -180 degrees the line leaves at one edge and comes back at
-//! the other: a wrap is drawn as a wrap, not as a stroke through the whole circle. Below it how
-//! sure the head is; where nothing is known the plot is shaded.
+//! Below it how sure the head is; where nothing is known the plot is shaded.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-use super::{LEFT, RIGHT, Sheet, TimeAxis, fill, runs};
+use super::axis::Axis;
+use super::curve::{Place, wrapped};
+use super::{LEFT, RIGHT, Sheet, fill, runs};
 use crate::library::{Pose, Poses};
 
 const HEIGHT: f64 = 340.0;
@@ -25,7 +25,7 @@ pub fn headings(poses: &Poses) -> String {
         .iter()
         .filter(|pose| pose.heading_rad.is_some())
         .count();
-    let axis = TimeAxis::of(poses);
+    let axis = Axis::of_time(poses);
     let y = |heading: f64| TOP + (heading + PI) / (2.0 * PI) * (BOTTOM - TOP);
     let mut sheet = Sheet::new(
         HEIGHT,
@@ -33,7 +33,7 @@ pub fn headings(poses: &Poses) -> String {
         &format!(
             "Where the head points in the picture, in degrees, over {:.1} seconds; known in {n_known} of \
              {} frames. 0 is right, 90 down, 180 left, -90 up.",
-            axis.end_s,
+            axis.end,
             poses.frames.len()
         ),
     );
@@ -61,7 +61,7 @@ pub fn headings(poses: &Poses) -> String {
 }
 
 /// The directions by their names, and shade where nothing is known.
-fn grid(sheet: &mut Sheet, poses: &Poses, axis: &TimeAxis, y: impl Fn(f64) -> f64) {
+fn grid(sheet: &mut Sheet, poses: &Poses, axis: &Axis, y: impl Fn(f64) -> f64) {
     for [from, to] in runs(poses.frames.len(), |k| {
         poses.frames[k].heading_rad.is_none()
     }) {
@@ -93,7 +93,7 @@ fn grid(sheet: &mut Sheet, poses: &Poses, axis: &TimeAxis, y: impl Fn(f64) -> f6
 }
 
 /// How sure the head is, 0.5 at the bottom to 1 at the top.
-fn strip(sheet: &mut Sheet, poses: &Poses, axis: &TimeAxis) {
+fn strip(sheet: &mut Sheet, poses: &Poses, axis: &Axis) {
     sheet.text("soft", "end", [LEFT - 8.0, STRIP[1] - 8.0], "head sure");
     sheet.rect(
         "sunken",
@@ -121,40 +121,20 @@ fn stride(poses: &Poses) -> usize {
     poses.frames.len().div_ceil(6000).max(1)
 }
 
-/// The line as path data, of the poses chosen and the one that leads to each: broken where the
-/// heading is not known, wrapped at +-180 degrees.
+/// The line as path data, of the poses chosen and the one that leads to each.
 fn line(
     poses: &Poses,
     chosen: impl Fn(&Pose) -> bool,
     x: impl Fn(f64) -> f64,
     y: impl Fn(f64) -> f64,
 ) -> String {
-    let mut path = String::new();
-    let mut last: Option<(f64, f64)> = None;
-    let mut pen_down = false;
-    for pose in poses.frames.iter().step_by(stride(poses)) {
-        let Some(heading) = pose.heading_rad else {
-            (last, pen_down) = (None, false);
-            continue;
-        };
-        let to = x(pose.time_s);
-        if !chosen(pose) {
-            (last, pen_down) = (Some((to, heading)), false);
-            continue;
-        }
-        let (from, before) = last.unwrap_or((to, heading));
-        if !pen_down {
-            write!(path, "M{from:.1} {:.1}", y(before)).expect("memory");
-        }
-        if (heading - before).abs() > PI {
-            let (over, edge) = ((from + to) / 2.0, PI * before.signum());
-            let (leave, enter) = (y(edge), y(-edge));
-            write!(path, "L{over:.1} {leave:.1}M{over:.1} {enter:.1}").expect("memory");
-        }
-        write!(path, "L{to:.1} {:.1}", y(heading)).expect("memory");
-        (last, pen_down) = (Some((to, heading)), true);
-    }
-    path
+    let place = |pose: &Pose| Place {
+        x: x(pose.time_s),
+        heading_rad: pose.heading_rad,
+        drawn: chosen(pose),
+    };
+    let poses = poses.frames.iter().step_by(stride(poses));
+    wrapped(poses.map(place), y)
 }
 
 #[cfg(test)]
@@ -181,14 +161,12 @@ mod tests {
     }
 
     #[test]
-    fn a_wrap_lifts_the_pen_and_an_ordinary_turn_does_not() {
+    fn a_heading_that_is_not_known_breaks_the_line() {
         let strokes = |headings: &[Option<f64>]| {
-            line(&poses(headings), |_| true, |t| t, |h| h)
-                .matches('M')
-                .count()
+            let line = line(&poses(headings), |_| true, |t| t, |h| h);
+            line.matches('M').count()
         };
         assert_eq!(strokes(&[Some(0.1), Some(0.5), Some(2.0)]), 1);
-        assert_eq!(strokes(&[Some(3.0), Some(-3.0)]), 2);
         assert_eq!(strokes(&[Some(0.0), None, Some(0.0)]), 2);
         let svg = headings(&poses(&[Some(3.0), Some(-3.0), None, Some(-2.0)]));
         assert!(svg.contains("known in 3 of 4 frames"));

@@ -1,25 +1,35 @@
-//! Pictures of a library for people, as SVG written by hand: headings.svg, trajectory.svg and
-//! confidence.svg (DESIGN.md, REST API).
+//! Pictures for people, as SVG written by hand: of a library headings.svg, trajectory.svg,
+//! confidence.svg and transitions.svg, of a flock plan.svg (DESIGN.md, REST API).
 //!
 //! Each has a title and a description for those who do not see it, and colors for a light page in its
 //! attributes, over which a style sheet lays those for a dark one.
 
+mod axis;
 mod confidence;
+mod curve;
 mod headings;
+mod plan;
 mod trajectory;
+mod transitions;
 
 use std::fmt::Write;
 
 pub use confidence::confidence;
 pub use headings::headings;
+pub use plan::plan;
 pub use trajectory::trajectory;
+pub use transitions::transitions;
 
-/// Every picture of the poses, by its file name.
-pub fn pictures(poses: &crate::library::Poses) -> [(&'static str, String); 3] {
+use crate::library::Library;
+
+/// Every picture of a library, by its file name.
+pub fn pictures(library: &Library) -> [(&'static str, String); 4] {
+    let poses = &library.poses;
     [
         ("headings.svg", headings(poses)),
         ("trajectory.svg", trajectory(poses)),
         ("confidence.svg", confidence(poses)),
+        ("transitions.svg", transitions(library)),
     ]
 }
 
@@ -128,52 +138,6 @@ fn rimmed(inside: &str, rim: &str) -> String {
     format!("class=\"{inside} {rim}-stroke\" fill=\"{fill}\" stroke=\"{stroke}\"")
 }
 
-/// Time from left to right.
-struct TimeAxis {
-    end_s: f64,
-}
-
-impl TimeAxis {
-    fn of(poses: &crate::library::Poses) -> TimeAxis {
-        let end_s = poses.frames.last().map_or(1.0, |pose| pose.time_s);
-        TimeAxis {
-            end_s: end_s.max(1e-3),
-        }
-    }
-
-    fn x(&self, time_s: f64) -> f64 {
-        LEFT + time_s / self.end_s * (RIGHT - LEFT)
-    }
-
-    /// Ticks with their times under a plot from `top` to `bottom`.
-    fn draw(&self, sheet: &mut Sheet, top: f64, bottom: f64) {
-        let step_s = round_step(self.end_s / 9.0);
-        for tick in 0..=(self.end_s / step_s * (1.0 + 1e-9)) as u32 {
-            let time_s = f64::from(tick) * step_s;
-            let x = self.x(time_s);
-            sheet.stroke("line", &format!("M{x:.1} {top:.1}V{:.1}", bottom + 5.0), "");
-            let label = (time_s * 1000.0).round() / 1000.0;
-            let unit = if tick == 0 { " s" } else { "" };
-            sheet.text(
-                "soft",
-                "middle",
-                [x, bottom + 20.0],
-                &format!("{label}{unit}"),
-            );
-        }
-    }
-}
-
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
-fn round_step(least: f64) -> f64 {
-    let power = libm::pow(10.0, libm::log10(least.max(1e-9)).floor());
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|n| n * power)
-        .find(|step| *step >= least * (1.0 - 1e-9))
-        .unwrap_or(10.0 * power)
-}
-
 /// Runs of frames for which something holds: the first frame and the one after the last.
 fn runs(n_frames: usize, holds: impl Fn(usize) -> bool) -> Vec<[usize; 2]> {
     let mut runs: Vec<[usize; 2]> = Vec::new();
@@ -191,21 +155,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_round_and_runs_are_whole() {
-        assert_eq!(round_step(0.3), 0.5);
-        assert_eq!(round_step(5.0), 5.0);
-        assert_eq!(round_step(70.0), 100.0);
+    fn runs_are_whole() {
         assert_eq!(runs(6, |k| [0, 1, 4].contains(&k)), [[0, 2], [4, 5]]);
     }
 
     #[test]
     fn no_element_has_an_attribute_twice() {
-        let mut poses = crate::fish::sample::SampleFilm::new(crate::fish::sample::SampleParams {
-            n_frames: 90,
+        let mut library = crate::flock::synthetic::library(crate::library::View::Side);
+        let flock = crate::flock::Params {
+            count: 3,
+            frames: 40,
             ..Default::default()
-        })
-        .expect("in range")
-        .truth();
+        };
+        let flock = crate::flock::plan_flock(&library, &flock, &crate::progress::Silent);
+        let plan = ("plan.svg", plan(&flock.expect("a good library")));
+        let poses = &mut library.poses;
         poses.frames[20..30].fill(crate::library::Pose::default());
         poses.tail_beat = Some(crate::library::TailBeat {
             method: crate::library::TailBeatMethod::Bend,
@@ -218,7 +182,7 @@ mod tests {
                 confidence: 0.9,
             }],
         });
-        for (name, svg) in pictures(&poses) {
+        for (name, svg) in pictures(&library).into_iter().chain([plan]) {
             for tag in svg.split('<').filter_map(|rest| rest.split_once('>')) {
                 let mut names: Vec<&str> = tag
                     .0

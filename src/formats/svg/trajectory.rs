@@ -1,7 +1,8 @@
 //! trajectory.svg: the animal's way across the picture, colored by time, with its start, its end and
 //! a scale; where it was not seen, a dashed line.
 
-use super::{RIGHT, Sheet, WIDTH, fill, rimmed, round_step, runs};
+use super::axis::round_step;
+use super::{RIGHT, Sheet, WIDTH, fill, rimmed, runs};
 use crate::library::Poses;
 
 /// From first to last, readable on light and dark.

@@ -31,9 +31,11 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     for (file, magic) in [
         ("background.png", &b"\x89PNG"[..]),
         ("distance.png", b"\x89PNG"),
+        ("candidates.png", b"\x89PNG"),
         ("headings.svg", b"<svg"),
         ("trajectory.svg", b"<svg"),
         ("confidence.svg", b"<svg"),
+        ("transitions.svg", b"<svg"),
         ("overlay.mp4", b"\0\0\0"),
         ("poses.csv", b"frame"),
         ("sprites.zip", b"PK"),
@@ -55,6 +57,8 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     assert_eq!(video.headers()["content-type"], "video/mp4");
     assert_eq!(&video.bytes().await.unwrap()[4..8], b"ftyp");
     assert_eq!(app.json(&format!("{flock}/flock.json")).await["seed"], 7);
+    let plan = app.get(&format!("{flock}/plan.svg")).send().await.unwrap();
+    assert!(plan.text().await.unwrap().contains("All 3 individuals"));
     assert_fish(&app, &analysis["library_id"]).await;
     app.assert_sound().await;
 }

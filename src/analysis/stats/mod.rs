@@ -1,4 +1,11 @@
-//! What is worth knowing about a library: how much was found, how the animal moves, what it covers.
+//! What is worth knowing about a library: how much was found, how the animal moves, what it covers;
+//! and what to do about what it lacks (ALGORITHMS.md 5).
+
+mod advice;
+#[cfg(test)]
+mod tests;
+
+pub use advice::{Advice, Motion, advice};
 
 use super::pose;
 use super::pose::smooth::smooth;

@@ -1,0 +1,110 @@
+//! `flockreel check-plan LIBRARY flock.json`: whether a stored plan is what it says, for scientists and for
+//! CI (ALGORITHMS.md 6, proofs b and c). Exit status 0 for a plan that holds, 2 with the first violation.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::{Error, Listener, Summary};
+use crate::flock::check::check;
+use crate::formats::flock_json;
+
+/// Arguments of `check-plan`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that `analyze` made.
+    #[arg(value_name = "LIBRARY_DIR")]
+    library: PathBuf,
+    /// What `flock --plan` wrote.
+    #[arg(value_name = "FLOCK_JSON")]
+    plan: PathBuf,
+}
+
+/// Checks the plan.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let library = super::read_library(&args.library, &args.plan)?.library;
+    let bytes = std::fs::read(&args.plan)
+        .map_err(|cause| Error::Usage(format!("cannot read {}: {cause}", args.plan.display())))?;
+    let flock = flock_json::read(&bytes).map_err(|cause| {
+        Error::Usage(format!(
+            "not a flock.json: {}: {cause}",
+            args.plan.display()
+        ))
+    })?;
+    let report = check(&library, &flock, &Listener::new())
+        .map_err(|violation| Error::Usage(format!("{violation} ({})", violation.code())))?;
+    super::say(&format!(
+        "the plan holds: {} individuals, {} frames, {} jumps; {} of the plans proven the cheapest over {} edges",
+        report.n_individuals, report.n_frames, report.n_jumps, report.n_exact, report.n_edges
+    ));
+    Ok(Some(Summary(json!({
+        "plan": args.plan,
+        "individuals": report.n_individuals,
+        "frames": report.n_frames,
+        "jumps": report.n_jumps,
+        "exact": report.n_exact,
+        "edges": report.n_edges,
+    }))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis;
+    use crate::flock::{Params, plan_flock, synthetic};
+    use crate::formats::library_dir;
+    use crate::formats::library_json::FootageSummary;
+    use crate::library::View;
+    use crate::progress::Silent;
+
+    #[test]
+    fn a_stored_plan_holds_and_one_changed_by_hand_exits_with_2_and_a_sentence() {
+        let library = synthetic::library(View::Side);
+        let params = Params {
+            count: 2,
+            frames: 50,
+            ..Params::default()
+        };
+        let dir = tempfile::tempdir().unwrap();
+        let footage = FootageSummary {
+            sha256: "ab".into(),
+            n_bytes: 9,
+        };
+        let analysis = analysis::Params::default();
+        library_dir::write(dir.path(), &library, &analysis, &footage).unwrap();
+        // Planned from what the files hold, as the command does.
+        let library = crate::cli::read_library(dir.path(), dir.path())
+            .unwrap()
+            .library;
+        let flock = plan_flock(&library, &params, &Silent).unwrap();
+        let plan = dir.path().join("flock.json");
+        let outcome = |bytes: &[u8]| {
+            std::fs::write(&plan, bytes).unwrap();
+            run(Args {
+                library: dir.path().to_owned(),
+                plan: plan.clone(),
+            })
+        };
+        let bytes = flock_json::write(&flock);
+        let Summary(summary) = outcome(&bytes).unwrap().unwrap();
+        assert_eq!(
+            (&summary["exact"], &summary["frames"]),
+            (&json!(2), &json!(100))
+        );
+
+        let text = String::from_utf8(bytes).unwrap();
+        let total = format!("\"total\":{}", flock.individuals[1].cost.total);
+        let changed = text.replace(&total, "\"total\":0.0");
+        let error = outcome(changed.as_bytes()).expect_err("not what it costs");
+        assert_eq!(error.exit_code(), 2);
+        let sentence = error.to_string();
+        assert!(
+            sentence.starts_with("individual 1: cost.total says 0.000000 rad"),
+            "{sentence}"
+        );
+        assert!(sentence.ends_with("(wrong_cost)"), "{sentence}");
+
+        let error = outcome(b"{}").expect_err("no flock");
+        assert!(error.to_string().starts_with("not a flock.json: "));
+    }
+}

@@ -1,0 +1,88 @@
+//! What may follow what, read straight off the library: states are (frame of the component, mirror side),
+//! edges are "the next frame" and every jump on every side. Nothing here is sorted for speed.
+
+use std::collections::BTreeMap;
+
+use crate::flock::Flock;
+use crate::flock::plan::cost::Weights;
+use crate::library::Library;
+
+/// A jump on one side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Edge {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    /// Turns.
+    pub(super) cost: u64,
+}
+
+/// The states in order of (side, frame), and all edges between them.
+pub(super) struct Graph {
+    states: Vec<(u32, bool)>,
+    numbers: BTreeMap<(bool, u32), usize>,
+    /// The state that shows the next frame, where there is one.
+    pub(super) next: Vec<Option<usize>>,
+    pub(super) jumps: Vec<Edge>,
+    /// The cost of (from, to).
+    costs: BTreeMap<(usize, usize), u64>,
+    /// Both sides may be shown.
+    pub(super) mirror: bool,
+}
+
+impl Graph {
+    pub(super) fn new(library: &Library, flock: &Flock) -> Graph {
+        let weights = Weights::new(&flock.params.matching, library);
+        let mirror = flock.params.mirror;
+        let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
+        let frames = &library.playback.component;
+        let states: Vec<(u32, bool)> = sides
+            .iter()
+            .flat_map(|&side| frames.iter().map(move |&frame| (frame, side)))
+            .collect();
+        let numbers: BTreeMap<(bool, u32), usize> = (states.iter().enumerate())
+            .map(|(number, &(frame, side))| ((side, frame), number))
+            .collect();
+        let at = |frame: u32, side: bool| numbers.get(&(side, frame)).copied();
+        let mut costs = BTreeMap::new();
+        for jump in &library.playback.jumps {
+            for &side in sides {
+                let ends = at(jump.from, side).zip(at(jump.to, side != jump.mirrored));
+                if let Some(ends) = ends {
+                    let cost = u64::from(weights.of_jump(jump.cost, library.epsilon));
+                    let least = costs.entry(ends).or_insert(cost);
+                    *least = cost.min(*least);
+                }
+            }
+        }
+        Graph {
+            next: states
+                .iter()
+                .map(|&(frame, side)| at(frame + 1, side))
+                .collect(),
+            jumps: (costs.iter())
+                .map(|(&(from, to), &cost)| Edge { from, to, cost })
+                .collect(),
+            states,
+            numbers,
+            costs,
+            mirror,
+        }
+    }
+
+    pub(super) fn n_states(&self) -> usize {
+        self.states.len()
+    }
+
+    /// What each state shows.
+    pub(super) fn shown(&self) -> &[(u32, bool)] {
+        &self.states
+    }
+
+    pub(super) fn state(&self, frame: u32, side: bool) -> Option<usize> {
+        self.numbers.get(&(side, frame)).copied()
+    }
+
+    pub(super) fn jump_cost(&self, from: usize, to: usize) -> Option<u64> {
+        self.costs.get(&(from, to)).copied()
+    }
+}

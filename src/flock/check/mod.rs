@@ -1,0 +1,122 @@
+//! An independent check of a stored plan (ALGORITHMS.md 6, proofs b and c): `flockreel check-plan`.
+//!
+//! From a library and a flock as their files hold them it verifies that every step is the next frame or
+//! a jump of the library, mirror sides, the dwell, every cost, and that nothing cheaper exists. What a
+//! state and a jump cost is asked of `plan::cost` and `plan::crowd`, which define it; how the plan was
+//! found is not: states, edges, sums and the recursion (from the last frame to the first, one step an
+//! edge) are its own.
+
+mod cost;
+mod graph;
+mod optimum;
+mod steps;
+#[cfg(test)]
+mod tests;
+mod violation;
+
+pub use violation::Violation;
+
+use rayon::prelude::*;
+
+use self::cost::Ledger;
+use self::graph::Graph;
+use super::{Flock, Individual};
+use crate::library::Library;
+use crate::progress::Progress;
+
+/// Individuals checked between two reports of progress.
+const BATCH: usize = 16;
+
+/// What was found in order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Report {
+    /// Individuals of the flock.
+    pub n_individuals: usize,
+    /// Output frames of all of them.
+    pub n_frames: usize,
+    /// Jumps in all plans.
+    pub n_jumps: usize,
+    /// Plans that claim to be the cheapest of all, and are.
+    pub n_exact: usize,
+    /// Edges looked at to prove it.
+    pub n_edges: u64,
+}
+
+/// Checks every individual of a flock, in order of id; fails with the first violation.
+///
+/// Reports the stage `checking`. A plan that does not claim to be the cheapest (`cost.exact` is false)
+/// is held to its steps, its costs and its lower bound.
+pub fn check(
+    library: &Library,
+    flock: &Flock,
+    progress: &dyn Progress,
+) -> Result<Report, Violation> {
+    belong_together(library, flock)?;
+    for (id, individual) in flock.individuals.iter().enumerate() {
+        steps::lengths(flock, id, individual)?;
+    }
+    let graph = Graph::new(library, flock);
+    let individuals = flock.individuals.iter().enumerate();
+    let plans: Result<Vec<Vec<usize>>, Violation> = individuals
+        .map(|(id, individual)| steps::states(&graph, id, individual))
+        .collect();
+    let plans = plans?;
+    let ledger = Ledger::new(library, flock, &graph, &plans);
+    let mut report = Report::default();
+    let ids: Vec<usize> = (0..flock.individuals.len()).collect();
+    for batch in ids.chunks(BATCH) {
+        progress.report("checking", batch[0] as f64 / ids.len() as f64);
+        let one = |&id: &usize| individual(&graph, &ledger, id, &plans[id]);
+        let checked: Vec<Result<Report, Violation>> = batch.par_iter().map(one).collect();
+        for one in checked {
+            report.add(one?);
+        }
+    }
+    progress.report("checking", 1.0);
+    Ok(report)
+}
+
+fn individual(
+    graph: &Graph,
+    ledger: &Ledger<'_>,
+    id: usize,
+    states: &[usize],
+) -> Result<Report, Violation> {
+    let jumps = steps::jumps(graph, ledger.dwell, id, states)?;
+    let bill = ledger.bill(id, &jumps)?;
+    let n_edges = optimum::check(graph, ledger, id, states, &bill)?;
+    Ok(Report {
+        n_individuals: 1,
+        n_frames: states.len(),
+        n_jumps: jumps.len(),
+        n_exact: usize::from(ledger.is_exact(id)),
+        n_edges,
+    })
+}
+
+impl Report {
+    fn add(&mut self, other: Report) {
+        self.n_individuals += other.n_individuals;
+        self.n_frames += other.n_frames;
+        self.n_jumps += other.n_jumps;
+        self.n_exact += other.n_exact;
+        self.n_edges += other.n_edges;
+    }
+}
+
+fn belong_together(library: &Library, flock: &Flock) -> Result<(), Violation> {
+    flock.params.check().map_err(Violation::Params)?;
+    let poses = &library.poses;
+    if (poses.fps, poses.image_size_px) != (flock.fps, flock.image_size_px) {
+        return Err(Violation::OtherLibrary);
+    }
+    let n_individuals = flock.individuals.len();
+    if n_individuals != flock.params.count as usize {
+        return Err(Violation::Count(n_individuals, flock.params.count));
+    }
+    let misplaced = |(id, one): &(usize, &Individual)| one.id as usize != *id;
+    match flock.individuals.iter().enumerate().find(misplaced) {
+        Some((id, one)) => Err(Violation::Order(id, one.id)),
+        None => Ok(()),
+    }
+}

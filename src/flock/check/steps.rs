@@ -1,0 +1,91 @@
+//! Whether a plan can be played at all: its lists, its frames, its steps, and how long it dwells.
+
+use super::graph::Graph;
+use super::violation::Violation;
+use crate::flock::{Flock, Individual};
+
+/// A jump that a plan takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Taken {
+    /// The output frame jumped to.
+    pub(super) t: usize,
+    /// Turns.
+    pub(super) cost: u64,
+}
+
+/// Every list that the check reads has an entry for every frame.
+pub(super) fn lengths(flock: &Flock, id: usize, individual: &Individual) -> Result<(), Violation> {
+    let wanted = flock.params.frames as usize;
+    let boid = &individual.boid;
+    for (list, found) in [
+        ("source_frame", individual.source_frame.len()),
+        ("mirrored", individual.mirrored.len()),
+        ("boid.position", boid.position_px.len()),
+        ("boid.heading_rad", boid.heading_rad.len()),
+        ("boid.speed", boid.speed_bl_per_s.len()),
+    ] {
+        if found != wanted {
+            return Err(Violation::Length {
+                id,
+                list,
+                found,
+                wanted,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// What a plan shows, as states of the graph, if all of it may be shown.
+pub(super) fn states(
+    graph: &Graph,
+    id: usize,
+    individual: &Individual,
+) -> Result<Vec<usize>, Violation> {
+    let shown = individual.source_frame.iter().zip(&individual.mirrored);
+    let state = |(t, (&frame, &side)): (usize, (&u32, &bool))| {
+        if side && !graph.mirror {
+            return Err(Violation::Mirror { id, t });
+        }
+        let state = graph.state(frame, side);
+        state.ok_or(Violation::OutsideComponent { id, t, frame })
+    };
+    shown.enumerate().map(state).collect()
+}
+
+/// The jumps of a plan, if all its steps are allowed.
+pub(super) fn jumps(
+    graph: &Graph,
+    dwell: usize,
+    id: usize,
+    states: &[usize],
+) -> Result<Vec<Taken>, Violation> {
+    let mut jumps: Vec<Taken> = Vec::new();
+    for t in 1..states.len() {
+        let (before, state) = (states[t - 1], states[t]);
+        if graph.next[before] == Some(state) {
+            continue;
+        }
+        let [(from, from_side), (to, side)] = [before, state].map(|state| graph.shown()[state]);
+        let cost = graph
+            .jump_cost(before, state)
+            .ok_or(Violation::IllegalStep {
+                id,
+                t,
+                from,
+                to,
+                turned: from_side != side,
+            })?;
+        let since = jumps.last().map_or(dwell, |jump| t - jump.t);
+        if since < dwell {
+            return Err(Violation::Dwell {
+                id,
+                t,
+                since,
+                dwell,
+            });
+        }
+        jumps.push(Taken { t, cost });
+    }
+    Ok(jumps)
+}

@@ -1,0 +1,227 @@
+//! The check holds for what the planner makes, and is red for every way to spoil it.
+
+use super::*;
+use crate::flock::individual::rounded;
+use crate::flock::{Params, plan_flock, synthetic};
+use crate::geometry::Turns;
+use crate::library::View;
+use crate::progress::Silent;
+
+fn planned(view: View, preset: &str) -> (Library, Flock) {
+    let library = synthetic::library(view);
+    let params = Params {
+        count: 4,
+        frames: 90,
+        ..Params::preset(preset).expect("a known preset")
+    };
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    (library, flock)
+}
+
+fn red(library: &Library, flock: &Flock) -> Violation {
+    check(library, flock, &Silent).expect_err("spoiled")
+}
+
+/// The file's costs changed to what the steps add up to, so that only the plan is to blame.
+fn with_honest_costs(library: &Library, mut flock: Flock, id: usize) -> Flock {
+    for _ in 0..5 {
+        let Err(Violation::Cost { part, found, .. }) = check(library, &flock, &Silent) else {
+            break;
+        };
+        let cost = &mut flock.individuals[id].cost;
+        let rad = rounded(found as f64 / Turns::PER_RAD, 6);
+        match part {
+            "cost.heading" => cost.heading = rad,
+            "cost.speed" => cost.speed = rad,
+            "cost.transition" => cost.transition = rad,
+            "cost.crowd" => cost.crowd = rad,
+            _ => cost.total = rad,
+        }
+    }
+    flock
+}
+
+#[test]
+fn what_the_planner_makes_holds() {
+    for (view, preset) in [
+        (View::Side, "school"),
+        (View::Top, "swarm"),
+        (View::Side, "papers"),
+    ] {
+        let (library, flock) = planned(view, preset);
+        let report = check(&library, &flock, &Silent).expect(preset);
+        assert_eq!(
+            (report.n_individuals, report.n_exact, report.n_frames),
+            (4, 4, 360)
+        );
+        let jumps = flock.stats.jumps_per_100_frames * 3.6;
+        assert!(
+            (report.n_jumps as f64 - jumps).abs() < 0.1,
+            "{jumps} {report:?}"
+        );
+        let jumps = library.playback.jumps.iter().filter(|jump| !jump.mirrored);
+        let least = 4 * 89 * jumps.count() as u64;
+        assert!(report.n_edges > least, "every edge of every frame");
+    }
+}
+
+#[test]
+fn a_step_that_the_library_does_not_know_is_named() {
+    let (library, mut flock) = planned(View::Side, "school");
+    let one = &mut flock.individuals[2];
+    let far = (one.source_frame[40] + 1..).step_by(3);
+    let lost = far.skip(3).find(|&to| {
+        let ends = (one.source_frame[40], to);
+        !library
+            .playback
+            .jumps
+            .iter()
+            .any(|jump| (jump.from, jump.to) == ends)
+    });
+    let lost = lost.expect("most are not").min(580);
+    for (k, frame) in one.source_frame[41..].iter_mut().enumerate() {
+        *frame = (lost + k as u32).min(590);
+    }
+    let violation = red(&library, &flock);
+    assert_eq!(violation.code(), "illegal_step");
+    assert!(
+        violation
+            .to_string()
+            .starts_with("individual 2, frame 41: from source frame")
+    );
+}
+
+#[test]
+fn a_frame_outside_of_the_component_is_named() {
+    let (library, mut flock) = planned(View::Side, "school");
+    flock.individuals[1].source_frame[7] = 4_000_000;
+    let sentence = "individual 1, frame 7: source frame 4000000 is not in the library's component";
+    assert_eq!(red(&library, &flock).to_string(), sentence);
+}
+
+#[test]
+fn a_mirror_image_needs_leave() {
+    let (library, mut flock) = planned(View::Side, "papers");
+    flock.individuals[0].mirrored[3] = true;
+    assert_eq!(red(&library, &flock), Violation::Mirror { id: 0, t: 3 });
+}
+
+#[test]
+fn a_longer_dwell_than_was_kept_is_missed() {
+    let (library, mut flock) = planned(View::Side, "swarm");
+    let least = (0..4).filter_map(|id| {
+        let shown = |t: usize| {
+            let one: &Individual = &flock.individuals[id];
+            (one.source_frame[t], one.mirrored[t])
+        };
+        let is_jump = |&t: &usize| crate::flock::placement::is_jump(shown(t - 1), shown(t));
+        let jumps: Vec<usize> = (1..90).filter(is_jump).collect();
+        jumps.windows(2).map(|pair| pair[1] - pair[0]).min()
+    });
+    let least = least.min().expect("two jumps somewhere");
+    assert!(least >= library.clip_frames);
+    flock.params.dwell_frames = Some(least as u32 + 1);
+    // Individuals before the one that jumped so soon may now be cheaper than they need to be: no fault.
+    let violation = red(&library, &flock);
+    let jumped = matches!(violation, Violation::Dwell { since, .. } if since == least);
+    assert!(jumped, "{violation}");
+}
+
+#[test]
+fn every_part_of_the_cost_is_recomputed() {
+    let (library, flock) = planned(View::Side, "school");
+    let turn = 1.0 / Turns::PER_RAD;
+    type Part = fn(&mut crate::flock::PlanCost) -> &mut f64;
+    let spoil: [(&str, Part); 5] = [
+        ("cost.heading", |cost| &mut cost.heading),
+        ("cost.speed", |cost| &mut cost.speed),
+        ("cost.transition", |cost| &mut cost.transition),
+        ("cost.crowd", |cost| &mut cost.crowd),
+        ("cost.total", |cost| &mut cost.total),
+    ];
+    for (name, of) in spoil {
+        let mut spoiled = flock.clone();
+        *of(&mut spoiled.individuals[3].cost) += turn;
+        let violation = red(&library, &spoiled);
+        let told = matches!(violation, Violation::Cost { id: 3, part, said, found } if part == name && said == found + 1);
+        assert!(told, "{violation}");
+        *of(&mut spoiled.individuals[3].cost) += 0.3 * turn;
+        assert_eq!(red(&library, &spoiled).code(), "cost_not_whole", "{name}");
+    }
+}
+
+#[test]
+fn a_plan_that_could_be_cheaper_is_told_where_it_goes_wrong() {
+    let (library, mut flock) = planned(View::Side, "school");
+    // The other way round in the picture, all the while: every step is as legal as before.
+    let mirrored = &mut flock.individuals[3].mirrored;
+    mirrored.iter_mut().for_each(|side| *side = !*side);
+    let mut flock = with_honest_costs(&library, flock, 3);
+    let violation = red(&library, &flock);
+    let told = matches!(violation, Violation::Suboptimal { id: 3, t: 0, cost, cheapest } if cost > cheapest);
+    assert!(told, "{violation}");
+    // Who does not claim to be the cheapest may cost more.
+    flock.individuals[3].cost.exact = false;
+    assert_eq!(
+        check(&library, &flock, &Silent).map(|report| report.n_exact),
+        Ok(3)
+    );
+}
+
+#[test]
+fn a_jump_too_many_late_in_the_film_is_told_by_its_frame() {
+    let (library, flock) = planned(View::Side, "school");
+    // The last frame shows what another jump leads to: legal, and seldom as cheap.
+    let spoiled = (0..4).rev().find_map(|id| {
+        let mut spoiled = flock.clone();
+        let one = &mut spoiled.individuals[id];
+        let (before, side) = (one.source_frame[88], one.mirrored[88]);
+        let jump = library
+            .playback
+            .jumps
+            .iter()
+            .rev()
+            .find(|jump| jump.from == before)?;
+        (one.source_frame[89], one.mirrored[89]) = (jump.to, side != jump.mirrored);
+        let spoiled = with_honest_costs(&library, spoiled, id);
+        let violation = red(&library, &spoiled);
+        matches!(violation, Violation::Suboptimal { .. }).then_some(violation)
+    });
+    let told = matches!(spoiled, Some(Violation::Suboptimal { t: 89, .. }));
+    assert!(told, "{spoiled:?}");
+}
+
+#[test]
+fn a_lower_bound_above_a_plan_is_none() {
+    let (library, mut flock) = planned(View::Side, "school");
+    flock.individuals[1].cost.lower_bound += 1.0 / Turns::PER_RAD;
+    assert_eq!(red(&library, &flock).code(), "wrong_lower_bound");
+}
+
+#[test]
+fn files_that_do_not_belong_together_are_told_first() {
+    let (library, flock) = planned(View::Side, "school");
+    let spoiled = |spoil: fn(&mut Flock)| {
+        let mut flock = flock.clone();
+        spoil(&mut flock);
+        red(&library, &flock).code()
+    };
+    assert_eq!(spoiled(|flock| flock.fps = 25.0), "other_library");
+    assert_eq!(spoiled(|flock| flock.individuals.swap(0, 1)), "wrong_order");
+    assert_eq!(
+        spoiled(|flock| flock.individuals.truncate(3)),
+        "wrong_count"
+    );
+    assert_eq!(
+        spoiled(|flock| flock.params.matching.wx = 9.0),
+        "bad_params"
+    );
+    assert_eq!(
+        spoiled(|flock| _ = flock.individuals[2].mirrored.pop()),
+        "wrong_length"
+    );
+    assert_eq!(
+        spoiled(|flock| flock.params.matching.wx = 0.4),
+        "wrong_cost"
+    );
+}

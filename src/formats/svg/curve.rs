@@ -1,0 +1,65 @@
+//! A heading as a curve. Where it passes from +180 to -180 degrees the line leaves at one edge and
+//! comes back at the other: a wrap is drawn as a wrap, not as a stroke through the whole circle.
+
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+/// One place of a curve.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub(super) x: f64,
+    /// In (-pi, pi]; `None` breaks the curve.
+    pub(super) heading_rad: Option<f64>,
+    /// Whether the stroke that leads here is drawn.
+    pub(super) drawn: bool,
+}
+
+/// The curve as path data; `y` places a heading.
+pub(super) fn wrapped(places: impl Iterator<Item = Place>, y: impl Fn(f64) -> f64) -> String {
+    let mut path = String::new();
+    let mut last: Option<(f64, f64)> = None;
+    let mut pen_down = false;
+    for place in places {
+        let Some(heading) = place.heading_rad else {
+            (last, pen_down) = (None, false);
+            continue;
+        };
+        let to = place.x;
+        if !place.drawn {
+            (last, pen_down) = (Some((to, heading)), false);
+            continue;
+        }
+        let (from, before) = last.unwrap_or((to, heading));
+        if !pen_down {
+            write!(path, "M{from:.1} {:.1}", y(before)).expect("memory");
+        }
+        if (heading - before).abs() > PI {
+            let (over, edge) = ((from + to) / 2.0, PI * before.signum());
+            let (leave, enter) = (y(edge), y(-edge));
+            write!(path, "L{over:.1} {leave:.1}M{over:.1} {enter:.1}").expect("memory");
+        }
+        write!(path, "L{to:.1} {:.1}", y(heading)).expect("memory");
+        (last, pen_down) = (Some((to, heading)), true);
+    }
+    path
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wrap_lifts_the_pen_and_an_ordinary_turn_does_not() {
+        let strokes = |headings: &[Option<f64>]| {
+            let places = headings.iter().map(|&heading_rad| Place {
+                x: 0.0,
+                heading_rad,
+                drawn: true,
+            });
+            wrapped(places, |heading| heading).matches('M').count()
+        };
+        assert_eq!(strokes(&[Some(0.1), Some(0.5), Some(2.0)]), 1);
+        assert_eq!(strokes(&[Some(3.0), Some(-3.0)]), 2);
+        assert_eq!(strokes(&[Some(0.0), None, Some(0.0)]), 2);
+    }
+}
