@@ -1,5 +1,4 @@
-//! The whole matrix D, for those who ask for it: as numbers, or min-pooled to a picture's size
-//! (ALGORITHMS.md 5; O's figure 2). Transitions never need it.
+//! The whole matrix D, for those who ask for it as numbers (ALGORITHMS.md 5). Transitions never need it.
 
 use super::{Cancelled, Distances};
 use crate::progress::Progress;
@@ -44,43 +43,5 @@ impl DistanceMatrix {
     /// The largest D; 0 when there are no clips.
     pub fn max(&self) -> u64 {
         self.triangle.iter().copied().max().unwrap_or(0)
-    }
-}
-
-/// D with every cell the least distance of the pairs that fall into it, so that a single like
-/// moment in a long footage still shows.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PooledMatrix {
-    /// Rows and columns: the lesser of the number of clips and what was asked for.
-    pub side: usize,
-    /// Row by row; symmetric.
-    pub cells: Vec<u64>,
-}
-
-impl PooledMatrix {
-    /// Pools D(i, j) into cell (i side / n, j side / n), divisions rounded down, with
-    /// `side` = min(n, `largest_side`).
-    pub fn of(
-        distances: &Distances<'_>,
-        largest_side: usize,
-        progress: &dyn Progress,
-    ) -> Result<Self, Cancelled> {
-        let n_clips = distances.n_clips();
-        let side = n_clips.min(largest_side);
-        let mut cells = vec![u64::MAX; side * side];
-        let cell = |clip_idx: usize| clip_idx * side / n_clips;
-        distances.for_each_row(progress, |i, row| {
-            let pooled = &mut cells[cell(i) * side..][..side];
-            for (j, &distance) in (i..).zip(row) {
-                let least = &mut pooled[cell(j)];
-                *least = distance.min(*least);
-            }
-        })?;
-        for row in 0..side {
-            for column in 0..row {
-                cells[row * side + column] = cells[column * side + row];
-            }
-        }
-        Ok(PooledMatrix { side, cells })
     }
 }

@@ -5,6 +5,7 @@
 //! computed. The rows stream by in order, in panels of 4 times 48: no N x N matrix is held here.
 
 mod bounds;
+mod group;
 mod kernel;
 mod matrix;
 mod minima;
@@ -16,7 +17,7 @@ mod window;
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use matrix::{DistanceMatrix, PooledMatrix};
+pub use matrix::DistanceMatrix;
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;
 pub use pruned::NOT_BELOW;
@@ -26,8 +27,8 @@ use rayon::prelude::*;
 
 use crate::cpu::Level;
 use crate::progress::Progress;
+use group::{GROUP, Group, GroupMemory};
 use kernel::Tile;
-use pixels::{GROUP, Group, GroupMemory};
 use window::WindowSums;
 
 /// Groups of rows in a panel: so many tiles are computed for each group of columns that is looked at.

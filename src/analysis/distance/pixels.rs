@@ -1,11 +1,8 @@
 //! The pixels that distances compare (ALGORITHMS.md 5), laid out for the kernels.
 //!
 //! Each sprite becomes U: four bytes a pixel, color premultiplied as `(A*C + 127) div 255`, then A;
-//! with `planes: rgb` the byte of A is 0 in every sprite and adds nothing. Sprites stand in groups
-//! of 48. Inside a group the sprites are cut into blocks of 16 x 16 pixels, and block 0 of all 48 comes
-//! before block 1: a tile of 48 x 48 distances then reads two runs of 48 KB at a time, without the
-//! cache conflicts of sprites whose size is a multiple of 4 KB. Bytes beyond the last sprite and
-//! beyond the last pixel, up to whole blocks, are 0.
+//! with `planes: rgb` the byte of A is 0 in every sprite and adds nothing. They are kept in
+//! groups (`group`), in memory or put aside, together with the sums that bound their distances (`bounds`).
 
 use std::sync::Arc;
 
@@ -13,28 +10,11 @@ use rayon::prelude::*;
 
 use super::Side;
 use super::bounds::{Bounds, Sums};
+use super::group::{BLOCK, GROUP, Group, GroupMemory, SIDE, gather, sad, scatter};
 use super::upright::Canvas;
 use crate::analysis::params::Planes;
 use crate::library::{Poses, Sprites, View};
 use crate::scratch::{Full, Scratch};
-
-/// Sprites in a group: the side of a tile of distances.
-pub(super) const GROUP: usize = 48;
-/// Bytes in a block.
-pub(super) const BLOCK: usize = 1024;
-
-/// Side of the square of pixels that a block holds: an animal fills few of them, and of two blank blocks
-/// nothing need be compared.
-const SIDE: usize = 16;
-/// Bytes of one row of a block.
-const ROW: usize = SIDE * 4;
-
-/// 16 x 16 pixels of a sprite, on cache lines of their own.
-#[derive(Clone, Copy)]
-#[repr(C, align(64))]
-pub(super) struct Block(pub(super) [u8; BLOCK]);
-
-const BLANK: Block = Block([0; BLOCK]);
 
 /// How a sprite is mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,76 +50,6 @@ enum Stored {
         sums: Vec<u32>,
         at: u64,
     },
-}
-
-/// The blocks of some groups, and what the bytes of each add up to.
-#[derive(Default)]
-pub(super) struct GroupMemory {
-    blocks: Vec<Block>,
-    sums: Vec<u32>,
-    packed: Vec<u8>,
-}
-
-impl GroupMemory {
-    fn clear(&mut self, n_blocks: usize) {
-        self.blocks.clear();
-        self.blocks.resize(n_blocks, BLANK);
-        self.sums.clear();
-        self.sums.resize(n_blocks, 0);
-    }
-
-    fn lend(&self, n_sprites: usize) -> Group<'_> {
-        Group {
-            n_sprites,
-            blocks: &self.blocks,
-            sums: &self.sums,
-        }
-    }
-
-    /// Puts the blocks that are not blank aside.
-    fn put_aside(mut self, scratch: &dyn Scratch) -> Result<Stored, Full> {
-        self.packed.clear();
-        for (block, &sum) in self.blocks.iter().zip(&self.sums) {
-            if sum > 0 {
-                self.packed.extend_from_slice(&block.0);
-            }
-        }
-        let at = scratch.put(&self.packed)?;
-        let sums = self.sums;
-        Ok(Stored::Aside { sums, at })
-    }
-
-    /// Has the blocks back.
-    fn have_back(&mut self, sums: &[u32], at: u64, scratch: &dyn Scratch) {
-        self.clear(sums.len());
-        self.sums.copy_from_slice(sums);
-        let n_packed = sums.iter().filter(|&&sum| sum > 0).count();
-        self.packed.resize(n_packed * BLOCK, 0);
-        scratch.get(at, &mut self.packed);
-        let kept = self
-            .blocks
-            .iter_mut()
-            .zip(sums)
-            .filter(|(_, sum)| **sum > 0);
-        for ((block, _), packed) in kept.zip(self.packed.as_chunks::<BLOCK>().0) {
-            block.0 = *packed;
-        }
-    }
-}
-
-fn sum_up(blocks: &[Block], sums: &mut [u32]) {
-    for (sum, block) in sums.iter_mut().zip(blocks) {
-        *sum = block.0.iter().map(|&byte| u32::from(byte)).sum();
-    }
-}
-
-/// 48 sprites, the last ones blank where the footage ends.
-#[derive(Clone, Copy)]
-pub(super) struct Group<'a> {
-    pub(super) n_sprites: usize,
-    /// Block 0 of each sprite, then block 1 of each.
-    blocks: &'a [Block],
-    sums: &'a [u32],
 }
 
 impl ComparedSprites {
@@ -193,7 +103,10 @@ impl ComparedSprites {
                 let (group, sums) = compared.gathered(group_idx, &source);
                 let stored = match held {
                     true => Stored::Held(group),
-                    false => group.put_aside(&*compared.scratch)?,
+                    false => {
+                        let (sums, at) = group.put_aside(&*compared.scratch)?;
+                        Stored::Aside { sums, at }
+                    }
                 };
                 Ok((stored, sums))
             })
@@ -219,7 +132,7 @@ impl ComparedSprites {
             let mirrored = Sums::of_mirrored(&bytes, self.width, self.flip);
             sums.push((Sums::of(&bytes, self.width), mirrored));
         }
-        sum_up(&group.blocks, &mut group.sums);
+        group.sum_up();
         (group, sums)
     }
 
@@ -290,7 +203,7 @@ impl ComparedSprites {
             self.mirror(&mut bytes);
             scatter(&bytes, self.width, sprite, &mut memory.blocks);
         }
-        sum_up(&memory.blocks, &mut memory.sums);
+        memory.sum_up();
         memory.lend(group.n_sprites)
     }
 
@@ -320,13 +233,6 @@ impl ComparedSprites {
     }
 }
 
-/// d of a sprite of one group and a sprite of another.
-fn sad(a: Group<'_>, i: usize, b: Group<'_>, j: usize) -> u64 {
-    (0..a.n_blocks())
-        .map(|block| super::kernel::scalar::sad_block(a.block(block, i), b.block(block, j)))
-        .sum()
-}
-
 /// What U is made of.
 struct Source<'a> {
     sprites: &'a Sprites,
@@ -350,23 +256,6 @@ impl Source<'_> {
     }
 }
 
-impl<'a> Group<'a> {
-    /// Blocks in each sprite.
-    pub(super) fn n_blocks(&self) -> usize {
-        self.blocks.len() / GROUP
-    }
-
-    /// One block of one of the 48 sprites.
-    pub(super) fn block(&self, block: usize, sprite: usize) -> &'a Block {
-        &self.blocks[block * GROUP + sprite]
-    }
-
-    /// What the bytes of that block add up to.
-    pub(super) fn sum(&self, block: usize, sprite: usize) -> u32 {
-        self.sums[block * GROUP + sprite]
-    }
-}
-
 /// U of a straight-alpha sprite.
 fn premultiply(sprite: &[u8], planes: Planes, out: &mut [u8]) {
     let keep_alpha = match planes {
@@ -383,32 +272,4 @@ fn premultiply(sprite: &[u8], planes: Planes, out: &mut [u8]) {
             a & keep_alpha,
         ];
     }
-}
-
-/// Writes one sprite's bytes to its place in a group.
-fn scatter(bytes: &[u8], width: usize, sprite: usize, group: &mut [Block]) {
-    for (first, block, at) in pieces(bytes.len(), width) {
-        let n = ROW.min(width * 4 - first % (width * 4));
-        group[block * GROUP + sprite].0[at..at + n].copy_from_slice(&bytes[first..first + n]);
-    }
-}
-
-/// Reads one sprite's bytes from a group.
-fn gather(group: Group<'_>, width: usize, sprite: usize, bytes: &mut [u8]) {
-    for (first, block, at) in pieces(bytes.len(), width) {
-        let n = ROW.min(width * 4 - first % (width * 4));
-        bytes[first..first + n].copy_from_slice(&group.block(block, sprite).0[at..at + n]);
-    }
-}
-
-/// The rows of all blocks: where each begins in a sprite's bytes, its block, and where in that.
-fn pieces(n_bytes: usize, width: usize) -> impl Iterator<Item = (usize, usize, usize)> {
-    let n_columns = width.div_ceil(SIDE);
-    let row_bytes = (width * 4).max(1);
-    (0..n_bytes / row_bytes).flat_map(move |y| {
-        (0..n_columns).map(move |column| {
-            let first = y * row_bytes + column * ROW;
-            (first, y / SIDE * n_columns + column, y % SIDE * ROW)
-        })
-    })
 }

@@ -8,8 +8,8 @@
 
 use rayon::prelude::*;
 
+use super::group::{GROUP, Group, GroupMemory};
 use super::kernel::{self, SadTile, Tile, Wanted};
-use super::pixels::{GROUP, Group, GroupMemory};
 use super::{Cancelled, Distances};
 use crate::progress::Progress;
 

@@ -377,27 +377,3 @@ fn the_matrix_holds_every_distance_both_ways_round() {
     }
     assert_eq!(matrix.max(), 120);
 }
-
-#[test]
-fn pooling_keeps_the_least_distance_of_each_cell() {
-    let sprites = noise(4, 4, 29, 5);
-    let distances = Distances {
-        pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
-        clip: uniform(3),
-        side: Side::Plain,
-        cpu: Level::Scalar,
-    };
-    let matrix = DistanceMatrix::of(&distances, &Silent).expect("nobody cancels");
-    let pooled = PooledMatrix::of(&distances, 10, &Silent).expect("nobody cancels");
-    assert_eq!((matrix.n_clips(), pooled.side), (27, 10));
-    for (k, &least) in pooled.cells.iter().enumerate() {
-        let falls_in = |clip: &usize, cell: usize| clip * 10 / 27 == cell;
-        let rows = (0..27).filter(|i| falls_in(i, k / 10));
-        let all = rows.flat_map(|i| {
-            let columns = (0..27).filter(|j| falls_in(j, k % 10));
-            columns.map(move |j| (i, j))
-        });
-        let wanted = all.map(|(i, j)| matrix.distance(i, j)).min();
-        assert_eq!(Some(least), wanted);
-    }
-}

@@ -8,7 +8,7 @@
 use std::arch::x86_64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::{BLOCK, Block};
+use crate::analysis::distance::group::{BLOCK, Block};
 
 /// Loads of 64 bytes in a block.
 const STEPS: usize = BLOCK / 64;

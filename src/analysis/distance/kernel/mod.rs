@@ -9,7 +9,7 @@ mod avx512;
 mod neon;
 pub(super) mod scalar;
 
-use super::pixels::{GROUP, Group};
+use super::group::{GROUP, Group};
 use crate::cpu::Level;
 
 /// d of each row sprite (first index) and each column sprite.

@@ -6,7 +6,7 @@
 use std::arch::aarch64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::{BLOCK, Block};
+use crate::analysis::distance::group::{BLOCK, Block};
 
 /// Loads of 16 bytes in a block.
 const STEPS: usize = BLOCK / 16;

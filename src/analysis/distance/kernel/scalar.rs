@@ -1,7 +1,7 @@
 //! The sum of absolute differences in plain Rust: the definition that every other kernel equals.
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::pixels::Block;
+use crate::analysis::distance::group::Block;
 
 /// Adds d of every pair of the tile.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
