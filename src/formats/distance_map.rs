@@ -2,12 +2,13 @@
 //! (O's figures 2 and 3).
 //!
 //! The first shows D, near = black, far = white: gray levels are round(255 D / largest D drawn);
-//! whoever wants numbers takes `distance.npy`. The second shows the pairs with D < epsilon, faintly,
+//! whoever wants numbers takes `distance.npy`. Of more than 8192 clips all that is four epsilon apart
+//! or more is white, because to know how far takes very long. The second shows the pairs with D < epsilon, faintly,
 //! and over them the transitions that were kept, mirrored ones in another color. At most 1024 x 1024:
 //! of a longer footage a cell shows the least of its pairs, so that a single like moment still shows.
 
 use super::picture;
-use crate::analysis::distance::{Cancelled, Distances};
+use crate::analysis::distance::{Cancelled, Distances, NOT_BELOW};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
@@ -16,6 +17,10 @@ pub const LARGEST_SIDE: usize = 1024;
 
 /// From this side on a transition is a mark of 3 x 3 cells, else a single cell.
 const LARGE_SIDE: usize = 256;
+
+/// Of more clips than these only the distances below some epsilon are computed.
+const MOST_WHOLE: usize = 8192;
+const FAR: u64 = 4;
 
 const PAPER: [u8; 3] = [0xfd, 0xfc, 0xf9];
 /// A pair with D < epsilon.
@@ -45,9 +50,13 @@ impl DistanceMap {
     ) -> Result<DistanceMap, Cancelled> {
         let present = whole_clips(&library.sprites, library.clip_frames);
         let mut map = DistanceMap::empty(distances.n_clips());
-        distances.for_each_row(progress, |i, row| {
-            map.pool(i, row, &present, library.epsilon);
-        })?;
+        let pool = |i: usize, row: &[u64]| map.pool(i, row, &present, library.epsilon);
+        match distances.n_clips() > MOST_WHOLE {
+            false => distances.for_each_row(progress, pool)?,
+            true => {
+                distances.for_each_row_below(library.epsilon.saturating_mul(FAR), progress, pool)?
+            }
+        }
         map.mirror_triangle();
         Ok(map)
     }
@@ -93,7 +102,7 @@ impl DistanceMap {
         DistanceMap {
             side,
             n_clips,
-            least: vec![u64::MAX; side * side],
+            least: vec![NOT_BELOW; side * side],
             alike: vec![false; side * side],
         }
     }
@@ -151,8 +160,12 @@ fn whole_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
 }
 
 fn levels(cells: &[u64]) -> Vec<u8> {
-    let largest = cells.iter().copied().max().unwrap_or(0).max(1);
-    let level = |&distance: &u64| (255.0 * distance as f64 / largest as f64).round() as u8;
+    let drawn = cells.iter().copied().filter(|&d| d != NOT_BELOW);
+    let largest = drawn.max().unwrap_or(0).max(1);
+    let level = |&distance: &u64| match distance {
+        NOT_BELOW => 255,
+        _ => (255.0 * distance as f64 / largest as f64).round() as u8,
+    };
     cells.iter().map(level).collect()
 }
 
@@ -170,6 +183,7 @@ mod tests {
     fn near_is_black_and_far_is_white() {
         assert_eq!(levels(&[0, 50, 200, 100]), [0, 64, 255, 128]);
         assert_eq!(levels(&[0, 0]), [0, 0]);
+        assert_eq!(levels(&[0, NOT_BELOW, 10]), [0, 255, 255]);
     }
 
     /// `n_clips` clips, all far from each other but for the pairs given.
