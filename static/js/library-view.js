@@ -5,7 +5,7 @@ import { byId, element, showProblem } from "./element.js";
 import { showHeading } from "./heading.js";
 import { count, percent, seconds } from "./words.js";
 
-const PICTURES = [["overlay", "overlay.mp4"], ["trajectory", "trajectory.svg"], ["confidence", "confidence.svg"]];
+const PICTURES = [["overlay", "overlay.mp4"], ["trajectory", "trajectory.svg"], ["confidence", "confidence.svg"], ["transitions", "transitions.svg"]];
 
 /** @param {any} library */
 export async function showLibrary(library) {
@@ -13,11 +13,15 @@ export async function showLibrary(library) {
   byId("library-title").textContent = library.name || "What the film holds";
   byId("library-numbers").replaceChildren(...numbersOf(library).map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
   byId("library-distance").src = `${at}/distance.png`;
+  byId("library-candidates").src = `${at}/candidates.png`;
   byId("library-background").src = `${at}/background.png`;
   for (const [name, file] of PICTURES) {
     byId(`library-${name}`).src = `${at}/${file}`;
     byId(`library-${name}-file`).href = `${at}/${file}`;
   }
+  const advice = library.advice ?? [];
+  byId("library-advice-list").replaceChildren(...advice.map((one) => element("li", {}, one.sentence)));
+  byId("library-advice").hidden = advice.length === 0;
   byId("library-headings-file").href = `${at}/headings.svg`;
   byId("library-table").href = `${at}/poses.csv`;
   byId("library-poses").href = `${at}/poses.json`;

@@ -41,6 +41,8 @@ def test_a_chosen_film_becomes_a_flock_that_plays_and_downloads(page, empty_serv
     measure(page, film)
     expect(page.locator("#library-numbers")).to_contain_text("150")
     until(page, "[...document.querySelectorAll('#library img')].every((image) => image.naturalWidth > 0)")
+    library = json.loads(fetch(empty_service + "/v1/libraries"))["items"][0]
+    expect(page.locator("#library-advice-list li")).to_have_text([one["sentence"] for one in library["advice"]])
 
     make_a_flock(page, 6, 60)
     until(page, "document.querySelector('#stage-video').currentTime > 0.2")
