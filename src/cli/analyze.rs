@@ -3,7 +3,6 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
@@ -17,8 +16,6 @@ use crate::jobs::analysis::Advice;
 use crate::jobs::overlay;
 use crate::library::Library;
 use crate::media::{Limits, Video, read_image};
-use crate::scratch::Scratch;
-use crate::store::Spill;
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
@@ -79,9 +76,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let background = background.transpose().map_err(media)?;
     let progress = Listener::new();
     let level = cpu::Level::detect();
-    std::fs::create_dir_all(&args.output)
-        .map_err(Error::io(format!("cannot make {}", args.output.display())))?;
-    let scratch: Arc<dyn Scratch> = Arc::new(Spill::into(&args.output));
+    let scratch = super::scratch_beside(&args.output);
     let background = background.as_ref();
     let library = analysis::analyze(&video, background, &params, level, &scratch, &progress)
         .map_err(|error| Error::work(error.code(), &error))?;

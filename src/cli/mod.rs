@@ -27,6 +27,7 @@ pub use error::Error;
 pub use progress::Listener;
 
 use crate::formats::library_dir::{self, StoredLibrary};
+use crate::scratch::Scratch;
 use crate::store::Spill;
 
 /// flockreel: film one animal, get a flock of it.
@@ -97,12 +98,14 @@ fn run(command: Command) -> Result<Option<Summary>, Error> {
 /// Reads a library for a command whose output goes to `output`, beside which there is room for what memory
 /// should not hold.
 fn read_library(folder: &Path, output: &Path) -> Result<StoredLibrary, Error> {
-    let beside = match output.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    library_dir::read(folder, Arc::new(Spill::into(beside)))
+    library_dir::read(folder, scratch_beside(output))
         .map_err(|error| Error::Usage(format!("not a library: {}: {error}", folder.display())))
+}
+
+/// Room on the disk that the output goes to, in the nearest folder that is there already.
+fn scratch_beside(output: &Path) -> Arc<dyn Scratch> {
+    let folder = output.ancestors().find(|folder| folder.is_dir());
+    Arc::new(Spill::into(folder.unwrap_or(Path::new("."))))
 }
 
 /// Logs go to stderr: everything worth knowing of a service, only warnings of the other commands.
