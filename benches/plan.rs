@@ -81,7 +81,9 @@ fn time(
         std::hint::black_box(plans.expect("plans"));
         start.elapsed().as_secs_f64()
     };
-    (0..n_runs.max(1)).map(|_| run()).fold(f64::INFINITY, f64::min)
+    (0..n_runs.max(1))
+        .map(|_| run())
+        .fold(f64::INFINITY, f64::min)
 }
 
 const N_FRAMES: u32 = 1200;
@@ -93,7 +95,11 @@ const EPSILON: u64 = 1000;
 fn made_library() -> Library {
     let wave = |frame: u32, period: f64| (f64::from(frame) / period).sin();
     let heading = |frame: u32| {
-        let side = if wave(frame, 29.0) > 0.0 { 0.0 } else { std::f64::consts::PI };
+        let side = if wave(frame, 29.0) > 0.0 {
+            0.0
+        } else {
+            std::f64::consts::PI
+        };
         side + 0.5 * wave(frame, 11.0) + 0.3 * wave(frame, 47.0)
     };
     let mut centroid_px = [320.0, 240.0];

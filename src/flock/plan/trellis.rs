@@ -23,24 +23,10 @@ pub struct Trellis {
     first_source: Vec<u32>,
     /// (state, cost in turns) of each jump, by target, then source.
     sources: Vec<(u32, u32)>,
-    /// For each of `sources`, which of `leaving` it is.
-    leaving_of: Vec<u32>,
     /// States that some jump leaves, rising.
     leaving: Vec<u32>,
-    /// `ways[first_way[j]..first_way[j + 1]]` lead from leaving state j.
-    first_way: Vec<u32>,
-    ways: Vec<Way>,
-}
-
-/// A jump seen from the state that it leaves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Way {
-    /// Which of the targets it leads to.
-    pub target_idx: u32,
-    /// Its cost, turns.
-    pub cost: u32,
-    /// Which of that target's sources it is.
-    pub rank: u16,
+    /// `sources` with the number of the leaving state for the state.
+    jumps: Vec<(u32, u32)>,
 }
 
 impl Trellis {
@@ -55,10 +41,8 @@ impl Trellis {
             targets: Vec::new(),
             first_source: vec![0],
             sources: Vec::new(),
-            leaving_of: Vec::new(),
             leaving: Vec::new(),
-            first_way: Vec::new(),
-            ways: Vec::new(),
+            jumps: Vec::new(),
         };
         let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
         for &side in sides {
@@ -76,39 +60,6 @@ impl Trellis {
         }
         trellis.lay_jumps(jumps);
         trellis
-    }
-
-    /// The same trellis for time that runs backward: state `s` becomes `n_states - s`, continuing
-    /// leads to the state before, and jumps lead from their targets to their sources. At least
-    /// `dwell` frames between two jumps are that either way.
-    pub fn reversed(&self) -> Trellis {
-        let n = self.n_states();
-        // The barrier before a run comes to stand behind it: each stands for the one before the
-        // next run, and the first run's for the last's.
-        let of_shown = |at: usize| if at == 0 { 0 } else { n - at };
-        let mut reversed = Trellis {
-            frames: (0..n).map(|at| self.frames[of_shown(at)]).collect(),
-            mirrored: (0..n).map(|at| self.mirrored[of_shown(at)]).collect(),
-            barriers: Vec::new(),
-            runs: Vec::with_capacity(n),
-            targets: Vec::new(),
-            first_source: vec![0],
-            sources: Vec::new(),
-            ..self.clone()
-        };
-        for at in 0..n {
-            if reversed.frames[at] == NO_FRAME {
-                reversed.barriers.push(at as u32);
-            }
-            reversed.runs.push(reversed.barriers.len() as u32);
-        }
-        let mut jumps = Vec::with_capacity(self.sources.len());
-        for (k, &target) in self.targets.iter().enumerate() {
-            let turned = |&(source, cost): &(u32, u32)| (n as u32 - source, n as u32 - target, cost);
-            jumps.extend(self.sources(k).iter().map(turned));
-        }
-        reversed.lay_jumps(jumps);
-        reversed
     }
 
     /// Number of states, barriers included.
@@ -154,20 +105,16 @@ impl Trellis {
         &self.sources[range]
     }
 
-    /// For each of `sources(k)`, which of `leaving` it is.
-    pub fn leaving_of(&self, k: usize) -> &[u32] {
-        let range = self.first_source[k] as usize..self.first_source[k + 1] as usize;
-        &self.leaving_of[range]
-    }
-
     /// The states that jumps leave, rising.
     pub fn leaving(&self) -> &[u32] {
         &self.leaving
     }
 
-    /// The jumps from the `j`th leaving state, by target.
-    pub fn ways(&self, j: usize) -> &[Way] {
-        &self.ways[self.first_way[j] as usize..self.first_way[j + 1] as usize]
+    /// For each target its jumps as `sources` gives them, with the number of the leaving state.
+    #[inline(always)]
+    pub fn jumps(&self) -> impl Iterator<Item = &[(u32, u32)]> {
+        let ends = self.first_source.windows(2);
+        ends.map(|ends| &self.jumps[ends[0] as usize..ends[1] as usize])
     }
 
     /// Whether `state + ahead` is reached from `state` by continuing alone.
@@ -205,30 +152,15 @@ impl Trellis {
                 *end = self.sources.len() as u32;
             }
         }
-        self.lay_ways();
-    }
-
-    /// The same jumps by the state that they leave.
-    fn lay_ways(&mut self) {
         self.leaving = self.sources.iter().map(|source| source.0).collect();
         self.leaving.sort_unstable();
         self.leaving.dedup();
         let leaving = &self.leaving;
-        let of = |source: &(u32, u32)| leaving.partition_point(|&state| state < source.0) as u32;
-        self.leaving_of = self.sources.iter().map(of).collect();
-        let mut ways: Vec<(u32, Way)> = Vec::with_capacity(self.sources.len());
-        for k in 0..self.targets.len() {
-            let sources = self.sources(k).iter().zip(self.leaving_of(k));
-            for (rank, (&(_, cost), &j)) in sources.enumerate() {
-                let (target_idx, rank) = (k as u32, rank as u16);
-                ways.push((j, Way { target_idx, cost, rank }));
-            }
-        }
-        ways.sort_by_key(|way| way.0);
-        self.first_way = (0..=leaving.len() as u32)
-            .map(|j| ways.partition_point(|way| way.0 < j) as u32)
+        let number = |state| leaving.partition_point(|&other| other < state) as u32;
+        let jumps = self.sources.iter();
+        self.jumps = jumps
+            .map(|&(source, cost)| (number(source), cost))
             .collect();
-        self.ways = ways.into_iter().map(|way| way.1).collect();
     }
 }
 
