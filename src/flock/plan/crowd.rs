@@ -1,5 +1,6 @@
 //! Against clones: looking like a near neighbor costs (ALGORITHMS.md 6). Each individual looks out
-//! for those of smaller id, whose plans are final, so that anyone can recompute the cost.
+//! for those of smaller id whose plans were final when its own was made, so that anyone can recompute
+//! the cost. Distances are whole 32nds of a body length, weights a table: the same on any machine.
 
 use super::trellis::Trellis;
 use crate::flock::individual::BoidTrack;
@@ -11,11 +12,34 @@ const LOOKALIKE_S: f64 = 0.3;
 const WIDTH_BL: f64 = 4.0;
 /// Farther than this costs nothing.
 const REACH_BL: f64 = 8.0;
+/// Places are rounded to so many parts of a body length.
+const PARTS: f64 = 32.0;
+/// Steps of the table to a squared body length.
+const STEPS: usize = 16;
+/// So many are planned one after the other, each looking out for all before it; after them
+/// `ROUND` at a time, who look out for the rounds before.
+const ONE_BY_ONE: usize = 64;
+/// Individuals in a round.
+pub const ROUND: usize = 16;
 
-/// The crowd term's measures, in frames, pixels and turns.
-#[derive(Clone, Copy, Debug)]
+/// Where a boid is, in 32nds of a body length.
+pub type Place = [i32; 3];
+
+/// How many individuals number `id` looks out for: all of smaller id up to the 64th, from there on
+/// those before its round of 16.
+pub fn n_watched(id: usize) -> usize {
+    if id < ONE_BY_ONE {
+        id
+    } else {
+        id / ROUND * ROUND
+    }
+}
+
+/// The crowd term's measures, in frames, parts and turns.
+#[derive(Clone, Debug)]
 pub struct Crowd {
-    weight_turns: f64,
+    /// What looking alike costs by squared distance, turns.
+    costs: Vec<u16>,
     /// Frames apart that still look alike.
     window: u32,
     length_px: f64,
@@ -33,11 +57,35 @@ pub struct Lookalike {
 impl Crowd {
     /// `w_c` in radians; the animal's length in pixels.
     pub fn new(w_c: f64, fps: f64, length_px: f64) -> Crowd {
+        let n_steps = (REACH_BL * REACH_BL) as usize * STEPS;
+        let cost = |step: usize| {
+            let square_bl = (step as f64 + 0.5) / STEPS as f64;
+            let near = libm::exp(-square_bl / (2.0 * WIDTH_BL * WIDTH_BL));
+            (w_c * Turns::PER_RAD * near).round() as u16
+        };
         Crowd {
-            weight_turns: w_c * Turns::PER_RAD,
+            costs: (0..n_steps).map(cost).chain([0]).collect(),
             window: ((LOOKALIKE_S * fps).ceil() as u32).saturating_sub(1),
             length_px,
         }
+    }
+
+    /// The place at frame `t`.
+    pub fn place(&self, boid: &BoidTrack, t: usize) -> Place {
+        boid.position_px[t].map(|px| (px / self.length_px * PARTS).round() as i32)
+    }
+
+    /// What looking like one at `b` costs one at `a`, turns.
+    #[inline(always)]
+    pub fn cost_at(&self, a: Place, b: Place) -> u16 {
+        let mut square = 0;
+        for axis in 0..3 {
+            let gap = (a[axis] - b[axis]).clamp(-8191, 8191);
+            square += gap * gap;
+        }
+        // 32 x 32 parts to the squared body length, 16 steps to it as well.
+        let step = (square >> 6) as usize;
+        self.costs[step.min(self.costs.len() - 1)]
     }
 
     /// Whom to avoid looking like at frame `t`, of the planned others: (boid, states).
@@ -47,9 +95,10 @@ impl Crowd {
         others: impl Iterator<Item = (&'a BoidTrack, &'a [u32])>,
         t: usize,
     ) -> Vec<Lookalike> {
+        let here = self.place(boid, t);
         others
             .filter_map(|(other, states)| {
-                let cost = self.cost_at(boid.position_px[t], other.position_px[t]);
+                let cost = self.cost_at(here, self.place(other, t));
                 let state = states[t];
                 (cost > 0).then_some(Lookalike { state, cost })
             })
@@ -72,27 +121,55 @@ impl Crowd {
             .sum()
     }
 
-    /// Adds the same costs to every state of a row at once.
-    pub fn add_to_row(&self, trellis: &Trellis, lookalikes: &[Lookalike], row: &mut [[u32; 1]]) {
-        for other in lookalikes {
-            let Some((frame, side)) = trellis.shown(other.state as usize) else {
-                continue;
-            };
-            for near in frame.saturating_sub(self.window)..=frame + self.window {
-                if let Some(state) = trellis.state(near, side) {
-                    row[state as usize][0] += u32::from(other.cost);
+    /// The states that look like each state: first, and one past the last.
+    pub fn alike(&self, trellis: &Trellis) -> Vec<[u32; 2]> {
+        let n = trellis.n_states();
+        let near = |at: usize, other: usize| match (trellis.shown(at), trellis.shown(other)) {
+            (Some(a), Some(b)) => a.1 == b.1 && a.0.abs_diff(b.0) <= self.window,
+            // A barrier is passed over; one at the edge does no harm.
+            _ => true,
+        };
+        (0..n)
+            .map(|at| {
+                if trellis.shown(at).is_none() {
+                    return [at as u32; 2];
                 }
-            }
+                let reach = self.window as usize * 2 + 2;
+                let low = (at.saturating_sub(reach)..at)
+                    .rev()
+                    .find(|&other| !near(at, other));
+                let high = (at..(at + reach).min(n)).find(|&other| !near(at, other));
+                let low = low.map_or(at.saturating_sub(reach), |other| other + 1);
+                [low as u32, high.unwrap_or((at + reach).min(n)) as u32]
+            })
+            .collect()
+    }
+}
+
+/// Plans that are final, frame by frame.
+#[derive(Clone, Debug)]
+pub struct Settled {
+    /// `[t][id]`: state.
+    states: Vec<Vec<u32>>,
+}
+
+impl Settled {
+    /// Nobody's.
+    pub fn new(n_frames: usize) -> Settled {
+        Settled {
+            states: vec![Vec::new(); n_frames],
         }
     }
 
-    fn cost_at(&self, a_px: [f64; 3], b_px: [f64; 3]) -> u16 {
-        let square: f64 = a_px.iter().zip(b_px).map(|(a, b)| (a - b) * (a - b)).sum();
-        let square_bl = square / (self.length_px * self.length_px);
-        if square_bl > REACH_BL * REACH_BL {
-            return 0;
+    /// The next individual's.
+    pub fn push(&mut self, states: &[u32]) {
+        for (at, &state) in self.states.iter_mut().zip(states) {
+            at.push(state);
         }
-        let near = libm::exp(-square_bl / (2.0 * WIDTH_BL * WIDTH_BL));
-        (self.weight_turns * near).round() as u16
+    }
+
+    /// The states at frame `t`, by id.
+    pub fn at(&self, t: usize) -> &[u32] {
+        &self.states[t]
     }
 }

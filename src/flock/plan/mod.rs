@@ -4,25 +4,28 @@
 pub mod certificate;
 pub mod cost;
 pub mod crowd;
+mod round;
+mod rows;
 pub mod trellis;
 pub mod viterbi;
 
 use rayon::prelude::*;
 
 use self::cost::{CEILING, Feature, FrameMotion, Weights};
-use self::crowd::{Crowd, Lookalike};
+use self::crowd::{Crowd, Place, ROUND, Settled, n_watched};
+use self::round::Round;
 use self::trellis::Trellis;
-use self::viterbi::{Path, cheapest_paths};
+use self::viterbi::{Film, Path};
 use super::error::Error;
 use super::individual::{BoidTrack, PlanCost, rounded};
 use super::params::Params;
+use crate::cpu::Level;
 use crate::geometry::{Turns, wrap_rad};
 use crate::library::Library;
 use crate::progress::Progress;
 
 /// Individuals planned side by side.
 const LANES: usize = 8;
-
 /// What one individual shows, and what that costs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -38,6 +41,10 @@ pub struct Planner<'a> {
     weights: Weights,
     features: Vec<Feature>,
     crowd: Crowd,
+    /// The states that look like each state.
+    alike: Vec<[u32; 2]>,
+    /// `[t][id]`: where each boid is.
+    places: Vec<Vec<Place>>,
     dwell: usize,
     fps: f64,
     boids: &'a [BoidTrack],
@@ -57,9 +64,15 @@ impl<'a> Planner<'a> {
         });
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
+        let crowd = Crowd::new(params.matching.w_c, fps, length_px);
+        let features = weights.features(&trellis, motion);
+        let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
+        let place = |t| boids.iter().map(|boid| crowd.place(boid, t)).collect();
         Planner {
-            features: weights.features(&trellis, motion),
-            crowd: Crowd::new(params.matching.w_c, fps, length_px),
+            features,
+            alike: crowd.alike(&trellis),
+            places: (0..n_frames).map(place).collect(),
+            crowd,
             dwell: params
                 .dwell_frames
                 .map_or(library.clip_frames, |frames| frames as usize)
@@ -71,103 +84,54 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The plans of all boids, by id: first all at once as if alone, then again, in order of id,
-    /// whoever looks like a near neighbor of smaller id.
+    /// The plans of all boids, by id: each as if alone, then again whoever looks like a near neighbor
+    /// that it looks out for.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         progress.report("planning", 0.0);
-        let wanted: Vec<Vec<Feature>> = self.boids.iter().map(|b| self.wanted(b)).collect();
-        let alone = self.plan_alone(&wanted)?;
-        let bounds: Vec<u32> = alone.iter().map(|path| path.cost).collect();
-        let mut states: Vec<Vec<u32>> = Vec::with_capacity(alone.len());
-        let mut plans = Vec::with_capacity(alone.len());
-        for (id, path) in alone.into_iter().enumerate() {
+        let n_boids = self.boids.len();
+        let wanted: Vec<Vec<Feature>> = self.boids.par_iter().map(|b| self.wanted(b)).collect();
+        let mut settled = Settled::new(self.places.len());
+        let mut plans = Vec::with_capacity(n_boids);
+        for first in (0..n_boids).step_by(ROUND) {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }
-            let crowd = self.crowd_of(id, &states);
-            let clones = self.crowd_cost(&crowd, &path.states) > 0;
-            let path = match clones {
-                true => self.plan_in_crowd(&wanted[id], &crowd)?,
-                false => path,
+            let round = Round {
+                planner: self,
+                first,
+                wanted: &wanted[first..(first + ROUND).min(n_boids)],
             };
-            plans.push(self.costed(&path, &wanted[id], &crowd, bounds[id]));
-            states.push(path.states);
-            progress.report("planning", (id + 1) as f64 / self.boids.len() as f64);
+            plans.extend(round.plan(&mut settled)?);
+            progress.report("planning", plans.len() as f64 / n_boids as f64);
         }
         Ok(plans)
     }
 
-    fn plan_alone(&self, wanted: &[Vec<Feature>]) -> Result<Vec<Path>, Error> {
-        let batches: Vec<&[Vec<Feature>]> = wanted.chunks(LANES).collect();
-        let paths: Option<Vec<[Path; LANES]>> = batches
-            .par_iter()
-            .map(|batch| {
-                let lane_of = |lane: usize| &batch[lane.min(batch.len() - 1)];
-                cheapest_paths(
-                    &self.trellis,
-                    batch[0].len(),
-                    self.dwell,
-                    |t, row: &mut [[u32; LANES]]| {
-                        let wanted: [Feature; LANES] = std::array::from_fn(|l| lane_of(l)[t]);
-                        for (out, &feature) in row.iter_mut().zip(&self.features) {
-                            for lane in 0..LANES {
-                                out[lane] = self.weights.total(wanted[lane], feature);
-                            }
-                        }
-                    },
-                )
-            })
-            .collect();
-        let mut paths: Vec<Path> = paths
-            .ok_or(Error::NoTransitions)?
-            .into_iter()
-            .flatten()
-            .collect();
-        paths.truncate(wanted.len());
-        Ok(paths)
-    }
-
-    fn plan_in_crowd(&self, wanted: &[Feature], crowd: &[Vec<Lookalike>]) -> Result<Path, Error> {
-        let [path] = cheapest_paths(
-            &self.trellis,
-            wanted.len(),
-            self.dwell,
-            |t, row: &mut [[u32; 1]]| self.row_in_crowd(t, wanted, crowd, row),
-        )
-        .ok_or(Error::NoTransitions)?;
-        Ok(path)
-    }
-
-    fn row_in_crowd(
-        &self,
-        t: usize,
-        wanted: &[Feature],
-        crowd: &[Vec<Lookalike>],
-        row: &mut [[u32; 1]],
-    ) {
-        for (out, &feature) in row.iter_mut().zip(&self.features) {
-            out[0] = self.weights.total(wanted[t], feature);
-        }
-        self.crowd.add_to_row(&self.trellis, &crowd[t], row);
-        for out in row {
-            out[0] = out[0].min(CEILING - 1);
+    fn film(&self) -> Film<'_> {
+        Film {
+            trellis: &self.trellis,
+            n_frames: self.places.len(),
+            dwell: self.dwell,
+            cpu: Level::detect(),
         }
     }
 
-    /// Whom individual `id` should not look like, at every frame.
-    fn crowd_of(&self, id: usize, states: &[Vec<u32>]) -> Vec<Vec<Lookalike>> {
-        let boid = &self.boids[id];
-        let others = || self.boids.iter().zip(states.iter().map(Vec::as_slice));
-        (0..boid.heading_rad.len())
-            .map(|t| self.crowd.lookalikes(boid, others(), t))
-            .collect()
-    }
-
-    fn crowd_cost(&self, crowd: &[Vec<Lookalike>], states: &[u32]) -> u32 {
-        let at = |(near, &state): (&Vec<Lookalike>, &u32)| {
-            self.crowd.cost_of(&self.trellis, near, state)
-        };
-        crowd.iter().zip(states).map(at).sum()
+    /// What looking like those it looks out for adds to each frame of a path, turns.
+    fn crowd_costs<'b>(
+        &'b self,
+        id: usize,
+        path: &'b Path,
+        settled: &'b Settled,
+    ) -> impl Iterator<Item = u32> + 'b {
+        let n_watched = n_watched(id);
+        path.states.iter().enumerate().map(move |(t, &state)| {
+            let [low, high] = self.alike[state as usize];
+            let others = settled.at(t)[..n_watched].iter().zip(&self.places[t]);
+            others
+                .filter(|(other, _)| (low..high).contains(*other))
+                .map(|(_, place)| u32::from(self.crowd.cost_at(self.places[t][id], *place)))
+                .sum()
+        })
     }
 
     /// What a boid wants at every frame, from its track as the file holds it.
@@ -182,21 +146,23 @@ impl<'a> Planner<'a> {
             .collect()
     }
 
-    /// The plan with its cost in parts: summed anew from the states.
+    /// The plan with its cost in parts: summed anew from the states. `crowd[t]` is what the crowd
+    /// would add without the ceiling.
     fn costed(
         &self,
         path: &Path,
         wanted: &[Feature],
-        crowd: &[Vec<Lookalike>],
+        crowd: impl Iterator<Item = u32>,
         lower_bound: u32,
     ) -> Plan {
-        let (mut heading, mut speed, mut transition) = (0u32, 0u32, 0u32);
-        for (t, &state) in path.states.iter().enumerate() {
-            let [h, s] = self
-                .weights
-                .of_state(wanted[t], self.features[state as usize]);
+        let (mut heading, mut speed, mut transition, mut alike) = (0u32, 0u32, 0u32, 0u32);
+        for ((t, &state), crowd) in path.states.iter().enumerate().zip(crowd) {
+            let feature = self.features[state as usize];
+            let [h, s] = self.weights.of_state(wanted[t], feature);
             heading += h;
             speed += s;
+            let alone = self.weights.total(wanted[t], feature);
+            alike += (alone + crowd).min(CEILING - 1) - alone;
             if t > 0 && path.states[t - 1] + 1 != state {
                 transition += self.jump_cost(path.states[t - 1], state);
             }
@@ -213,7 +179,7 @@ impl<'a> Planner<'a> {
                 heading: rad(heading),
                 speed: rad(speed),
                 transition: rad(transition),
-                crowd: rad(self.crowd_cost(crowd, &path.states)),
+                crowd: rad(alike),
                 lower_bound: rad(lower_bound),
                 exact: true,
             },

@@ -1,6 +1,7 @@
 //! Plans of whole flocks: their certificates, and their cost told from the outside.
 
 use super::*;
+use crate::flock::plan::viterbi::Rows;
 use crate::flock::synthetic;
 use crate::flock::{Flock, plan_flock};
 use crate::library::View;
@@ -33,7 +34,7 @@ fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
             .state(other.source_frame[t], other.mirrored[t])
             .expect("a frame of the component")
     };
-    let states: Vec<Vec<u32>> = (0..id)
+    let states: Vec<Vec<u32>> = (0..crowd::n_watched(id))
         .map(|i| (0..turns.len()).map(|t| state(i, t)).collect())
         .collect();
     let mut total = 0;
@@ -84,24 +85,26 @@ fn the_plans_of_a_flock_hold_their_certificates() {
     let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
     let motion = cost::motion_of(&library);
     let planner = Planner::new(&library, &motion, &boids, &flock.params);
-    let mut states: Vec<Vec<u32>> = Vec::new();
+    let mut settled = Settled::new(boids[0].heading_rad.len());
     for (id, boid) in boids.iter().enumerate() {
-        let (wanted, crowd) = (planner.wanted(boid), planner.crowd_of(id, &states));
-        let path = planner.plan_in_crowd(&wanted, &crowd).unwrap();
-        let row = |t: usize, row: &mut [[u32; 1]]| planner.row_in_crowd(t, &wanted, &crowd, row);
-        let columns = viterbi::potentials(&planner.trellis, wanted.len(), planner.dwell, row);
-        let rows: Vec<Vec<[u32; 1]>> = (0..wanted.len())
+        let wanted = planner.wanted(boid);
+        let rows = || rows::InCrowd::new(&planner, &settled, [id], [&wanted]);
+        let film = planner.film();
+        let [path] = film.cheapest_paths(&mut rows()).unwrap();
+        let columns = film.potentials(&mut rows());
+        let (mut rows, n_states) = (rows(), planner.trellis.n_states());
+        let costs: Vec<Vec<[u32; 1]>> = (0..wanted.len())
             .map(|t| {
-                let mut costs = vec![[0]; planner.trellis.n_states()];
-                row(t, &mut costs);
-                costs
+                let mut row = vec![[0]; n_states];
+                rows.fill(t, 0, &mut row);
+                row
             })
             .collect();
-        let cost_at = |t: usize, state: usize| rows[t][state][0];
+        let cost_at = |t: usize, state: usize| costs[t][state][0];
         let checked =
             certificate::check(&planner.trellis, planner.dwell, &cost_at, &columns, &path);
         assert_eq!(checked, Ok(()), "individual {id}");
-        states.push(path.states);
+        settled.push(&path.states);
     }
 }
 

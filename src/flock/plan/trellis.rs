@@ -23,6 +23,10 @@ pub struct Trellis {
     first_source: Vec<u32>,
     /// (state, cost in turns) of each jump, by target, then source.
     sources: Vec<(u32, u32)>,
+    /// States that some jump leaves, rising.
+    leaving: Vec<u32>,
+    /// `sources` with the number of the leaving state for the state.
+    jumps: Vec<(u32, u32)>,
 }
 
 impl Trellis {
@@ -37,6 +41,8 @@ impl Trellis {
             targets: Vec::new(),
             first_source: vec![0],
             sources: Vec::new(),
+            leaving: Vec::new(),
+            jumps: Vec::new(),
         };
         let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
         for &side in sides {
@@ -99,6 +105,18 @@ impl Trellis {
         &self.sources[range]
     }
 
+    /// The states that jumps leave, rising.
+    pub fn leaving(&self) -> &[u32] {
+        &self.leaving
+    }
+
+    /// For each target its jumps as `sources` gives them, with the number of the leaving state.
+    #[inline(always)]
+    pub fn jumps(&self) -> impl Iterator<Item = &[(u32, u32)]> {
+        let ends = self.first_source.windows(2);
+        ends.map(|ends| &self.jumps[ends[0] as usize..ends[1] as usize])
+    }
+
     /// Whether `state + ahead` is reached from `state` by continuing alone.
     pub fn continues(&self, state: usize, ahead: usize) -> bool {
         let end = state + ahead;
@@ -134,6 +152,15 @@ impl Trellis {
                 *end = self.sources.len() as u32;
             }
         }
+        self.leaving = self.sources.iter().map(|source| source.0).collect();
+        self.leaving.sort_unstable();
+        self.leaving.dedup();
+        let leaving = &self.leaving;
+        let number = |state| leaving.partition_point(|&other| other < state) as u32;
+        let jumps = self.sources.iter();
+        self.jumps = jumps
+            .map(|&(source, cost)| (number(source), cost))
+            .collect();
     }
 }
 

@@ -26,27 +26,39 @@ impl Case {
         self.costs[(t * 31 + state * 7 + lane * 3) % self.costs.len()]
     }
 
-    fn plan<const LANES: usize>(&self) -> Option<[Path; LANES]> {
-        self.plan_by_segments(self.n_frames)
+    fn film<'a>(&self, trellis: &'a Trellis, cpu: Level) -> Film<'a> {
+        Film {
+            trellis,
+            n_frames: self.n_frames,
+            dwell: self.dwell,
+            cpu,
+        }
     }
 
-    fn plan_by_segments<const LANES: usize>(&self, segment: usize) -> Option<[Path; LANES]> {
-        let row = |t: usize, row: &mut [[u32; LANES]]| {
-            for (state, out) in row.iter_mut().enumerate() {
+    fn rows<const LANES: usize>(&self) -> impl Rows<LANES> {
+        |t: usize, first: usize, row: &mut [[u32; LANES]]| {
+            for (state, out) in (first..).zip(row) {
                 *out = std::array::from_fn(|lane| self.cost(t, state, lane));
             }
-        };
-        cheapest_paths_by_segments(&self.trellis(), self.n_frames, self.dwell, segment, row)
+        }
+    }
+
+    fn plan<const LANES: usize>(&self) -> Option<[Path; LANES]> {
+        self.plan_at(Level::detect(), self.n_frames)
+    }
+
+    fn plan_at<const LANES: usize>(&self, cpu: Level, segment: usize) -> Option<[Path; LANES]> {
+        let trellis = self.trellis();
+        let film = self.film(&trellis, cpu);
+        film.cheapest_paths_by_segments(&mut self.rows(), segment)
     }
 
     fn check(&self, path: &Path) -> Result<(), certificate::Violation> {
         let trellis = self.trellis();
         let cost_at = |t: usize, state: usize| self.cost(t, state, 0);
-        let columns = potentials(&trellis, self.n_frames, self.dwell, |t, row| {
-            for (state, out) in row.iter_mut().enumerate() {
-                out[0] = cost_at(t, state);
-            }
-        });
+        let columns = self
+            .film(&trellis, Level::detect())
+            .potentials(&mut self.rows());
         certificate::check(&trellis, self.dwell, &cost_at, &columns, path)
     }
 
@@ -126,11 +138,13 @@ proptest! {
 
 proptest! {
     #[test]
-    fn lanes_do_not_touch_each_other_and_segments_change_nothing(
+    fn lanes_segments_and_instruction_sets_change_nothing(
         case in case(8), segment in 1usize..4
     ) {
         let whole = case.plan::<8>();
-        prop_assert_eq!(&case.plan_by_segments::<8>(segment), &whole);
+        for cpu in Level::available() {
+            prop_assert_eq!(&case.plan_at::<8>(cpu, segment), &whole);
+        }
         let alone = case.plan::<1>();
         prop_assert_eq!(whole.map(|paths| paths[0].clone()), alone.map(|[path]| path));
     }

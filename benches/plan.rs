@@ -1,0 +1,176 @@
+//! How fast plans are made (ALGORITHMS.md 6 and 9), for `bench/plan.py`.
+//!
+//! Arguments: COUNT FRAMES RUNS [LIBRARY_DIR]. Without a folder the library is made here: 1200 frames
+//! of an animal that turns to and fro, with about 2000 jumps, half of them mirrored. The boids are
+//! simulated once; the plan alone is timed, on one thread and on all. Prints one line of JSON.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use flockreel::cpu::Level;
+use flockreel::flock::plan::Planner;
+use flockreel::flock::plan::cost::motion_of;
+use flockreel::flock::{BoidTrack, Params, Stats, plan_flock};
+use flockreel::formats::library_dir;
+use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Poses, Sprites, View};
+use flockreel::progress::Silent;
+use flockreel::random::unit;
+use flockreel::raster::RgbImage;
+use flockreel::scratch::InMemory;
+
+fn main() {
+    let arguments: Vec<String> = std::env::args()
+        .skip(1)
+        .filter(|a| a != "--bench")
+        .collect();
+    let [count, frames, runs, folder @ ..] = &arguments[..] else {
+        // `cargo test --benches` runs this without arguments.
+        return println!("arguments: COUNT FRAMES RUNS [LIBRARY_DIR]");
+    };
+    let number = |text: &String| text.parse().expect("a number");
+    let library = match folder.first() {
+        Some(folder) => {
+            library_dir::read(Path::new(folder), Arc::new(InMemory::default()))
+                .expect("a library")
+                .library
+        }
+        None => made_library(),
+    };
+    let params = Params {
+        count: number(count),
+        frames: number(frames),
+        ..Params::default()
+    };
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
+    let n_threads = rayon::current_num_threads();
+    let one = time(&library, &boids, &params, 1, number(runs));
+    let all = time(&library, &boids, &params, n_threads, number(runs));
+    let Stats {
+        jumps_per_100_frames,
+        clone_share,
+        ..
+    } = flock.stats;
+    println!(
+        "{{\"count\":{count},\"frames\":{frames},\"states\":{},\"jumps\":{},\"level\":\"{}\",\
+         \"one_thread_s\":{one:.6},\"threads\":{n_threads},\"all_threads_s\":{all:.6},\
+         \"jumps_per_100_frames\":{jumps_per_100_frames},\"clone_share\":{clone_share}}}",
+        2 * library.playback.component.len(),
+        2 * library.playback.jumps.len(),
+        Level::detect().name(),
+    );
+}
+
+/// The least time of some runs, seconds.
+fn time(
+    library: &Library,
+    boids: &[BoidTrack],
+    params: &Params,
+    n_threads: usize,
+    n_runs: u32,
+) -> f64 {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads)
+        .build()
+        .expect("threads");
+    let motion = motion_of(library);
+    let run = || {
+        let start = Instant::now();
+        let plans = pool.install(|| Planner::new(library, &motion, boids, params).plan(&Silent));
+        std::hint::black_box(plans.expect("plans"));
+        start.elapsed().as_secs_f64()
+    };
+    (0..n_runs.max(1))
+        .map(|_| run())
+        .fold(f64::INFINITY, f64::min)
+}
+
+const N_FRAMES: u32 = 1200;
+const N_JUMPS: u64 = 2000;
+const LENGTH_PX: f64 = 80.0;
+const EPSILON: u64 = 1000;
+
+/// An animal that swims to and fro, and jumps between places where it points alike.
+fn made_library() -> Library {
+    let wave = |frame: u32, period: f64| (f64::from(frame) / period).sin();
+    let heading = |frame: u32| {
+        let side = if wave(frame, 29.0) > 0.0 {
+            0.0
+        } else {
+            std::f64::consts::PI
+        };
+        side + 0.5 * wave(frame, 11.0) + 0.3 * wave(frame, 47.0)
+    };
+    let mut centroid_px = [320.0, 240.0];
+    let frames = (0..N_FRAMES)
+        .map(|frame| {
+            centroid_px[0] += 3.0 * heading(frame).cos();
+            centroid_px[1] += 3.0 * heading(frame).sin();
+            Pose {
+                time_s: f64::from(frame) / 30.0,
+                centroid_px: Some(centroid_px),
+                heading_rad: Some(heading(frame)),
+                length_px: Some(LENGTH_PX),
+                height_px: Some(0.4 * LENGTH_PX),
+                ..Pose::default()
+            }
+        })
+        .collect();
+    let jumps = made_jumps(heading);
+    Library {
+        poses: Poses {
+            tail_beat: None,
+            fps: 30.0,
+            image_size_px: [640, 480],
+            view: View::Side,
+            camera: None,
+            animal: None,
+            frames,
+        },
+        background: RgbImage::new(640, 480),
+        sprites: Sprites::missing(96, 64, N_FRAMES as usize),
+        clip_frames: 8,
+        epsilon: EPSILON,
+        natural_step: EPSILON / 2,
+        transitions: Vec::new(),
+        patches: Vec::new(),
+        playback: Playback {
+            component: (0..N_FRAMES).collect(),
+            jumps,
+        },
+        stats: LibraryStats {
+            n_frames: N_FRAMES as usize,
+            n_detected: N_FRAMES as usize,
+            component_share: 1.0,
+            speed_bl_per_s: Some([0.5, 1.1, 2.0]),
+            turn_rate_rad_per_s: Some(2.0),
+            length_px: Some(LENGTH_PX),
+            ..LibraryStats::default()
+        },
+    }
+}
+
+fn made_jumps(heading: impl Fn(u32) -> f64) -> Vec<Jump> {
+    let frame = |draw: u64, which: u64| (unit(5, &[which, draw]) * f64::from(N_FRAMES)) as u32;
+    let jump = |draw: u64| {
+        let (from, to) = (frame(draw, 1), frame(draw, 2));
+        let mirrored = unit(5, &[3, draw]) < 0.5;
+        let meant = match mirrored {
+            true => std::f64::consts::PI - heading(to),
+            false => heading(to),
+        };
+        let alike = (heading(from) - meant).cos() > 0.97 && from.abs_diff(to) > 15;
+        let cost = 500 + (unit(5, &[4, draw]) * 499.0) as u64;
+        alike.then_some(Jump {
+            from,
+            to,
+            cost,
+            mirrored,
+        })
+    };
+    let mut jumps: Vec<Jump> = (0..).filter_map(jump).take(N_JUMPS as usize).collect();
+    jumps.sort_unstable();
+    jumps.dedup_by_key(|jump| (jump.from, jump.to, jump.mirrored));
+    jumps
+}
