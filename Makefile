@@ -61,6 +61,7 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	python3 bench/run.py $(RELEASE)
 	target/bench-venv/bin/python bench/distance.py
 	python3 bench/transitions.py
+	python3 bench/plan.py
 
 accuracy: build ## the poses against the truth of a film generator: make accuracy GENERATOR=goldfish.py
 	python3 bench/accuracy.py $(RELEASE) $(GENERATOR)

@@ -36,6 +36,9 @@ pub struct Args {
     /// Rules to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.
     #[arg(long, value_name = "JSON")]
     rules: Option<String>,
+    /// What frames and boids are matched by: heading (the default) or position.
+    #[arg(long = "match", value_name = "BY")]
+    match_by: Option<String>,
     /// Write the plan, flock.json, here.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
@@ -85,7 +88,9 @@ impl Args {
                 .map_err(|cause| Error::Usage(format!("--rules is not JSON: {cause}")))?;
             overrides.insert("rules".into(), rules);
         }
+        let by = |by: &String| json!({ "by": by });
         let given = [
+            ("matching", self.match_by.as_ref().map(by)),
             ("preset", self.preset.clone().map(Value::from)),
             ("count", self.count.map(Value::from)),
             ("frames", self.frames.map(Value::from)),

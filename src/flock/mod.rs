@@ -82,7 +82,13 @@ pub fn plan_flock(
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
         length_px: calibration.length_px,
-        stats: quality::measure(&individuals, &orders, library, calibration.length_px),
+        stats: quality::measure(
+            &individuals,
+            &orders,
+            library,
+            params,
+            calibration.length_px,
+        ),
         params: params.clone(),
         individuals,
     })

@@ -69,6 +69,8 @@ pub struct Rules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Matching {
+    /// What is matched: directions, or places.
+    pub by: MatchBy,
     /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
     pub w_h: f64,
     /// Cost of a radian that rotating the sprite must make up for.
@@ -81,6 +83,18 @@ pub struct Matching {
     pub wx: f64,
     /// Cost of looking like a neighbor, radians for each at no distance.
     pub w_c: f64,
+}
+
+/// What real frames and boids are matched by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MatchBy {
+    /// O: where the animal points, and how fast it is.
+    Heading,
+    /// Colqui et al. 2008: how the animal moved in the picture against how the boid moves, frame by
+    /// frame. `w_h` is then the cost of a body length a second each way; `w_r`, `rho_deg` and `w_v` play
+    /// no part in the plan.
+    Position,
 }
 
 /// What rule A is.
@@ -136,6 +150,7 @@ impl Default for Rules {
 impl Default for Matching {
     fn default() -> Matching {
         Matching {
+            by: MatchBy::Heading,
             w_h: 1.0,
             w_r: 0.1,
             rho_deg: 10.0,
@@ -208,6 +223,7 @@ impl Params {
     pub fn papers() -> Params {
         Params {
             matching: Matching {
+                by: MatchBy::Heading,
                 w_h: 1.0,
                 w_r: 0.0,
                 rho_deg: 0.0,

@@ -2,6 +2,7 @@
 
 use super::boids::measures::Order;
 use super::individual::{Individual, rounded};
+use super::params::Params;
 use super::placement::is_jump;
 use crate::geometry::wrap_rad;
 use crate::library::Library;
@@ -27,6 +28,9 @@ pub struct Stats {
     pub slip_median_rad: f64,
     /// Share of the pair-frames within 4 BL in which both show nearly the same source frame.
     pub clone_share: f64,
+    /// How many can be shown at once without any two looking alike: frames of the component far
+    /// enough apart, on each side allowed. A larger flock has clones whatever the plan.
+    pub distinct_looks: u32,
     /// Share of the component's frames that are shown.
     pub variety: f64,
     /// Mean over the frames.
@@ -42,6 +46,7 @@ pub fn measure(
     individuals: &[Individual],
     orders: &[Order],
     library: &Library,
+    params: &Params,
     length_px: f64,
 ) -> Stats {
     let fps = library.poses.fps;
@@ -57,6 +62,8 @@ pub fn measure(
         path_deviation_p95_bl: quantile(&sorted(deviations), 0.95) / length_px,
         slip_median_rad: quantile(&sorted(slips.collect()), 0.5),
         clone_share: clone_share(individuals, CLONE_BL * length_px, CLONE_S * fps),
+        distinct_looks: distinct_looks(&library.playback.component, CLONE_S * fps)
+            * if params.mirror { 2 } else { 1 },
         variety: variety(individuals, library),
         polarization: mean(|order| order.polarization),
         milling: mean(|order| order.milling),
@@ -75,6 +82,7 @@ impl Stats {
             path_deviation_p95_bl: r(self.path_deviation_p95_bl),
             slip_median_rad: r(self.slip_median_rad),
             clone_share: r(self.clone_share),
+            distinct_looks: self.distinct_looks,
             variety: r(self.variety),
             polarization: r(self.polarization),
             milling: r(self.milling),
@@ -146,6 +154,19 @@ fn clone_share(individuals: &[Individual], within_px: f64, within_frames: f64) -
     clones as f64 / near.max(1) as f64
 }
 
+/// The most frames of which no two are nearer than `apart_frames`.
+fn distinct_looks(component: &[u32], apart_frames: f64) -> u32 {
+    let mut n_looks = 0;
+    let mut last: Option<u32> = None;
+    for &frame in component {
+        if last.is_none_or(|last| f64::from(frame - last) >= apart_frames) {
+            n_looks += 1;
+            last = Some(frame);
+        }
+    }
+    n_looks
+}
+
 fn variety(individuals: &[Individual], library: &Library) -> f64 {
     let mut used = vec![false; library.poses.frames.len()];
     for frame in individuals.iter().flat_map(|i| &i.source_frame) {
@@ -165,5 +186,18 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     match sorted.len() {
         0 => 0.0,
         n => sorted[((n - 1) as f64 * share).round() as usize],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::distinct_looks;
+
+    #[test]
+    fn looks_differ_when_their_frames_lie_far_enough_apart() {
+        let component: Vec<u32> = (10..37).chain(40..42).collect();
+        assert_eq!(distinct_looks(&component, 9.0), 4, "10, 19, 28 and 40");
+        assert_eq!(distinct_looks(&component, 1.0), 29);
+        assert_eq!(distinct_looks(&[], 9.0), 0);
     }
 }

@@ -119,6 +119,9 @@ struct StatsFile {
     path_deviation_p95_bl: f64,
     slip_median_rad: f64,
     clone_share: f64,
+    /// Absent in files of before; 0 then.
+    #[serde(default)]
+    distinct_looks: u32,
     variety: f64,
     polarization: f64,
     milling: f64,
@@ -225,6 +228,7 @@ impl StatsFile {
             path_deviation_p95_bl: stats.path_deviation_p95_bl,
             slip_median_rad: stats.slip_median_rad,
             clone_share: stats.clone_share,
+            distinct_looks: stats.distinct_looks,
             variety: stats.variety,
             polarization: stats.polarization,
             milling: stats.milling,
@@ -240,6 +244,7 @@ impl StatsFile {
             path_deviation_p95_bl: self.path_deviation_p95_bl,
             slip_median_rad: self.slip_median_rad,
             clone_share: self.clone_share,
+            distinct_looks: self.distinct_looks,
             variety: self.variety,
             polarization: self.polarization,
             milling: self.milling,

@@ -69,7 +69,7 @@ impl Preset for analysis::Params {
 
 impl Preset for flock::Params {
     fn preset(name: &str) -> Option<Self> {
-        (name == "papers").then(flock::Params::papers)
+        flock::Params::preset(name)
     }
 
     fn check(&self) -> Result<(), String> {
@@ -114,6 +114,17 @@ mod tests {
                 ..papers
             })
         );
+    }
+
+    #[test]
+    fn every_preset_of_a_flock_can_be_asked_for() {
+        for name in flock::Params::PRESETS {
+            let overrides = Map::from_iter([("preset".to_owned(), Value::from(name))]);
+            assert_eq!(read(overrides).ok(), flock::Params::preset(name), "{name}");
+        }
+        let json = r#"{"matching": {"by": "position"}}"#;
+        let params: flock::Params = read(serde_json::from_str(json).unwrap()).unwrap();
+        assert_eq!(params.matching.by, flock::params::MatchBy::Position);
     }
 
     #[test]

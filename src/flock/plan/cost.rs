@@ -5,7 +5,7 @@
 //! compared is how far animal and boid turn in a quarter of a second.
 
 use super::trellis::Trellis;
-use crate::flock::params::Matching;
+use crate::flock::params::{MatchBy, Matching};
 use crate::geometry::Turns;
 use crate::library::{Library, View};
 
@@ -33,6 +33,7 @@ pub struct Weights {
     rho_turns: u16,
     jump_turns: f64,
     view: View,
+    by: MatchBy,
     v0_bl_per_s: f64,
 }
 
@@ -45,13 +46,17 @@ impl Weights {
         Weights {
             heading: fixed(matching.w_h),
             rotation: fixed(matching.w_r),
-            speed: fixed(matching.w_v),
-            rho_turns: match view {
-                View::Side => Turns::from_rad(matching.rho_deg.to_radians()).0,
-                View::Top => 0,
+            speed: match matching.by {
+                MatchBy::Heading => fixed(matching.w_v),
+                MatchBy::Position => fixed(matching.w_h),
+            },
+            rho_turns: match (view, matching.by) {
+                (View::Side, MatchBy::Heading) => Turns::from_rad(matching.rho_deg.to_radians()).0,
+                _ => 0,
             },
             jump_turns: matching.wx * Turns::PER_RAD,
             view,
+            by: matching.by,
             v0_bl_per_s: (0.25 * cruise).max(0.05),
         }
     }
@@ -84,6 +89,10 @@ impl Weights {
 
     /// What a boid wants: its heading, how fast that turns, and its speed.
     pub fn wanted(&self, heading_rad: f64, turn_rad_per_s: f64, speed_bl_per_s: f64) -> Feature {
+        if self.by == MatchBy::Position {
+            let along = [libm::cos(heading_rad), libm::sin(heading_rad)];
+            return moving(along.map(|axis| speed_bl_per_s * axis));
+        }
         Feature {
             turns: match self.view {
                 View::Side => Turns::from_rad(heading_rad).0,
@@ -100,6 +109,10 @@ impl Weights {
                 return Feature::default();
             };
             let moved = &motion[frame as usize];
+            if self.by == MatchBy::Position {
+                let [x, y] = moved.velocity_bl_per_s;
+                return moving([if mirrored { -x } else { x }, y]);
+            }
             let (heading, turn) = match mirrored {
                 false => (Turns::from_rad(moved.heading_rad), moved.turn_rad_per_s),
                 true => (
@@ -116,6 +129,17 @@ impl Weights {
             }
         };
         (0..trellis.n_states()).map(feature).collect()
+    }
+}
+
+/// A velocity in the picture in the place of heading and speed: a body length a second is a radian, and
+/// more than a quarter circle's worth is cut down to it, so that differences never wrap.
+fn moving(velocity_bl_per_s: [f64; 2]) -> Feature {
+    let [x, y] = velocity_bl_per_s
+        .map(|bl_per_s| (bl_per_s * Turns::PER_RAD).round().clamp(-16383.0, 16383.0) as i16);
+    Feature {
+        turns: x as u16,
+        log_speed: (y as u16).wrapping_add(1 << 15),
     }
 }
 
@@ -140,6 +164,8 @@ pub struct FrameMotion {
     pub turn_rad_per_s: f64,
     /// Speed of the centroid in the image, body lengths a second.
     pub speed_bl_per_s: f64,
+    /// Its velocity, image axes.
+    pub velocity_bl_per_s: [f64; 2],
 }
 
 /// The motion at every frame: central differences over two frames either way where the animal was
@@ -169,6 +195,7 @@ pub fn motion_of(library: &Library) -> Vec<FrameMotion> {
             heading_rad,
             turn_rad_per_s: crate::geometry::wrap_rad(after.1 - before.1) / span_s,
             speed_bl_per_s: (dx * dx + dy * dy).sqrt() / length_px / span_s,
+            velocity_bl_per_s: [dx, dy].map(|px| px / length_px / span_s),
         }
     };
     (0..poses.frames.len()).map(motion).collect()

@@ -66,7 +66,10 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
         self.sum = [0; LANES];
         let others = self.settled.at(t)[..self.n_watched].iter().zip(places);
         for (&state, &place) in others {
-            let costs = here.map(|here| u32::from(planner.crowd.cost_at(here, place)));
+            let mut costs = [0; LANES];
+            for lane in 0..LANES {
+                costs[lane] = u32::from(planner.crowd.cost_at(here[lane], place));
+            }
             if costs == [0; LANES] {
                 continue;
             }

@@ -1,6 +1,7 @@
 //! Plans of whole flocks: their certificates, and their cost told from the outside.
 
 use super::*;
+use crate::flock::params::MatchBy;
 use crate::flock::plan::viterbi::Rows;
 use crate::flock::synthetic;
 use crate::flock::{Flock, plan_flock};
@@ -9,11 +10,15 @@ use crate::progress::Silent;
 
 fn flock(view: View, name: &str) -> (Library, Flock) {
     let library = synthetic::library(view);
-    let params = Params {
+    let preset = if name == "position" { "school" } else { name };
+    let mut params = Params {
         count: 10,
         frames: 120,
-        ..Params::preset(name).expect("a known preset")
+        ..Params::preset(preset).expect("a known preset")
     };
+    if name == "position" {
+        params.matching.by = MatchBy::Position;
+    }
     let flock = plan_flock(&library, &params, &Silent).expect("a good library");
     (library, flock)
 }
@@ -64,6 +69,7 @@ fn the_cost_recomputed_from_the_file_and_the_library_is_the_one_told() {
         (View::Side, "school"),
         (View::Top, "swarm"),
         (View::Side, "papers"),
+        (View::Side, "position"),
     ] {
         let (library, flock) = flock(view, name);
         let bytes = crate::formats::flock_json::write(&flock);
@@ -126,5 +132,61 @@ fn after_a_jump_at_least_the_dwell_is_played() {
             jumps.windows(2).all(|pair| pair[1] - pair[0] >= dwell),
             "{jumps:?}"
         );
+    }
+}
+
+#[test]
+fn matched_by_place_frames_move_as_the_boids_do_and_by_heading_they_point_as_they_do() {
+    let gap = |name: &str| {
+        let (library, flock) = flock(View::Side, name);
+        let motion = cost::motion_of(&library);
+        let gaps = flock.individuals.iter().flat_map(|individual| {
+            (0..individual.source_frame.len()).map(|t| {
+                let [x, y] = motion[individual.source_frame[t] as usize].velocity_bl_per_s;
+                let x = if individual.mirrored[t] { -x } else { x };
+                let (boid, speed) = (
+                    individual.boid.heading_rad[t],
+                    individual.boid.speed_bl_per_s[t],
+                );
+                (x - speed * libm::cos(boid)).abs() + (y - speed * libm::sin(boid)).abs()
+            })
+        });
+        (gaps.sum::<f64>(), flock.stats.heading_error_median_rad)
+    };
+    let (by_place, by_heading) = (gap("position"), gap("school"));
+    assert!(by_place.0 < by_heading.0, "{by_place:?} {by_heading:?}");
+    assert!(by_heading.1 <= by_place.1, "{by_place:?} {by_heading:?}");
+}
+
+#[test]
+fn whoever_is_in_a_later_round_looks_out_for_all_rounds_before() {
+    assert_eq!([0, 1, 63].map(crowd::n_watched), [0, 1, 63]);
+    assert_eq!(
+        [64, 79, 80, 95, 96].map(crowd::n_watched),
+        [64, 64, 80, 80, 96]
+    );
+}
+
+#[test]
+fn a_large_flock_has_the_same_plans_for_any_number_of_threads_and_its_costs_add_up() {
+    let library = synthetic::library(View::Side);
+    let params = Params {
+        count: 90,
+        frames: 40,
+        ..Params::default()
+    };
+    let planned = |n_threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n_threads)
+            .build()
+            .unwrap();
+        pool.install(|| plan_flock(&library, &params, &Silent))
+            .unwrap()
+    };
+    let flock = planned(1);
+    assert_eq!(flock, planned(3));
+    for id in [63, 64, 79, 80, 89] {
+        let told = (flock.individuals[id].cost.total * Turns::PER_RAD).round() as u32;
+        assert_eq!(cost_from_outside(&library, &flock, id), told, "{id}");
     }
 }

@@ -25,7 +25,12 @@ pub struct Trellis {
     sources: Vec<(u32, u32)>,
     /// States that some jump leaves, rising.
     leaving: Vec<u32>,
-    /// `sources` with the number of the leaving state for the state.
+    /// The targets by how many jumps lead to them, so that a loop over those is of one length for
+    /// many targets in a row.
+    by_degree: Vec<u32>,
+    /// Where each target stands in `by_degree`.
+    order: Vec<u32>,
+    /// Of each target in that order, its jumps: (number of the leaving state, cost).
     jumps: Vec<(u32, u32)>,
 }
 
@@ -42,6 +47,8 @@ impl Trellis {
             first_source: vec![0],
             sources: Vec::new(),
             leaving: Vec::new(),
+            by_degree: Vec::new(),
+            order: Vec::new(),
             jumps: Vec::new(),
         };
         let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
@@ -110,11 +117,23 @@ impl Trellis {
         &self.leaving
     }
 
-    /// For each target its jumps as `sources` gives them, with the number of the leaving state.
+    /// Where target `k` stands in `jumps`.
+    pub fn order(&self, k: usize) -> usize {
+        self.order[k] as usize
+    }
+
+    /// The targets by how many jumps lead to them: (state, jumps), those as `sources` gives them but
+    /// with the number of the leaving state.
     #[inline(always)]
-    pub fn jumps(&self) -> impl Iterator<Item = &[(u32, u32)]> {
-        let ends = self.first_source.windows(2);
-        ends.map(|ends| &self.jumps[ends[0] as usize..ends[1] as usize])
+    pub fn jumps(&self) -> impl Iterator<Item = (usize, &[(u32, u32)])> {
+        let mut rest = self.jumps.as_slice();
+        self.by_degree.iter().map(move |&k| {
+            let k = k as usize;
+            let n_jumps = (self.first_source[k + 1] - self.first_source[k]) as usize;
+            let (jumps, after) = rest.split_at(n_jumps);
+            rest = after;
+            (self.targets[k] as usize, jumps)
+        })
     }
 
     /// Whether `state + ahead` is reached from `state` by continuing alone.
@@ -157,10 +176,18 @@ impl Trellis {
         self.leaving.dedup();
         let leaving = &self.leaving;
         let number = |state| leaving.partition_point(|&other| other < state) as u32;
-        let jumps = self.sources.iter();
-        self.jumps = jumps
+        let n_targets = self.targets.len() as u32;
+        let mut by_degree: Vec<u32> = (0..n_targets).collect();
+        by_degree.sort_by_key(|&k| self.sources(k as usize).len());
+        self.order = vec![0; by_degree.len()];
+        for (place, &k) in (0u32..).zip(&by_degree) {
+            self.order[k as usize] = place;
+        }
+        let sources = by_degree.iter().flat_map(|&k| self.sources(k as usize));
+        self.jumps = sources
             .map(|&(source, cost)| (number(source), cost))
             .collect();
+        self.by_degree = by_degree;
     }
 }
 

@@ -25,10 +25,10 @@ pub(super) struct Column<const LANES: usize> {
     sums: Vec<[u32; LANES]>,
     /// V of each leaving state at the frame before.
     leaving: Vec<[u32; LANES]>,
-    /// `landed[(t mod dwell) * n_targets + k]`: the lead of landing on target k at frame t.
+    /// `landed[(t mod dwell) * n_targets + order]`: the lead of landing on a target at frame t.
     landed: Vec<[i32; LANES]>,
-    /// The targets from which `dwell` frames can be played.
-    arriving: Vec<u32>,
+    /// The targets from which `dwell` frames can be played, rising: (order, state).
+    arriving: Vec<(u32, u32)>,
 }
 
 /// The place of state 0 at frame `t`.
@@ -58,10 +58,9 @@ impl<const LANES: usize> Column<LANES> {
             sums: vec![[0; LANES]; n_states],
             leaving: vec![[0; LANES]; trellis.leaving().len()],
             landed: vec![[NO_LEAD; LANES]; n_targets * dwell],
-            arriving: (0u32..)
-                .zip(trellis.targets())
+            arriving: (trellis.targets().iter().enumerate())
                 .filter(|(_, target)| trellis.continues(**target as usize, dwell - 1))
-                .map(|(k, _)| k)
+                .map(|(k, &target)| (trellis.order(k) as u32, target))
                 .collect(),
         };
         column.go_on(0, rows);
@@ -135,11 +134,12 @@ impl<const LANES: usize> Column<LANES> {
     fn land(&mut self, trellis: &Trellis, t: usize, trace: &mut Trace<LANES>) {
         let n = self.leads.len();
         let origin = origin(t, n);
-        let targets = trellis.targets();
-        let landed = &mut self.landed[t % self.dwell * targets.len()..][..targets.len()];
-        let winners = trace.next_frame(targets.len());
-        let targets = landed.iter_mut().zip(winners).zip(targets);
-        for (((landed, winner), &target), jumps) in targets.zip(trellis.jumps()) {
+        let n_targets = trellis.targets().len();
+        let landed = &mut self.landed[t % self.dwell * n_targets..][..n_targets];
+        let winners = trace.next_frame(n_targets);
+        for ((landed, winner), (target, jumps)) in
+            landed.iter_mut().zip(winners).zip(trellis.jumps())
+        {
             let mut best = [UNREACHED; LANES];
             let mut rank_of_best = [0u32; LANES];
             for (rank, &(j, cost)) in (0u32..).zip(jumps) {
@@ -151,7 +151,7 @@ impl<const LANES: usize> Column<LANES> {
                     rank_of_best[lane] = if better { rank } else { rank_of_best[lane] };
                 }
             }
-            let sums = &self.sums[place(target as usize, origin, n)];
+            let sums = &self.sums[place(target, origin, n)];
             for lane in 0..LANES {
                 landed[lane] = best[lane] as i32 - sums[lane] as i32;
                 winner[lane] = rank_of_best[lane] as u16;
@@ -195,20 +195,21 @@ impl<const LANES: usize> Column<LANES> {
         let origin = origin(landed_at, n);
         let n_targets = trellis.targets().len();
         let landed = &self.landed[landed_at % self.dwell * n_targets..][..n_targets];
-        for &k in &self.arriving {
-            let (new, target) = (&landed[k as usize], trellis.targets()[k as usize] as usize);
-            let lead = &mut self.leads[place(target, origin, n)];
-            let mut least = *lead;
+        let arrivals = trace.arrivals(self.arriving.len());
+        let mut n_arrived = 0;
+        for &(order, target) in &self.arriving {
+            let new = &landed[order as usize];
+            let lead = &mut self.leads[place(target as usize, origin, n)];
+            let mut lanes = 0;
             for lane in 0..LANES {
-                least[lane] = least[lane].min(new[lane]);
+                lanes |= u32::from(new[lane] < lead[lane]) << lane;
+                lead[lane] = lead[lane].min(new[lane]);
             }
-            if least != *lead {
-                let cheaper = |lane: &usize| least[*lane] < lead[*lane];
-                let lanes = (0..LANES).filter(cheaper).map(|lane| 1 << lane).sum();
-                *lead = least;
-                trace.arrived((target + self.dwell - 1) as u32, lanes);
-            }
+            // Without a branch: whether it is cheaper is hard to foresee.
+            arrivals[n_arrived] = (target + self.dwell as u32 - 1, lanes as u8);
+            n_arrived += usize::from(lanes != 0);
         }
+        trace.keep(n_arrived);
     }
 
     /// V of every state at frame `t`, the last one advanced to, for one individual.
@@ -238,7 +239,8 @@ impl<const LANES: usize> Column<LANES> {
         let n_targets = trellis.targets().len();
         for t in (n_frames + 1).saturating_sub(self.dwell).max(1)..n_frames {
             let landed = &self.landed[t % self.dwell * n_targets..][..n_targets];
-            for (k, (leads, &target)) in landed.iter().zip(trellis.targets()).enumerate() {
+            for (k, &target) in trellis.targets().iter().enumerate() {
+                let leads = landed[trellis.order(k)];
                 if trellis.continues(target as usize, last - t) {
                     let sums = self.sums[place(target as usize, origin(t, n), n)];
                     let cost = (leads[lane] as u32).wrapping_add(sums[lane]);

@@ -9,7 +9,7 @@ use crate::flock::plan::trellis::Trellis;
 pub(super) struct Trace<const LANES: usize> {
     first: usize,
     n_targets: usize,
-    /// `[(t - first) * n_targets + k]`: which of the sources of target k.
+    /// `[(t - first) * n_targets + order]`: which of a target's sources.
     winners: Vec<[u16; LANES]>,
     /// Where each frame's arrivals begin.
     arrivals: Vec<usize>,
@@ -26,7 +26,7 @@ impl<const LANES: usize> Trace<LANES> {
         self.arrived.clear();
     }
 
-    /// The next frame; gives the place for its winners, by target. Its arrivals come now.
+    /// The next frame; gives the place for its winners, in the trellis's order. Its arrivals come now.
     #[inline(always)]
     pub(super) fn next_frame(&mut self, n_targets: usize) -> &mut [[u16; LANES]] {
         self.n_targets = n_targets;
@@ -36,10 +36,20 @@ impl<const LANES: usize> Trace<LANES> {
         &mut self.winners[from..]
     }
 
-    /// A run ended in `state`; states rise.
+    /// Gives the place for up to `most` arrivals of the frame, states rising; `keep` says how many
+    /// of them there are.
     #[inline(always)]
-    pub(super) fn arrived(&mut self, state: u32, lanes: u8) {
-        self.arrived.push((state, lanes));
+    pub(super) fn arrivals(&mut self, most: usize) -> &mut [(u32, u8)] {
+        let from = self.arrived.len();
+        self.arrived.resize(from + most, (0, 0));
+        &mut self.arrived[from..]
+    }
+
+    /// Keeps the first `n_arrived` of the frame's arrivals.
+    #[inline(always)]
+    pub(super) fn keep(&mut self, n_arrived: usize) {
+        let from = self.arrivals.last().copied().unwrap_or(0);
+        self.arrived.truncate(from + n_arrived);
     }
 
     fn is_arrival(&self, t: usize, state: u32, lane: usize) -> bool {
@@ -50,8 +60,8 @@ impl<const LANES: usize> Trace<LANES> {
         found.is_ok_and(|at| arrived[at].1 >> lane & 1 == 1)
     }
 
-    fn winner(&self, t: usize, k: usize, lane: usize) -> usize {
-        usize::from(self.winners[(t - self.first) * self.n_targets + k][lane])
+    fn winner(&self, t: usize, order: usize, lane: usize) -> usize {
+        usize::from(self.winners[(t - self.first) * self.n_targets + order][lane])
     }
 }
 
@@ -107,7 +117,7 @@ impl Walk {
                     }
                 }
                 Back::Landed { k, t } if t >= start => {
-                    let winner = trace.winner(t, k, lane);
+                    let winner = trace.winner(t, trellis.order(k), lane);
                     let at = trellis.sources(k)[winner].0 as usize;
                     self.back = Back::Free { at, t: t - 1 };
                 }

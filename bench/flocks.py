@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""How good flocks are: the measures of ALGORITHMS.md 9 on libraries that `flockreel analyze` made.
+
+    bench/flocks.py PROGRAM LIBRARY_DIR... [--count 20] [--frames 400] [--seed 1] [--preset school] [--match heading]
+
+For each library plans a flock, and prints what flock.json's stats say with their bars (* = missed), how many frames
+the component has, and how visible the cuts are: for each jump that the flock plays, the step across it between
+the sprites as exported (RGB times alpha, and alpha; ALGORITHMS.md 5), over the median step between consecutive
+sprites, hard as if nothing were faded. Needs numpy and cv2.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+import cv2
+import numpy as np
+
+# The figure, its greatest value, and how it is printed.
+BARS = [
+    ("heading_error_median_deg", 1.0),
+    ("heading_error_p90_deg", 6.0),
+    ("jumps_per_100_frames", 4.0),
+    ("clone_share", 0.005),
+    ("cut_median", 1.3),
+    ("cut_above_natural_p99", 0.0),
+]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program")
+    parser.add_argument("libraries", nargs="+", type=pathlib.Path)
+    for name, default in [("count", "20"), ("frames", "400"), ("seed", "1"), ("preset", "school"), ("match", "heading")]:
+        parser.add_argument(f"--{name}", default=default)
+    args = parser.parse_args()
+    for library in args.libraries:
+        with tempfile.TemporaryDirectory() as folder:
+            figures = measure(args, library, pathlib.Path(folder))
+        if isinstance(figures, str):
+            print(f"{library.name:28} {figures}", flush=True)
+            continue
+        words = [f"{name} {figures[name]:.4g}{'*' if figures[name] > bar else ''}" for name, bar in BARS]
+        print(f"{library.name:28} component {figures['component']} of {figures['n_frames']} frames, {', '.join(words)}, "
+              f"variety {figures['variety']:.2f}, bound gap {figures['gap']:.3f}", flush=True)
+
+
+def measure(args, library, folder):
+    plan = folder / "flock.json"
+    words = [args.program, "flock", library, "-o", folder / "x.mp4", "--plan", plan] + (["--match", args.match] if args.match != "heading" else [])
+    for name in ("count", "frames", "seed", *(["preset"] if args.preset != "school" else [])):
+        words += [f"--{name}", getattr(args, name)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode:
+        return "refused: " + done.stderr.strip().splitlines()[-1]
+    flock = json.loads(plan.read_text())
+    known = json.loads((library / "library.json").read_text())
+    n_frames = len(json.loads((library / "poses.json").read_text())["frames"])
+    subprocess.run([args.program, "sprites", library, "-o", folder / "sprites"], check=True, capture_output=True)
+    median, p99, cuts = cut_steps(folder / "sprites", flock, n_frames)
+    stats, costs = flock["stats"], [one["cost"] for one in flock["individuals"]]
+    total, bound = (sum(cost[key] for cost in costs) for key in ("total", "lower_bound"))
+    return {
+        **stats,
+        "heading_error_median_deg": np.degrees(stats["heading_error_median_rad"]),
+        "heading_error_p90_deg": np.degrees(stats["heading_error_p90_rad"]),
+        "component": len(known["component"]),
+        "n_frames": n_frames,
+        "cut_median": float(np.median(cuts)) / median if cuts else 0.0,
+        "cut_above_natural_p99": float(np.mean([cut > p99 for cut in cuts])) if cuts else 0.0,
+        "gap": (total - bound) / max(total, 1e-9),
+    }
+
+
+def cut_steps(folder, flock, n_frames):
+    """The median and the 99th percentile of natural steps, and the step of each cut played."""
+    sprites = [compared(folder / f"{frame:06}.png") for frame in range(n_frames)]
+    step = lambda a, b: int(np.abs(a - b).sum())
+    natural = [step(a, b) for a, b in zip(sprites, sprites[1:]) if a is not None and b is not None]
+    cuts, known = [], {}
+    for one in flock["individuals"]:
+        shown = list(zip(one["source_frame"], one["mirrored"]))
+        for (a, side), (b, other) in zip(shown, shown[1:]):
+            if (b, other) == (a + 1, side) or sprites[a] is None or sprites[b] is None:
+                continue
+            key = (a, b, side != other)
+            if key not in known:
+                known[key] = step(sprites[a], sprites[b][:, ::-1] if key[2] else sprites[b])
+            cuts.append(known[key])
+    return float(np.median(natural)), float(np.percentile(natural, 99)), cuts
+
+
+def compared(path):
+    rgba = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if path.exists() else None
+    if rgba is None:
+        return None
+    rgba = rgba.astype(np.int32)
+    alpha = rgba[..., 3:]
+    return np.concatenate([(alpha * rgba[..., :3] + 127) // 255, alpha], axis=-1)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,37 @@
+#!/usr/bin/env python3
+"""How long plans take: 20 individuals x 400 frames, and 1000 x 1000, over 1200 frames with both mirrors.
+
+    bench/plan.py [--engine PROGRAM] [--library DIR] [--small-only]
+
+Runs benches/plan.rs, on a library made by code or on one given, prints a line of JSON for each case with its
+bar in seconds, and ends with 1 when a bar is missed. Times are of the plan alone, the least of some runs.
+"""
+import argparse
+import json
+import subprocess
+import sys
+
+# Individuals, frames, runs, and the most seconds on all threads.
+CASES = [(20, 400, 30, 0.030), (1000, 1000, 1, 3.0)]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--engine", help="the built benchmark; cargo builds and runs it when absent")
+    parser.add_argument("--library", help="a folder that `flockreel analyze` made")
+    parser.add_argument("--small-only", action="store_true")
+    args = parser.parse_args()
+    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "--bench", "plan", "--"]
+    missed = False
+    for count, frames, runs, bar_s in CASES[: 1 if args.small_only else None]:
+        words = [*command, str(count), str(frames), str(runs), *([args.library] if args.library else [])]
+        done = subprocess.run(words, check=True, stdout=subprocess.PIPE)
+        result = json.loads(done.stdout.splitlines()[-1])
+        result.update(bar_s=bar_s, within=result["all_threads_s"] < bar_s)
+        missed |= not result["within"]
+        print(json.dumps(result), flush=True)
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
