@@ -57,9 +57,10 @@ def measure(args, library, folder):
         return "refused: " + done.stderr.strip().splitlines()[-1]
     flock = json.loads(plan.read_text())
     known = json.loads((library / "library.json").read_text())
-    n_frames = len(json.loads((library / "poses.json").read_text())["frames"])
+    poses = json.loads((library / "poses.json").read_text())
+    n_frames = len(poses["frames"])
     subprocess.run([args.program, "sprites", library, "-o", folder / "sprites"], check=True, capture_output=True)
-    median, p99, cuts = cut_steps(folder / "sprites", flock, n_frames)
+    median, p99, cuts = cut_steps(folder / "sprites", flock, poses)
     stats, costs = flock["stats"], [one["cost"] for one in flock["individuals"]]
     total, bound = (sum(cost[key] for cost in costs) for key in ("total", "lower_bound"))
     return {
@@ -74,9 +75,15 @@ def measure(args, library, folder):
     }
 
 
-def cut_steps(folder, flock, n_frames):
-    """The median and the 99th percentile of natural steps, and the step of each cut played."""
-    sprites = [compared(folder / f"{frame:06}.png") for frame in range(n_frames)]
+def cut_steps(folder, flock, poses):
+    """The median and the 99th percentile of natural steps, and the step of each cut played.
+
+    In top view sprites are turned to heading 0 first, and mirrored top to bottom.
+    """
+    top = poses["view"] == "top"
+    headings = [(frame["heading_rad"] or 0.0) if top else 0.0 for frame in poses["frames"]]
+    sprites = [compared(folder / f"{frame:06}.png", heading) for frame, heading in enumerate(headings)]
+    mirrored = (lambda sprite: sprite[::-1]) if top else (lambda sprite: sprite[:, ::-1])
     step = lambda a, b: int(np.abs(a - b).sum())
     natural = [step(a, b) for a, b in zip(sprites, sprites[1:]) if a is not None and b is not None]
     cuts, known = [], {}
@@ -87,18 +94,25 @@ def cut_steps(folder, flock, n_frames):
                 continue
             key = (a, b, side != other)
             if key not in known:
-                known[key] = step(sprites[a], sprites[b][:, ::-1] if key[2] else sprites[b])
+                known[key] = step(sprites[a], mirrored(sprites[b]) if key[2] else sprites[b])
             cuts.append(known[key])
     return float(np.median(natural)), float(np.percentile(natural, 99)), cuts
 
 
-def compared(path):
+def compared(path, turned_rad):
+    """A sprite turned back by an angle, as it is compared; None where the animal was not found."""
     rgba = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if path.exists() else None
-    if rgba is None:
+    if rgba is None or not rgba[..., 3].any():
         return None
     rgba = rgba.astype(np.int32)
     alpha = rgba[..., 3:]
-    return np.concatenate([(alpha * rgba[..., :3] + 127) // 255, alpha], axis=-1)
+    planes = np.concatenate([(alpha * rgba[..., :3] + 127) // 255, alpha], axis=-1)
+    if turned_rad:
+        height, width = planes.shape[:2]
+        # cv2 turns counterclockwise in the picture for a positive angle; a heading is clockwise.
+        turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), np.degrees(turned_rad), 1)
+        planes = cv2.warpAffine(planes.astype(np.float32), turn, (width, height)).round().astype(np.int32)
+    return planes
 
 
 if __name__ == "__main__":
