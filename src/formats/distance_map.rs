@@ -172,12 +172,16 @@ fn levels(cells: &[u64]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+
+    use crate::analysis::Params;
     use crate::analysis::distance::{ComparedSprites, Side};
     use crate::analysis::params::Planes;
     use crate::cpu::Level;
     use crate::flock::synthetic;
     use crate::library::{Transition, View};
     use crate::progress::Silent;
+    use crate::scratch::{Full, InMemory};
 
     #[test]
     fn near_is_black_and_far_is_white() {
@@ -237,6 +241,32 @@ mod tests {
         );
         assert!(map.alike[(700 * 1024 / 3000) * 1024 + 1023]);
         assert_eq!(map.least.iter().filter(|&&least| least == 5).count(), 2);
+    }
+
+    #[test]
+    fn of_more_clips_than_can_all_be_compared_the_near_ones_are_drawn() {
+        // Dark in the first half, bright in the second.
+        let n = MOST_WHOLE + 8;
+        let mut library = synthetic::library(View::Side);
+        let scratch = Arc::new(InMemory::default());
+        let draw = |frame_idx: usize, rgba: &mut [u8]| {
+            let red = if frame_idx < n / 2 { 10 } else { 200 };
+            rgba.copy_from_slice(&[red + (frame_idx % 2) as u8, 0, 0, 255]);
+            Ok::<_, Full>(true)
+        };
+        library.sprites = Sprites::drawn([1, 1], n, scratch, draw).expect("memory has room");
+        library.poses.frames.resize(n, Default::default());
+        (library.clip_frames, library.epsilon) = (1, 2);
+        let pixels = ComparedSprites::new(&library.sprites, &library.poses, Planes::Rgba);
+        let distances = Distances {
+            pixels: &pixels.expect("memory has room"),
+            clip: Params::default().clip(1),
+            side: Side::Plain,
+            cpu: Level::detect(),
+        };
+        let map = DistanceMap::of(&distances, &library, &Silent).expect("nobody cancels");
+        assert_eq!((map.least[0], map.least[1023]), (0, NOT_BELOW));
+        assert_eq!(levels(&map.least)[1023], 255);
     }
 
     #[test]

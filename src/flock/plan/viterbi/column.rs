@@ -78,9 +78,9 @@ impl<const LANES: usize> Column<LANES> {
     ) {
         match film.cpu {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512 => {
+            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
                 #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
-                // SAFETY: whoever makes a film says that this machine has its level.
+                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
                     self.advance_avx2(film.trellis, t, rows, trace);
                 }
