@@ -23,7 +23,9 @@ use crate::store::flocks::Flock;
 
 const FILES: Files = &[
     ("flock.json", "application/json"),
+    ("ground-truth.zip", "application/zip"),
     ("plan.svg", "image/svg+xml"),
+    ("tracks.csv", "text/csv; charset=utf-8"),
     ("video.mp4", "video/mp4"),
 ];
 
@@ -112,7 +114,7 @@ pub(super) async fn get_flock(
     Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
 }
 
-/// A file of a flock: flock.json, plan.svg, video.mp4.
+/// A file of a flock: flock.json, plan.svg, video.mp4, tracks.csv, ground-truth.zip.
 #[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -127,18 +129,27 @@ pub(super) async fn get_flock_file(
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
     let flock = find(&state, id).await?;
-    let label = match name {
-        "video.mp4" => format!("flock-{id}.mp4"),
-        "plan.svg" => format!("flock-{id}-plan.svg"),
-        _ => format!("flock-{id}.json"),
+    // What a browser cannot show is saved.
+    let kind = match media_type {
+        "application/zip" => "attachment",
+        _ => "inline",
     };
     let download = Download {
         folder: &flock.folder,
         name,
         media_type,
-        disposition: disposition("inline", &label),
+        disposition: disposition(kind, &label_of(name, id)),
     };
     download.answer(&state.context.store, &conditions).await
+}
+
+/// The name under which a file is saved.
+fn label_of(name: &str, id: Uuid) -> String {
+    match name {
+        "video.mp4" => format!("flock-{id}.mp4"),
+        "flock.json" => format!("flock-{id}.json"),
+        _ => format!("flock-{id}-{name}"),
+    }
 }
 
 async fn find(state: &AppState, id: Uuid) -> Result<Flock, Problem> {

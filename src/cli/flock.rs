@@ -1,17 +1,14 @@
 //! `flockreel flock`: library to flock (DESIGN.md, Command line), as a video and, when asked for, its
 //! plan as flock.json.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
 use super::{Error, Listener, Summary};
-use crate::flock::{Compositor, Flock, Params, plan_flock};
+use crate::flock::{Params, plan_flock};
 use crate::formats::{flock_json, params, svg};
-use crate::library::Library;
-use crate::media::{self, VideoFormat, VideoWriter};
-use crate::progress::Progress;
-use crate::raster::ColorSpec;
+use crate::jobs::flock::film::Film;
 
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]
@@ -45,6 +42,9 @@ pub struct Args {
     /// Draw what the boids ask for against what is shown here, as SVG.
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
+    /// Write what is where in every frame into this folder: masks, coco.json, MOTChallenge, tracks.csv.
+    #[arg(long, value_name = "DIR")]
+    ground_truth: Option<PathBuf>,
 }
 
 /// Plans and films a flock.
@@ -64,12 +64,18 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             path.display()
         )))?;
     }
-    film(&library, &flock, &args.output, &progress)
+    let film = Film {
+        library: &library,
+        flock: &flock,
+        progress: &progress,
+    };
+    film.make(&args.output, args.ground_truth.as_deref())
         .map_err(|error| Error::work(error.code(), &error))?;
     Ok(Some(Summary(json!({
         "video": args.output,
         "plan": args.plan,
         "plan_picture": args.plan_picture,
+        "ground_truth": args.ground_truth,
         "count": params.count,
         "frames": params.frames,
         "seed": params.seed,
@@ -101,26 +107,4 @@ impl Args {
         }
         params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
     }
-}
-
-fn film(
-    library: &Library,
-    flock: &Flock,
-    path: &Path,
-    progress: &dyn Progress,
-) -> Result<(), media::Error> {
-    let format = VideoFormat {
-        width: flock.image_size_px[0],
-        height: flock.image_size_px[1],
-        fps: flock.fps,
-        color: ColorSpec::default(),
-    };
-    let compositor = Compositor::with_color(library, flock, format.color);
-    let n_frames = compositor.n_frames() as f64;
-    let mut video = VideoWriter::create(path, &format)?;
-    compositor.render_all(|frame_idx, frame| {
-        progress.report("rendering", (frame_idx + 1) as f64 / n_frames);
-        video.write(frame)
-    })?;
-    video.finish()
 }

@@ -13,7 +13,7 @@ pub mod quality;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
-pub use composite::Compositor;
+pub use composite::{Compositor, Shot};
 pub use error::Error;
 pub use individual::{BoidTrack, Fade, Individual, PlanCost};
 pub use params::Params;

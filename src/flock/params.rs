@@ -4,6 +4,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::composite::params::Render;
+
 /// Parameters of a flock; all have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -35,6 +37,8 @@ pub struct Params {
     /// Depth of the tank in side view, body lengths, 0..=100; null = half its width, at most 3. Top
     /// view has none.
     pub depth_bl: Option<f64>,
+    /// The film.
+    pub render: Render,
 }
 
 /// How the boids steer (ALGORITHMS.md 7). Weights 0..=20, radii in body lengths 0.1..=50.
@@ -177,6 +181,7 @@ impl Default for Params {
             leaders: true,
             tank: TankExtent::Seen,
             depth_bl: None,
+            render: Render::default(),
         }
     }
 }
@@ -257,6 +262,7 @@ impl Params {
         if let Some(depth_bl) = self.depth_bl {
             within("depth_bl", depth_bl, 0.0, 100.0)?;
         }
+        self.render.check()?;
         self.rules.check()?;
         self.matching.check()
     }

@@ -37,6 +37,20 @@ pub fn write_gray(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     encode(width, height, ColorType::Grayscale, pixels)
 }
 
+/// Labels as a PNG of 16-bit gray. Panics when there are not `width * height` of them.
+pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
+    let bytes: Vec<u8> = labels
+        .iter()
+        .flat_map(|label| label.to_be_bytes())
+        .collect();
+    encode_deep(
+        width,
+        height,
+        (ColorType::Grayscale, BitDepth::Sixteen),
+        &bytes,
+    )
+}
+
 /// Reads an 8-bit RGB PNG.
 pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
     let (width, height, pixels) = decode(bytes, ColorType::Rgb, "RGB")?;
@@ -58,10 +72,14 @@ pub fn read_rgba(bytes: &[u8]) -> Result<RgbaImage, Error> {
 }
 
 fn encode(width: u32, height: u32, color: ColorType, pixels: &[u8]) -> Vec<u8> {
+    encode_deep(width, height, (color, BitDepth::Eight), pixels)
+}
+
+fn encode_deep(width: u32, height: u32, kind: (ColorType, BitDepth), pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(color);
-    encoder.set_depth(BitDepth::Eight);
+    encoder.set_color(kind.0);
+    encoder.set_depth(kind.1);
     encoder.set_compression(Compression::Fast);
     encoder
         .write_header()

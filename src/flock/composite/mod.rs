@@ -3,60 +3,120 @@
 //!
 //! Sprites are drawn far to near, ties by id, premultiplied, by Catmull-Rom interpolation; whole
 //! pixels without rotation come out as they are. A frame starts from the background already in the
-//! encoder's form; what is drawn is converted box by box, so the cost follows the area drawn.
+//! encoder's form; what is drawn is converted box by box, so the cost follows the area drawn. The ground
+//! truth comes from the same layers.
+
+mod backdrop; // what lies behind
+mod layer; // one individual in one frame
+pub mod params;
+pub mod truth; // what of whom can be seen
+mod view; // from pixels of the footage to those of the film
 
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use self::backdrop::Backdrop;
+use self::layer::{Appearance, Painter, Scene};
+use self::params::Background;
+use self::truth::{Drawn, FrameTruth};
+use self::view::View;
 use super::individual::{Fade, Individual};
 use super::{Flock, Library};
+use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::blend::{mix, over};
-use crate::raster::resample::{Placement, Premultiplied, Resampled};
-use crate::raster::{ColorSpec, Frame, RgbImage};
+use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock, any of them from any thread.
 pub struct Compositor<'a> {
     library: &'a Library,
     flock: &'a Flock,
-    plate: Frame,
+    view: View,
+    form: Form,
+    with_truth: bool,
+    backdrop: Backdrop,
+    cpu: Level,
     /// Per individual and output frame: which of its fades concerns it.
     fade_at: Vec<Vec<Option<u32>>>,
-    canvases: Mutex<Vec<Canvas>>,
+    desks: Mutex<Vec<Desk>>,
 }
 
-/// What one thread draws on, kept from frame to frame.
-struct Canvas {
-    image: RgbImage,
+/// The form in which frames are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Opaque planes, as an encoder takes them.
+    Planar(ColorSpec),
+    /// Straight-alpha RGBA.
+    Straight,
+}
+
+/// One frame of the film, in the form asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shot {
+    /// The planes; empty in the form `Straight`.
+    pub frame: Frame,
+    /// RGBA, by rows; empty in the form `Planar`.
+    pub rgba: Vec<u8>,
+    /// What of whom can be seen, where that was asked for.
+    pub truth: FrameTruth,
+}
+
+/// What one thread draws on and with, kept from frame to frame.
+struct Desk {
+    canvas: Canvas,
     dirty: Vec<Rect>,
-    straight: Vec<u8>,
-    sprite: Premultiplied,
-    main: Resampled,
-    second: Resampled,
+    painter: Painter,
+    drawn: Vec<Drawn>,
 }
 
 impl<'a> Compositor<'a> {
-    /// Ready to draw in the usual color form.
+    /// Ready to draw as the flock's own `render` parameters say, in the usual planes; over the plate
+    /// where they ask for nothing behind.
     pub fn new(library: &'a Library, flock: &'a Flock) -> Compositor<'a> {
-        Compositor::with_color(library, flock, ColorSpec::default())
-    }
-
-    /// Ready to draw in a given color form.
-    pub fn with_color(library: &'a Library, flock: &'a Flock, color: ColorSpec) -> Compositor<'a> {
-        let background = &library.background;
-        let mut plate = Frame::new(background.width, background.height, color);
-        plate.draw_rgb(
-            background,
-            Rect::of_size(background.width, background.height),
-        );
+        let render = &flock.params.render;
+        let size_px = render.size_px.unwrap_or(flock.image_size_px);
+        let view = View::fitted(flock.image_size_px, size_px);
+        let background = match render.background {
+            Background::Transparent => Background::Plate,
+            other => other,
+        };
+        let form = Form::Planar(ColorSpec::default());
         Compositor {
             library,
             flock,
-            plate,
+            view,
+            form,
+            with_truth: false,
+            backdrop: Backdrop::of(background, &library.background, &view, form),
+            cpu: Level::detect(),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
-            canvases: Mutex::new(Vec::new()),
+            desks: Mutex::default(),
         }
+    }
+
+    /// The same in straight-alpha RGBA, with nothing behind where the parameters ask for that.
+    pub fn straight(mut self) -> Compositor<'a> {
+        self.form = Form::Straight;
+        let background = self.flock.params.render.background;
+        self.behind(background)
+    }
+
+    /// The same, telling the ground truth of every frame.
+    pub fn with_truth(mut self) -> Compositor<'a> {
+        self.with_truth = true;
+        self
+    }
+
+    /// The same before a picture, cut to the film's shape.
+    pub fn before(mut self, picture: &RgbImage) -> Compositor<'a> {
+        self.backdrop = Backdrop::picture(picture, self.view.size_px, self.form);
+        self
+    }
+
+    fn behind(mut self, background: Background) -> Compositor<'a> {
+        let plate = &self.library.background;
+        self.backdrop = Backdrop::of(background, plate, &self.view, self.form);
+        self
     }
 
     /// Frames of the film.
@@ -67,43 +127,55 @@ impl<'a> Compositor<'a> {
             .map_or(0, |individual| individual.source_frame.len())
     }
 
-    /// Draws one frame. Its size and color form become those of the film.
-    pub fn render(&self, frame_idx: usize, frame: &mut Frame) {
-        let mut canvas = self.take_canvas();
-        for rect in std::mem::take(&mut canvas.dirty) {
-            copy_box(&self.library.background, &mut canvas.image, rect);
+    /// Width and height of the film.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.view.size_px
+    }
+
+    /// Draws one frame.
+    pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
+        let mut desk = self.take_desk();
+        for rect in std::mem::take(&mut desk.dirty) {
+            desk.canvas.copy_box(&self.backdrop.canvas, rect);
         }
+        desk.drawn.clear();
         for individual in self.far_to_near(frame_idx) {
-            self.draw(individual, frame_idx, &mut canvas);
+            self.draw(individual, frame_idx, &mut desk);
         }
-        frame.clone_from(&self.plate);
-        merge_overlapping(&mut canvas.dirty);
-        for &rect in &canvas.dirty {
-            frame.draw_rgb(&canvas.image, rect);
+        if self.with_truth {
+            shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);
         }
-        self.canvases
+        merge_overlapping(&mut desk.dirty);
+        self.backdrop.begin(shot);
+        for &rect in &desk.dirty {
+            match self.form {
+                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect),
+                Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
+            }
+        }
+        self.desks
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .push(canvas);
+            .push(desk);
     }
 
     /// Draws every frame in order on all threads and gives each to `sink`, which may refuse: then
     /// its error comes back. While one batch is taken, the next is drawn.
     pub fn render_all<E: Send>(
         &self,
-        mut sink: impl FnMut(usize, &Frame) -> Result<(), E> + Send,
+        mut sink: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
     ) -> Result<(), E> {
         let batch = 2 * rayon::current_num_threads();
-        let draw = |from: usize, frames: &mut [Frame]| {
-            let indexed = frames.par_iter_mut().enumerate();
-            indexed.for_each(|(k, frame)| {
+        let draw = |from: usize, shots: &mut [Shot]| {
+            let indexed = shots.par_iter_mut().enumerate();
+            indexed.for_each(|(k, shot)| {
                 if from + k < self.n_frames() {
-                    self.render(from + k, frame);
+                    self.render(from + k, shot);
                 }
             });
         };
-        let mut ready = vec![Frame::default(); batch];
-        let mut coming = vec![Frame::default(); batch];
+        let mut ready = vec![Shot::default(); batch];
+        let mut coming = vec![Shot::default(); batch];
         draw(0, &mut ready);
         for from in (0..self.n_frames()).step_by(batch) {
             let n_ready = batch.min(self.n_frames() - from);
@@ -121,61 +193,52 @@ impl<'a> Compositor<'a> {
         Ok(())
     }
 
-    fn take_canvas(&self) -> Canvas {
+    fn take_desk(&self) -> Desk {
         let spare = self
-            .canvases
+            .desks
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .pop();
-        spare.unwrap_or_else(|| Canvas {
-            image: self.library.background.clone(),
+        spare.unwrap_or_else(|| Desk {
+            canvas: self.backdrop.canvas.clone(),
             dirty: Vec::new(),
-            straight: Vec::new(),
-            sprite: Premultiplied::default(),
-            main: Resampled::default(),
-            second: Resampled::default(),
+            painter: Painter::default(),
+            drawn: Vec::new(),
         })
     }
 
     fn far_to_near(&self, frame_idx: usize) -> Vec<&Individual> {
-        let depth = |individual: &&Individual| individual.boid.position_px[frame_idx][2];
+        let depth = |individual: &&Individual| match &individual.depth_m {
+            Some(depth_m) => depth_m[frame_idx],
+            None => individual.boid.position_px[frame_idx][2],
+        };
         let mut order: Vec<&Individual> = self.flock.individuals.iter().collect();
         order.sort_by(|a, b| depth(b).total_cmp(&depth(a)).then(a.id.cmp(&b.id)));
         order
     }
 
-    fn draw(&self, individual: &Individual, t: usize, canvas: &mut Canvas) {
-        let mut place = Placement {
-            center_px: individual.centroid_px[t],
-            rotation_rad: individual.rotation_rad[t],
-            scale: individual.scale[t],
-            mirrored: individual.mirrored[t],
+    fn draw(&self, individual: &Individual, frame_idx: usize, desk: &mut Desk) {
+        let scene = Scene {
+            sprites: &self.library.sprites,
+            view: self.view,
+            cpu: self.cpu,
         };
-        let size = [canvas.image.width, canvas.image.height];
-        self.premultiply(individual.source_frame[t], canvas);
-        canvas.main.draw(&canvas.sprite, &place, size);
-        let fade = self.fade_at[individual.id as usize][t];
-        if let Some(fade) = fade.map(|idx| &individual.fades[idx as usize]) {
-            let k = t - fade.start as usize;
-            place.rotation_rad = fade.rotation_rad[k];
-            place.mirrored = fade.mirrored;
-            self.premultiply(fade.source_frame[k], canvas);
-            canvas.second.draw(&canvas.sprite, &place, size);
-            mix(&mut canvas.main, &canvas.second, fade.weight[k] as f32);
+        let fade = self.fade_at[individual.id as usize][frame_idx];
+        let who = Appearance {
+            individual,
+            frame_idx,
+            fade: fade.map(|idx| &individual.fades[idx as usize]),
+        };
+        desk.painter.paint(&scene, &who);
+        let layer = &desk.painter.layer;
+        desk.canvas.over(layer, self.cpu);
+        if !layer.rect.is_empty() {
+            desk.dirty.push(layer.rect);
         }
-        over(&mut canvas.image, &canvas.main);
-        if !canvas.main.rect.is_empty() {
-            canvas.dirty.push(canvas.main.rect);
+        if self.with_truth {
+            let drawn = desk.painter.drawn(&scene, &who);
+            desk.drawn.push(drawn);
         }
-    }
-
-    fn premultiply(&self, frame: u32, canvas: &mut Canvas) {
-        let (sprites, idx) = (&self.library.sprites, frame as usize);
-        sprites.read(idx, &mut canvas.straight);
-        let size = [sprites.width(), sprites.height()];
-        canvas
-            .sprite
-            .fill(&canvas.straight, size, sprites.bounds(idx));
     }
 }
 
@@ -191,15 +254,6 @@ fn mark(fade_at: &mut [Option<u32>], fade: &Fade, idx: u32) {
     let start = fade.start as usize;
     for at in &mut fade_at[start..start + fade.weight.len()] {
         *at = Some(idx);
-    }
-}
-
-fn copy_box(from: &RgbImage, to: &mut RgbImage, rect: Rect) {
-    let stride = from.width as usize * 3;
-    let n = rect.w as usize * 3;
-    for y in rect.y..rect.bottom() {
-        let at = y as usize * stride + rect.x as usize * 3;
-        to.pixels[at..at + n].copy_from_slice(&from.pixels[at..at + n]);
     }
 }
 

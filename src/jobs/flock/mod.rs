@@ -1,18 +1,20 @@
-//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json`, `plan.svg` and
-//! `video.mp4`.
+//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json`, `plan.svg`,
+//! `video.mp4`, and what its `render` parameters ask for besides.
+
+pub mod film; // frames to files
+pub mod truth; // the ground truth as a folder and as one file
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use self::film::Film;
 use super::{Attempt, Context, Error, Product, Stages, clock};
-use crate::flock::{Compositor, Flock, Params, plan_flock};
+use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, library_dir, svg};
 use crate::ids::{FlockId, JobId, LibraryId};
 use crate::library::Library;
-use crate::media::{VideoFormat, VideoWriter};
 use crate::progress::Progress;
-use crate::raster::ColorSpec;
 use crate::store;
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
@@ -97,23 +99,19 @@ impl Input {
 }
 
 fn render(attempt: &Attempt, library: &Library, flock: &Flock) -> Result<(), Error> {
-    let format = VideoFormat {
-        width: flock.image_size_px[0],
-        height: flock.image_size_px[1],
-        fps: flock.fps,
-        color: ColorSpec::default(),
+    let folder = attempt.folder();
+    let film = Film {
+        library,
+        flock,
+        progress: attempt.listener,
     };
-    let mut video = VideoWriter::create(&attempt.folder().join("video.mp4"), &format)?;
-    let compositor = Compositor::with_color(library, flock, format.color);
-    let n_frames = compositor.n_frames();
-    compositor.render_all(|frame_idx, frame| {
-        if attempt.listener.cancelled() {
-            return Err(Error::Cancelled);
-        }
-        video.write(frame)?;
-        let fraction = (frame_idx + 1) as f64 / n_frames as f64;
-        attempt.listener.report("rendering", fraction);
-        Ok(())
-    })?;
-    Ok(video.finish()?)
+    let truth = folder.join("ground-truth");
+    let video = folder.join("video.mp4");
+    if !flock.params.render.ground_truth {
+        return film.make(&video, None);
+    }
+    film.make(&video, Some(&truth))?;
+    std::fs::copy(truth.join("tracks.csv"), folder.join("tracks.csv"))?;
+    truth::pack(&truth, &folder.join("ground-truth.zip"))?;
+    Ok(std::fs::remove_dir_all(&truth)?)
 }

@@ -1,0 +1,88 @@
+//! What lies behind a flock: the plate at the film's size, one color, nothing, or a given picture
+//! (ALGORITHMS.md 8); in the form of the film already, so that a frame begins with a copy.
+
+use super::params::Background;
+use super::view::View;
+use super::{Form, Shot};
+use crate::geometry::Rect;
+use crate::raster::canvas::opaque;
+use crate::raster::resize::resized;
+use crate::raster::{Canvas, Frame, RgbImage};
+
+/// A background, ready.
+pub(super) struct Backdrop {
+    /// What sprites are drawn over.
+    pub(super) canvas: Canvas,
+    frame: Frame,
+    rgba: Vec<u8>,
+}
+
+impl Backdrop {
+    /// A background that can be asked for by name.
+    pub(super) fn of(
+        background: Background,
+        plate: &RgbImage,
+        view: &View,
+        form: Form,
+    ) -> Backdrop {
+        let [width, height] = view.size_px;
+        let mut canvas = Canvas::new(width, height);
+        match background {
+            Background::Transparent => {}
+            Background::Color(rgb) => canvas.pixels.fill(opaque(rgb)),
+            Background::Plate => {
+                canvas.pixels.fill(opaque([0; 3]));
+                let rect = view.rect();
+                let plate = Canvas::of_rgb(&resized(plate, rect.w, rect.h));
+                canvas.put(&plate, rect);
+            }
+        }
+        Backdrop::ready(canvas, form)
+    }
+
+    /// A picture that fills the film: its middle, where it has another shape.
+    pub(super) fn picture(picture: &RgbImage, [width, height]: [u32; 2], form: Form) -> Backdrop {
+        let scale = (f64::from(width) / f64::from(picture.width))
+            .max(f64::from(height) / f64::from(picture.height));
+        let side = |px: u32, least: u32| ((f64::from(px) * scale).round() as u32).max(least);
+        let large = resized(
+            picture,
+            side(picture.width, width),
+            side(picture.height, height),
+        );
+        let (left, top) = ((large.width - width) / 2, (large.height - height) / 2);
+        let mut middle = RgbImage::new(width, height);
+        let n = width as usize * 3;
+        for (y, row) in (top as usize..).zip(middle.pixels.chunks_exact_mut(n)) {
+            let at = (y * large.width as usize + left as usize) * 3;
+            row.copy_from_slice(&large.pixels[at..at + n]);
+        }
+        Backdrop::ready(Canvas::of_rgb(&middle), form)
+    }
+
+    fn ready(canvas: Canvas, form: Form) -> Backdrop {
+        let whole = Rect::of_size(canvas.width, canvas.height);
+        let mut backdrop = Backdrop {
+            frame: Frame::default(),
+            rgba: Vec::new(),
+            canvas,
+        };
+        match form {
+            Form::Planar(color) => {
+                backdrop.frame = Frame::new(whole.w, whole.h, color);
+                backdrop.frame.draw_canvas(&backdrop.canvas, whole);
+            }
+            Form::Straight => {
+                backdrop.rgba = vec![0; whole.area() as usize * 4];
+                backdrop.canvas.straight_into(whole, &mut backdrop.rgba);
+            }
+        }
+        backdrop
+    }
+
+    /// Makes a shot what it is before anybody is drawn.
+    pub(super) fn begin(&self, shot: &mut Shot) {
+        shot.frame.clone_from(&self.frame);
+        shot.rgba.clone_from(&self.rgba);
+    }
+}
