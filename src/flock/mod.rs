@@ -50,6 +50,23 @@ pub struct Flock {
     pub stats: Stats,
 }
 
+impl Flock {
+    /// Whether it can be filmed with a library: every frame that it shows has its sprite there, and its
+    /// tracks are of one length.
+    pub fn fits(&self, library: &Library) -> bool {
+        let n_frames = self.params.frames as usize;
+        let sprites = &library.sprites;
+        let exists = |&frame: &u32| (frame as usize) < sprites.n_frames();
+        self.image_size_px == library.poses.image_size_px
+            && (0..).zip(&self.individuals).all(|(id, individual)| {
+                individual.id == id
+                    && individual.is_complete(n_frames)
+                    && individual.source_frame.iter().all(exists)
+                    && (individual.fades.iter()).all(|fade| fade.source_frame.iter().all(exists))
+            })
+    }
+}
+
 /// Simulates, plans and places a flock of the library's animal.
 pub fn plan_flock(
     library: &Library,

@@ -4,6 +4,7 @@
 pub mod csv;
 pub mod distance_map;
 pub mod flock_json;
+pub mod flock_overlay;
 pub mod glb;
 pub mod ground_truth;
 pub mod library_dir;

@@ -1,7 +1,9 @@
-//! Pictures as PNG bytes and back: plates, sprites, maps. Fast deflate: files are many and small.
+//! Pictures as PNG bytes and back: plates, sprites, maps, labels; posters as JPEG. Fast deflate: files are many and small.
 
 use std::io::Cursor;
 
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 use png::{BitDepth, ColorType, Compression};
 
 use crate::raster::{RgbImage, RgbaImage};
@@ -49,6 +51,21 @@ pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
         (ColorType::Grayscale, BitDepth::Sixteen),
         &bytes,
     )
+}
+
+/// An RGB image as JPEG, for posters.
+pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 90);
+    encoder
+        .encode(
+            &image.pixels,
+            image.width,
+            image.height,
+            ExtendedColorType::Rgb8,
+        )
+        .expect("writing to memory fails only for a wrong number of pixels");
+    bytes
 }
 
 /// Reads an 8-bit RGB PNG.

@@ -75,12 +75,16 @@ impl Canvas {
         }
     }
 
-    /// The box as straight-alpha RGBA, into a picture of the canvas's size.
+    /// The box as straight-alpha RGBA, into a picture of the canvas's size; a pixel without alpha keeps
+    /// the color that the picture has there.
     pub fn straight_into(&self, rect: Rect, rgba: &mut [u8]) {
         for row in self.rows(rect) {
             let out = &mut rgba[row.start * 4..row.end * 4];
             for (out, pixel) in out.chunks_exact_mut(4).zip(&self.pixels[row]) {
-                out.copy_from_slice(&straight(*pixel));
+                match pixel[3] {
+                    0 => out[3] = 0,
+                    _ => out.copy_from_slice(&straight(*pixel)),
+                }
             }
         }
     }
@@ -213,7 +217,7 @@ mod tests {
         canvas.over(&quarter, Level::detect());
         let mut rgba = vec![9; 8];
         canvas.straight_into(Rect::of_size(2, 1), &mut rgba);
-        assert_eq!(rgba, [200, 100, 40, 64, 0, 0, 0, 0]);
+        assert_eq!(rgba, [200, 100, 40, 64, 9, 9, 9, 0]);
     }
 
     proptest! {

@@ -13,6 +13,8 @@ use crate::raster::{Canvas, Frame, RgbImage};
 pub(super) struct Backdrop {
     /// What sprites are drawn over.
     pub(super) canvas: Canvas,
+    /// Whether there is nothing behind.
+    pub(super) is_clear: bool,
     frame: Frame,
     rgba: Vec<u8>,
 }
@@ -37,32 +39,23 @@ impl Backdrop {
                 canvas.put(&plate, rect);
             }
         }
-        Backdrop::ready(canvas, form)
+        let mut backdrop = Backdrop::ready(canvas, form);
+        if background == Background::Transparent {
+            backdrop.is_clear = true;
+            backdrop.hide(mean(plate));
+        }
+        backdrop
     }
 
-    /// A picture that fills the film: its middle, where it has another shape.
-    pub(super) fn picture(picture: &RgbImage, [width, height]: [u32; 2], form: Form) -> Backdrop {
-        let scale = (f64::from(width) / f64::from(picture.width))
-            .max(f64::from(height) / f64::from(picture.height));
-        let side = |px: u32, least: u32| ((f64::from(px) * scale).round() as u32).max(least);
-        let large = resized(
-            picture,
-            side(picture.width, width),
-            side(picture.height, height),
-        );
-        let (left, top) = ((large.width - width) / 2, (large.height - height) / 2);
-        let mut middle = RgbImage::new(width, height);
-        let n = width as usize * 3;
-        for (y, row) in (top as usize..).zip(middle.pixels.chunks_exact_mut(n)) {
-            let at = (y * large.width as usize + left as usize) * 3;
-            row.copy_from_slice(&large.pixels[at..at + n]);
-        }
-        Backdrop::ready(Canvas::of_rgb(&middle), form)
+    /// A picture that fills the film.
+    pub(super) fn picture(picture: &RgbImage, size_px: [u32; 2], form: Form) -> Backdrop {
+        Backdrop::ready(filling(picture, size_px), form)
     }
 
     fn ready(canvas: Canvas, form: Form) -> Backdrop {
         let whole = Rect::of_size(canvas.width, canvas.height);
         let mut backdrop = Backdrop {
+            is_clear: false,
             frame: Frame::default(),
             rgba: Vec::new(),
             canvas,
@@ -80,9 +73,68 @@ impl Backdrop {
         backdrop
     }
 
+    /// Gives transparent pixels a color, which nobody sees but a codec that cannot keep pixels apart.
+    fn hide(&mut self, rgb: [u8; 3]) {
+        for pixel in self.rgba.chunks_exact_mut(4) {
+            pixel[..3].copy_from_slice(&rgb);
+        }
+    }
+
     /// Makes a shot what it is before anybody is drawn.
     pub(super) fn begin(&self, shot: &mut Shot) {
         shot.frame.clone_from(&self.frame);
         shot.rgba.clone_from(&self.rgba);
+    }
+}
+
+/// A picture as it fills a film: its middle, where it has another shape.
+pub(super) fn filling(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
+    let scale = (f64::from(width) / f64::from(picture.width))
+        .max(f64::from(height) / f64::from(picture.height));
+    let side = |px: u32, least: u32| ((f64::from(px) * scale).round() as u32).max(least);
+    let large = resized(
+        picture,
+        side(picture.width, width),
+        side(picture.height, height),
+    );
+    let (left, top) = ((large.width - width) / 2, (large.height - height) / 2);
+    let mut middle = RgbImage::new(width, height);
+    let n = width as usize * 3;
+    for (y, row) in (top as usize..).zip(middle.pixels.chunks_exact_mut(n)) {
+        let at = (y * large.width as usize + left as usize) * 3;
+        row.copy_from_slice(&large.pixels[at..at + n]);
+    }
+    Canvas::of_rgb(&middle)
+}
+
+/// A picture's mean color.
+pub(super) fn mean(picture: &RgbImage) -> [u8; 3] {
+    let mut sum = [0u64; 3];
+    for pixel in picture.pixels.chunks_exact(3) {
+        for (sum, &value) in sum.iter_mut().zip(pixel) {
+            *sum += u64::from(value);
+        }
+    }
+    let n = (picture.pixels.len() as u64 / 3).max(1);
+    sum.map(|sum| (sum / n) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::canvas::straight;
+
+    #[test]
+    fn a_picture_of_another_shape_fills_the_film_with_its_middle() {
+        let mut picture = RgbImage::new(40, 20);
+        for y in 0..20 {
+            for x in 0..40 {
+                picture.set_pixel(x, y, [(x * 6) as u8, 50, 60]);
+            }
+        }
+        let canvas = filling(&picture, [20, 20]);
+        let at = |x: usize| straight(canvas.pixels[10 * 20 + x]);
+        assert_eq!((at(0), at(19)), ([60, 50, 60, 255], [174, 50, 60, 255]));
+        assert_eq!(mean(&picture), [117, 50, 60]);
     }
 }

@@ -7,6 +7,7 @@
 //! truth comes from the same layers.
 
 mod backdrop; // what lies behind
+mod bleed; // color beyond the edges of alpha
 mod layer; // one individual in one frame
 pub mod params;
 pub mod truth; // what of whom can be seen
@@ -17,6 +18,7 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use self::backdrop::Backdrop;
+use self::bleed::bleed;
 use self::layer::{Appearance, Painter, Scene};
 use self::params::Background;
 use self::truth::{Drawn, FrameTruth};
@@ -36,6 +38,7 @@ pub struct Compositor<'a> {
     with_truth: bool,
     backdrop: Backdrop,
     cpu: Level,
+    n_frames: usize,
     /// Per individual and output frame: which of its fades concerns it.
     fade_at: Vec<Vec<Option<u32>>>,
     desks: Mutex<Vec<Desk>>,
@@ -59,6 +62,8 @@ pub struct Shot {
     pub rgba: Vec<u8>,
     /// What of whom can be seen, where that was asked for.
     pub truth: FrameTruth,
+    /// What lies behind this frame alone, filling the film; empty = the film's own backdrop.
+    pub behind: Frame,
 }
 
 /// What one thread draws on and with, kept from frame to frame.
@@ -89,6 +94,7 @@ impl<'a> Compositor<'a> {
             with_truth: false,
             backdrop: Backdrop::of(background, &library.background, &view, form),
             cpu: Level::detect(),
+            n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
             desks: Mutex::default(),
         }
@@ -119,12 +125,15 @@ impl<'a> Compositor<'a> {
         self
     }
 
+    /// The same, but no more than `n_frames` of it.
+    pub fn first(mut self, n_frames: usize) -> Compositor<'a> {
+        self.n_frames = self.n_frames.min(n_frames);
+        self
+    }
+
     /// Frames of the film.
     pub fn n_frames(&self) -> usize {
-        self.flock
-            .individuals
-            .first()
-            .map_or(0, |individual| individual.source_frame.len())
+        self.n_frames
     }
 
     /// Width and height of the film.
@@ -135,9 +144,7 @@ impl<'a> Compositor<'a> {
     /// Draws one frame.
     pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
         let mut desk = self.take_desk();
-        for rect in std::mem::take(&mut desk.dirty) {
-            desk.canvas.copy_box(&self.backdrop.canvas, rect);
-        }
+        self.clean(&mut desk, shot);
         desk.drawn.clear();
         for individual in self.far_to_near(frame_idx) {
             self.draw(individual, frame_idx, &mut desk);
@@ -145,6 +152,28 @@ impl<'a> Compositor<'a> {
         if self.with_truth {
             shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);
         }
+        self.develop(&mut desk, shot);
+        self.desks
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .push(desk);
+    }
+
+    /// Makes a desk's canvas what lies behind the shot.
+    fn clean(&self, desk: &mut Desk, shot: &Shot) {
+        let dirty = std::mem::take(&mut desk.dirty);
+        if shot.behind.planes.is_empty() {
+            for rect in dirty {
+                desk.canvas.copy_box(&self.backdrop.canvas, rect);
+            }
+        } else {
+            desk.canvas = backdrop::filling(&shot.behind.to_rgb(), self.view.size_px);
+            desk.dirty.push(self.view.whole());
+        }
+    }
+
+    /// Turns what is on the desk into the form asked for.
+    fn develop(&self, desk: &mut Desk, shot: &mut Shot) {
         merge_overlapping(&mut desk.dirty);
         self.backdrop.begin(shot);
         for &rect in &desk.dirty {
@@ -153,39 +182,43 @@ impl<'a> Compositor<'a> {
                 Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
             }
         }
-        self.desks
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(desk);
+        if self.form == Form::Straight && self.backdrop.is_clear {
+            for &rect in &desk.dirty {
+                bleed(&mut shot.rgba, self.view.size_px, rect);
+            }
+        }
     }
 
-    /// Draws every frame in order on all threads and gives each to `sink`, which may refuse: then
-    /// its error comes back. While one batch is taken, the next is drawn.
+    /// Draws every frame in order on all threads and gives each to `sink`. Before a frame is drawn
+    /// `prepare` may say what lies behind it. Either may refuse: then its error comes back. While one
+    /// batch is taken, the next is drawn.
     pub fn render_all<E: Send>(
         &self,
+        mut prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
         mut sink: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
     ) -> Result<(), E> {
         let batch = 2 * rayon::current_num_threads();
+        let n_frames = self.n_frames;
         let draw = |from: usize, shots: &mut [Shot]| {
             let indexed = shots.par_iter_mut().enumerate();
-            indexed.for_each(|(k, shot)| {
-                if from + k < self.n_frames() {
-                    self.render(from + k, shot);
-                }
-            });
+            indexed.for_each(|(k, shot)| self.render(from + k, shot));
+        };
+        let n_in = |from: usize| batch.min(n_frames.saturating_sub(from));
+        let mut prepare_all = |from: usize, shots: &mut [Shot]| {
+            (from..)
+                .zip(shots)
+                .try_for_each(|(k, shot)| prepare(k, shot))
         };
         let mut ready = vec![Shot::default(); batch];
         let mut coming = vec![Shot::default(); batch];
-        draw(0, &mut ready);
-        for from in (0..self.n_frames()).step_by(batch) {
-            let n_ready = batch.min(self.n_frames() - from);
+        prepare_all(0, &mut ready[..n_in(0)])?;
+        draw(0, &mut ready[..n_in(0)]);
+        for from in (0..n_frames).step_by(batch) {
+            let (taken, next) = (&ready[..n_in(from)], &mut coming[..n_in(from + batch)]);
+            prepare_all(from + batch, next)?;
             let (taken, ()) = rayon::join(
-                || {
-                    (from..)
-                        .zip(&ready[..n_ready])
-                        .try_for_each(|(k, f)| sink(k, f))
-                },
-                || draw(from + batch, &mut coming),
+                || (from..).zip(taken).try_for_each(|(k, shot)| sink(k, shot)),
+                || draw(from + batch, next),
             );
             taken?;
             std::mem::swap(&mut ready, &mut coming);

@@ -6,6 +6,11 @@ use crate::flock::{Params, plan_flock};
 use crate::library::View;
 use crate::progress::Silent;
 
+/// Nothing lies behind one frame alone.
+fn unprepared<E>(_: usize, _: &mut Shot) -> Result<(), E> {
+    Ok(())
+}
+
 fn flock(library: &Library, name: &str) -> Flock {
     let params = Params {
         count: 8,
@@ -21,7 +26,7 @@ fn frames_in_any_order_are_those_of_the_film() {
     let flock = flock(&library, "school");
     let film = Compositor::new(&library, &flock);
     let mut frames = Vec::new();
-    film.render_all(|idx, shot: &Shot| {
+    film.render_all(unprepared, |idx, shot: &Shot| {
         assert_eq!(idx, frames.len());
         frames.push(shot.frame.clone());
         Ok::<(), ()>(())
@@ -41,7 +46,10 @@ fn the_error_of_whoever_takes_the_frames_comes_back() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "school");
     let film = Compositor::new(&library, &flock);
-    let taken = film.render_all(|idx, _| if idx == 5 { Err("full") } else { Ok(()) });
+    let taken = film.render_all(
+        unprepared,
+        |idx, _| if idx == 5 { Err("full") } else { Ok(()) },
+    );
     assert_eq!(taken, Err("full"));
 }
 
@@ -89,7 +97,7 @@ fn overlapping_boxes_are_merged_and_those_apart_kept() {
 fn shots(library: &Library, flock: &Flock) -> Vec<Shot> {
     let film = Compositor::new(library, flock).with_truth();
     let mut shots = Vec::new();
-    film.render_all(|_, shot: &Shot| {
+    film.render_all(unprepared, |_, shot: &Shot| {
         shots.push(shot.clone());
         Ok::<(), ()>(())
     })
