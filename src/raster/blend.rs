@@ -17,6 +17,21 @@ pub fn mix(main: &mut Resampled, second: &Resampled, weight: f64, memory: &mut V
     std::mem::swap(&mut main.pixels, memory);
 }
 
+/// Lets only `share` of a layer's color through (0..=1) and puts another, of alpha 1, in the place of the
+/// rest; alpha stays.
+pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
+    let kept = (share * 32767.0).round() as i16;
+    for pixel in &mut layer.pixels {
+        let alpha = pixel[3];
+        for channel in 0..3 {
+            // Twice, because a color goes to 16384 and a weight to 32768.
+            let whole = (2 * i32::from(color[channel])).min(32767) as i16;
+            let veil = scaled(scaled(alpha, whole), 32767 - kept);
+            pixel[channel] = (scaled(pixel[channel], kept) + veil).min(alpha);
+        }
+    }
+}
+
 fn add(pixels: &mut [Quad], rect: Rect, layer: &Resampled, weight: i16) {
     if layer.rect.is_empty() {
         return;
@@ -62,6 +77,23 @@ mod tests {
             .zip(before.pixels.iter().flatten())
         {
             assert!(a.abs_diff(*b) <= 1, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn haze_takes_the_color_and_leaves_the_alpha() {
+        let white = [16384; 4];
+        let half = [8192, 4096, 0, 8192];
+        for (share, want) in [
+            (1.0, half),
+            (0.0, [8192; 4]),
+            (0.5, [8192, 6144, 4096, 8192]),
+        ] {
+            let mut found = layer(Rect::of_size(1, 1), half);
+            haze(&mut found, share, white);
+            for (a, b) in found.pixels[0].iter().zip(want) {
+                assert!(a.abs_diff(b) <= 2, "{share}: {:?}", found.pixels);
+            }
         }
     }
 

@@ -1,12 +1,15 @@
 //! One individual as it is drawn into one frame: its sprite placed, and around a jump the second one
 //! faded in or out (ALGORITHMS.md 8).
 
+use super::morph::bend;
+use super::params::Cut;
+use super::shadow::Floor;
 use super::truth::{Drawn, Whole};
 use super::view::View;
 use crate::cpu::Level;
 use crate::flock::individual::{Fade, Individual};
 use crate::library::Sprites;
-use crate::raster::blend::mix;
+use crate::raster::blend::{haze, mix};
 use crate::raster::resample::{Placement, Premultiplied, Quad, Resampled};
 
 /// What drawing needs besides the individual.
@@ -15,6 +18,17 @@ pub(super) struct Scene<'a> {
     pub(super) sprites: &'a Sprites,
     pub(super) view: View,
     pub(super) cpu: Level,
+    pub(super) cut: Cut,
+    pub(super) haze: Option<Haze>,
+}
+
+/// What is lost with distance.
+#[derive(Clone, Copy)]
+pub(super) struct Haze {
+    /// The share that is left after each pixel of depth.
+    pub(super) left_per_px: f64,
+    /// What takes the place of the rest.
+    pub(super) color: Quad,
 }
 
 /// One individual at one frame.
@@ -40,6 +54,19 @@ impl Painter {
     /// Draws an individual's layer for a picture of the film.
     pub(super) fn paint(&mut self, scene: &Scene, who: &Appearance) {
         self.paint_shifted(scene, who, scene.view.size_px, [0.0; 2]);
+        if let Some(veil) = scene.haze {
+            let depth_px = who.individual.boid.position_px[who.frame_idx][2].max(0.0);
+            haze(
+                &mut self.layer,
+                libm::pow(veil.left_per_px, depth_px),
+                veil.color,
+            );
+        }
+    }
+
+    /// Draws the shadow of an individual in place of it.
+    pub(super) fn shade(&mut self, floor: &Floor, scene: &Scene, who: &Appearance) {
+        floor.draw(who, &scene.view, &mut self.layer);
     }
 
     /// What was painted last, as the ground truth needs it.
@@ -99,6 +126,9 @@ impl Painter {
         place.mirrored = fade.mirrored;
         self.take(scene, fade.source_frame[k], place.scale);
         self.second.draw(&self.sprite, &place, size, scene.cpu);
+        if scene.cut == Cut::Morph {
+            bend(&mut self.layer, &mut self.second, fade.weight[k]);
+        }
         mix(
             &mut self.layer,
             &self.second,

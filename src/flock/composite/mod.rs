@@ -9,7 +9,9 @@
 mod backdrop; // what lies behind
 mod bleed; // color beyond the edges of alpha
 mod layer; // one individual in one frame
+mod morph; // two sprites bent to each other at a jump
 pub mod params;
+mod shadow; // on the floor
 pub mod truth; // what of whom can be seen
 mod view; // from pixels of the footage to those of the film
 
@@ -19,14 +21,16 @@ use rayon::prelude::*;
 
 use self::backdrop::Backdrop;
 use self::bleed::bleed;
-use self::layer::{Appearance, Painter, Scene};
+use self::layer::{Appearance, Haze, Painter, Scene};
 use self::params::Background;
+use self::shadow::Floor;
 use self::truth::{Drawn, FrameTruth};
 use self::view::View;
 use super::individual::{Fade, Individual};
 use super::{Flock, Library};
 use crate::cpu::Level;
 use crate::geometry::Rect;
+use crate::raster::canvas::opaque;
 use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock, any of them from any thread.
@@ -37,6 +41,8 @@ pub struct Compositor<'a> {
     form: Form,
     with_truth: bool,
     backdrop: Backdrop,
+    haze: Option<Haze>,
+    floor: Option<Floor>,
     cpu: Level,
     n_frames: usize,
     /// Per individual and output frame: which of its fades concerns it.
@@ -86,6 +92,7 @@ impl<'a> Compositor<'a> {
             other => other,
         };
         let form = Form::Planar(ColorSpec::default());
+        let floor = Floor::of(library, flock.length_px, render.shadow);
         Compositor {
             library,
             flock,
@@ -93,6 +100,11 @@ impl<'a> Compositor<'a> {
             form,
             with_truth: false,
             backdrop: Backdrop::of(background, &library.background, &view, form),
+            haze: (render.haze_per_bl > 0.0).then(|| Haze {
+                left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
+                color: opaque(backdrop::mean(&library.background)),
+            }),
+            floor: (render.shadow > 0.0).then_some(floor),
             cpu: Level::detect(),
             n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
@@ -146,8 +158,14 @@ impl<'a> Compositor<'a> {
         let mut desk = self.take_desk();
         self.clean(&mut desk, shot);
         desk.drawn.clear();
-        for individual in self.far_to_near(frame_idx) {
-            self.draw(individual, frame_idx, &mut desk);
+        let order = self.far_to_near(frame_idx);
+        if let Some(floor) = &self.floor {
+            for individual in &order {
+                self.shade(floor, self.appearance(individual, frame_idx), &mut desk);
+            }
+        }
+        for individual in order {
+            self.draw(self.appearance(individual, frame_idx), &mut desk);
         }
         if self.with_truth {
             shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);
@@ -240,37 +258,57 @@ impl<'a> Compositor<'a> {
         })
     }
 
-    fn far_to_near(&self, frame_idx: usize) -> Vec<&Individual> {
+    fn far_to_near(&self, frame_idx: usize) -> Vec<&'a Individual> {
         let depth = |individual: &&Individual| match &individual.depth_m {
             Some(depth_m) => depth_m[frame_idx],
             None => individual.boid.position_px[frame_idx][2],
         };
-        let mut order: Vec<&Individual> = self.flock.individuals.iter().collect();
+        let mut order: Vec<&'a Individual> = self.flock.individuals.iter().collect();
         order.sort_by(|a, b| depth(b).total_cmp(&depth(a)).then(a.id.cmp(&b.id)));
         order
     }
 
-    fn draw(&self, individual: &Individual, frame_idx: usize, desk: &mut Desk) {
-        let scene = Scene {
-            sprites: &self.library.sprites,
-            view: self.view,
-            cpu: self.cpu,
-        };
+    fn appearance(&self, individual: &'a Individual, frame_idx: usize) -> Appearance<'a> {
         let fade = self.fade_at[individual.id as usize][frame_idx];
-        let who = Appearance {
+        Appearance {
             individual,
             frame_idx,
             fade: fade.map(|idx| &individual.fades[idx as usize]),
-        };
-        desk.painter.paint(&scene, &who);
-        let layer = &desk.painter.layer;
-        desk.canvas.over(layer, self.cpu);
-        if !layer.rect.is_empty() {
-            desk.dirty.push(layer.rect);
         }
+    }
+
+    fn scene(&self) -> Scene<'a> {
+        Scene {
+            sprites: &self.library.sprites,
+            view: self.view,
+            cpu: self.cpu,
+            cut: self.flock.params.render.cut,
+            haze: self.haze,
+        }
+    }
+
+    fn draw(&self, who: Appearance, desk: &mut Desk) {
+        desk.painter.paint(&self.scene(), &who);
+        desk.put(self.cpu);
         if self.with_truth {
-            let drawn = desk.painter.drawn(&scene, &who);
+            let drawn = desk.painter.drawn(&self.scene(), &who);
             desk.drawn.push(drawn);
+        }
+    }
+
+    fn shade(&self, floor: &Floor, who: Appearance, desk: &mut Desk) {
+        desk.painter.shade(floor, &self.scene(), &who);
+        desk.put(self.cpu);
+    }
+}
+
+impl Desk {
+    /// Puts what the painter has drawn over the canvas.
+    fn put(&mut self, cpu: Level) {
+        let layer = &self.painter.layer;
+        self.canvas.over(layer, cpu);
+        if !layer.rect.is_empty() {
+            self.dirty.push(layer.rect);
         }
     }
 }

@@ -80,7 +80,7 @@ impl Coding {
                 // With alpha there may be no hidden reference frames: the two layers would part.
                 format!(
                     "-vf {} -c:v libvpx-vp9 -deadline realtime -cpu-used 5 -row-mt 1 -threads 4 \
-                     -auto-alt-ref 0 -crf 20 -b:v 0 -f webm",
+                     -auto-alt-ref 0 -crf 26 -b:v 0 -f webm",
                     from_rgba(planes)
                 )
             }
@@ -97,8 +97,8 @@ impl Coding {
                 "-vf {SMALL} -c:v libwebp_anim -quality 75 -compression_level 3 -loop 0 -f webp"
             ),
             Coding::Gif => format!(
-                "-vf {SMALL},split[a][b];[a]palettegen=stats_mode=diff[p];\
-                 [b][p]paletteuse=dither=sierra2_4a:diff_mode=rectangle -c:v gif -loop 0 -f gif"
+                "-vf {SMALL},split[a][b];[a]palettegen=stats_mode=full[p];\
+                 [b][p]paletteuse=dither=bayer:bayer_scale=4 -c:v gif -loop 0 -f gif"
             ),
         }
     }
