@@ -66,6 +66,8 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	target/bench-venv/bin/python bench/distance.py
 	python3 bench/transitions.py
 	python3 bench/plan.py
+	@test -d target/demo/library || $(MAKE) --no-print-directory demo
+	python3 bench/render.py target/demo/library $(RELEASE)
 
 accuracy: build ## the poses against the truth of a film generator: make accuracy GENERATOR=goldfish.py
 	python3 bench/accuracy.py $(RELEASE) $(GENERATOR)

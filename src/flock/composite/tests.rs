@@ -1,5 +1,6 @@
 //! What the film shows: whole sprites as they are, no boxes, the same from any thread.
 
+use super::params::Cut;
 use super::*;
 use crate::flock::synthetic;
 use crate::flock::{Params, plan_flock};
@@ -188,4 +189,102 @@ fn at_another_size_the_truth_is_the_same_but_larger() {
             assert!((ratio - 4.0).abs() < 0.4, "{ratio}");
         }
     }
+}
+
+#[test]
+fn shadow_and_haze_change_the_picture_and_not_the_truth() {
+    for view in [View::Side, View::Top] {
+        let library = synthetic::library(view);
+        let mut flock = flock(&library, "school");
+        let plain = shots(&library, &flock);
+        flock.params.render.shadow = 0.6;
+        flock.params.render.haze_per_bl = 0.3;
+        for individual in &mut flock.individuals {
+            for place in &mut individual.boid.position_px {
+                place[2] += 40.0;
+            }
+        }
+        let other = shots(&library, &flock);
+        let darker = |a: &Shot, b: &Shot| {
+            let pairs = a.frame.luma().iter().zip(b.frame.luma());
+            pairs.filter(|(a, b)| **b + 10 < **a).count()
+        };
+        for (plain, other) in plain.iter().zip(&other) {
+            assert!(plain.truth == other.truth);
+            assert!(darker(plain, other) > 300);
+        }
+    }
+}
+
+#[test]
+fn what_is_filmed_on_nothing_gives_over_the_plate_the_film() {
+    let library = synthetic::library(View::Side);
+    let mut flock = flock(&library, "swarm");
+    flock.params.render.background = Background::Transparent;
+    let (mut opaque, mut clear) = (Shot::default(), Shot::default());
+    Compositor::new(&library, &flock).render(11, &mut opaque);
+    Compositor::new(&library, &flock)
+        .straight()
+        .render(11, &mut clear);
+    let film = opaque.frame.to_rgb();
+    let (mut error, mut n_clear) = (0u64, 0);
+    for (k, rgba) in clear.rgba.chunks_exact(4).enumerate() {
+        n_clear += usize::from(rgba[3] == 0);
+        for channel in 0..3 {
+            let plate = u32::from(library.background.pixels[3 * k + channel]);
+            let alpha = u32::from(rgba[3]);
+            let shown = (u32::from(rgba[channel]) * alpha + plate * (255 - alpha)) / 255;
+            error += u64::from((shown as u8).abs_diff(film.pixels[3 * k + channel]));
+        }
+    }
+    assert!(n_clear > 320 * 240 / 2, "{n_clear}");
+    // Chroma is halved on the way through the planes; nothing else differs.
+    let mean = error as f64 / (3.0 * 320.0 * 240.0);
+    assert!(mean < 2.0, "{mean}");
+}
+
+#[test]
+fn a_frame_of_another_film_lies_behind_where_it_is_given() {
+    let library = synthetic::library(View::Top);
+    let flock = flock(&library, "school");
+    let mut behind = Frame::new(64, 48, ColorSpec::default());
+    behind.planes.fill(128);
+    let mut shot = Shot {
+        behind,
+        ..Shot::default()
+    };
+    let film = Compositor::new(&library, &flock).with_truth();
+    film.render(9, &mut shot);
+    let n_gray = (shot.frame.luma().iter().zip(&shot.truth.labels))
+        .filter(|(luma, label)| **label == 0 && luma.abs_diff(128) <= 1)
+        .count();
+    assert!(n_gray > 320 * 240 / 2, "{n_gray}");
+    // Without one the plate is back.
+    let mut plain = Shot::default();
+    film.render(9, &mut plain);
+    let mut fresh = Shot::default();
+    Compositor::new(&library, &flock).render(9, &mut fresh);
+    assert!(plain.frame == fresh.frame);
+}
+
+#[test]
+fn bending_at_jumps_moves_no_more_than_the_pixels_of_a_fade() {
+    let library = synthetic::library(View::Side);
+    let mut flock = flock(&library, "swarm");
+    let faded = shots(&library, &flock);
+    flock.params.render.cut = Cut::Morph;
+    let bent = shots(&library, &flock);
+    let mut n_other = 0;
+    for (t, (a, b)) in faded.iter().zip(&bent).enumerate() {
+        let at = t as u32;
+        let during =
+            |fade: &Fade| (fade.start..fade.start + fade.weight.len() as u32).contains(&at);
+        let is_fading = (flock.individuals.iter()).any(|one| one.fades.iter().any(during));
+        assert!(is_fading || a.frame == b.frame, "frame {t}");
+        n_other += usize::from(a.frame != b.frame);
+        for (a, b) in a.truth.seen.iter().zip(&b.truth.seen) {
+            assert!(a.amodal_area.abs_diff(b.amodal_area) < a.amodal_area / 4 + 8);
+        }
+    }
+    assert!(n_other > 0, "no jump was bridged");
 }

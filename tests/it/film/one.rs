@@ -1,23 +1,23 @@
 //! A flock of one that swims where the filmed animal swam, without a jump, is the footage again
-//! (ALGORITHMS.md 8): mean absolute error in the animal's box below 2 of 255, resampling, matte and plate
-//! all included. The film has no noise, which no plate could have foreseen.
+//! (ALGORITHMS.md 8): mean absolute error in the animal's box below 2 of 255 over the film and below 3
+//! in every frame, resampling, halved chroma, matte and plate all included. The film has no noise, which no plate could have foreseen.
 
 use flockreel::flock::{BoidTrack, Compositor, Flock, Individual, Params, PlanCost, Shot, Stats};
 use flockreel::footage::FrameSource;
 use flockreel::library::Library;
 use flockreel::raster::{Frame, RgbImage};
 
-use super::sample::filmed_with;
+use super::sample::filmed_without_noise;
 
 #[test]
 fn a_flock_of_one_along_its_own_path_is_the_footage() {
-    let (film, library, _) = &filmed_with(0.0);
+    let (film, library, _) = filmed_without_noise();
     let (first, n_frames) = longest_run(library);
     assert!(n_frames > 100, "{n_frames}");
     let flock = along_its_own_path(library, first, n_frames);
     let compositor = Compositor::new(library, &flock).with_truth();
     let (mut stream, mut frame) = (film.open().unwrap(), Frame::default());
-    let mut shot = Shot::default();
+    let (mut shot, mut errors) = (Shot::default(), Vec::new());
     for frame_idx in 0..first + n_frames {
         stream.next_frame(&mut frame).unwrap().expect("a frame");
         let Some(t) = frame_idx.checked_sub(first) else {
@@ -25,8 +25,8 @@ fn a_flock_of_one_along_its_own_path_is_the_footage() {
         };
         compositor.render(t, &mut shot);
         let error = error_in_box(library, frame_idx, &shot.frame.to_rgb(), &frame.to_rgb());
-        assert!(error < 2.0, "frame {frame_idx}: {error}");
-        // Shifted by two pixels it would not be.
+        assert!(error < 3.0, "frame {frame_idx}: {error}");
+        errors.push(error);
         let seen = &shot.truth.seen[0];
         let [x, y, w, h] = seen.amodal_box.unwrap();
         let known = library.poses.frames[frame_idx].box_px.unwrap();
@@ -39,6 +39,8 @@ fn a_flock_of_one_along_its_own_path_is_the_footage() {
             );
         }
     }
+    let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+    assert!(mean < 2.0, "{mean}");
 }
 
 /// The longest run of whole sprites: its first frame, and how many.

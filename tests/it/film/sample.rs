@@ -26,8 +26,13 @@ pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
     FILMED.get_or_init(|| filmed_with(SampleParams::default().noise))
 }
 
-/// The sample with so much noise, and what the analysis made of it.
-pub(super) fn filmed_with(noise: f64) -> (SampleFilm, Library, analysis::Params) {
+/// The same without noise: what is there can be told from what is added.
+pub(super) fn filmed_without_noise() -> &'static (SampleFilm, Library, analysis::Params) {
+    static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
+    FILMED.get_or_init(|| filmed_with(0.0))
+}
+
+fn filmed_with(noise: f64) -> (SampleFilm, Library, analysis::Params) {
     let params = SampleParams {
         n_frames: N_FRAMES,
         noise,
