@@ -93,9 +93,8 @@ fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting, image
         scale: 1.0,
         mirrored: false,
     };
-    let mut matte = Premultiplied::default();
     let whole = Rect::of_size(image.width, image.height);
-    matte.fill(&image.pixels, [image.width, image.height], whole, 1.0);
+    let matte = Premultiplied::of(&image.pixels, [image.width, image.height], whole, 1.0);
     let mut placed = Resampled::default();
     placed.draw(&matte, &place, [width, height], Level::detect());
     let rows = placed.pixels.chunks_exact(placed.rect.w.max(1) as usize);
