@@ -32,8 +32,10 @@ pub struct Individual {
 /// Where a boid was and what it did.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct BoidTrack {
-    /// x, y in the picture, and z away from the viewer, all in pixels.
+    /// x, y in the picture, and z behind the front of the tank; all in pixels, z at the flock's body length.
     pub position_px: Vec<[f64; 3]>,
+    /// Direction of its motion in space, a unit vector; only where the tank has depth.
+    pub forward: Option<Vec<[f64; 3]>>,
     /// Direction of its motion in the picture.
     pub heading_rad: Vec<f64>,
     /// Speed in the picture, body lengths a second.
@@ -51,6 +53,8 @@ pub struct Fade {
     pub mirrored: bool,
     /// Its rotation.
     pub rotation_rad: Vec<f64>,
+    /// Its size relative to the footage.
+    pub scale: Vec<f64>,
     /// Its weight at each frame, 0..=1; the main sprite has the rest.
     pub weight: Vec<f64>,
 }

@@ -89,13 +89,17 @@ struct FadeFile {
     source_frame: Vec<u32>,
     mirrored: bool,
     rotation_rad: Vec<f64>,
+    scale: Vec<f64>,
     weight: Vec<f64>,
 }
 
-/// `position`: x, y and depth behind the picture, pixels; `speed`: body lengths a second.
+/// `position`: x, y and depth behind the tank's front, pixels; `speed`: body lengths a second.
 #[derive(Serialize, Deserialize)]
 struct BoidFile {
     position: Vec<[f64; 3]>,
+    /// Absent in files of before.
+    #[serde(default)]
+    forward: Option<Vec<[f64; 3]>>,
     heading_rad: Vec<f64>,
     speed: Vec<f64>,
 }
@@ -143,6 +147,7 @@ impl IndividualFile {
             depth_m: individual.depth_m,
             boid: BoidFile {
                 position: individual.boid.position_px,
+                forward: individual.boid.forward,
                 heading_rad: individual.boid.heading_rad,
                 speed: individual.boid.speed_bl_per_s,
             },
@@ -163,6 +168,7 @@ impl IndividualFile {
             depth_m: self.depth_m,
             boid: BoidTrack {
                 position_px: self.boid.position,
+                forward: self.boid.forward,
                 heading_rad: self.boid.heading_rad,
                 speed_bl_per_s: self.boid.speed,
             },
@@ -178,6 +184,7 @@ impl FadeFile {
             source_frame: fade.source_frame,
             mirrored: fade.mirrored,
             rotation_rad: fade.rotation_rad,
+            scale: fade.scale,
             weight: fade.weight,
         }
     }
@@ -188,6 +195,7 @@ impl FadeFile {
             source_frame: self.source_frame,
             mirrored: self.mirrored,
             rotation_rad: self.rotation_rad,
+            scale: self.scale,
             weight: self.weight,
         }
     }

@@ -91,6 +91,11 @@ impl<'a> Boids<'a> {
         boids
     }
 
+    /// The depth of the tank's front, body lengths from the camera.
+    pub fn front_bl(&self) -> f64 {
+        self.tank.corners[0][2]
+    }
+
     /// One output frame.
     pub fn advance(&mut self) {
         for _ in 0..self.n_substeps {
@@ -218,10 +223,10 @@ impl<'a> Boids<'a> {
         scaled(speed.clamp(least, most), direction)
     }
 
-    /// Ornstein-Uhlenbeck turn rates; the level one as varied as half the animal's greatest.
+    /// Ornstein-Uhlenbeck turn rates; at weight 1 the level one is as varied as the animal's own.
     fn next_wander(&self, id: usize) -> [f64; 2] {
         let keep = libm::exp(-self.step_s / WANDER_S);
-        let spread = 0.5 * self.params.rules.wander * self.calibration.turn_rad_per_s;
+        let spread = self.params.rules.wander * self.calibration.wander_rad_per_s;
         let fresh = spread * (1.0 - keep * keep).sqrt();
         std::array::from_fn(|k| {
             let key = [draw::WANDER, id as u64, self.step_idx, k as u64];

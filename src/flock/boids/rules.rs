@@ -116,7 +116,7 @@ impl Steering<'_> {
             return [0.0; 3];
         }
         let up = self.up();
-        let mut from_middle = minus(moment.position, self.tank.middle());
+        let mut from_middle = minus(moment.position, self.tank.middle);
         from_middle = add_scaled(from_middle, -dot(from_middle, up), up);
         let around = scaled(
             self.calibration.cruise_bl_per_s,

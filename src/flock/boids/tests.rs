@@ -2,18 +2,18 @@
 
 use super::measures::{Order, order};
 use super::*;
-use crate::flock::plan::cost::motion_of;
+use crate::flock::lens::Lens;
+use crate::flock::motion::motion_of;
 use crate::flock::synthetic;
-use crate::library::View;
+use crate::library::{Library, View};
 
 /// Every frame's positions and velocities of `n_frames`, and the mean order of them.
 fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Vec<Vec3>>, Order) {
     let library = synthetic::library(view);
-    let calibration = Calibration::of(&library, &motion_of(&library), params);
+    let calibration = calibrated(&library, params);
     let tank = Tank::new(
         [0.5, 0.5, 0.0],
         [15.5, 11.5, if view == View::Side { 3.0 } else { 0.0 }],
-        vec![],
     );
     let mut boids = Boids::new(params, &calibration, &tank, 30.0);
     let (mut positions, mut velocities) = (Vec::new(), Vec::new());
@@ -28,6 +28,11 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
         velocities.push(boids.velocities.clone());
     }
     (positions, velocities, mean)
+}
+
+fn calibrated(library: &Library, params: &Params) -> Calibration {
+    let lens = Lens::of(library, params);
+    Calibration::of(library, &motion_of(library, &lens), lens.is_flat())
 }
 
 fn preset(name: &str) -> Params {
@@ -58,7 +63,7 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
             ..preset(name)
         };
         let (positions, velocities, _) = swim(View::Side, &params, 200);
-        let tank = Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 3.0], vec![]);
+        let tank = Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 3.0]);
         assert!(positions.iter().flatten().all(|&p| tank.holds(p)), "{name}");
         let fastest = velocities
             .iter()
@@ -73,7 +78,7 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
 fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
     let library = synthetic::library(View::Side);
     let params = preset("swarm");
-    let calibration = Calibration::of(&library, &motion_of(&library), &params);
+    let calibration = calibrated(&library, &params);
     let [up, down] = calibration.slopes.expect("side view has a reach");
     let (_, velocities, _) = swim(View::Side, &params, 300);
     for v in velocities.iter().flatten() {

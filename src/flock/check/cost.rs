@@ -5,7 +5,9 @@ use super::graph::Graph;
 use super::steps::Taken;
 use super::violation::Violation;
 use crate::flock::Flock;
-use crate::flock::plan::cost::{CEILING, Feature, Weights, motion_of};
+use crate::flock::lens::Lens;
+use crate::flock::motion::motion_of;
+use crate::flock::plan::cost::{CEILING, Feature, Weights};
 use crate::flock::plan::crowd::{Crowd, Lookalike, n_watched};
 use crate::flock::plan::trellis::Trellis;
 use crate::flock::plan::turn_rates;
@@ -74,7 +76,7 @@ impl<'a> Ledger<'a> {
         Ledger {
             flock,
             crowd: Crowd::new(params.matching.w_c, library.poses.fps, length_px),
-            features: weights.features(&trellis, &motion_of(library)),
+            features: weights.features(&trellis, &motion_of(library, &Lens::of(library, params))),
             plans: plans.iter().map(named).collect(),
             names,
             dwell: params

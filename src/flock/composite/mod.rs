@@ -158,6 +158,7 @@ impl<'a> Compositor<'a> {
         if let Some(fade) = fade.map(|idx| &individual.fades[idx as usize]) {
             let k = t - fade.start as usize;
             place.rotation_rad = fade.rotation_rad[k];
+            place.scale = fade.scale[k];
             place.mirrored = fade.mirrored;
             self.premultiply(fade.source_frame[k], canvas);
             canvas.second.draw(&canvas.sprite, &place, size);

@@ -5,6 +5,7 @@
 //! compared is how far animal and boid turn in a quarter of a second.
 
 use super::trellis::Trellis;
+use crate::flock::motion::FrameMotion;
 use crate::flock::params::{MatchBy, Matching};
 use crate::geometry::Turns;
 use crate::library::{Library, View};
@@ -153,50 +154,4 @@ fn log_speed(speed_bl_per_s: f64, v0_bl_per_s: f64) -> u16 {
     // From 0.05 to 100 BL/s the logarithm spans -3 to 5: 2 radians to the 65536 would not hold it.
     let log = libm::log(speed_bl_per_s.clamp(0.0, 100.0) + v0_bl_per_s);
     ((log + 3.0).clamp(0.0, 6.2) * Turns::PER_RAD).round() as u16
-}
-
-/// How the animal itself moved at a frame of the footage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrameMotion {
-    /// Direction of the head, image axes.
-    pub heading_rad: f64,
-    /// How fast the heading changed.
-    pub turn_rad_per_s: f64,
-    /// Speed of the centroid in the image, body lengths a second.
-    pub speed_bl_per_s: f64,
-    /// Its velocity, image axes.
-    pub velocity_bl_per_s: [f64; 2],
-}
-
-/// The motion at every frame: central differences over two frames either way where the animal was
-/// found; zero speed and turn where its neighbors in time were not.
-pub fn motion_of(library: &Library) -> Vec<FrameMotion> {
-    let poses = &library.poses;
-    let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
-    let at = |frame: usize| {
-        let pose = poses.frames.get(frame)?;
-        Some((pose.centroid_px?, pose.heading_rad?))
-    };
-    let motion = |frame: usize| {
-        let heading_rad = at(frame).map_or(0.0, |pose| pose.1);
-        let ends = (1..=2).rev().find_map(|reach| {
-            let before = at(frame.checked_sub(reach)?)?;
-            let after = at(frame + reach)?;
-            Some((before, after, 2.0 * reach as f64 / poses.fps))
-        });
-        let Some((before, after, span_s)) = ends else {
-            return FrameMotion {
-                heading_rad,
-                ..FrameMotion::default()
-            };
-        };
-        let (dx, dy) = (after.0[0] - before.0[0], after.0[1] - before.0[1]);
-        FrameMotion {
-            heading_rad,
-            turn_rad_per_s: crate::geometry::wrap_rad(after.1 - before.1) / span_s,
-            speed_bl_per_s: (dx * dx + dy * dy).sqrt() / length_px / span_s,
-            velocity_bl_per_s: [dx, dy].map(|px| px / length_px / span_s),
-        }
-    };
-    (0..poses.frames.len()).map(motion).collect()
 }

@@ -11,13 +11,14 @@ pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::cost::{CEILING, Feature, FrameMotion, Weights};
+use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Place, ROUND, Settled, n_watched};
 use self::round::Round;
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path};
 use super::error::Error;
 use super::individual::{BoidTrack, PlanCost, rounded};
+use super::motion::FrameMotion;
 use super::params::Params;
 use crate::cpu::Level;
 use crate::geometry::{Turns, wrap_rad};

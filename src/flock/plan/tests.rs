@@ -1,6 +1,8 @@
 //! Plans of whole flocks: their certificates, and their cost told from the outside.
 
 use super::*;
+use crate::flock::lens::Lens;
+use crate::flock::motion::motion_of;
 use crate::flock::params::MatchBy;
 use crate::flock::plan::viterbi::Rows;
 use crate::flock::synthetic;
@@ -25,7 +27,7 @@ fn flock(view: View, name: &str) -> (Library, Flock) {
 
 /// J of one individual by the words of ALGORITHMS.md 6, in turns, from what the files hold.
 fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
-    let motion = cost::motion_of(library);
+    let motion = motion_of(library, &Lens::of(library, &flock.params));
     let weights = Weights::new(&flock.params.matching, library);
     let crowd = Crowd::new(flock.params.matching.w_c, flock.fps, flock.length_px);
     let trellis = Trellis::new(&library.playback, flock.params.mirror, |_| 0);
@@ -89,7 +91,7 @@ fn the_cost_recomputed_from_the_file_and_the_library_is_the_one_told() {
 fn the_plans_of_a_flock_hold_their_certificates() {
     let (library, flock) = flock(View::Side, "school");
     let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
-    let motion = cost::motion_of(&library);
+    let motion = motion_of(&library, &Lens::of(&library, &flock.params));
     let planner = Planner::new(&library, &motion, &boids, &flock.params);
     let mut settled = Settled::new(boids[0].heading_rad.len());
     for (id, boid) in boids.iter().enumerate() {
@@ -139,7 +141,7 @@ fn after_a_jump_at_least_the_dwell_is_played() {
 fn matched_by_place_frames_move_as_the_boids_do_and_by_heading_they_point_as_they_do() {
     let gap = |name: &str| {
         let (library, flock) = flock(View::Side, name);
-        let motion = cost::motion_of(&library);
+        let motion = motion_of(&library, &Lens::of(&library, &flock.params));
         let gaps = flock.individuals.iter().flat_map(|individual| {
             (0..individual.source_frame.len()).map(|t| {
                 let [x, y] = motion[individual.source_frame[t] as usize].velocity_bl_per_s;
