@@ -19,6 +19,8 @@ pub struct Individual {
     pub centroid_px: Vec<[f64; 2]>,
     /// The direction of the head as shown.
     pub heading_rad: Vec<f64>,
+    /// The direction in space as shown, a unit vector; only where the tank has depth.
+    pub forward: Option<Vec<[f64; 3]>>,
     /// Size relative to the footage.
     pub scale: Vec<f64>,
     /// Depth in the camera's frame; only with a camera.

@@ -31,6 +31,7 @@ use self::boids::vector::unit;
 use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
+use self::params::MatchBy;
 use self::placement::Stage;
 use self::plan::{Plan, Planner};
 use crate::geometry::Turns;
@@ -68,6 +69,7 @@ pub fn plan_flock(
         return Err(Error::NoTransitions);
     }
     let lens = Lens::of(library, params);
+    let params = &told(params, library, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
@@ -90,6 +92,22 @@ pub fn plan_flock(
         params: params.clone(),
         individuals,
     })
+}
+
+/// The parameters with what they leave open.
+fn told(params: &Params, library: &Library, lens: &Lens) -> Params {
+    let mut params = params.clone();
+    let is_known = library
+        .poses
+        .frames
+        .iter()
+        .any(|pose| pose.forward.is_some());
+    params.matching.by = Some(match params.matching.by {
+        None if is_known && !lens.is_flat() => MatchBy::Direction,
+        Some(MatchBy::Direction) if lens.is_flat() => MatchBy::Heading,
+        by => by.unwrap_or(MatchBy::Heading),
+    });
+    params
 }
 
 /// The boids' tracks as files hold them, by id, and the order of every frame.
@@ -153,6 +171,7 @@ fn place(stage: &Stage, tracks: Vec<BoidTrack>, plans: Vec<Plan>) -> Vec<Individ
                 fades: placed.fades,
                 centroid_px: placed.centroid_px,
                 heading_rad: placed.heading_rad,
+                forward: placed.forward,
                 scale: placed.scale,
                 depth_m: placed.depth_m,
                 boid,

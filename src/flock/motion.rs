@@ -1,11 +1,13 @@
 //! How the animal itself moved at every frame of the footage: what boids are calibrated by and plans
 //! are matched with (ALGORITHMS.md 6 and 7).
 
-use super::boids::vector::{Vec3, dot, unit};
+use super::boids::vector::{Vec3, angle_between, unit};
 use super::lens::{Lens, depths_bl};
 use crate::geometry::wrap_rad;
 use crate::library::{Library, Pose, View};
 
+/// A speed in space is told where at least this share of the direction lies in the picture's plane.
+const LEAST_LEVEL: f64 = 0.7;
 /// Directions are compared over this time either way.
 const TURN_SPAN_S: f64 = 0.1;
 
@@ -24,6 +26,8 @@ pub struct FrameMotion {
     pub forward: Vec3,
     /// Distance from the camera, body lengths; 0 where the lens is flat.
     pub depth_bl: f64,
+    /// Speed in space, body lengths a second, where enough of it is in the picture's plane.
+    pub pace_bl_per_s: Option<f64>,
     /// How fast the direction in space changed, where it was found a tenth of a second before and after.
     pub swing_rad_per_s: Option<f64>,
 }
@@ -38,45 +42,50 @@ pub fn motion_of(library: &Library, lens: &Lens) -> Vec<FrameMotion> {
     let swing = |frame: usize| {
         let before = forwards[frame.checked_sub(reach)?]?;
         let after = (*forwards.get(frame + reach)?)?;
-        let angle = libm::acos(dot(before, after).clamp(-1.0, 1.0));
-        Some(angle * library.poses.fps / (2 * reach) as f64)
+        Some(angle_between(before, after) * library.poses.fps / (2 * reach) as f64)
     };
     (depths_bl(library, lens).into_iter().enumerate())
-        .map(|(frame, depth_bl)| FrameMotion {
-            forward: forwards[frame].unwrap_or_default(),
-            depth_bl,
-            swing_rad_per_s: swing(frame),
-            ..in_picture(library, lens.length_px, frame)
+        .map(|(frame, depth_bl)| {
+            let moved = in_picture(library, lens.length_px, frame);
+            let nearer = lens.length_px / lens.px_per_bl(depth_bl);
+            FrameMotion {
+                forward: forwards[frame].unwrap_or_default(),
+                depth_bl,
+                pace_bl_per_s: moved.and_then(|moved| {
+                    let [x, y, _] = forwards[frame]?;
+                    let level = x.hypot(y);
+                    (level > LEAST_LEVEL).then_some(moved.speed_bl_per_s * nearer / level)
+                }),
+                swing_rad_per_s: swing(frame),
+                ..moved.unwrap_or_else(|| FrameMotion {
+                    heading_rad: library.poses.frames[frame].heading_rad.unwrap_or(0.0),
+                    ..FrameMotion::default()
+                })
+            }
         })
         .collect()
 }
 
-fn in_picture(library: &Library, length_px: f64, frame: usize) -> FrameMotion {
+/// What the picture tells of a frame, where the animal was found before and after.
+fn in_picture(library: &Library, length_px: f64, frame: usize) -> Option<FrameMotion> {
     let poses = &library.poses;
     let at = |frame: usize| {
         let pose = poses.frames.get(frame)?;
         Some((pose.centroid_px?, pose.heading_rad?))
     };
-    let heading_rad = at(frame).map_or(0.0, |pose| pose.1);
-    let ends = (1..=2).rev().find_map(|reach| {
+    let (before, after, span_s) = (1..=2).rev().find_map(|reach| {
         let before = at(frame.checked_sub(reach)?)?;
         let after = at(frame + reach)?;
         Some((before, after, 2.0 * reach as f64 / poses.fps))
-    });
-    let Some((before, after, span_s)) = ends else {
-        return FrameMotion {
-            heading_rad,
-            ..FrameMotion::default()
-        };
-    };
+    })?;
     let (dx, dy) = (after.0[0] - before.0[0], after.0[1] - before.0[1]);
-    FrameMotion {
-        heading_rad,
+    Some(FrameMotion {
+        heading_rad: at(frame).map_or(0.0, |pose| pose.1),
         turn_rad_per_s: wrap_rad(after.1 - before.1) / span_s,
         speed_bl_per_s: (dx * dx + dy * dy).sqrt() / length_px / span_s,
         velocity_bl_per_s: [dx, dy].map(|px| px / length_px / span_s),
         ..FrameMotion::default()
-    }
+    })
 }
 
 /// The direction in space: as measured, or from the heading and how much of the length is seen.

@@ -32,8 +32,8 @@ pub struct Params {
     pub leaders: bool,
     /// Where the flock may go.
     pub tank: TankExtent,
-    /// Depth of the tank in side view, body lengths, 0..=100; null = half its width, at most 3. Top
-    /// view has none.
+    /// Depth of the tank in side view, body lengths, 0..=100; null = as deep as the animal was seen to be, 1 to 6.
+    /// Top view has none.
     pub depth_bl: Option<f64>,
 }
 
@@ -69,8 +69,9 @@ pub struct Rules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Matching {
-    /// What is matched: directions, or places.
-    pub by: MatchBy,
+    /// What is matched; null = directions in space where the library knows them and the tank has depth, headings
+    /// otherwise. A flock says which it was.
+    pub by: Option<MatchBy>,
     /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
     pub w_h: f64,
     /// Cost of a radian that rotating the sprite must make up for.
@@ -89,8 +90,11 @@ pub struct Matching {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatchBy {
-    /// O: where the animal points, and how fast it is.
+    /// O: where the animal points in the picture, and how fast it is.
     Heading,
+    /// The same, but where it points in space. Only where the tank has depth. What stays wrong is the chord
+    /// between two unit vectors; without a camera, away from the viewer and toward are one.
+    Direction,
     /// Colqui et al. 2008: how the animal moved in the picture against how the boid moves, frame by
     /// frame. `w_h` is then the cost of a body length a second each way; `w_r`, `rho_deg` and `w_v` play
     /// no part in the plan.
@@ -150,7 +154,7 @@ impl Default for Rules {
 impl Default for Matching {
     fn default() -> Matching {
         Matching {
-            by: MatchBy::Heading,
+            by: None,
             w_h: 1.0,
             w_r: 0.1,
             rho_deg: 10.0,
@@ -223,7 +227,7 @@ impl Params {
     pub fn papers() -> Params {
         Params {
             matching: Matching {
-                by: MatchBy::Heading,
+                by: Some(MatchBy::Heading),
                 w_h: 1.0,
                 w_r: 0.0,
                 rho_deg: 0.0,

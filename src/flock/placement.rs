@@ -44,6 +44,8 @@ pub struct Placed {
     pub heading_rad: Vec<f64>,
     /// Its centroid.
     pub centroid_px: Vec<[f64; 2]>,
+    /// The direction in space, where the tank has depth.
+    pub forward: Option<Vec<[f64; 3]>>,
     /// Its size relative to the footage.
     pub scale: Vec<f64>,
     /// Its depth in the camera's frame, where metres are known.
@@ -71,12 +73,18 @@ impl Stage<'_> {
         let depth_bl: Vec<f64> = (boid.position_px.iter())
             .map(|position| self.depth_bl(position[2]))
             .collect();
-        let rotation_rad = shown
+        let rotation_rad: Vec<f64> = shown
             .iter()
             .zip(&heading_rad)
             .map(|(&state, &heading)| rounded(self.rotation(state, heading), 5))
             .collect();
         Placed {
+            forward: (!self.lens.is_flat()).then(|| {
+                let turned = shown.iter().zip(&rotation_rad);
+                turned
+                    .map(|(&state, &turn)| self.forward(state, turn))
+                    .collect()
+            }),
             rotation_rad,
             centroid_px: self.positions(&heading_rad, boid),
             scale: (shown.iter().zip(&depth_bl))
@@ -117,6 +125,14 @@ impl Stage<'_> {
         } else {
             heading
         }
+    }
+
+    /// The direction in space of a source frame on its mirror side, turned in the picture.
+    fn forward(&self, (frame, mirrored): (u32, bool), turn_rad: f64) -> [f64; 3] {
+        let [x, y, z] = self.motion[frame as usize].forward;
+        let x = if mirrored { -x } else { x };
+        let (cos, sin) = (libm::cos(turn_rad), libm::sin(turn_rad));
+        [cos * x - sin * y, sin * x + cos * y, z].map(|part| rounded(part, 5))
     }
 
     /// The rotation that shows a source frame with a heading, as far as the view allows.

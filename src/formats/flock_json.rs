@@ -77,6 +77,7 @@ struct IndividualFile {
     fade: Vec<FadeFile>,
     centroid_px: Vec<[f64; 2]>,
     heading_rad: Vec<f64>,
+    forward: Option<Vec<[f64; 3]>>,
     scale: Vec<f64>,
     depth_m: Option<Vec<f64>>,
     boid: BoidFile,
@@ -143,6 +144,7 @@ impl IndividualFile {
             fade: individual.fades.into_iter().map(FadeFile::of).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
+            forward: individual.forward,
             scale: individual.scale,
             depth_m: individual.depth_m,
             boid: BoidFile {
@@ -164,6 +166,7 @@ impl IndividualFile {
             fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,
+            forward: self.forward,
             scale: self.scale,
             depth_m: self.depth_m,
             boid: BoidTrack {

@@ -23,6 +23,8 @@ pub struct Calibration {
 /// Share of the frames that the steepest directions, and the fastest turns, may leave out.
 const STEEPEST: f64 = 0.98;
 const FASTEST: f64 = 0.95;
+/// And the slowest.
+const SLOWEST: f64 = 0.05;
 /// A boid may point this steeply whatever was seen.
 const LEAST_STEEP_RAD: f64 = 0.05;
 const MOST_STEEP_RAD: f64 = 1.2;
@@ -31,10 +33,12 @@ impl Calibration {
     /// Measured on the frames that may be shown. `flat`: without depth, where there is no way to turn round
     /// but through the vertical.
     pub fn of(library: &Library, motion: &[FrameMotion], flat: bool) -> Calibration {
-        let [slow, cruise, fast] = library.stats.speed_bl_per_s.unwrap_or([0.5, 1.0, 1.5]);
+        let shown = || (library.playback.component.iter()).map(|&frame| &motion[frame as usize]);
+        let paces = sorted(shown().filter_map(|m| m.pace_bl_per_s));
+        let [slow, cruise, fast] = [(SLOWEST, 0.5), (0.5, 1.0), (FASTEST, 1.5)]
+            .map(|(share, usual)| quantile(&paces, share).unwrap_or(usual));
         // An animal that mostly sits still would make a flock of statues: a quarter of its best.
         let cruise = cruise.max(0.25 * fast).max(0.05);
-        let shown = || (library.playback.component.iter()).map(|&frame| &motion[frame as usize]);
         let swings = sorted(shown().filter_map(|m| m.swing_rad_per_s));
         let turn_rad_per_s = quantile(&swings, FASTEST).map_or(2.0, |rate| rate.clamp(0.5, 6.0));
         Calibration {

@@ -10,7 +10,6 @@ use crate::flock::motion::motion_of;
 use crate::flock::plan::cost::{CEILING, Feature, Weights};
 use crate::flock::plan::crowd::{Crowd, Lookalike, n_watched};
 use crate::flock::plan::trellis::Trellis;
-use crate::flock::plan::turn_rates;
 use crate::geometry::Turns;
 use crate::library::Library;
 
@@ -91,7 +90,9 @@ impl<'a> Ledger<'a> {
     /// Sums an individual's costs and compares them with what the file says.
     pub(super) fn bill(&self, id: usize, jumps: &[Taken]) -> Result<Bill, Violation> {
         let mut bill = Bill {
-            wanted: self.wanted(id),
+            wanted: self
+                .weights
+                .wanted(&self.flock.individuals[id].boid, self.flock.fps),
             lookalikes: self.lookalikes(id),
             before: vec![0],
         };
@@ -178,15 +179,6 @@ impl<'a> Ledger<'a> {
     fn price(&self, wanted: Feature, name: u32, crowd: u32) -> u64 {
         let alone = self.weights.total(wanted, self.features[name as usize]);
         u64::from((alone + crowd).min(CEILING - 1))
-    }
-
-    fn wanted(&self, id: usize) -> Vec<Feature> {
-        let boid = &self.flock.individuals[id].boid;
-        let turns = turn_rates(&boid.heading_rad, self.flock.fps);
-        let wanted = |(t, turn): (usize, f64)| {
-            (self.weights).wanted(boid.heading_rad[t], turn, boid.speed_bl_per_s[t])
-        };
-        turns.into_iter().enumerate().map(wanted).collect()
     }
 
     fn lookalikes(&self, id: usize) -> Vec<Vec<Lookalike>> {

@@ -21,7 +21,7 @@ use super::individual::{BoidTrack, PlanCost, rounded};
 use super::motion::FrameMotion;
 use super::params::Params;
 use crate::cpu::Level;
-use crate::geometry::{Turns, wrap_rad};
+use crate::geometry::Turns;
 use crate::library::Library;
 use crate::progress::Progress;
 
@@ -90,7 +90,9 @@ impl<'a> Planner<'a> {
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         progress.report("planning", 0.0);
         let n_boids = self.boids.len();
-        let wanted: Vec<Vec<Feature>> = self.boids.par_iter().map(|b| self.wanted(b)).collect();
+        let wanted: Vec<Vec<Feature>> = (self.boids.par_iter())
+            .map(|boid| self.weights.wanted(boid, self.fps))
+            .collect();
         let mut settled = Settled::new(self.places.len());
         let mut plans = Vec::with_capacity(n_boids);
         for first in (0..n_boids).step_by(ROUND) {
@@ -133,18 +135,6 @@ impl<'a> Planner<'a> {
                 .map(|(_, place)| u32::from(self.crowd.cost_at(self.places[t][id], *place)))
                 .sum()
         })
-    }
-
-    /// What a boid wants at every frame, from its track as the file holds it.
-    fn wanted(&self, boid: &BoidTrack) -> Vec<Feature> {
-        let turns = turn_rates(&boid.heading_rad, self.fps);
-        let speeds = &boid.speed_bl_per_s;
-        (0..turns.len())
-            .map(|t| {
-                self.weights
-                    .wanted(boid.heading_rad[t], turns[t], speeds[t])
-            })
-            .collect()
     }
 
     /// The plan with its cost in parts: summed anew from the states. `crowd[t]` is what the crowd
@@ -193,18 +183,6 @@ impl<'a> Planner<'a> {
         let at = sources.binary_search_by_key(&from, |source| source.0);
         at.map_or(0, |at| sources[at].1)
     }
-}
-
-/// The turn rate at every frame of a track: central differences, one-sided at the ends.
-pub fn turn_rates(heading_rad: &[f64], fps: f64) -> Vec<f64> {
-    let last = heading_rad.len().saturating_sub(1);
-    (0..heading_rad.len())
-        .map(|t| {
-            let (before, after) = (t.saturating_sub(1), (t + 1).min(last));
-            let span_s = (after - before).max(1) as f64 / fps;
-            wrap_rad(heading_rad[after] - heading_rad[before]) / span_s
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ fn flock(view: View, name: &str) -> (Library, Flock) {
         ..Params::preset(preset).expect("a known preset")
     };
     if name == "position" {
-        params.matching.by = MatchBy::Position;
+        params.matching.by = Some(MatchBy::Position);
     }
     let flock = plan_flock(&library, &params, &Silent).expect("a good library");
     (library, flock)
@@ -34,7 +34,7 @@ fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
     let features = weights.features(&trellis, &motion);
     let individual = &flock.individuals[id];
     let boid = &individual.boid;
-    let turns = turn_rates(&boid.heading_rad, flock.fps);
+    let wanted = weights.wanted(boid, flock.fps);
     let state = |i: usize, t: usize| {
         let other = &flock.individuals[i];
         trellis
@@ -42,11 +42,10 @@ fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
             .expect("a frame of the component")
     };
     let states: Vec<Vec<u32>> = (0..crowd::n_watched(id))
-        .map(|i| (0..turns.len()).map(|t| state(i, t)).collect())
+        .map(|i| (0..wanted.len()).map(|t| state(i, t)).collect())
         .collect();
     let mut total = 0;
-    for (t, &turn) in turns.iter().enumerate() {
-        let wanted = weights.wanted(boid.heading_rad[t], turn, boid.speed_bl_per_s[t]);
+    for (t, &wanted) in wanted.iter().enumerate() {
         let here = state(id, t);
         total += weights.total(wanted, features[here as usize]);
         let others = flock.individuals.iter().map(|i| &i.boid);
@@ -95,7 +94,7 @@ fn the_plans_of_a_flock_hold_their_certificates() {
     let planner = Planner::new(&library, &motion, &boids, &flock.params);
     let mut settled = Settled::new(boids[0].heading_rad.len());
     for (id, boid) in boids.iter().enumerate() {
-        let wanted = planner.wanted(boid);
+        let wanted = planner.weights.wanted(boid, planner.fps);
         let rows = || rows::InCrowd::new(&planner, &settled, [id], [&wanted]);
         let film = planner.film();
         let [path] = film.cheapest_paths(&mut rows()).unwrap();
