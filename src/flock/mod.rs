@@ -25,7 +25,7 @@ use rayon::prelude::*;
 
 use self::boids::Boids;
 use self::boids::calibration::Calibration;
-use self::boids::measures::{self, Order};
+use self::boids::measures::Order;
 use self::boids::tank::Tank;
 use self::boids::vector::unit;
 use self::individual::rounded;
@@ -134,7 +134,7 @@ fn simulate(
         for (id, track) in tracks.iter_mut().enumerate() {
             record(track, lens, &boids, id);
         }
-        orders.push(measures::order(&boids.positions, &boids.velocities));
+        orders.push(boids.order());
         progress.report("simulating", f64::from(t + 1) / f64::from(n_frames));
     }
     Ok((tracks, orders))

@@ -74,6 +74,9 @@ pub struct Matching {
     pub by: Option<MatchBy>,
     /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
     pub w_h: f64,
+    /// Share of a difference along the line of sight that counts when directions are matched, 0..=1: 1 = the whole
+    /// angle in space. A wrong heading is seen at once, a wrong foreshortening hardly.
+    pub w_d: f64,
     /// Cost of a radian that rotating the sprite must make up for.
     pub w_r: f64,
     /// How far a sprite may be rotated in side view, degrees, 0..=45.
@@ -137,10 +140,10 @@ impl Default for Rules {
     fn default() -> Rules {
         Rules {
             separation: 1.5,
-            alignment: 1.0,
+            alignment: 2.0,
             cohesion: 0.8,
             walls: 4.0,
-            wander: 0.5,
+            wander: 0.25,
             circling: 0.0,
             separation_bl: 1.0,
             alignment_bl: 3.0,
@@ -156,6 +159,7 @@ impl Default for Matching {
         Matching {
             by: None,
             w_h: 1.0,
+            w_d: 0.3,
             w_r: 0.1,
             rho_deg: 10.0,
             w_v: 0.1,
@@ -205,7 +209,7 @@ impl Params {
             })),
             "mill" => Some(with_rules(Rules {
                 circling: 1.5,
-                alignment: 0.3,
+                alignment: 0.0,
                 cohesion: 0.0,
                 ..Rules::default()
             })),
@@ -229,6 +233,7 @@ impl Params {
             matching: Matching {
                 by: Some(MatchBy::Heading),
                 w_h: 1.0,
+                w_d: 1.0,
                 w_r: 0.0,
                 rho_deg: 0.0,
                 w_v: 0.0,
@@ -304,6 +309,7 @@ impl Matching {
         for (name, value) in weights {
             within(name, value, 0.0, 4.0)?;
         }
+        within("matching.w_d", self.w_d, 0.0, 1.0)?;
         within("matching.rho_deg", self.rho_deg, 0.0, 45.0)
     }
 }

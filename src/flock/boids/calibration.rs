@@ -56,6 +56,12 @@ impl Calibration {
         }
     }
 
+    /// The usual acceleration: what turns half again as fast as the animal does on average, at cruising speed.
+    pub fn usual_acceleration_bl_per_s2(&self) -> f64 {
+        let usual = 1.5 * self.wander_rad_per_s;
+        self.cruise_bl_per_s * usual.min(self.turn_rad_per_s)
+    }
+
     /// The greatest acceleration: what turns at the greatest rate at cruising speed.
     pub fn acceleration_bl_per_s2(&self) -> f64 {
         self.cruise_bl_per_s * self.turn_rad_per_s

@@ -29,7 +29,7 @@ const LONGEST_STEP_BL: f64 = 0.2;
 /// Boids nearer than this are pushed apart after each step, where the tank has room.
 const OVERLAP_BL: f64 = 0.5;
 /// How long they swim before the first frame, so that the flock has formed.
-const WARM_UP_S: f64 = 6.0;
+const WARM_UP_S: f64 = 10.0;
 /// Time constant of the wandering turn rate.
 const WANDER_S: f64 = 1.0;
 /// Boids of one unit of parallel work.
@@ -40,6 +40,7 @@ mod draw {
     pub(super) const START: u64 = 1;
     pub(super) const WANDER: u64 = 2;
     pub(super) const LEAD: u64 = 3;
+    pub(super) const COURSE: u64 = 4;
 }
 
 /// Boids in their tank.
@@ -91,6 +92,11 @@ impl<'a> Boids<'a> {
         boids
     }
 
+    /// How they move as a whole at this moment.
+    pub fn order(&self) -> measures::Order {
+        measures::order(&self.positions, &self.velocities, self.tank.up())
+    }
+
     /// The depth of the tank's front, body lengths from the camera.
     pub fn front_bl(&self) -> f64 {
         self.tank.corners[0][2]
@@ -105,10 +111,14 @@ impl<'a> Boids<'a> {
 
     fn start(&mut self) {
         let [least, greatest] = self.tank.corners;
+        // Who aligns starts aligned: a school takes long to form, and is wanted from the first frame.
+        let course =
+            std::f64::consts::PI * (2.0 * random::unit(self.params.seed, &[draw::COURSE])).floor();
+        let spread = std::f64::consts::PI / (1.0 + 4.0 * self.params.rules.alignment);
         for id in 0..self.positions.len() {
             let key = |word| [draw::START, id as u64, word];
             let at = |word| random::unit(self.params.seed, &key(word));
-            let angle = std::f64::consts::TAU * at(3);
+            let angle = course + spread * (2.0 * at(3) - 1.0);
             let (cos, sin) = (libm::cos(angle), libm::sin(angle));
             let direction = match self.tank.is_flat() {
                 true => [cos, sin, 0.0],

@@ -1,7 +1,7 @@
 //! Where the flock may go: half-spaces, seen in the picture as lines, and in side view a depth
 //! (ALGORITHMS.md 7). All in body lengths. Inside the tank always.
 
-use super::vector::{Vec3, add_scaled, dot, minus, norm};
+use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled};
 use crate::flock::lens::Lens;
 use crate::flock::motion::FrameMotion;
 use crate::flock::params::{Params, TankExtent};
@@ -30,6 +30,8 @@ pub struct Tank {
     pub corners: [Vec3; 2],
     /// A place well inside.
     pub middle: Vec3,
+    /// How far it reaches from there, about: half its width, height and depth.
+    pub reach_bl: Vec3,
     section_bl2: f64,
 }
 
@@ -100,41 +102,55 @@ impl Tank {
             walls,
             corners,
             middle: [0.0; 3],
+            reach_bl: [0.0; 3],
             section_bl2: 0.0,
         };
-        (tank.middle, tank.section_bl2) = tank.section();
+        tank.measure();
         tank
     }
 
-    /// The middle of the places inside at half its depth, and their area.
-    fn section(&self) -> (Vec3, f64) {
+    /// The middle of the places inside at half its depth, how far they reach, and their area.
+    fn measure(&mut self) {
         let [least, greatest] = self.corners;
         let depth = 0.5 * (least[2] + greatest[2]);
         let at = |axis: usize, k: usize| {
             let share = (k as f64 + 0.5) / N_SAMPLES as f64;
             least[axis] + share * (greatest[axis] - least[axis])
         };
-        let (mut sum, mut n_inside) = ([0.0; 3], 0u32);
+        let (mut sum, mut squares, mut n) = ([0.0; 3], [0.0; 3], 0.0);
         for k in 0..N_SAMPLES * N_SAMPLES {
             let place = [at(0, k % N_SAMPLES), at(1, k / N_SAMPLES), depth];
             if self.holds(place) {
                 sum = add_scaled(sum, 1.0, place);
-                n_inside += 1;
+                squares = add_scaled(squares, 1.0, place.map(|x| x * x));
+                n += 1.0;
             }
         }
         let area = (greatest[0] - least[0]) * (greatest[1] - least[1]);
-        match n_inside {
-            0 => ([at(0, N_SAMPLES / 2), at(1, N_SAMPLES / 2), depth], 0.0),
-            n => (
-                sum.map(|sum| sum / f64::from(n)),
-                area * f64::from(n) / (N_SAMPLES * N_SAMPLES) as f64,
-            ),
-        }
+        self.section_bl2 = area * n / (N_SAMPLES * N_SAMPLES) as f64;
+        self.middle = match n > 0.0 {
+            true => scaled(1.0 / n, sum),
+            false => [at(0, N_SAMPLES / 2), at(1, N_SAMPLES / 2), depth],
+        };
+        // The half of a span is the root of three times its variance.
+        let half = |axis: usize| {
+            let variance = squares[axis] / f64::max(n, 1.0) - self.middle[axis] * self.middle[axis];
+            (3.0 * variance.max(0.0)).sqrt()
+        };
+        self.reach_bl = [half(0), half(1), 0.5 * (greatest[2] - least[2])];
     }
 
     /// Whether it has no depth: everything happens in the picture's plane.
     pub fn is_flat(&self) -> bool {
         self.corners[1][2] <= self.corners[0][2]
+    }
+
+    /// The axis about which boids turn: out of the picture when flat, the vertical otherwise.
+    pub fn up(&self) -> Vec3 {
+        match self.is_flat() {
+            true => [0.0, 0.0, 1.0],
+            false => [0.0, 1.0, 0.0],
+        }
     }
 
     /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where

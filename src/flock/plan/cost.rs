@@ -45,6 +45,8 @@ pub struct Weights {
     jump_turns: f64,
     view: View,
     by: MatchBy,
+    /// Weight of what leads along the line of sight.
+    away: f32,
     /// Whether it is known if the animal points away from the viewer or toward.
     is_signed: bool,
     v0_bl_per_s: f64,
@@ -71,6 +73,7 @@ impl Weights {
             jump_turns: matching.wx * Turns::PER_RAD,
             view,
             by,
+            away: matching.w_d as f32,
             is_signed: library
                 .poses
                 .frames
@@ -92,7 +95,7 @@ impl Weights {
         let gap = (wanted.turns.wrapping_sub(state.turns) as i16).unsigned_abs();
         let within = u32::from(gap.min(self.rho_turns));
         let beyond = match self.by {
-            MatchBy::Direction => chord_turns(wanted, state, u32::from(gap) - within),
+            MatchBy::Direction => self.chord_turns(wanted, state, u32::from(gap) - within),
             _ => u32::from(gap) - within,
         };
         let speed_gap = u32::from(wanted.log_speed.abs_diff(state.log_speed));
@@ -100,6 +103,22 @@ impl Weights {
             (self.heading * beyond + self.rotation * within) >> 8,
             (self.speed * speed_gap) >> 8,
         ]
+    }
+
+    /// The chord between two directions whose headings are `beyond` turns apart, turns to the radian: the angle
+    /// between them where it is small. |a - b|^2 = (difference of levels)^2 + 2 levels (1 - cos beyond)
+    /// + (difference of aways)^2, the last with its weight.
+    #[inline(always)]
+    fn chord_turns(&self, a: Feature, b: Feature, beyond: u32) -> u32 {
+        // Additions, products and one root in single precision: the same on any machine.
+        let half = beyond as f32 * (std::f32::consts::PI / 65536.0);
+        let square = half * half;
+        let sine = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
+        let [level_a, level_b] = [a, b].map(|f| f32::from(f.level));
+        let level = level_a - level_b;
+        let away = self.away * (f32::from(a.away) - f32::from(b.away));
+        let squared = level * level + away * away + 4.0 * level_a * level_b * sine * sine;
+        (squared.sqrt() * (Turns::PER_RAD / UNIT) as f32 + 0.5) as u32
     }
 
     /// The sum of `of_state`, below the ceiling.
@@ -188,20 +207,6 @@ impl Weights {
         };
         (0..trellis.n_states()).map(feature).collect()
     }
-}
-
-/// The chord between two directions whose headings are `beyond` turns apart, turns to the radian: the angle between
-/// them where it is small. |a - b|^2 = (difference of levels)^2 + (of aways)^2 + 2 levels (1 - cos beyond).
-#[inline(always)]
-fn chord_turns(a: Feature, b: Feature, beyond: u32) -> u32 {
-    // Additions, products and one root in single precision: the same on any machine.
-    let half = beyond as f32 * (std::f32::consts::PI / 65536.0);
-    let square = half * half;
-    let sine = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
-    let [level_a, level_b] = [a, b].map(|f| f32::from(f.level));
-    let (level, away) = (level_a - level_b, f32::from(a.away) - f32::from(b.away));
-    let squared = level * level + away * away + 4.0 * level_a * level_b * sine * sine;
-    (squared.sqrt() * (Turns::PER_RAD / UNIT) as f32 + 0.5) as u32
 }
 
 /// The turn rate at every frame of a track: central differences, one-sided at the ends.

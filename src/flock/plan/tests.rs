@@ -10,17 +10,20 @@ use crate::flock::{Flock, plan_flock};
 use crate::library::View;
 use crate::progress::Silent;
 
+/// By a preset's name, or a school matched by what is named.
 fn flock(view: View, name: &str) -> (Library, Flock) {
     let library = synthetic::library(view);
-    let preset = if name == "position" { "school" } else { name };
+    let (preset, by) = match name {
+        "heading" => ("school", Some(MatchBy::Heading)),
+        "position" => ("school", Some(MatchBy::Position)),
+        name => (name, None),
+    };
     let mut params = Params {
         count: 10,
         frames: 120,
         ..Params::preset(preset).expect("a known preset")
     };
-    if name == "position" {
-        params.matching.by = Some(MatchBy::Position);
-    }
+    params.matching.by = by.or(params.matching.by);
     let flock = plan_flock(&library, &params, &Silent).expect("a good library");
     (library, flock)
 }
@@ -154,7 +157,7 @@ fn matched_by_place_frames_move_as_the_boids_do_and_by_heading_they_point_as_the
         });
         (gaps.sum::<f64>(), flock.stats.heading_error_median_rad)
     };
-    let (by_place, by_heading) = (gap("position"), gap("school"));
+    let (by_place, by_heading) = (gap("position"), gap("heading"));
     assert!(by_place.0 < by_heading.0, "{by_place:?} {by_heading:?}");
     assert!(by_heading.1 <= by_place.1, "{by_place:?} {by_heading:?}");
 }
