@@ -9,8 +9,12 @@ use crate::library::{Library, Pose, View};
 
 /// Directions in which the seen area is bounded.
 const N_SIDES: usize = 16;
-/// The seen area counts when it is at least this share of the picture.
-const LEAST_SEEN_SHARE: f64 = 0.2;
+/// A flock without room gets it farther out until the tank is this share of the picture. From above, what
+/// bounds the animal is mostly a wall; from the side, mostly its whim.
+const MOST_OF_ARENA: f64 = 0.2;
+const MOST_OF_TANK: f64 = 0.7;
+/// By so much at a time.
+const FARTHER_BL: f64 = 0.25;
 /// The side of the square that a boid needs to keep the usual distances.
 const ROOM_BL: f64 = 1.2;
 /// Between a body and a wall.
@@ -45,42 +49,40 @@ pub struct Wall {
 }
 
 impl Tank {
-    /// The tank of a library: where the animal is wholly in the picture, or where it was seen, and as deep as it
-    /// was seen to be.
+    /// The tank of a library: where the animal was seen, as deep as it was seen to be. Where a flock has no room
+    /// there, it reaches farther, but not beyond where the animal is wholly in the picture.
     pub fn of(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> Tank {
-        let body = Body::of(library, lens.length_px);
         let [w, h] = library.poses.image_size_px.map(f64::from);
-        let depths = depths(library, lens, motion, params);
-        let wall = |(outward, offset_px)| {
-            let widest = offset_px_across(outward, [w, h]) / lens.px_per_bl(depths[0]);
-            lens.wall(
-                outward,
-                offset_px,
-                body.margin_bl(outward).min(widest / 3.0),
-            )
+        let site = Site {
+            lens,
+            body: Body::of(library, lens.length_px),
+            size_px: [w, h],
+            depths_bl: depths(library, lens, motion, params),
         };
-        let picture = [
-            ([1.0, 0.0], w),
-            ([-1.0, 0.0], 0.0),
-            ([0.0, 1.0], h),
-            ([0.0, -1.0], 0.0),
-        ];
         let seen = match params.tank {
-            TankExtent::Seen => seen_lines(library, w * h),
+            TankExtent::Seen => seen_lines(library),
             TankExtent::Picture => Vec::new(),
         };
-        let walls = picture.into_iter().chain(seen).map(wall).collect();
-        let places = depths.map(|z| [[0.0, 0.0], [w, h]].map(|px| lens.place_bl(px, z)));
-        let extreme = |axis: usize, of: fn(f64, f64) -> f64| {
-            places
-                .iter()
-                .flatten()
-                .map(|p| p[axis])
-                .reduce(of)
-                .unwrap_or(0.0)
-        };
-        let corners = [f64::min, f64::max].map(|of| std::array::from_fn(|axis| extreme(axis, of)));
-        Tank::within(corners, walls)
+        if seen.is_empty() {
+            return site.tank(&[]);
+        }
+        let most_px2 = w
+            * h
+            * if library.poses.view == View::Top {
+                MOST_OF_ARENA
+            } else {
+                MOST_OF_TANK
+            };
+        let mut farther_px = 0.0;
+        loop {
+            let lines: Vec<Line> = seen.iter().map(|&(u, px)| (u, px + farther_px)).collect();
+            let tank = site.tank(&lines);
+            let has_room = tank.closeness(params.count as usize) >= 1.0;
+            if has_room || area(&lines) >= most_px2 || farther_px > w + h {
+                return tank;
+            }
+            farther_px += FARTHER_BL * lens.length_px;
+        }
     }
 
     /// A box.
@@ -230,6 +232,57 @@ impl Tank {
     }
 }
 
+/// A unit vector in the picture and how far it may be gone along it from the picture's corner, pixels.
+type Line = ([f64; 2], f64);
+
+/// What tanks of one library have in common.
+struct Site<'a> {
+    lens: &'a Lens,
+    body: Body,
+    size_px: [f64; 2],
+    depths_bl: [f64; 2],
+}
+
+impl Site<'_> {
+    /// The tank in which bodies stay within the picture and these lines.
+    fn tank(&self, lines: &[Line]) -> Tank {
+        let [w, h] = self.size_px;
+        let picture = [
+            ([1.0, 0.0], w),
+            ([0.0, 1.0], h),
+            ([-1.0, 0.0], 0.0),
+            ([0.0, -1.0], 0.0),
+        ];
+        let walls = self.walls(&picture).chain(self.walls(lines)).collect();
+        let places = self
+            .depths_bl
+            .map(|z| [[0.0, 0.0], [w, h]].map(|px| self.lens.place_bl(px, z)));
+        let extreme = |axis: usize, of: fn(f64, f64) -> f64| {
+            places
+                .iter()
+                .flatten()
+                .map(|p| p[axis])
+                .reduce(of)
+                .unwrap_or(0.0)
+        };
+        let corners = [f64::min, f64::max].map(|of| std::array::from_fn(|axis| extreme(axis, of)));
+        Tank::within(corners, walls)
+    }
+
+    /// A body's margin within lines, each of which has its opposite half the way round; never more than
+    /// a third of the way between them.
+    fn walls(&self, lines: &[Line]) -> impl Iterator<Item = Wall> {
+        let px_per_bl = self.lens.px_per_bl(self.depths_bl[0]);
+        (0..lines.len()).map(move |k| {
+            let (outward, offset_px) = lines[k];
+            let opposite_px = lines[(k + lines.len() / 2) % lines.len()].1;
+            let across_bl = (offset_px + opposite_px) / px_per_bl;
+            let margin_bl = self.body.margin_bl(outward).min(across_bl / 3.0);
+            self.lens.wall(outward, offset_px, margin_bl)
+        })
+    }
+}
+
 /// How far a body reaches from its centroid.
 struct Body {
     view: View,
@@ -260,11 +313,6 @@ impl Body {
     }
 }
 
-/// How far the picture extends in a direction.
-fn offset_px_across(outward: [f64; 2], [w, h]: [f64; 2]) -> f64 {
-    outward[0].abs() * w + outward[1].abs() * h
-}
-
 /// The nearest and the farthest place, from the camera; nowhere when the lens is flat.
 fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> [f64; 2] {
     if lens.is_flat() {
@@ -287,10 +335,9 @@ fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Param
     [nearest, nearest + depth]
 }
 
-/// The outer polygon of the bodies seen: unit vectors outward and offsets; empty when that is a small part of
-/// the picture.
-fn seen_lines(library: &Library, picture_px2: f64) -> Vec<([f64; 2], f64)> {
-    let lines: Vec<([f64; 2], f64)> = (0..N_SIDES)
+/// The outer polygon of the bodies seen; empty when there are none.
+fn seen_lines(library: &Library) -> Vec<Line> {
+    (0..N_SIDES)
         .filter_map(|k| {
             let angle = std::f64::consts::TAU * k as f64 / N_SIDES as f64;
             let outward = [libm::cos(angle), libm::sin(angle)];
@@ -301,11 +348,7 @@ fn seen_lines(library: &Library, picture_px2: f64) -> Vec<([f64; 2], f64)> {
                 .filter_map(|pose| reach_px(pose, outward));
             Some((outward, quantile(bodies.collect(), 1.0 - OUTLIERS)?))
         })
-        .collect();
-    match lines.len() == N_SIDES && area(&lines) >= LEAST_SEEN_SHARE * picture_px2 {
-        true => lines,
-        false => Vec::new(),
-    }
+        .collect()
 }
 
 /// How far a body reaches in a direction: an ellipse of its length and height.
@@ -319,7 +362,7 @@ fn reach_px(pose: &Pose, outward: [f64; 2]) -> Option<f64> {
 }
 
 /// The area within lines of rising angle, by their corners.
-fn area(lines: &[([f64; 2], f64)]) -> f64 {
+fn area(lines: &[Line]) -> f64 {
     let corner = |k: usize| {
         let (a, b) = (&lines[k], &lines[(k + 1) % lines.len()]);
         let cross = a.0[0] * b.0[1] - a.0[1] * b.0[0];

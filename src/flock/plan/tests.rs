@@ -155,7 +155,7 @@ fn matched_by_place_frames_move_as_the_boids_do_and_by_heading_they_point_as_the
                 (x - speed * libm::cos(boid)).abs() + (y - speed * libm::sin(boid)).abs()
             })
         });
-        (gaps.sum::<f64>(), flock.stats.heading_error_median_rad)
+        (gaps.sum::<f64>(), flock.stats.heading_error_p90_rad)
     };
     let (by_place, by_heading) = (gap("position"), gap("heading"));
     assert!(by_place.0 < by_heading.0, "{by_place:?} {by_heading:?}");
