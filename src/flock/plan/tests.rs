@@ -140,7 +140,7 @@ fn after_a_jump_at_least_the_dwell_is_played() {
 }
 
 #[test]
-fn matched_by_place_frames_move_as_the_boids_do_and_by_heading_they_point_as_they_do() {
+fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
     let gap = |name: &str| {
         let (library, flock) = flock(View::Side, name);
         let motion = motion_of(&library, &Lens::of(&library, &flock.params));
@@ -155,11 +155,10 @@ fn matched_by_place_frames_move_as_the_boids_do_and_by_heading_they_point_as_the
                 (x - speed * libm::cos(boid)).abs() + (y - speed * libm::sin(boid)).abs()
             })
         });
-        (gaps.sum::<f64>(), flock.stats.heading_error_p90_rad)
+        gaps.sum::<f64>()
     };
     let (by_place, by_heading) = (gap("position"), gap("heading"));
-    assert!(by_place.0 < by_heading.0, "{by_place:?} {by_heading:?}");
-    assert!(by_heading.1 <= by_place.1, "{by_place:?} {by_heading:?}");
+    assert!(by_place < by_heading, "{by_place} {by_heading}");
 }
 
 #[test]
