@@ -27,7 +27,7 @@ use self::boids::Boids;
 use self::boids::calibration::Calibration;
 use self::boids::measures::Order;
 use self::boids::tank::Tank;
-use self::boids::vector::unit;
+use self::boids::vector::{Vec3, unit};
 use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
@@ -51,6 +51,8 @@ pub struct Flock {
     pub params: Params,
     /// By id.
     pub individuals: Vec<Individual>,
+    /// Where the predator was at every frame, as boids' positions are; empty without one.
+    pub predator_px: Vec<[f64; 3]>,
     /// How good it is.
     pub stats: Stats,
 }
@@ -73,9 +75,9 @@ pub fn plan_flock(
     let motion = motion_of(library, &lens);
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
-    let boids = Boids::new(params, &calibration, &tank, library.poses.fps);
-    let (tracks, orders) = simulate(boids, &lens, params.frames, progress)?;
-    let plans = Planner::new(library, &motion, &tracks, params).plan(progress)?;
+    let boids = Boids::new(params, &calibration, (&lens, &tank), library.poses.fps);
+    let course = simulate(boids, &lens, params.frames, progress)?;
+    let plans = Planner::new(library, &motion, &course.tracks, params).plan(progress)?;
     let stage = Stage {
         library,
         motion: &motion,
@@ -83,13 +85,20 @@ pub fn plan_flock(
         lens: &lens,
         tank: &tank,
     };
-    let individuals = place(&stage, tracks, plans);
+    let individuals = place(&stage, course.tracks, plans);
     Ok(Flock {
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
         length_px: lens.length_px,
-        stats: quality::measure(&individuals, &orders, library, params, lens.length_px),
+        stats: quality::measure(
+            &individuals,
+            &course.orders,
+            library,
+            params,
+            lens.length_px,
+        ),
         params: params.clone(),
+        predator_px: course.predator_px,
         individuals,
     })
 }
@@ -110,20 +119,32 @@ fn told(params: &Params, library: &Library, lens: &Lens) -> Params {
     params
 }
 
-/// The boids' tracks as files hold them, by id, and the order of every frame.
+/// How a simulation went, as files hold it.
+struct Course {
+    /// By id.
+    tracks: Vec<BoidTrack>,
+    /// By frame.
+    orders: Vec<Order>,
+    /// By frame; empty without one.
+    predator_px: Vec<[f64; 3]>,
+}
+
 fn simulate(
     mut boids: Boids,
     lens: &Lens,
     n_frames: u32,
     progress: &dyn Progress,
-) -> Result<(Vec<BoidTrack>, Vec<Order>), Error> {
+) -> Result<Course, Error> {
     progress.report("simulating", 0.0);
     let track = BoidTrack {
         forward: (!lens.is_flat()).then(Vec::new),
         ..BoidTrack::default()
     };
-    let mut tracks = vec![track; boids.positions.len()];
-    let mut orders = Vec::with_capacity(n_frames as usize);
+    let mut course = Course {
+        tracks: vec![track; boids.positions.len()],
+        orders: Vec::with_capacity(n_frames as usize),
+        predator_px: Vec::new(),
+    };
     for t in 0..n_frames {
         if progress.cancelled() {
             return Err(Error::Cancelled);
@@ -131,21 +152,28 @@ fn simulate(
         if t > 0 {
             boids.advance();
         }
-        for (id, track) in tracks.iter_mut().enumerate() {
+        for (id, track) in course.tracks.iter_mut().enumerate() {
             record(track, lens, &boids, id);
         }
-        orders.push(boids.order());
+        let predator = boids.predator().map(|place| seen(place, lens, &boids));
+        course.predator_px.extend(predator);
+        course.orders.push(boids.order());
         progress.report("simulating", f64::from(t + 1) / f64::from(n_frames));
     }
-    Ok((tracks, orders))
+    Ok(course)
+}
+
+/// A place in the picture, and how far behind the front of the tank: pixels.
+fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
+    let [x, y] = lens.picture_px(place);
+    let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
+    [x, y, behind_px].map(|px| rounded(px, 2))
 }
 
 /// A boid's moment, as it is seen.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
     let (place, velocity) = (boids.positions[id], boids.velocities[id]);
-    let [x, y] = lens.picture_px(place);
-    let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
-    (track.position_px).push([x, y, behind_px].map(|px| rounded(px, 2)));
+    track.position_px.push(seen(place, lens, boids));
     if let Some(forward) = &mut track.forward {
         forward.push(unit(velocity).map(|part| rounded(part, 5)));
     }

@@ -4,6 +4,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+pub use super::boids::params::{Goal, Obstacle, Predator, Rules, Zones};
+
 /// Parameters of a flock; all have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -32,37 +34,15 @@ pub struct Params {
     pub leaders: bool,
     /// Where the flock may go.
     pub tank: TankExtent,
+    /// Where it is drawn to, at most 64.
+    pub goals: Vec<Goal>,
+    /// What it swims round, at most 64.
+    pub obstacles: Vec<Obstacle>,
+    /// What it flees from.
+    pub predator: Option<Predator>,
     /// Depth of the tank in side view, body lengths, 0..=100; null = as deep as the animal was seen to be, 1 to 6.
     /// Top view has none.
     pub depth_bl: Option<f64>,
-}
-
-/// How the boids steer (ALGORITHMS.md 7). Weights 0..=20, radii in body lengths 0.1..=50.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Rules {
-    /// Weight of separation.
-    pub separation: f64,
-    /// Weight of alignment.
-    pub alignment: f64,
-    /// Weight of cohesion.
-    pub cohesion: f64,
-    /// Weight of the walls.
-    pub walls: f64,
-    /// Weight of the wander: 1 = turn rates as varied as the animal's own.
-    pub wander: f64,
-    /// Weight of circling about the middle of the tank.
-    pub circling: f64,
-    /// Neighbors nearer than this push apart.
-    pub separation_bl: f64,
-    /// Neighbors nearer than this are aligned with.
-    pub alignment_bl: f64,
-    /// Neighbors nearer than this attract.
-    pub cohesion_bl: f64,
-    /// Field of view, degrees, 1..=360.
-    pub view_deg: f64,
-    /// At most this many nearest neighbors count, 1..=64.
-    pub neighbors: u32,
 }
 
 /// How real frames are matched with boids (ALGORITHMS.md 6). Weights 0..=4.
@@ -136,24 +116,6 @@ pub enum TankExtent {
     Picture,
 }
 
-impl Default for Rules {
-    fn default() -> Rules {
-        Rules {
-            separation: 1.5,
-            alignment: 2.0,
-            cohesion: 0.8,
-            walls: 4.0,
-            wander: 0.25,
-            circling: 0.0,
-            separation_bl: 1.0,
-            alignment_bl: 3.0,
-            cohesion_bl: 6.0,
-            view_deg: 300.0,
-            neighbors: 16,
-        }
-    }
-}
-
 impl Default for Matching {
     fn default() -> Matching {
         Matching {
@@ -184,6 +146,9 @@ impl Default for Params {
             position: Position::Leash,
             leaders: true,
             tank: TankExtent::Seen,
+            goals: Vec::new(),
+            obstacles: Vec::new(),
+            predator: None,
             depth_bl: None,
         }
     }
@@ -191,7 +156,8 @@ impl Default for Params {
 
 impl Params {
     /// The names that `preset` knows.
-    pub const PRESETS: [&'static str; 5] = ["school", "swarm", "mill", "scatter", "papers"];
+    pub const PRESETS: [&'static str; 6] =
+        ["school", "swarm", "mill", "scatter", "zonal", "papers"];
 
     /// The parameters of a named preset; `None` for an unknown name. `school` is the default.
     pub fn preset(name: &str) -> Option<Params> {
@@ -219,6 +185,11 @@ impl Params {
                 cohesion: 0.0,
                 wander: 1.0,
                 separation_bl: 3.0,
+                ..Rules::default()
+            })),
+            "zonal" => Some(with_rules(Rules {
+                zones: Some(Zones::default()),
+                neighbors: 256,
                 ..Rules::default()
             })),
             "papers" => Some(Params::papers()),
@@ -267,33 +238,12 @@ impl Params {
             within("depth_bl", depth_bl, 0.0, 100.0)?;
         }
         self.rules.check()?;
+        within("goals", self.goals.len() as f64, 0.0, 64.0)?;
+        within("obstacles", self.obstacles.len() as f64, 0.0, 64.0)?;
+        self.goals.iter().try_for_each(Goal::check)?;
+        self.obstacles.iter().try_for_each(Obstacle::check)?;
+        self.predator.iter().try_for_each(Predator::check)?;
         self.matching.check()
-    }
-}
-
-impl Rules {
-    fn check(&self) -> Result<(), String> {
-        let weights = [
-            ("rules.separation", self.separation),
-            ("rules.alignment", self.alignment),
-            ("rules.cohesion", self.cohesion),
-            ("rules.walls", self.walls),
-            ("rules.wander", self.wander),
-            ("rules.circling", self.circling),
-        ];
-        let radii = [
-            ("rules.separation_bl", self.separation_bl),
-            ("rules.alignment_bl", self.alignment_bl),
-            ("rules.cohesion_bl", self.cohesion_bl),
-        ];
-        for (name, value) in weights {
-            within(name, value, 0.0, 20.0)?;
-        }
-        for (name, value) in radii {
-            within(name, value, 0.1, 50.0)?;
-        }
-        within("rules.view_deg", self.view_deg, 1.0, 360.0)?;
-        within("rules.neighbors", f64::from(self.neighbors), 1.0, 64.0)
     }
 }
 
@@ -314,7 +264,7 @@ impl Matching {
     }
 }
 
-fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
+pub(super) fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
     (least..=most)
         .contains(&value)
         .then_some(())

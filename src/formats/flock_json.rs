@@ -21,6 +21,7 @@ pub fn write(flock: &Flock) -> Vec<u8> {
         image_size_px: flock.image_size_px,
         length_px: flock.length_px,
         stats: StatsFile::of(&flock.stats),
+        predator: flock.predator_px.clone(),
         individuals: (), // written line by line below
     };
     let head = serde_json::to_string(&file).expect("plain values serialise");
@@ -46,6 +47,7 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
         image_size_px: file.image_size_px,
         length_px: file.length_px,
         params: file.params,
+        predator_px: file.predator,
         individuals: file
             .individuals
             .into_iter()
@@ -65,6 +67,9 @@ struct FlockFile<Individuals> {
     image_size_px: [u32; 2],
     length_px: f64,
     stats: StatsFile,
+    /// Absent in files of before.
+    #[serde(default)]
+    predator: Vec<[f64; 3]>,
     individuals: Individuals,
 }
 

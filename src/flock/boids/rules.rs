@@ -6,13 +6,17 @@
 
 use super::calibration::Calibration;
 use super::grid::Neighbor;
+use super::scene::{Hunter, Scene};
 use super::tank::Tank;
 use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
-use crate::flock::params::{Params, Rules, Separation};
+use super::zones;
+use crate::flock::params::{Params, Rules, Separation, Zones};
 
 /// A wall is steered from when the path over this time meets it.
 const WALL_HORIZON_S: f64 = 1.0;
 
+/// So strong a wish is granted as far as the turn rate allows.
+const WITHOUT_DELAY: f64 = 20.0;
 /// Whoever circles does so at this share of the way from the middle to the walls.
 const RING: f64 = 0.65;
 /// Weight of swimming across the picture rather than into it.
@@ -30,6 +34,8 @@ pub struct Moment<'a> {
     pub wander_rad_per_s: [f64; 2],
     /// It leads: alignment and cohesion are off.
     pub leads: bool,
+    /// What its course is wrong by, with zones.
+    pub noise: Vec3,
 }
 
 /// Everything that steering depends on besides the moment.
@@ -40,6 +46,12 @@ pub struct Steering<'a> {
     pub calibration: &'a Calibration,
     /// Where the walls are.
     pub tank: &'a Tank,
+    /// What else there is.
+    pub scene: &'a Scene<'a>,
+    /// Seconds of the film.
+    pub time_s: f64,
+    /// The predator.
+    pub hunter: Option<&'a Hunter>,
     /// cos of half the field of view.
     pub cos_half_view: f64,
     /// The velocity of every boid.
@@ -49,35 +61,83 @@ pub struct Steering<'a> {
 impl Steering<'_> {
     /// The acceleration granted, at most the calibration's, BL/s^2.
     pub fn acceleration(&self, moment: &Moment) -> Vec3 {
+        let most = self.calibration.acceleration_bl_per_s2();
+        let usual = self.calibration.usual_acceleration_bl_per_s2();
+        let (position, velocity) = (moment.position, moment.velocity);
+        let walls = add_scaled(
+            self.tank.push(position, velocity, WALL_HORIZON_S),
+            1.0,
+            self.scene.push(position, velocity, WALL_HORIZON_S),
+        );
+        let flight = self.scene.flee(position, self.hunter).unwrap_or_default();
+        let walls = add_scaled(flight, self.params.rules.walls, walls);
+        let goals = self.scene.toward_goals(
+            self.time_s,
+            position,
+            velocity,
+            self.calibration.cruise_bl_per_s,
+        );
+        let (urgent, wishes) = match &self.params.rules.zones {
+            Some(zones) => (
+                [0.0; 3],
+                [self.with_zones(zones, moment), [0.0; 3], [0.0; 3], [0.0; 3]],
+            ),
+            None => self.with_rules(moment),
+        };
+        let urgent = add_scaled(urgent, 1.0, walls);
+        let [together, around, broadside, near] = wishes;
+        let wishes = [urgent, together, around, broadside, near, goals].map(|w| scaled(usual, w));
+        let wander = match self.params.rules.zones {
+            Some(_) => [0.0; 3],
+            None => self.wander(moment),
+        };
+        let [urgent, together, around, broadside, near, goals] = wishes;
+        let cruise = self.cruise(moment);
+        granted(
+            &[
+                urgent, together, around, broadside, near, goals, wander, cruise,
+            ],
+            most,
+        )
+    }
+
+    /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
+    fn with_rules(&self, moment: &Moment) -> (Vec3, [Vec3; 4]) {
         let rules = &self.params.rules;
         let seen: Vec<&Neighbor> = moment
             .neighbors
             .iter()
             .filter(|n| self.sees(moment.velocity, n))
             .collect();
-        let walls = self
-            .tank
-            .push(moment.position, moment.velocity, WALL_HORIZON_S);
         let apart = match self.params.separation {
             Separation::Repulsion => separation(&seen, rules),
             Separation::Papers => self.rule_a_of_the_papers(&seen, moment),
         };
         let together = if moment.leads { 0.0 } else { 1.0 };
-        let urgent = add_scaled(scaled(rules.separation, apart), rules.walls, walls);
         let wishes = [
-            urgent,
             scaled(together * rules.alignment, self.alignment(&seen, moment)),
             scaled(rules.circling, self.circling(moment)),
             scaled(BROADSIDE, self.broadside(&seen, moment)),
             scaled(together * rules.cohesion, cohesion(&seen, rules)),
         ];
-        let usual = self.calibration.usual_acceleration_bl_per_s2();
-        let [urgent, together, around, broadside, near] = wishes.map(|wish| scaled(usual, wish));
-        let own = [self.wander(moment), self.cruise(moment)];
-        granted(
-            &[urgent, together, around, broadside, near, own[0], own[1]],
-            self.calibration.acceleration_bl_per_s2(),
-        )
+        (scaled(rules.separation, apart), wishes)
+    }
+
+    /// Couzin et al. 2002: as fast as may be onto the course of the zones.
+    fn with_zones(&self, zones: &Zones, moment: &Moment) -> Vec3 {
+        let around = (moment.neighbors, self.velocities);
+        let course = zones::course(
+            zones,
+            moment.velocity,
+            around.0,
+            around.1,
+            self.cos_half_view,
+        );
+        let course = course.unwrap_or_else(|| unit(moment.velocity));
+        let wished = unit(add_scaled(course, 1.0, moment.noise));
+        let cruise = self.calibration.cruise_bl_per_s;
+        let gap = minus(scaled(cruise, wished), moment.velocity);
+        scaled(WITHOUT_DELAY / cruise, gap)
     }
 
     fn sees(&self, velocity: Vec3, neighbor: &Neighbor) -> bool {

@@ -4,6 +4,7 @@ use super::measures::Order;
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
+use crate::flock::params::{Goal, Obstacle, Predator, Zones};
 use crate::flock::synthetic;
 use crate::library::{Library, View};
 
@@ -15,7 +16,8 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
         [0.5, 0.5, 0.0],
         [15.5, 11.5, if view == View::Side { 3.0 } else { 0.0 }],
     );
-    let mut boids = Boids::new(params, &calibration, &tank, 30.0);
+    let lens = Lens::of(&library, params);
+    let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
     let (mut positions, mut velocities) = (Vec::new(), Vec::new());
     let mut mean = Order::default();
     for _ in 0..n_frames {
@@ -127,4 +129,154 @@ fn another_seed_gives_another_flock() {
     };
     assert_ne!(seeded(1), seeded(2));
     assert_eq!(seeded(1), seeded(1));
+}
+
+/// Boids in the open sea, as Couzin et al. have them: 3 units a second, 40 degrees a second.
+fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
+    let mut params = Params {
+        count: 100,
+        ..preset("zonal")
+    };
+    params.leaders = false;
+    params.rules.view_deg = 270.0;
+    params.rules.zones = Some(Zones {
+        orientation_bl,
+        attraction_bl: 14.0,
+        ..Zones::default()
+    });
+    let calibration = Calibration {
+        cruise_bl_per_s: 3.0,
+        speed_limits_bl_per_s: [3.0, 3.0],
+        turn_rad_per_s: 40f64.to_radians(),
+        wander_rad_per_s: 40f64.to_radians(),
+        slopes: None,
+    };
+    (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
+}
+
+/// Polarization and rotation about the group's own axis, after `n_frames` from one heap.
+fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
+    let (params, calibration, tank) = at_sea(orientation_bl);
+    let lens = Lens::flat(40.0);
+    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
+    for id in 0..boids.positions.len() {
+        let draw = |word| 2.0 * random::unit(7, &[id as u64, word]) - 1.0;
+        boids.positions[id] = [0, 1, 2].map(|axis| 5.0 * draw(axis));
+        boids.velocities[id] = scaled(3.0, unit([3, 4, 5].map(draw)));
+    }
+    let (mut polarization, mut rotation) = (0.0, 0.0);
+    for frame in 0..n_frames {
+        boids.advance();
+        if frame >= n_frames / 2 {
+            let n = boids.positions.len() as f64;
+            let sum = |of: &dyn Fn(usize) -> Vec3| {
+                (0..boids.positions.len()).fold([0.0; 3], |sum, id| add_scaled(sum, 1.0, of(id)))
+            };
+            let middle = scaled(1.0 / n, sum(&|id| boids.positions[id]));
+            let spin = |id: usize| {
+                let out = vector::minus(boids.positions[id], middle);
+                vector::cross(unit(out), unit(boids.velocities[id]))
+            };
+            polarization += norm(sum(&|id| unit(boids.velocities[id]))) / n;
+            rotation += norm(sum(&spin)) / n;
+        }
+    }
+    let half = f64::from(n_frames - n_frames / 2);
+    (polarization / half, rotation / half)
+}
+
+#[test]
+fn wider_zones_of_orientation_make_a_swarm_then_a_torus_then_a_school_as_couzin_found() {
+    let [swarm, torus, school] = [0.0, 2.0, 10.0].map(|width| group(width, 2000));
+    assert!(swarm.0 < 0.35 && swarm.1 < 0.35, "{swarm:?}");
+    assert!(torus.0 < 0.35 && torus.1 > 0.6, "{torus:?}");
+    assert!(school.0 > 0.9 && school.1 < 0.35, "{school:?}");
+}
+
+/// The flock in a tank with something else in it, at every frame.
+fn with(params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Option<Vec3>>) {
+    let library = synthetic::library(View::Top);
+    let calibration = calibrated(&library, params);
+    let (lens, tank) = (
+        Lens::flat(40.0),
+        Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 0.0]),
+    );
+    let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
+    let frame = |_| {
+        boids.advance();
+        (boids.positions.clone(), boids.predator())
+    };
+    (0..n_frames).map(frame).unzip()
+}
+
+#[test]
+fn nobody_swims_through_an_obstacle() {
+    let obstacles = vec![
+        Obstacle::Circle {
+            center_px: [200.0, 200.0],
+            radius_px: 60.0,
+        },
+        Obstacle::Box {
+            box_px: [400.0, 100.0, 60.0, 200.0],
+        },
+    ];
+    let params = Params {
+        obstacles,
+        ..preset("swarm")
+    };
+    let (positions, _) = with(&params, 300);
+    for p in positions.iter().flatten() {
+        let from_disk = norm(vector::minus(*p, [5.0, 5.0, 0.0]));
+        assert!(from_disk > 1.5 + 0.25, "{p:?}");
+        let in_box = p[0] > 9.8 && p[0] < 11.7 && p[1] > 2.3 && p[1] < 7.7;
+        assert!(!in_box, "{p:?}");
+    }
+}
+
+#[test]
+fn a_flock_comes_to_its_goal_and_leaves_it_when_the_time_is_over() {
+    let at = |at_px, from_s, until_s| Goal {
+        at_px,
+        depth_bl: None,
+        from_s,
+        until_s,
+        weight: 2.0,
+    };
+    let params = Params {
+        goals: vec![
+            at([80.0, 80.0], 0.0, Some(10.0)),
+            at([560.0, 400.0], 10.0, None),
+        ],
+        ..preset("school")
+    };
+    let (positions, _) = with(&params, 900);
+    let off = |frame: usize, place: Vec3| {
+        let all = positions[frame]
+            .iter()
+            .map(|&p| norm(vector::minus(p, place)));
+        all.sum::<f64>() / positions[frame].len() as f64
+    };
+    let near = [off(290, [2.0, 2.0, 0.0]), off(899, [14.0, 10.0, 0.0])];
+    assert!(near.iter().all(|&bl| bl < 3.0), "{near:?}");
+}
+
+#[test]
+fn a_flock_keeps_away_from_a_predator() {
+    let hunted = Params {
+        predator: Some(Predator::default()),
+        ..preset("school")
+    };
+    let (positions, predator) = with(&hunted, 400);
+    let nearest = |frame: usize, place: Vec3| {
+        let all = positions[frame]
+            .iter()
+            .map(|&p| norm(vector::minus(p, place)));
+        all.fold(f64::INFINITY, f64::min)
+    };
+    let mean = (100..400)
+        .map(|frame| nearest(frame, predator[frame].expect("it hunts")))
+        .sum::<f64>()
+        / 300.0;
+    assert!(mean > 1.0, "{mean}");
+    assert_eq!(with(&preset("school"), 1).1, [None]);
 }
