@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit page-test docs deny bench accuracy papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit truth-test page-test docs deny bench accuracy papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,7 +16,7 @@ help: ## list the commands
 run: build ## install what is missing, build, start the service and its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit page-test ## install what the tests need and run them all
+test: unit truth-test page-test ## install what the tests need and run them all
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,7 +26,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit page-test docs deny ## everything that CI checks
+check: fmt clippy unit truth-test page-test docs deny ## everything that CI checks
 	@echo "all checks passed"
 
 fmt: ## the formatting
@@ -39,7 +39,11 @@ unit: target/vendor ## the tests in Rust
 	@scripts/system-packages.sh test
 	$(CARGO) test --locked
 
-# The program that the tests built: `cargo build` would build the dependencies anew, without the tests' features.
+# The program that the tests built, here and below: `cargo build` would build the dependencies anew, without the tests' features.
+truth-test: target/vendor ## a flock's ground truth, read by the field's own tools
+	$(CARGO) test --locked --no-run
+	@scripts/truth-tests.sh $(DEBUG)
+
 page-test: vendor ## the page in a browser, against a really started service
 	$(CARGO) test --locked --no-run
 	@scripts/page-tests.sh $(DEBUG)
@@ -62,6 +66,8 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	target/bench-venv/bin/python bench/distance.py
 	python3 bench/transitions.py
 	python3 bench/plan.py
+	@test -d target/demo/library || $(MAKE) --no-print-directory demo
+	python3 bench/render.py target/demo/library $(RELEASE)
 
 accuracy: build ## the poses against the truth of a film generator: make accuracy GENERATOR=goldfish.py
 	python3 bench/accuracy.py $(RELEASE) $(GENERATOR)

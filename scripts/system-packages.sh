@@ -2,7 +2,7 @@
 # Installs the Debian packages that flockreel needs, and only those that are missing.
 # The same list for `make`, the Dockerfile and CI, so that they cannot drift apart.
 #
-#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | page-test
+#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | truth-test | page-test
 #
 # Says what it does. Uses sudo when it is not root. Ends with 1 when something is still missing.
 set -eu
@@ -18,6 +18,8 @@ health    curl      curl
 test      cc        gcc libc6-dev
 test      ffmpeg    ffmpeg
 test      ffprobe   ffmpeg
+truth-test python3  python3-venv
+truth-test ffmpeg   ffmpeg
 page-test python3   python3-venv
 page-test chromium  chromium
 LIST

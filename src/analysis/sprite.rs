@@ -4,8 +4,12 @@ use std::sync::Arc;
 
 use super::sighting::Sighting;
 use super::tracking::{Track, Tracked};
+use crate::cpu::Level;
+use crate::geometry::Rect;
 use crate::library::{Sprites, View};
 use crate::raster::RgbaImage;
+use crate::raster::canvas::straight;
+use crate::raster::resample::{Placement, Premultiplied, Resampled};
 use crate::scratch::Full;
 
 /// Room around the largest silhouette.
@@ -18,7 +22,8 @@ const MULTIPLE: u32 = 8;
 /// The sprites of a track. The box holds the largest extent from the centroid over the frames in
 /// which the animal is not cut off; from above it is a square that holds the animal at any turn.
 ///
-/// The centroid's sub-pixel rest is resampled bilinearly in premultiplied alpha.
+/// The centroid's sub-pixel rest is interpolated by Catmull and Rom's curve in premultiplied alpha: a sprite
+/// is drawn between pixels once more, and would be soft if either step were bilinear.
 pub fn align(track: &Track, view: View) -> Result<Sprites, Full> {
     let size = common_size(&track.frames, view);
     let n_frames = track.frames.len();
@@ -78,65 +83,35 @@ fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
 fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting, image: &RgbaImage) {
     let rect = sighting.rect;
     let [cx, cy] = sighting.moments.centroid_px;
-    // Sprite column c shows the matte at column c + left, whole and fractional part.
-    let left = cx - f64::from(width) / 2.0 - f64::from(rect.x);
-    let top = cy - f64::from(height) / 2.0 - f64::from(rect.y);
-    let (x0, fx) = (left.floor() as i64, (left - left.floor()) as f32);
-    let (y0, fy) = (top.floor() as i64, (top - top.floor()) as f32);
-    let weights = [
-        (1.0 - fx) * (1.0 - fy),
-        fx * (1.0 - fy),
-        (1.0 - fx) * fy,
-        fx * fy,
-    ];
-    // Beyond the matte and the pixel around it there is nothing to draw.
-    let columns = (-1 - x0).clamp(0, width.into())..(i64::from(rect.w) - x0).clamp(0, width.into());
-    let rows = (-1 - y0).clamp(0, height.into())..(i64::from(rect.h) - y0).clamp(0, height.into());
-    let blank = vec![[0; 4]; rect.w as usize + 2];
-    let (mut above, mut below) = (blank.clone(), blank);
-    let stride = width as usize * 4;
-    for row in rows {
-        fetch(image, y0 + row, &mut above);
-        fetch(image, y0 + row + 1, &mut below);
-        let line = &mut sprite[row as usize * stride..][..stride];
-        for column in columns.clone() {
-            // One pixel of blank stands before the matte's first.
-            let at = (x0 + column + 1) as usize;
-            let corners = [above[at], above[at + 1], below[at], below[at + 1]];
-            let pixel = &mut line[column as usize * 4..][..4];
-            pixel.copy_from_slice(&blend(corners, weights));
+    let middle = |from: u32, side: u32, c: f64| f64::from(from) + f64::from(side) / 2.0 - c;
+    let place = Placement {
+        center_px: [
+            f64::from(width) / 2.0 + middle(rect.x, rect.w, cx),
+            f64::from(height) / 2.0 + middle(rect.y, rect.h, cy),
+        ],
+        rotation_rad: 0.0,
+        scale: 1.0,
+        mirrored: false,
+    };
+    let mut matte = Premultiplied::default();
+    let whole = Rect::of_size(image.width, image.height);
+    matte.fill(&image.pixels, [image.width, image.height], whole, 1.0);
+    let mut placed = Resampled::default();
+    placed.draw(&matte, &place, [width, height], Level::detect());
+    let rows = placed.pixels.chunks_exact(placed.rect.w.max(1) as usize);
+    for (row, y) in rows.zip(placed.rect.y as usize..) {
+        let at = (y * width as usize + placed.rect.x as usize) * 4;
+        let out = &mut sprite[at..at + row.len() * 4];
+        for (out, &pixel) in out.chunks_exact_mut(4).zip(row) {
+            out.copy_from_slice(&visible(straight(pixel)));
         }
     }
 }
 
-/// Copies a row of the matte between one blank pixel on either side; blanks it when there is none.
-fn fetch(image: &RgbaImage, row: i64, line: &mut [[u8; 4]]) {
-    let n = image.width as usize;
-    let within = &mut line[1..=n];
-    if (0..i64::from(image.height)).contains(&row) {
-        within.copy_from_slice(&image.pixels.as_chunks().0[row as usize * n..][..n]);
-    } else {
-        within.fill([0; 4]);
+/// A pixel whose alpha rounds to nothing has no color either.
+fn visible(pixel: [u8; 4]) -> [u8; 4] {
+    match pixel[3] {
+        0 => [0; 4],
+        _ => pixel,
     }
-}
-
-/// The weighted mean of four straight-alpha pixels, in premultiplied alpha.
-fn blend(corners: [[u8; 4]; 4], weights: [f32; 4]) -> [u8; 4] {
-    if corners.iter().all(|corner| corner[3] == 0) {
-        return [0; 4];
-    }
-    let mut sum = [0.0f32; 4];
-    for (corner, weight) in corners.iter().zip(weights) {
-        let alpha = weight * f32::from(corner[3]);
-        sum[3] += alpha;
-        for c in 0..3 {
-            sum[c] += alpha * f32::from(corner[c]);
-        }
-    }
-    let alpha = (sum[3] + 0.5) as u8;
-    if alpha == 0 {
-        return [0; 4];
-    }
-    let color = |c: usize| (sum[c] / sum[3] + 0.5) as u8;
-    [color(0), color(1), color(2), alpha]
 }

@@ -23,7 +23,16 @@ use crate::store::flocks::Flock;
 
 const FILES: Files = &[
     ("flock.json", "application/json"),
+    ("frames.zip", "application/zip"),
+    ("ground-truth.zip", "application/zip"),
+    ("overlay.mp4", "video/mp4"),
     ("plan.svg", "image/svg+xml"),
+    ("poster.png", "image/png"),
+    ("preview.gif", "image/gif"),
+    ("preview.webp", "image/webp"),
+    ("tracks.csv", "text/csv; charset=utf-8"),
+    ("video.mov", "video/quicktime"),
+    ("video.webm", "video/webm"),
     ("video.mp4", "video/mp4"),
 ];
 
@@ -112,7 +121,9 @@ pub(super) async fn get_flock(
     Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
 }
 
-/// A file of a flock: flock.json, plan.svg, video.mp4.
+/// A file of a flock: flock.json, plan.svg, video.mp4; tracks.csv and ground-truth.zip unless declined; and,
+/// where `render` asks for them, poster.png, video.webm, video.mov, frames.zip, preview.gif, preview.webp,
+/// overlay.mp4.
 #[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -127,18 +138,29 @@ pub(super) async fn get_flock_file(
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
     let flock = find(&state, id).await?;
-    let label = match name {
-        "video.mp4" => format!("flock-{id}.mp4"),
-        "plan.svg" => format!("flock-{id}-plan.svg"),
-        _ => format!("flock-{id}.json"),
+    // What a browser cannot show is saved.
+    let kind = match media_type {
+        "application/zip" | "video/quicktime" => "attachment",
+        _ => "inline",
     };
     let download = Download {
         folder: &flock.folder,
         name,
         media_type,
-        disposition: disposition("inline", &label),
+        disposition: disposition(kind, &label_of(name, id)),
     };
     download.answer(&state.context.store, &conditions).await
+}
+
+/// The name under which a file is saved.
+fn label_of(name: &str, id: Uuid) -> String {
+    match name {
+        "flock.json" => format!("flock-{id}.json"),
+        _ => match name.strip_prefix("video.") {
+            Some(kind) => format!("flock-{id}.{kind}"),
+            None => format!("flock-{id}-{name}"),
+        },
+    }
 }
 
 async fn find(state: &AppState, id: Uuid) -> Result<Flock, Problem> {

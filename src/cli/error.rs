@@ -38,6 +38,11 @@ impl Error {
         }
     }
 
+    /// The gate's reason.
+    pub fn work_of_media(error: &crate::media::Error) -> Error {
+        Error::work(error.code(), error)
+    }
+
     /// For `map_err`: a file operation named by what it tried.
     pub fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> Error {
         let what = what.into();

@@ -79,7 +79,8 @@ fn write_video(film: &SampleFilm, args: &Args, listener: &Listener) -> Result<()
     writer.finish().map_err(refused)
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+/// A size as people type it.
+pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').map(|(w, h)| (w.parse(), h.parse()));
     match sides {
         Some((Ok(width), Ok(height))) => Ok([width, height]),

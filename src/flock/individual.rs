@@ -80,6 +80,34 @@ pub struct PlanCost {
     pub exact: bool,
 }
 
+impl Individual {
+    /// Whether everything about it is there for every one of `n_frames` frames.
+    pub fn is_complete(&self, n_frames: usize) -> bool {
+        let boid = &self.boid;
+        let lengths = [
+            self.source_frame.len(),
+            self.mirrored.len(),
+            self.rotation_rad.len(),
+            self.centroid_px.len(),
+            self.heading_rad.len(),
+            self.scale.len(),
+            self.depth_m.as_ref().map_or(n_frames, Vec::len),
+            self.forward.as_ref().map_or(n_frames, Vec::len),
+            boid.forward.as_ref().map_or(n_frames, Vec::len),
+            boid.position_px.len(),
+            boid.heading_rad.len(),
+            boid.speed_bl_per_s.len(),
+        ];
+        lengths.iter().all(|&length| length == n_frames)
+            && self.fades.iter().all(|fade| {
+                let n = fade.weight.len();
+                let lengths = [&fade.rotation_rad, &fade.scale].map(Vec::len);
+                (fade.source_frame.len(), lengths) == (n, [n; 2])
+                    && fade.start as usize + n <= n_frames
+            })
+    }
+}
+
 /// `value` to so many decimals, as files hold it.
 pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);

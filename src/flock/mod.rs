@@ -15,7 +15,7 @@ pub mod quality;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
-pub use composite::Compositor;
+pub use composite::{Compositor, Shot};
 pub use error::Error;
 pub use individual::{BoidTrack, Fade, Individual, PlanCost};
 pub use params::Params;
@@ -55,6 +55,23 @@ pub struct Flock {
     pub predator_px: Vec<[f64; 3]>,
     /// How good it is.
     pub stats: Stats,
+}
+
+impl Flock {
+    /// Whether it can be filmed with a library: every frame that it shows has its sprite there, and its
+    /// tracks are of one length.
+    pub fn fits(&self, library: &Library) -> bool {
+        let n_frames = self.params.frames as usize;
+        let sprites = &library.sprites;
+        let exists = |&frame: &u32| (frame as usize) < sprites.n_frames();
+        self.image_size_px == library.poses.image_size_px
+            && (0..).zip(&self.individuals).all(|(id, individual)| {
+                individual.id == id
+                    && individual.is_complete(n_frames)
+                    && individual.source_frame.iter().all(exists)
+                    && (individual.fades.iter()).all(|fade| fade.source_frame.iter().all(exists))
+            })
+    }
 }
 
 /// Simulates, plans and places a flock of the library's animal.

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 pub use super::boids::params::{Goal, Obstacle, Predator, Rules, Zones};
+use super::composite::params::Render;
 
 /// Parameters of a flock; all have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -43,6 +44,8 @@ pub struct Params {
     /// Depth of the tank in side view, body lengths, 0..=100; null = as deep as the animal was seen to be, 1 to 6.
     /// Top view has none.
     pub depth_bl: Option<f64>,
+    /// The film.
+    pub render: Render,
 }
 
 /// How real frames are matched with boids (ALGORITHMS.md 6). Weights 0..=4.
@@ -150,6 +153,7 @@ impl Default for Params {
             obstacles: Vec::new(),
             predator: None,
             depth_bl: None,
+            render: Render::default(),
         }
     }
 }
@@ -237,6 +241,7 @@ impl Params {
         if let Some(depth_bl) = self.depth_bl {
             within("depth_bl", depth_bl, 0.0, 100.0)?;
         }
+        self.render.check()?;
         self.rules.check()?;
         within("goals", self.goals.len() as f64, 0.0, 64.0)?;
         within("obstacles", self.obstacles.len() as f64, 0.0, 64.0)?;

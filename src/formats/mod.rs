@@ -4,7 +4,9 @@
 pub mod csv;
 pub mod distance_map;
 pub mod flock_json;
+pub mod flock_overlay;
 pub mod glb;
+pub mod ground_truth;
 pub mod library_dir;
 pub mod library_json;
 pub mod npy;

@@ -1,7 +1,9 @@
-//! Pictures as PNG bytes and back: plates, sprites, maps. Fast deflate: files are many and small.
+//! Pictures as PNG bytes and back: plates, sprites, maps, labels; posters as JPEG. Fast deflate: files are many and small.
 
 use std::io::Cursor;
 
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 use png::{BitDepth, ColorType, Compression};
 
 use crate::raster::{RgbImage, RgbaImage};
@@ -37,6 +39,35 @@ pub fn write_gray(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     encode(width, height, ColorType::Grayscale, pixels)
 }
 
+/// Labels as a PNG of 16-bit gray. Panics when there are not `width * height` of them.
+pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
+    let bytes: Vec<u8> = labels
+        .iter()
+        .flat_map(|label| label.to_be_bytes())
+        .collect();
+    encode_deep(
+        width,
+        height,
+        (ColorType::Grayscale, BitDepth::Sixteen),
+        &bytes,
+    )
+}
+
+/// An RGB image as JPEG, for posters.
+pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 90);
+    encoder
+        .encode(
+            &image.pixels,
+            image.width,
+            image.height,
+            ExtendedColorType::Rgb8,
+        )
+        .expect("writing to memory fails only for a wrong number of pixels");
+    bytes
+}
+
 /// Reads an 8-bit RGB PNG.
 pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
     let (width, height, pixels) = decode(bytes, ColorType::Rgb, "RGB")?;
@@ -58,10 +89,14 @@ pub fn read_rgba(bytes: &[u8]) -> Result<RgbaImage, Error> {
 }
 
 fn encode(width: u32, height: u32, color: ColorType, pixels: &[u8]) -> Vec<u8> {
+    encode_deep(width, height, (color, BitDepth::Eight), pixels)
+}
+
+fn encode_deep(width: u32, height: u32, kind: (ColorType, BitDepth), pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(color);
-    encoder.set_depth(BitDepth::Eight);
+    encoder.set_color(kind.0);
+    encoder.set_depth(kind.1);
     encoder.set_compression(Compression::Fast);
     encoder
         .write_header()

@@ -120,15 +120,24 @@ impl Sprites {
     pub fn read(&self, frame_idx: usize, picture: &mut Vec<u8>) {
         picture.clear();
         picture.resize(self.n_bytes(), 0);
-        let Some(Cut { bounds, at }) = self.cuts[frame_idx] else {
-            return;
-        };
-        let mut packed = vec![0; bounds.area() as usize * 4];
-        self.scratch.get(at, &mut packed);
+        let mut packed = Vec::new();
+        let bounds = self.read_cut(frame_idx, &mut packed);
         let packed_rows = packed.chunks_exact(bounds.w.max(1) as usize * 4);
         for (row, packed_row) in rows(bounds, self.width).zip(packed_rows) {
             picture[row].copy_from_slice(packed_row);
         }
+    }
+
+    /// The box that shows anything, whose RGBA bytes alone become those of `packed`; empty for a missing
+    /// sprite.
+    pub fn read_cut(&self, frame_idx: usize, packed: &mut Vec<u8>) -> Rect {
+        packed.clear();
+        let Some(Cut { bounds, at }) = self.cuts[frame_idx] else {
+            return Rect::default();
+        };
+        packed.resize(bounds.area() as usize * 4, 0);
+        self.scratch.get(at, packed);
+        bounds
     }
 
     /// Where more may be put aside that belongs to these sprites.

@@ -7,7 +7,7 @@
 mod allow_list; // what ffmpeg may open and run
 mod container; // which of the accepted containers a file is, by its first bytes
 mod decode; // Video: footage -> frames
-mod encode; // VideoWriter: frames -> MP4
+mod encode; // VideoWriter: frames -> MP4, WebM, ProRes, GIF, WebP
 mod end; // how a child ended
 mod error;
 mod gate; // the one place that starts a process
@@ -19,7 +19,7 @@ mod sandbox; // what the child may do
 mod timeline; // presentation times -> a constant rate
 
 pub use decode::Video;
-pub use encode::{Quality, VideoFormat, VideoWriter};
+pub use encode::{Coding, Quality, VideoFormat, VideoWriter};
 pub use error::Error;
 pub use gate::tool_version;
 pub use image::{decode_image, read_image};

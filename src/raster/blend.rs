@@ -1,53 +1,47 @@
-//! Premultiplied pictures over one another (ALGORITHMS.md 8), in the encoded values in which they
-//! were cut out.
+//! Two placed sprites as one: the cross-fade at a jump (ALGORITHMS.md 8), premultiplied, in the encoded
+//! values in which they were cut out.
 
-use super::RgbImage;
-use super::resample::Resampled;
+use super::resample::{Quad, Resampled, scaled};
 use crate::geometry::Rect;
 
-/// Draws a placed sprite over a picture.
-pub fn over(canvas: &mut RgbImage, sprite: &Resampled) {
-    let rect = sprite.rect;
-    if rect.is_empty() {
-        return;
-    }
-    let stride = canvas.width as usize * 3;
-    let rows = sprite.pixels.chunks_exact(rect.w as usize);
-    for (row, y) in rows.zip(rect.y as usize..) {
-        let out = &mut canvas.pixels[y * stride + rect.x as usize * 3..][..rect.w as usize * 3];
-        for (out, pixel) in out.chunks_exact_mut(3).zip(row) {
-            if pixel[3] > 0.0 {
-                let through = 1.0 - pixel[3];
-                for channel in 0..3 {
-                    let value = pixel[channel] + through * f32::from(out[channel]);
-                    // A cast saturates: no clamp is needed.
-                    out[channel] = (value + 0.5) as u8;
-                }
-            }
+/// `weight` of `second` (0..=1) and the rest of `main`, in `main`: its box grows to hold both. `memory` is
+/// lent.
+pub fn mix(main: &mut Resampled, second: &Resampled, weight: f64, memory: &mut Vec<Quad>) {
+    let rect = main.rect.union(&second.rect);
+    memory.clear();
+    memory.resize(rect.area() as usize, [0; 4]);
+    let share = (weight * 32767.0).round() as i16;
+    add(memory, rect, main, 32767 - share);
+    add(memory, rect, second, share);
+    main.rect = rect;
+    std::mem::swap(&mut main.pixels, memory);
+}
+
+/// Lets only `share` of a layer's color through (0..=1) and puts another, of alpha 1, in the place of the
+/// rest; alpha stays.
+pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
+    let kept = (share * 32767.0).round() as i16;
+    for pixel in &mut layer.pixels {
+        let alpha = pixel[3];
+        for channel in 0..3 {
+            // Twice, because a color goes to 16384 and a weight to 32768.
+            let whole = (2 * i32::from(color[channel])).min(32767) as i16;
+            let veil = scaled(scaled(alpha, whole), 32767 - kept);
+            pixel[channel] = (scaled(pixel[channel], kept) + veil).min(alpha);
         }
     }
 }
 
-/// `weight` of `second` and the rest of `main`, in `main`: its box grows to hold both.
-pub fn mix(main: &mut Resampled, second: &Resampled, weight: f32) {
-    let rect = main.rect.union(&second.rect);
-    let mut pixels = vec![[0.0; 4]; rect.area() as usize];
-    add(&mut pixels, rect, main, 1.0 - weight);
-    add(&mut pixels, rect, second, weight);
-    main.rect = rect;
-    main.pixels = pixels;
-}
-
-fn add(pixels: &mut [[f32; 4]], rect: Rect, layer: &Resampled, weight: f32) {
+fn add(pixels: &mut [Quad], rect: Rect, layer: &Resampled, weight: i16) {
     if layer.rect.is_empty() {
         return;
     }
     let rows = layer.pixels.chunks_exact(layer.rect.w as usize);
     for (row, y) in rows.zip(layer.rect.y..) {
         let at = (y - rect.y) as usize * rect.w as usize + (layer.rect.x - rect.x) as usize;
-        for (out, pixel) in pixels[at..].iter_mut().zip(row) {
+        for (out, pixel) in pixels[at..at + row.len()].iter_mut().zip(row) {
             for channel in 0..4 {
-                out[channel] += weight * pixel[channel];
+                out[channel] += scaled(pixel[channel], weight);
             }
         }
     }
@@ -57,25 +51,10 @@ fn add(pixels: &mut [[f32; 4]], rect: Rect, layer: &Resampled, weight: f32) {
 mod tests {
     use super::*;
 
-    fn layer(rect: Rect, pixel: [f32; 4]) -> Resampled {
+    fn layer(rect: Rect, pixel: Quad) -> Resampled {
         Resampled {
             rect,
             pixels: vec![pixel; rect.area() as usize],
-        }
-    }
-
-    #[test]
-    fn opaque_covers_half_halves_and_clear_leaves() {
-        let rect = Rect::of_size(1, 1);
-        for (pixel, want) in [
-            ([10.0, 20.0, 30.0, 1.0], [10, 20, 30]),
-            ([100.0, 50.0, 0.0, 0.5], [150, 100, 50]),
-            ([0.0; 4], [100, 100, 100]),
-        ] {
-            let mut canvas = RgbImage::new(1, 1);
-            canvas.set_pixel(0, 0, [100, 100, 100]);
-            over(&mut canvas, &layer(rect, pixel));
-            assert_eq!(canvas.pixel(0, 0), want);
         }
     }
 
@@ -87,10 +66,35 @@ mod tests {
             w: 4,
             h: 3,
         };
-        let mut main = layer(rect, [100.0, 50.0, 25.0, 0.5]);
+        let mut main = layer(rect, [6400, 3201, 1603, 8192]);
         let before = main.clone();
-        mix(&mut main, &before, 0.25);
-        assert_eq!((main.rect, &main.pixels), (before.rect, &before.pixels));
+        mix(&mut main, &before, 0.25, &mut Vec::new());
+        assert_eq!(main.rect, before.rect);
+        for (a, b) in main
+            .pixels
+            .iter()
+            .flatten()
+            .zip(before.pixels.iter().flatten())
+        {
+            assert!(a.abs_diff(*b) <= 1, "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn haze_takes_the_color_and_leaves_the_alpha() {
+        let white = [16384; 4];
+        let half = [8192, 4096, 0, 8192];
+        for (share, want) in [
+            (1.0, half),
+            (0.0, [8192; 4]),
+            (0.5, [8192, 6144, 4096, 8192]),
+        ] {
+            let mut found = layer(Rect::of_size(1, 1), half);
+            haze(&mut found, share, white);
+            for (a, b) in found.pixels[0].iter().zip(want) {
+                assert!(a.abs_diff(b) <= 2, "{share}: {:?}", found.pixels);
+            }
+        }
     }
 
     #[test]
@@ -101,11 +105,12 @@ mod tests {
             w: 1,
             h: 1,
         };
-        let mut main = layer(at(0), [80.0, 0.0, 0.0, 1.0]);
-        mix(&mut main, &layer(at(2), [0.0, 80.0, 0.0, 1.0]), 0.25);
+        let mut main = layer(at(0), [8000, 0, 0, 16384]);
+        let second = layer(at(2), [0, 8000, 0, 16384]);
+        mix(&mut main, &second, 0.25, &mut Vec::new());
         assert_eq!(
             main.pixels,
-            [[60.0, 0.0, 0.0, 0.75], [0.0; 4], [0.0, 20.0, 0.0, 0.25]]
+            [[6000, 0, 0, 12288], [0; 4], [0, 2000, 0, 4096]]
         );
     }
 }

@@ -111,6 +111,49 @@ impl ColorSpec {
     }
 }
 
+/// Fixed-point factors from premultiplied colors of alpha 1, in 16384ths, to YUV.
+#[derive(Clone, Copy, Debug)]
+pub struct FromQuads {
+    y_offset: i32,
+    y: [i32; 3],
+    u: [i32; 3],
+    v: [i32; 3],
+}
+
+impl ColorSpec {
+    /// The factors that turn a color in 16384ths into YUV.
+    pub fn from_quads(self) -> FromQuads {
+        let (kr, kb) = self.weights();
+        let kg = 1.0 - kr - kb;
+        let (offset, luma, chroma) = self.spans();
+        // In 2^21sts, so that products of sums of four stay below 2^31.
+        let fixed = |v: f64, span: f64| (v * span * 128.0).round() as i32;
+        let (u, v) = (0.5 / (1.0 - kb), 0.5 / (1.0 - kr));
+        FromQuads {
+            y_offset: offset as i32,
+            y: [kr, kg, kb].map(|k| fixed(k, luma)),
+            u: [-kr * u, -kg * u, 0.5].map(|k| fixed(k, chroma)),
+            v: [0.5, -kg * v, -kb * v].map(|k| fixed(k, chroma)),
+        }
+    }
+}
+
+impl FromQuads {
+    /// The luma of one pixel.
+    #[inline(always)]
+    pub fn luma(&self, [r, g, b, _]: [i16; 4]) -> u8 {
+        let y = dot(self.y, [r, g, b].map(i32::from));
+        (self.y_offset + ((y + (1 << 20)) >> 21)).clamp(0, 255) as u8
+    }
+
+    /// The chroma (U, V) of a block given the sums of its four pixels' channels.
+    #[inline(always)]
+    pub fn chroma_of_block(&self, sum: [i32; 3]) -> [u8; 2] {
+        let chroma = |k: [i32; 3]| (128 + ((dot(k, sum) + (1 << 22)) >> 23)).clamp(0, 255) as u8;
+        [chroma(self.u), chroma(self.v)]
+    }
+}
+
 impl ToRgb {
     /// One pixel, each channel rounded and clamped to 0..=255.
     pub fn convert(&self, y: u8, u: u8, v: u8) -> [u8; 3] {

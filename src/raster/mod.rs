@@ -1,14 +1,17 @@
 //! Pictures as values: frames as they are decoded, RGB and RGBA images, masks.
 
 pub mod blend;
+pub mod canvas;
 pub mod color;
 pub mod frame;
 pub mod image;
 pub mod mask;
 pub mod pen;
 pub mod resample;
+pub mod resize;
 pub mod runs;
 
+pub use canvas::Canvas;
 pub use color::{ColorSpec, Matrix, Range};
 pub use frame::Frame;
 pub use image::{RgbImage, RgbaImage};

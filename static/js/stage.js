@@ -20,6 +20,11 @@ export function showFlock(flock, filmName) {
   byId("stage-facts").textContent = [origin, `${count(flock.frames)} frames`, `seed ${flock.seed}`].filter(Boolean).join(" · ");
   byId("stage-video-link").href = source;
   byId("stage-plan-link").href = `/v1/flocks/${flock.id}/flock.json`;
+  for (const [name, file] of [["tracks", "tracks.csv"], ["truth", "ground-truth.zip"]]) {
+    const link = byId(`stage-${name}-link`);
+    link.href = `/v1/flocks/${flock.id}/${file}`;
+    link.hidden = !flock.params.render?.ground_truth;
+  }
   byId("stage-caption").hidden = false;
 }
 

@@ -8,11 +8,11 @@
 
 pub mod calibration;
 pub mod grid;
+pub mod habitat;
 pub mod leadership;
 pub mod measures;
 pub mod params;
 pub mod rules;
-pub mod scene;
 pub mod tank;
 pub mod vector;
 pub mod zones;
@@ -21,8 +21,8 @@ use rayon::prelude::*;
 
 use self::calibration::Calibration;
 use self::grid::{Grid, Neighbor};
+use self::habitat::{Habitat, Hunter};
 use self::rules::{Moment, Steering};
-use self::scene::{Hunter, Scene};
 use self::tank::Tank;
 use self::vector::{Vec3, add_scaled, norm, scaled, turned_at_most, unit};
 use super::lens::Lens;
@@ -58,7 +58,7 @@ pub struct Boids<'a> {
     overlap_bl: f64,
     calibration: &'a Calibration,
     tank: &'a Tank,
-    scene: Scene<'a>,
+    habitat: Habitat<'a>,
     step_s: f64,
     n_substeps: u32,
     step_idx: u64,
@@ -92,7 +92,7 @@ impl<'a> Boids<'a> {
                 rules: params.rules.closer(closeness),
                 ..params.clone()
             },
-            scene: Scene::new(params, lens, tank),
+            habitat: Habitat::new(params, lens, tank),
             overlap_bl: OVERLAP_BL * closeness,
             calibration,
             tank,
@@ -110,7 +110,7 @@ impl<'a> Boids<'a> {
         for _ in 0..(WARM_UP_S * fps).ceil() as u64 {
             boids.advance();
         }
-        boids.hunter = boids.scene.hunter();
+        boids.hunter = boids.habitat.hunter();
         boids
     }
 
@@ -155,7 +155,7 @@ impl<'a> Boids<'a> {
                 least[axis] + at(axis as u64) * (greatest[axis] - least[axis])
             });
             self.velocities[id] = scaled(self.calibration.cruise_bl_per_s, direction);
-            self.scene
+            self.habitat
                 .keep_out(&mut self.positions[id], &mut self.velocities[id]);
         }
     }
@@ -164,7 +164,7 @@ impl<'a> Boids<'a> {
         self.time_s += self.step_s;
         if let Some(hunter) = &mut self.hunter {
             let (time_s, step_s) = (self.time_s, self.step_s);
-            self.scene
+            self.habitat
                 .advance(hunter, time_s, step_s, &self.positions, self.calibration);
         }
         let rules = &self.params.rules;
@@ -175,7 +175,7 @@ impl<'a> Boids<'a> {
             params: &self.params,
             calibration: self.calibration,
             tank: self.tank,
-            scene: &self.scene,
+            habitat: &self.habitat,
             time_s: self.time_s,
             hunter: self.hunter.as_ref(),
             cos_half_view: libm::cos(half_view_rad.min(std::f64::consts::PI)),
@@ -246,7 +246,8 @@ impl<'a> Boids<'a> {
             leads_for_s,
         };
         next.position = add_scaled(position, self.step_s, next.velocity);
-        self.scene.keep_out(&mut next.position, &mut next.velocity);
+        self.habitat
+            .keep_out(&mut next.position, &mut next.velocity);
         next
     }
 
@@ -258,7 +259,7 @@ impl<'a> Boids<'a> {
             velocity[1] = velocity[1].clamp(-up * level, down * level);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;
-        let flees = self.scene.flee(position, self.hunter.as_ref()).is_some();
+        let flees = self.habitat.flee(position, self.hunter.as_ref()).is_some();
         let most = if flees { FLIGHT_PACE * most } else { most };
         let speed = norm(velocity);
         let direction = if speed > 1e-9 {
@@ -323,7 +324,7 @@ impl<'a> Boids<'a> {
                 *position = add_scaled(*position, 0.5 * (self.overlap_bl - distance), away);
             }
             if *position != from {
-                self.scene.keep_out(position, &mut self.velocities[id]);
+                self.habitat.keep_out(position, &mut self.velocities[id]);
             }
         }
         self.positions = moved;

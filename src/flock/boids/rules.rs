@@ -6,7 +6,7 @@
 
 use super::calibration::Calibration;
 use super::grid::Neighbor;
-use super::scene::{Hunter, Scene};
+use super::habitat::{Habitat, Hunter};
 use super::tank::Tank;
 use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
 use super::zones;
@@ -47,7 +47,7 @@ pub struct Steering<'a> {
     /// Where the walls are.
     pub tank: &'a Tank,
     /// What else there is.
-    pub scene: &'a Scene<'a>,
+    pub habitat: &'a Habitat<'a>,
     /// Seconds of the film.
     pub time_s: f64,
     /// The predator.
@@ -67,11 +67,11 @@ impl Steering<'_> {
         let walls = add_scaled(
             self.tank.push(position, velocity, WALL_HORIZON_S),
             1.0,
-            self.scene.push(position, velocity, WALL_HORIZON_S),
+            self.habitat.push(position, velocity, WALL_HORIZON_S),
         );
-        let flight = self.scene.flee(position, self.hunter).unwrap_or_default();
+        let flight = self.habitat.flee(position, self.hunter).unwrap_or_default();
         let walls = add_scaled(flight, self.params.rules.walls, walls);
-        let goals = self.scene.toward_goals(
+        let goals = self.habitat.toward_goals(
             self.time_s,
             position,
             velocity,

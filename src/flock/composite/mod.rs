@@ -3,117 +3,240 @@
 //!
 //! Sprites are drawn far to near, ties by id, premultiplied, by Catmull-Rom interpolation; whole
 //! pixels without rotation come out as they are. A frame starts from the background already in the
-//! encoder's form; what is drawn is converted box by box, so the cost follows the area drawn.
+//! encoder's form; what is drawn is converted box by box, so the cost follows the area drawn. The ground
+//! truth comes from the same layers.
+
+mod backdrop; // what lies behind
+mod bleed; // color beyond the edges of alpha
+mod layer; // one individual in one frame
+mod morph; // two sprites bent to each other at a jump
+pub mod params;
+mod shadow; // on the floor
+pub mod truth; // what of whom can be seen
+mod view; // from pixels of the footage to those of the film
 
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
+use self::backdrop::Backdrop;
+use self::bleed::bleed;
+use self::layer::{Appearance, Haze, Painter, Scene};
+use self::params::Background;
+use self::shadow::Floor;
+use self::truth::{Drawn, FrameTruth};
+use self::view::View;
 use super::individual::{Fade, Individual};
 use super::{Flock, Library};
+use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::blend::{mix, over};
-use crate::raster::resample::{Placement, Premultiplied, Resampled};
-use crate::raster::{ColorSpec, Frame, RgbImage};
+use crate::raster::canvas::opaque;
+use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock, any of them from any thread.
 pub struct Compositor<'a> {
     library: &'a Library,
     flock: &'a Flock,
-    plate: Frame,
+    view: View,
+    form: Form,
+    with_truth: bool,
+    backdrop: Backdrop,
+    haze: Option<Haze>,
+    floor: Option<Floor>,
+    cpu: Level,
+    n_frames: usize,
     /// Per individual and output frame: which of its fades concerns it.
     fade_at: Vec<Vec<Option<u32>>>,
-    canvases: Mutex<Vec<Canvas>>,
+    desks: Mutex<Vec<Desk>>,
 }
 
-/// What one thread draws on, kept from frame to frame.
-struct Canvas {
-    image: RgbImage,
+/// The form in which frames are wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Opaque planes, as an encoder takes them.
+    Planar(ColorSpec),
+    /// Straight-alpha RGBA.
+    Straight,
+}
+
+/// One frame of the film, in the form asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shot {
+    /// The planes; empty in the form `Straight`.
+    pub frame: Frame,
+    /// RGBA, by rows; empty in the form `Planar`.
+    pub rgba: Vec<u8>,
+    /// What of whom can be seen, where that was asked for.
+    pub truth: FrameTruth,
+    /// What lies behind this frame alone, filling the film; empty = the film's own backdrop.
+    pub behind: Frame,
+}
+
+/// What one thread draws on and with, kept from frame to frame.
+struct Desk {
+    canvas: Canvas,
     dirty: Vec<Rect>,
-    straight: Vec<u8>,
-    sprite: Premultiplied,
-    main: Resampled,
-    second: Resampled,
+    painter: Painter,
+    drawn: Vec<Drawn>,
 }
 
 impl<'a> Compositor<'a> {
-    /// Ready to draw in the usual color form.
+    /// Ready to draw as the flock's own `render` parameters say, in the usual planes; over the plate
+    /// where they ask for nothing behind.
     pub fn new(library: &'a Library, flock: &'a Flock) -> Compositor<'a> {
-        Compositor::with_color(library, flock, ColorSpec::default())
-    }
-
-    /// Ready to draw in a given color form.
-    pub fn with_color(library: &'a Library, flock: &'a Flock, color: ColorSpec) -> Compositor<'a> {
-        let background = &library.background;
-        let mut plate = Frame::new(background.width, background.height, color);
-        plate.draw_rgb(
-            background,
-            Rect::of_size(background.width, background.height),
-        );
+        let render = &flock.params.render;
+        let size_px = render.size_px.unwrap_or(flock.image_size_px);
+        let view = View::fitted(flock.image_size_px, size_px);
+        let background = match render.background {
+            Background::Transparent => Background::Plate,
+            other => other,
+        };
+        let form = Form::Planar(ColorSpec::default());
+        let floor = Floor::of(library, flock.length_px, render.shadow);
         Compositor {
             library,
             flock,
-            plate,
+            view,
+            form,
+            with_truth: false,
+            backdrop: Backdrop::of(background, &library.background, &view, form),
+            haze: (render.haze_per_bl > 0.0).then(|| Haze {
+                left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
+                color: opaque(backdrop::mean(&library.background)),
+            }),
+            floor: (render.shadow > 0.0).then_some(floor),
+            cpu: Level::detect(),
+            n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
-            canvases: Mutex::new(Vec::new()),
+            desks: Mutex::default(),
         }
+    }
+
+    /// The same in straight-alpha RGBA, with nothing behind where the parameters ask for that.
+    pub fn straight(mut self) -> Compositor<'a> {
+        self.form = Form::Straight;
+        let background = self.flock.params.render.background;
+        self.behind(background)
+    }
+
+    /// The same, telling the ground truth of every frame.
+    pub fn with_truth(mut self) -> Compositor<'a> {
+        self.with_truth = true;
+        self
+    }
+
+    /// The same before a picture, cut to the film's shape.
+    pub fn before(mut self, picture: &RgbImage) -> Compositor<'a> {
+        self.backdrop = Backdrop::picture(picture, self.view.size_px, self.form);
+        self
+    }
+
+    fn behind(mut self, background: Background) -> Compositor<'a> {
+        let plate = &self.library.background;
+        self.backdrop = Backdrop::of(background, plate, &self.view, self.form);
+        self
+    }
+
+    /// The same, but no more than `n_frames` of it.
+    pub fn first(mut self, n_frames: usize) -> Compositor<'a> {
+        self.n_frames = self.n_frames.min(n_frames);
+        self
     }
 
     /// Frames of the film.
     pub fn n_frames(&self) -> usize {
-        self.flock
-            .individuals
-            .first()
-            .map_or(0, |individual| individual.source_frame.len())
+        self.n_frames
     }
 
-    /// Draws one frame. Its size and color form become those of the film.
-    pub fn render(&self, frame_idx: usize, frame: &mut Frame) {
-        let mut canvas = self.take_canvas();
-        for rect in std::mem::take(&mut canvas.dirty) {
-            copy_box(&self.library.background, &mut canvas.image, rect);
+    /// Width and height of the film.
+    pub fn size_px(&self) -> [u32; 2] {
+        self.view.size_px
+    }
+
+    /// Draws one frame.
+    pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
+        let mut desk = self.take_desk();
+        self.clean(&mut desk, shot);
+        desk.drawn.clear();
+        let order = self.far_to_near(frame_idx);
+        if let Some(floor) = &self.floor {
+            for individual in &order {
+                self.shade(floor, self.appearance(individual, frame_idx), &mut desk);
+            }
         }
-        for individual in self.far_to_near(frame_idx) {
-            self.draw(individual, frame_idx, &mut canvas);
+        for individual in order {
+            self.draw(self.appearance(individual, frame_idx), &mut desk);
         }
-        frame.clone_from(&self.plate);
-        merge_overlapping(&mut canvas.dirty);
-        for &rect in &canvas.dirty {
-            frame.draw_rgb(&canvas.image, rect);
+        if self.with_truth {
+            shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);
         }
-        self.canvases
+        self.develop(&mut desk, shot);
+        self.desks
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .push(canvas);
+            .push(desk);
     }
 
-    /// Draws every frame in order on all threads and gives each to `sink`, which may refuse: then
-    /// its error comes back. While one batch is taken, the next is drawn.
+    /// Makes a desk's canvas what lies behind the shot.
+    fn clean(&self, desk: &mut Desk, shot: &Shot) {
+        let dirty = std::mem::take(&mut desk.dirty);
+        if shot.behind.planes.is_empty() {
+            for rect in dirty {
+                desk.canvas.copy_box(&self.backdrop.canvas, rect);
+            }
+        } else {
+            desk.canvas = backdrop::filling(&shot.behind.to_rgb(), self.view.size_px);
+            desk.dirty.push(self.view.whole());
+        }
+    }
+
+    /// Turns what is on the desk into the form asked for.
+    fn develop(&self, desk: &mut Desk, shot: &mut Shot) {
+        merge_overlapping(&mut desk.dirty);
+        self.backdrop.begin(shot);
+        for &rect in &desk.dirty {
+            match self.form {
+                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect),
+                Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
+            }
+        }
+        if self.form == Form::Straight && self.backdrop.is_clear {
+            for &rect in &desk.dirty {
+                bleed(&mut shot.rgba, self.view.size_px, rect);
+            }
+        }
+    }
+
+    /// Draws every frame in order on all threads and gives each to `sink`. Before a frame is drawn
+    /// `prepare` may say what lies behind it. Either may refuse: then its error comes back. While one
+    /// batch is taken, the next is drawn.
     pub fn render_all<E: Send>(
         &self,
-        mut sink: impl FnMut(usize, &Frame) -> Result<(), E> + Send,
+        mut prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
+        mut sink: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
     ) -> Result<(), E> {
         let batch = 2 * rayon::current_num_threads();
-        let draw = |from: usize, frames: &mut [Frame]| {
-            let indexed = frames.par_iter_mut().enumerate();
-            indexed.for_each(|(k, frame)| {
-                if from + k < self.n_frames() {
-                    self.render(from + k, frame);
-                }
-            });
+        let n_frames = self.n_frames;
+        let draw = |from: usize, shots: &mut [Shot]| {
+            let indexed = shots.par_iter_mut().enumerate();
+            indexed.for_each(|(k, shot)| self.render(from + k, shot));
         };
-        let mut ready = vec![Frame::default(); batch];
-        let mut coming = vec![Frame::default(); batch];
-        draw(0, &mut ready);
-        for from in (0..self.n_frames()).step_by(batch) {
-            let n_ready = batch.min(self.n_frames() - from);
+        let n_in = |from: usize| batch.min(n_frames.saturating_sub(from));
+        let mut prepare_all = |from: usize, shots: &mut [Shot]| {
+            (from..)
+                .zip(shots)
+                .try_for_each(|(k, shot)| prepare(k, shot))
+        };
+        let mut ready = vec![Shot::default(); batch];
+        let mut coming = vec![Shot::default(); batch];
+        prepare_all(0, &mut ready[..n_in(0)])?;
+        draw(0, &mut ready[..n_in(0)]);
+        for from in (0..n_frames).step_by(batch) {
+            let (taken, next) = (&ready[..n_in(from)], &mut coming[..n_in(from + batch)]);
+            prepare_all(from + batch, next)?;
             let (taken, ()) = rayon::join(
-                || {
-                    (from..)
-                        .zip(&ready[..n_ready])
-                        .try_for_each(|(k, f)| sink(k, f))
-                },
-                || draw(from + batch, &mut coming),
+                || (from..).zip(taken).try_for_each(|(k, shot)| sink(k, shot)),
+                || draw(from + batch, next),
             );
             taken?;
             std::mem::swap(&mut ready, &mut coming);
@@ -121,62 +244,72 @@ impl<'a> Compositor<'a> {
         Ok(())
     }
 
-    fn take_canvas(&self) -> Canvas {
+    fn take_desk(&self) -> Desk {
         let spare = self
-            .canvases
+            .desks
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .pop();
-        spare.unwrap_or_else(|| Canvas {
-            image: self.library.background.clone(),
+        spare.unwrap_or_else(|| Desk {
+            canvas: self.backdrop.canvas.clone(),
             dirty: Vec::new(),
-            straight: Vec::new(),
-            sprite: Premultiplied::default(),
-            main: Resampled::default(),
-            second: Resampled::default(),
+            painter: Painter::default(),
+            drawn: Vec::new(),
         })
     }
 
-    fn far_to_near(&self, frame_idx: usize) -> Vec<&Individual> {
-        let depth = |individual: &&Individual| individual.boid.position_px[frame_idx][2];
-        let mut order: Vec<&Individual> = self.flock.individuals.iter().collect();
+    fn far_to_near(&self, frame_idx: usize) -> Vec<&'a Individual> {
+        let depth = |individual: &&Individual| match &individual.depth_m {
+            Some(depth_m) => depth_m[frame_idx],
+            None => individual.boid.position_px[frame_idx][2],
+        };
+        let mut order: Vec<&'a Individual> = self.flock.individuals.iter().collect();
         order.sort_by(|a, b| depth(b).total_cmp(&depth(a)).then(a.id.cmp(&b.id)));
         order
     }
 
-    fn draw(&self, individual: &Individual, t: usize, canvas: &mut Canvas) {
-        let mut place = Placement {
-            center_px: individual.centroid_px[t],
-            rotation_rad: individual.rotation_rad[t],
-            scale: individual.scale[t],
-            mirrored: individual.mirrored[t],
-        };
-        let size = [canvas.image.width, canvas.image.height];
-        self.premultiply(individual.source_frame[t], canvas);
-        canvas.main.draw(&canvas.sprite, &place, size);
-        let fade = self.fade_at[individual.id as usize][t];
-        if let Some(fade) = fade.map(|idx| &individual.fades[idx as usize]) {
-            let k = t - fade.start as usize;
-            place.rotation_rad = fade.rotation_rad[k];
-            place.scale = fade.scale[k];
-            place.mirrored = fade.mirrored;
-            self.premultiply(fade.source_frame[k], canvas);
-            canvas.second.draw(&canvas.sprite, &place, size);
-            mix(&mut canvas.main, &canvas.second, fade.weight[k] as f32);
-        }
-        over(&mut canvas.image, &canvas.main);
-        if !canvas.main.rect.is_empty() {
-            canvas.dirty.push(canvas.main.rect);
+    fn appearance(&self, individual: &'a Individual, frame_idx: usize) -> Appearance<'a> {
+        let fade = self.fade_at[individual.id as usize][frame_idx];
+        Appearance {
+            individual,
+            frame_idx,
+            fade: fade.map(|idx| &individual.fades[idx as usize]),
         }
     }
 
-    fn premultiply(&self, frame: u32, canvas: &mut Canvas) {
-        let (sprites, idx) = (&self.library.sprites, frame as usize);
-        sprites.read(idx, &mut canvas.straight);
-        let size = [sprites.width(), sprites.height()];
-        canvas
-            .sprite
-            .fill(&canvas.straight, size, sprites.bounds(idx));
+    fn scene(&self) -> Scene<'a> {
+        Scene {
+            sprites: &self.library.sprites,
+            view: self.view,
+            cpu: self.cpu,
+            cut: self.flock.params.render.cut,
+            haze: self.haze,
+        }
+    }
+
+    fn draw(&self, who: Appearance, desk: &mut Desk) {
+        desk.painter.paint(&self.scene(), &who);
+        desk.put(self.cpu);
+        if self.with_truth {
+            let drawn = desk.painter.drawn(&self.scene(), &who);
+            desk.drawn.push(drawn);
+        }
+    }
+
+    fn shade(&self, floor: &Floor, who: Appearance, desk: &mut Desk) {
+        desk.painter.shade(floor, &self.scene(), &who);
+        desk.put(self.cpu);
+    }
+}
+
+impl Desk {
+    /// Puts what the painter has drawn over the canvas.
+    fn put(&mut self, cpu: Level) {
+        let layer = &self.painter.layer;
+        self.canvas.over(layer, cpu);
+        if !layer.rect.is_empty() {
+            self.dirty.push(layer.rect);
+        }
     }
 }
 
@@ -192,15 +325,6 @@ fn mark(fade_at: &mut [Option<u32>], fade: &Fade, idx: u32) {
     let start = fade.start as usize;
     for at in &mut fade_at[start..start + fade.weight.len()] {
         *at = Some(idx);
-    }
-}
-
-fn copy_box(from: &RgbImage, to: &mut RgbImage, rect: Rect) {
-    let stride = from.width as usize * 3;
-    let n = rect.w as usize * 3;
-    for y in rect.y..rect.bottom() {
-        let at = y as usize * stride + rect.x as usize * 3;
-        to.pixels[at..at + n].copy_from_slice(&from.pixels[at..at + n]);
     }
 }
 

@@ -1,10 +1,16 @@
 //! What the film shows: whole sprites as they are, no boxes, the same from any thread.
 
+use super::params::Cut;
 use super::*;
 use crate::flock::synthetic;
 use crate::flock::{Params, plan_flock};
 use crate::library::View;
 use crate::progress::Silent;
+
+/// Nothing lies behind one frame alone.
+fn unprepared<E>(_: usize, _: &mut Shot) -> Result<(), E> {
+    Ok(())
+}
 
 fn flock(library: &Library, name: &str) -> Flock {
     let params = Params {
@@ -21,18 +27,18 @@ fn frames_in_any_order_are_those_of_the_film() {
     let flock = flock(&library, "school");
     let film = Compositor::new(&library, &flock);
     let mut frames = Vec::new();
-    film.render_all(|idx, frame: &Frame| {
+    film.render_all(unprepared, |idx, shot: &Shot| {
         assert_eq!(idx, frames.len());
-        frames.push(frame.clone());
+        frames.push(shot.frame.clone());
         Ok::<(), ()>(())
     })
     .unwrap();
     assert_eq!(frames.len(), 40);
     let fresh = Compositor::new(&library, &flock);
-    let mut frame = Frame::default();
+    let mut shot = Shot::default();
     for idx in (0..40).rev().step_by(7) {
-        fresh.render(idx, &mut frame);
-        assert!(frame == frames[idx], "frame {idx}");
+        fresh.render(idx, &mut shot);
+        assert!(shot.frame == frames[idx], "frame {idx}");
     }
 }
 
@@ -41,7 +47,10 @@ fn the_error_of_whoever_takes_the_frames_comes_back() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "school");
     let film = Compositor::new(&library, &flock);
-    let taken = film.render_all(|idx, _| if idx == 5 { Err("full") } else { Ok(()) });
+    let taken = film.render_all(
+        unprepared,
+        |idx, _| if idx == 5 { Err("full") } else { Ok(()) },
+    );
     assert_eq!(taken, Err("full"));
 }
 
@@ -50,11 +59,13 @@ fn nothing_changes_where_nobody_is() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "swarm");
     let film = Compositor::new(&library, &flock);
-    let mut frame = Frame::default();
-    film.render(17, &mut frame);
+    let (mut shot, mut empty) = (Shot::default(), Shot::default());
+    film.render(17, &mut shot);
+    film.backdrop.begin(&mut empty);
+    let (frame, plate) = (shot.frame, empty.frame);
     let half = f64::from(library.sprites.width()) / 2.0 * std::f64::consts::SQRT_2 + 3.0;
     let width = frame.width as usize;
-    for (k, (drawn, plate)) in frame.luma().iter().zip(film.plate.luma()).enumerate() {
+    for (k, (drawn, plate)) in frame.luma().iter().zip(plate.luma()).enumerate() {
         let (x, y) = ((k % width) as f64, (k / width) as f64);
         let near = flock.individuals.iter().any(|individual| {
             let [cx, cy] = individual.centroid_px[17];
@@ -81,4 +92,199 @@ fn overlapping_boxes_are_merged_and_those_apart_kept() {
             rect(40, 40)
         ]
     );
+}
+
+/// Every frame of a flock with its ground truth.
+fn shots(library: &Library, flock: &Flock) -> Vec<Shot> {
+    let film = Compositor::new(library, flock).with_truth();
+    let mut shots = Vec::new();
+    film.render_all(unprepared, |_, shot: &Shot| {
+        shots.push(shot.clone());
+        Ok::<(), ()>(())
+    })
+    .unwrap();
+    shots
+}
+
+#[test]
+fn labels_lie_on_what_is_drawn_and_what_is_drawn_opaque_has_one() {
+    for view in [View::Side, View::Top] {
+        let library = synthetic::library(view);
+        let mut flock = flock(&library, "swarm");
+        // The synthetic animal is far darker than white.
+        flock.params.render.background = Background::Color([255; 3]);
+        let mut n_labels = 0;
+        for shot in shots(&library, &flock) {
+            for (drawn, label) in shot.frame.luma().iter().zip(&shot.truth.labels) {
+                n_labels += usize::from(*label > 0);
+                assert!(*label == 0 || *drawn < 215, "{label} {drawn}");
+                assert!(*label > 0 || *drawn > 65, "{drawn}");
+            }
+        }
+        assert!(n_labels > 40 * 8 * 100, "{n_labels}");
+    }
+}
+
+#[test]
+fn the_truth_is_where_flock_json_says() {
+    for view in [View::Side, View::Top] {
+        let library = synthetic::library(view);
+        let flock = flock(&library, "school");
+        for (t, shot) in shots(&library, &flock).iter().enumerate() {
+            assert_eq!(shot.truth.seen.len(), 8);
+            for (individual, seen) in flock.individuals.iter().zip(&shot.truth.seen) {
+                assert_eq!(seen.centroid_px, individual.centroid_px[t]);
+                let [x, y, w, h] = seen
+                    .amodal_box
+                    .expect("everybody is drawn")
+                    .map(|v| v as f64);
+                let [cx, cy] = seen.centroid_px;
+                assert!((x..x + w).contains(&cx) && (y..y + h).contains(&cy));
+                // The long way of the box is that of the heading.
+                let heading = individual.heading_rad[t];
+                let across = libm::cos(heading).abs() > 0.9 && view == View::Top;
+                assert!(!across || w > h, "{w} {h} at {heading}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_animal_half_out_of_the_picture_is_told_whole_and_half_visible() {
+    let library = synthetic::library(View::Top);
+    let mut flock = flock(&library, "school");
+    flock.individuals.truncate(1);
+    let free = &shots(&library, &flock)[20].truth.seen[0];
+    let area = free.amodal_area;
+    assert!(free.visibility > 0.999 && free.amodal_area == free.visible_area);
+    for (axis, edge) in [(0, 0.0), (0, 320.0), (1, 0.0), (1, 240.0)] {
+        flock.individuals[0].centroid_px[20][axis] = edge;
+        let seen = &shots(&library, &flock)[20].truth.seen[0];
+        assert!(
+            (0.2..0.8).contains(&seen.visibility),
+            "{edge}: {}",
+            seen.visibility
+        );
+        let share = f64::from(seen.amodal_area) / f64::from(area);
+        assert!((share - 1.0).abs() < 0.05, "{edge}: {share}");
+        let [x, y, w, h] = seen.amodal_box.expect("it is drawn");
+        let (least, most) = ([x, y][axis], [x + w, y + h][axis]);
+        assert!(least < edge as i64 && most > edge as i64, "{least} {most}");
+        flock.individuals[0].centroid_px[20] = [160.0, 120.0];
+    }
+}
+
+#[test]
+fn at_another_size_the_truth_is_the_same_but_larger() {
+    let library = synthetic::library(View::Side);
+    let mut flock = flock(&library, "school");
+    let small = shots(&library, &flock);
+    flock.params.render.size_px = Some([640, 480]);
+    let large = shots(&library, &flock);
+    for (small, large) in small.iter().zip(&large) {
+        assert_eq!((large.frame.width, large.frame.height), (640, 480));
+        for (a, b) in small.truth.seen.iter().zip(&large.truth.seen) {
+            assert_eq!(a.centroid_px.map(|px| 2.0 * px), b.centroid_px);
+            let ratio = f64::from(b.amodal_area) / f64::from(a.amodal_area);
+            assert!((ratio - 4.0).abs() < 0.4, "{ratio}");
+        }
+    }
+}
+
+#[test]
+fn shadow_and_haze_change_the_picture_and_not_the_truth() {
+    for view in [View::Side, View::Top] {
+        let library = synthetic::library(view);
+        let mut flock = flock(&library, "school");
+        let plain = shots(&library, &flock);
+        flock.params.render.shadow = 0.6;
+        flock.params.render.haze_per_bl = 0.3;
+        for individual in &mut flock.individuals {
+            for place in &mut individual.boid.position_px {
+                place[2] += 40.0;
+            }
+        }
+        let other = shots(&library, &flock);
+        let darker = |a: &Shot, b: &Shot| {
+            let pairs = a.frame.luma().iter().zip(b.frame.luma());
+            pairs.filter(|(a, b)| **b + 10 < **a).count()
+        };
+        for (plain, other) in plain.iter().zip(&other) {
+            assert!(plain.truth == other.truth);
+            assert!(darker(plain, other) > 300);
+        }
+    }
+}
+
+#[test]
+fn what_is_filmed_on_nothing_gives_over_the_plate_the_film() {
+    let library = synthetic::library(View::Side);
+    let mut flock = flock(&library, "swarm");
+    flock.params.render.background = Background::Transparent;
+    let (mut opaque, mut clear) = (Shot::default(), Shot::default());
+    Compositor::new(&library, &flock).render(11, &mut opaque);
+    Compositor::new(&library, &flock)
+        .straight()
+        .render(11, &mut clear);
+    let film = opaque.frame.to_rgb();
+    let (mut error, mut n_clear) = (0u64, 0);
+    for (k, rgba) in clear.rgba.chunks_exact(4).enumerate() {
+        n_clear += usize::from(rgba[3] == 0);
+        for channel in 0..3 {
+            let plate = u32::from(library.background.pixels[3 * k + channel]);
+            let alpha = u32::from(rgba[3]);
+            let shown = (u32::from(rgba[channel]) * alpha + plate * (255 - alpha)) / 255;
+            error += u64::from((shown as u8).abs_diff(film.pixels[3 * k + channel]));
+        }
+    }
+    assert!(n_clear > 320 * 240 / 2, "{n_clear}");
+    // Chroma is halved on the way through the planes; nothing else differs.
+    let mean = error as f64 / (3.0 * 320.0 * 240.0);
+    assert!(mean < 2.0, "{mean}");
+}
+
+#[test]
+fn a_frame_of_another_film_lies_behind_where_it_is_given() {
+    let library = synthetic::library(View::Top);
+    let flock = flock(&library, "school");
+    let mut behind = Frame::new(64, 48, ColorSpec::default());
+    behind.planes.fill(128);
+    let mut shot = Shot {
+        behind,
+        ..Shot::default()
+    };
+    let film = Compositor::new(&library, &flock).with_truth();
+    film.render(9, &mut shot);
+    let n_gray = (shot.frame.luma().iter().zip(&shot.truth.labels))
+        .filter(|(luma, label)| **label == 0 && luma.abs_diff(128) <= 1)
+        .count();
+    assert!(n_gray > 320 * 240 / 2, "{n_gray}");
+    // Without one the plate is back.
+    let mut plain = Shot::default();
+    film.render(9, &mut plain);
+    let mut fresh = Shot::default();
+    Compositor::new(&library, &flock).render(9, &mut fresh);
+    assert!(plain.frame == fresh.frame);
+}
+
+#[test]
+fn bending_at_jumps_moves_no_more_than_the_pixels_of_a_fade() {
+    let library = synthetic::library(View::Side);
+    let mut flock = flock(&library, "swarm");
+    let faded = shots(&library, &flock);
+    flock.params.render.cut = Cut::Morph;
+    let bent = shots(&library, &flock);
+    let mut n_other = 0;
+    for (t, (a, b)) in faded.iter().zip(&bent).enumerate() {
+        let at = t as u32;
+        let during =
+            |fade: &Fade| (fade.start..fade.start + fade.weight.len() as u32).contains(&at);
+        let is_fading = (flock.individuals.iter()).any(|one| one.fades.iter().any(during));
+        assert!(is_fading || a.frame == b.frame, "frame {t}");
+        n_other += usize::from(a.frame != b.frame);
+        for (a, b) in a.truth.seen.iter().zip(&b.truth.seen) {
+            assert!(a.amodal_area.abs_diff(b.amodal_area) < a.amodal_area / 4 + 8);
+        }
+    }
+    assert!(n_other > 0, "no jump was bridged");
 }

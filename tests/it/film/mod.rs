@@ -1,5 +1,6 @@
 //! Accuracy against known truth, on generated films (ALGORITHMS.md 9).
 
 mod accuracy;
+mod one;
 mod reproduce;
 mod sample;

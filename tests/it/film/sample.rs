@@ -23,31 +23,40 @@ const N_FRAMES: usize = 180;
 /// The sample and what the analysis made of it, once for all tests.
 pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
     static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
-    FILMED.get_or_init(|| {
-        let params = SampleParams {
-            n_frames: N_FRAMES,
-            ..SampleParams::default()
-        };
-        let film = SampleFilm::new(params).expect("in range");
-        let (camera, animal) = (film.motion().camera, film.animal());
-        let params = analysis::Params {
-            camera: Some(CameraParams {
-                z_min_m: camera.z_min_m,
-                pane_px_per_m: camera.pane_px_per_m,
-                center_px: None,
-                medium_index: camera.medium_index,
-            }),
-            animal: Some(AnimalParams {
-                length_m: animal.length_m,
-                height_m: animal.height_m,
-            }),
-            ..analysis::Params::default()
-        };
-        let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
-        let library = analyze(&film, None, &params, Level::detect(), &scratch, &Silent);
-        let library = library.expect("it can be analysed");
-        (film, library, params)
-    })
+    FILMED.get_or_init(|| filmed_with(SampleParams::default().noise))
+}
+
+/// The same without noise: what is there can be told from what is added.
+pub(super) fn filmed_without_noise() -> &'static (SampleFilm, Library, analysis::Params) {
+    static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
+    FILMED.get_or_init(|| filmed_with(0.0))
+}
+
+fn filmed_with(noise: f64) -> (SampleFilm, Library, analysis::Params) {
+    let params = SampleParams {
+        n_frames: N_FRAMES,
+        noise,
+        ..SampleParams::default()
+    };
+    let film = SampleFilm::new(params).expect("in range");
+    let (camera, animal) = (film.motion().camera, film.animal());
+    let params = analysis::Params {
+        camera: Some(CameraParams {
+            z_min_m: camera.z_min_m,
+            pane_px_per_m: camera.pane_px_per_m,
+            center_px: None,
+            medium_index: camera.medium_index,
+        }),
+        animal: Some(AnimalParams {
+            length_m: animal.length_m,
+            height_m: animal.height_m,
+        }),
+        ..analysis::Params::default()
+    };
+    let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+    let library = analyze(&film, None, &params, Level::detect(), &scratch, &Silent);
+    let library = library.expect("it can be analysed");
+    (film, library, params)
 }
 
 fn library_on_disk(dir: &Path) {

@@ -14,7 +14,10 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     let analysis = app
         .accept("/v1/analyses", json!({"footage_id": footage_id}))
         .await;
-    let wishes = json!({"library_id": analysis["library_id"], "count": 3, "frames": 20, "seed": 7});
+    let render = json!({"formats": ["webm", "mov", "png", "gif", "webp", "poster"],
+        "background": "transparent", "overlay": true, "size_px": [160, 120]});
+    let wishes = json!({"library_id": analysis["library_id"], "count": 3, "frames": 20, "seed": 7,
+        "render": render});
     let flock = app.accept("/v1/flocks", wishes).await;
 
     let job = app.ended_job(&analysis["job_id"]).await;
@@ -59,8 +62,60 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     assert_eq!(app.json(&format!("{flock}/flock.json")).await["seed"], 7);
     let plan = app.get(&format!("{flock}/plan.svg")).send().await.unwrap();
     assert!(plan.text().await.unwrap().contains("All 3 individuals"));
+    assert_files(&app, &flock).await;
     assert_fish(&app, &analysis["library_id"]).await;
     app.assert_sound().await;
+}
+
+/// Everything that a flock was asked for can be had, as what it is.
+async fn assert_files(app: &TestApp, flock: &str) {
+    for (file, media_type, at, magic) in [
+        ("video.webm", "video/webm", 0, &b"\x1a\x45\xdf\xa3"[..]),
+        ("video.mov", "video/quicktime", 4, b"ftypqt"),
+        ("overlay.mp4", "video/mp4", 4, b"ftyp"),
+        ("frames.zip", "application/zip", 0, b"PK"),
+        ("ground-truth.zip", "application/zip", 0, b"PK"),
+        ("preview.gif", "image/gif", 0, b"GIF89a"),
+        ("preview.webp", "image/webp", 8, b"WEBP"),
+        ("poster.png", "image/png", 0, b"\x89PNG"),
+        (
+            "tracks.csv",
+            "text/csv; charset=utf-8",
+            0,
+            b"frame,time_s,id",
+        ),
+    ] {
+        let answer = app.get(&format!("{flock}/{file}")).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{file}");
+        assert_eq!(answer.headers()["content-type"], media_type, "{file}");
+        let bytes = answer.bytes().await.unwrap();
+        assert!(bytes[at..].starts_with(magic), "{file}");
+    }
+    let answer = app.get(&format!("{flock}/ground-truth.zip")).send().await;
+    let bytes = answer.unwrap().bytes().await.unwrap();
+    let mut zip = zip::ZipArchive::new(std::io::Cursor::new(&bytes[..])).unwrap();
+    let names: Vec<String> = (0..zip.len())
+        .map(|idx| zip.by_index(idx).unwrap().name().unwrap().to_string())
+        .collect();
+    for name in [
+        "README.txt",
+        "coco.json",
+        "gt/gt.txt",
+        "seqinfo.ini",
+        "tracks.csv",
+    ] {
+        assert!(names.iter().any(|found| found == name), "{name} {names:?}");
+    }
+    assert_eq!(
+        names
+            .iter()
+            .filter(|name| name.starts_with("masks/"))
+            .count(),
+        20
+    );
+    let place = names.iter().position(|name| name == "coco.json").unwrap();
+    let coco: Value = serde_json::from_reader(zip.by_index(place).unwrap()).unwrap();
+    assert_eq!(coco["images"][19]["width"], 160);
 }
 
 async fn assert_fish(app: &TestApp, library_id: &Value) {

@@ -3,6 +3,7 @@
 
 mod bad;
 mod good;
+mod kinds;
 mod real;
 mod speed;
 mod traced;

@@ -19,7 +19,7 @@ const FLEE_WEIGHT: f64 = 3.0;
 
 /// Goals and obstacles, and how the picture tells where they are.
 #[derive(Clone, Debug)]
-pub struct Scene<'a> {
+pub struct Habitat<'a> {
     lens: &'a Lens,
     tank: &'a Tank,
     goals: &'a [Goal],
@@ -35,10 +35,10 @@ pub struct Hunter {
     velocity: Vec3,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> Habitat<'a> {
     /// What the parameters put into a tank.
-    pub fn new(params: &'a Params, lens: &'a Lens, tank: &'a Tank) -> Scene<'a> {
-        Scene {
+    pub fn new(params: &'a Params, lens: &'a Lens, tank: &'a Tank) -> Habitat<'a> {
+        Habitat {
             lens,
             tank,
             goals: &params.goals,

@@ -1,26 +1,27 @@
-//! `flockreel flock`: library to flock (DESIGN.md, Command line), as a video and, when asked for, its
-//! plan as flock.json.
+//! `flockreel flock`: library to flock (DESIGN.md, Command line), as a film in any format and, when asked
+//! for, its plan as flock.json and its ground truth. A plan made before can be filmed again.
+
+mod outputs; // the flags about the film
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use serde_json::{Map, Value, json};
 
+use self::outputs::Outputs;
 use super::{Error, Listener, Summary};
-use crate::flock::{Compositor, Flock, Params, plan_flock};
+use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, params, svg};
+use crate::jobs::flock::film::Film;
 use crate::library::Library;
-use crate::media::{self, VideoFormat, VideoWriter};
-use crate::progress::Progress;
-use crate::raster::ColorSpec;
 
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The folder that `analyze` made.
     library: PathBuf,
-    /// The video to make.
-    #[arg(short, long, value_name = "VIDEO")]
-    output: PathBuf,
+    #[command(flatten)]
+    outputs: Outputs,
     /// Individuals, 1 to 2000.
     #[arg(long)]
     count: Option<u32>,
@@ -45,15 +46,23 @@ pub struct Args {
     /// Draw what the boids ask for against what is shown here, as SVG.
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
+    /// Film this plan, a flock.json of the same library, instead of making one.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["count", "frames", "seed", "preset", "rules", "match_by"])]
+    from: Option<PathBuf>,
 }
 
 /// Plans and films a flock.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = args.params()?;
-    let library = super::read_library(&args.library, &args.output)?.library;
+    let behind = args.outputs.behind()?;
+    let targets = args.outputs.targets(&params.render)?;
+    let library = super::read_library(&args.library, &args.outputs.output)?.library;
     let progress = Listener::new();
-    let flock = plan_flock(&library, &params, &progress)
-        .map_err(|error| Error::work(error.code(), &error))?;
+    let flock = match &args.from {
+        Some(path) => planned(path, &library, params)?,
+        None => plan_flock(&library, &params, &progress)
+            .map_err(|error| Error::work(error.code(), &error))?,
+    };
     if let Some(path) = &args.plan {
         std::fs::write(path, flock_json::write(&flock))
             .map_err(Error::io(format!("writing the plan: {}", path.display())))?;
@@ -64,19 +73,46 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             path.display()
         )))?;
     }
-    film(&library, &flock, &args.output, &progress)
+    let film = Film {
+        library: &library,
+        flock: &flock,
+        backdrop: behind.backdrop(),
+        progress: &progress,
+    };
+    let began = Instant::now();
+    film.make(&targets, args.outputs.ground_truth.as_deref())
         .map_err(|error| Error::work(error.code(), &error))?;
-    Ok(Some(Summary(json!({
-        "video": args.output,
+    Ok(Some(summary(&args, &flock, began.elapsed())))
+}
+
+fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
+    Summary(json!({
+        "video": args.outputs.output,
         "plan": args.plan,
         "plan_picture": args.plan_picture,
-        "count": params.count,
-        "frames": params.frames,
-        "seed": params.seed,
+        "ground_truth": args.outputs.ground_truth,
+        "count": flock.individuals.len(),
+        "frames": flock.params.frames,
+        "seed": flock.params.seed,
+        "rendered_s": (rendered.as_secs_f64() * 1e3).round() / 1e3,
         "heading_error_median_rad": flock.stats.heading_error_median_rad,
         "jumps_per_100_frames": flock.stats.jumps_per_100_frames,
         "clone_share": flock.stats.clone_share,
-    }))))
+    }))
+}
+
+/// A flock that was planned before, to be filmed as `params` say.
+fn planned(path: &Path, library: &Library, params: Params) -> Result<Flock, Error> {
+    let named = |why: &str| Error::Usage(format!("{why}: {}", path.display()));
+    let bytes =
+        std::fs::read(path).map_err(|cause| named(&format!("the plan cannot be read: {cause}")))?;
+    let mut flock =
+        flock_json::read(&bytes).map_err(|cause| named(&format!("not a flock.json: {cause}")))?;
+    if !flock.fits(library) {
+        return Err(named("the plan is of another library"));
+    }
+    flock.params.render = params.render;
+    Ok(flock)
 }
 
 impl Args {
@@ -88,6 +124,8 @@ impl Args {
                 .map_err(|cause| Error::Usage(format!("--rules is not JSON: {cause}")))?;
             overrides.insert("rules".into(), rules);
         }
+        let render = Value::Object(self.outputs.overrides());
+        overrides.insert("render".into(), render);
         let by = |by: &String| json!({ "by": by });
         let given = [
             ("matching", self.match_by.as_ref().map(by)),
@@ -101,26 +139,4 @@ impl Args {
         }
         params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
     }
-}
-
-fn film(
-    library: &Library,
-    flock: &Flock,
-    path: &Path,
-    progress: &dyn Progress,
-) -> Result<(), media::Error> {
-    let format = VideoFormat {
-        width: flock.image_size_px[0],
-        height: flock.image_size_px[1],
-        fps: flock.fps,
-        color: ColorSpec::default(),
-    };
-    let compositor = Compositor::with_color(library, flock, format.color);
-    let n_frames = compositor.n_frames() as f64;
-    let mut video = VideoWriter::create(path, &format)?;
-    compositor.render_all(|frame_idx, frame| {
-        progress.report("rendering", (frame_idx + 1) as f64 / n_frames);
-        video.write(frame)
-    })?;
-    video.finish()
 }

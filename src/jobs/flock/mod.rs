@@ -1,18 +1,26 @@
-//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json`, `plan.svg` and
-//! `video.mp4`.
+//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json`, `plan.svg`,
+//! `video.mp4`, and what its `render` parameters ask for besides.
+
+mod behind; // another film behind a flock
+pub mod film; // frames to files
+mod sink; // where frames go
+pub mod truth; // the ground truth as a folder and as one file
+
+use std::collections::BTreeSet;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use self::film::{Backdrop, Film, Output, Target};
 use super::{Attempt, Context, Error, Product, Stages, clock};
-use crate::flock::{Compositor, Flock, Params, plan_flock};
+use crate::flock::composite::params::{Format, Render};
+use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, library_dir, svg};
 use crate::ids::{FlockId, JobId, LibraryId};
 use crate::library::Library;
-use crate::media::{VideoFormat, VideoWriter};
 use crate::progress::Progress;
-use crate::raster::ColorSpec;
 use crate::store;
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
@@ -97,23 +105,57 @@ impl Input {
 }
 
 fn render(attempt: &Attempt, library: &Library, flock: &Flock) -> Result<(), Error> {
-    let format = VideoFormat {
-        width: flock.image_size_px[0],
-        height: flock.image_size_px[1],
-        fps: flock.fps,
-        color: ColorSpec::default(),
+    let folder = attempt.folder();
+    let film = Film {
+        library,
+        flock,
+        backdrop: Backdrop::AsAsked,
+        progress: attempt.listener,
     };
-    let mut video = VideoWriter::create(&attempt.folder().join("video.mp4"), &format)?;
-    let compositor = Compositor::with_color(library, flock, format.color);
-    let n_frames = compositor.n_frames();
-    compositor.render_all(|frame_idx, frame| {
-        if attempt.listener.cancelled() {
-            return Err(Error::Cancelled);
-        }
-        video.write(frame)?;
-        let fraction = (frame_idx + 1) as f64 / n_frames as f64;
-        attempt.listener.report("rendering", fraction);
-        Ok(())
-    })?;
-    Ok(video.finish()?)
+    let truth = folder.join("ground-truth");
+    let targets = targets(folder, &flock.params.render);
+    if !flock.params.render.ground_truth {
+        return film.make(&targets, None);
+    }
+    film.make(&targets, Some(&truth))?;
+    std::fs::copy(truth.join("tracks.csv"), folder.join("tracks.csv"))?;
+    truth::pack(&truth, &folder.join("ground-truth.zip"))?;
+    Ok(std::fs::remove_dir_all(&truth)?)
+}
+
+/// video.mp4, and what is asked for besides, each once.
+fn targets(folder: &Path, render: &Render) -> Vec<Target> {
+    let formats: BTreeSet<Format> = render
+        .formats
+        .iter()
+        .copied()
+        .chain([Format::Mp4])
+        .collect();
+    let mut targets: Vec<Target> = formats
+        .into_iter()
+        .map(|format| Target {
+            output: Output::Film(format),
+            path: folder.join(file_name(format)),
+        })
+        .collect();
+    if render.overlay {
+        targets.push(Target {
+            output: Output::Overlay,
+            path: folder.join("overlay.mp4"),
+        });
+    }
+    targets
+}
+
+/// The name of a format's file among those of a flock.
+pub fn file_name(format: Format) -> &'static str {
+    match format {
+        Format::Mp4 => "video.mp4",
+        Format::Webm => "video.webm",
+        Format::Mov => "video.mov",
+        Format::Png => "frames.zip",
+        Format::Gif => "preview.gif",
+        Format::Webp => "preview.webp",
+        Format::Poster => "poster.png",
+    }
 }

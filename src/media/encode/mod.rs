@@ -1,18 +1,23 @@
-//! Frames to an MP4 that browsers play: H.264 High, 4:2:0, index in front (ECOSYSTEM.md 5).
+//! Frames to a file: an MP4 that browsers play (H.264 High, 4:2:0, index in front), or one of the other
+//! kinds of `coding`, some with straight alpha (ECOSYSTEM.md 5).
 //!
 //! Equal frames give equal bytes whatever the machine: x264 gets a fixed number of threads (measured:
 //! 1, 2, 3 and 4 give four different films; 4 gives the same on one core, on two and without vector
 //! instructions), no processor-dependent choices, and writes no name of itself.
 //! The file appears under its own name only when it is whole.
 
+mod coding; // what the encoder is told for each kind of file
+
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+
+pub use coding::Coding;
 
 use super::error::Error;
 use super::gate::{Child, Order, Tool};
 use super::limits::Limits;
 use crate::footage::FootageFormat;
-use crate::raster::{ColorSpec, Frame, Matrix, Range};
+use crate::raster::{ColorSpec, Frame};
 
 /// What all frames of a video have in common.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,9 +62,10 @@ impl Default for Quality {
     }
 }
 
-/// An MP4 file being written. Dropped before [`VideoWriter::finish`], it leaves nothing behind.
+/// A video file being written. Dropped before [`VideoWriter::finish`], it leaves nothing behind.
 pub struct VideoWriter {
     format: VideoFormat,
+    coding: Coding,
     /// None once the encoder has failed: every later frame is refused.
     child: Option<Child>,
     part: Part,
@@ -68,9 +74,18 @@ pub struct VideoWriter {
 }
 
 impl VideoWriter {
-    /// Starts a video at `path`, with the default quality and limits.
+    /// Starts an MP4 at `path`, with the default quality and limits.
     pub fn create(path: &Path, format: &VideoFormat) -> Result<VideoWriter, Error> {
         VideoWriter::create_with(path, format, Quality::default(), &Limits::default())
+    }
+
+    /// Starts a file of another kind, with the default limits.
+    pub fn create_as(
+        path: &Path,
+        format: &VideoFormat,
+        coding: Coding,
+    ) -> Result<VideoWriter, Error> {
+        VideoWriter::start(path, format, coding, &Limits::default())
     }
 
     /// As `create`; of the limits, those on time, memory and output bytes hold.
@@ -78,6 +93,15 @@ impl VideoWriter {
         path: &Path,
         format: &VideoFormat,
         quality: Quality,
+        limits: &Limits,
+    ) -> Result<VideoWriter, Error> {
+        VideoWriter::start(path, format, Coding::H264(quality), limits)
+    }
+
+    fn start(
+        path: &Path,
+        format: &VideoFormat,
+        coding: Coding,
         limits: &Limits,
     ) -> Result<VideoWriter, Error> {
         let sides = 1..=8192;
@@ -89,11 +113,12 @@ impl VideoWriter {
         }
         let path = std::path::absolute(path).map_err(Error::io("finding the output folder"))?;
         let part = Part::beside(&path);
-        let args = encoder_args(&part.0, format, quality);
+        let args = coding.args(&part.0, format);
         let order = Order::new(Tool::Ffmpeg, args, limits, limits.max_frames)
             .with_output(limits.max_output_bytes);
         Ok(VideoWriter {
             format: *format,
+            coding,
             child: Some(Child::writing(order)?),
             part,
             path,
@@ -109,18 +134,35 @@ impl VideoWriter {
             color,
             ..
         } = self.format;
-        if (frame.width, frame.height, frame.color) != (width, height, color) {
+        if (frame.width, frame.height, frame.color) != (width, height, color)
+            || self.coding.takes_rgba()
+        {
             return Err(Error::BadOutput("a frame of another size or color"));
         }
+        if width % 2 == 0 && height % 2 == 0 || !self.coding.is_even() {
+            return self.give(&frame.planes);
+        }
+        let mut padded = std::mem::take(&mut self.padded);
+        pad(frame, &mut padded);
+        let written = self.give(&padded);
+        self.padded = padded;
+        written
+    }
+
+    /// Adds a frame of straight-alpha RGBA, by rows, of the video's size.
+    pub fn write_rgba(&mut self, rgba: &[u8]) -> Result<(), Error> {
+        let n_bytes = self.format.width as usize * self.format.height as usize * 4;
+        if rgba.len() != n_bytes || !self.coding.takes_rgba() {
+            return Err(Error::BadOutput("a picture of another size or kind"));
+        }
+        self.give(rgba)
+    }
+
+    fn give(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let Some(child) = &mut self.child else {
             return Err(Error::BadOutput("a frame after a failure"));
         };
-        let written = if width % 2 == 0 && height % 2 == 0 {
-            child.write_all(&frame.planes)
-        } else {
-            pad(frame, &mut self.padded);
-            child.write_all(&self.padded)
-        };
+        let written = child.write_all(bytes);
         if written.is_err() {
             self.child = None;
         }
@@ -157,59 +199,6 @@ impl Drop for Part {
     }
 }
 
-fn encoder_args(part: &Path, format: &VideoFormat, quality: Quality) -> Vec<OsString> {
-    let even = |side: u32| side.next_multiple_of(2);
-    let size = format!("{}x{}", even(format.width), even(format.height));
-    let (over, under) = fraction(format.fps);
-    let rate = format!("{over}/{under}");
-    let (range, pix_fmt) = match format.color.range {
-        Range::Limited => ("tv", "yuv420p"),
-        Range::Full => ("pc", "yuvj420p"),
-    };
-    let matrix = match format.color.matrix {
-        Matrix::Bt601 => "smpte170m",
-        Matrix::Bt709 => "bt709",
-    };
-    let Quality { crf, threads } = quality;
-    // Our RGB is sRGB, whatever the luma weights: its primaries are those of BT.709. The filter on
-    // the stream drops the message in which x264 writes its version and settings.
-    let words = format!(
-        "-nostdin -protocol_whitelist pipe -f rawvideo -pixel_format {pix_fmt} -video_size {size} \
-         -framerate {rate} -i pipe:0 -map 0:0 -an -sn -dn \
-         -vf setparams=range={range}:colorspace={matrix}:color_primaries=bt709:color_trc=bt709 \
-         -c:v libx264 -preset veryfast -profile:v high -crf {crf} -threads {threads} \
-         -x264-params cpu-independent=1 -bsf:v filter_units=remove_types=6 \
-         -fflags +bitexact -flags:v +bitexact -map_metadata -1 -movflags +faststart -f mp4 -y"
-    );
-    let mut args: Vec<OsString> = words.split_whitespace().map(Into::into).collect();
-    // The one word that may hold spaces.
-    let mut file = OsString::from("file:");
-    file.push(part);
-    args.push(file);
-    args
-}
-
-/// The fraction nearest to a frame rate, with numbers that ffmpeg takes (up to 1,001,000).
-fn fraction(fps: f64) -> (u64, u64) {
-    const MOST: f64 = 1_001_000.0;
-    let (mut before, mut last, mut rest) = ((0.0, 1.0), (1.0, 0.0), fps);
-    // Continued fraction: each step is the best one with numbers of its size.
-    loop {
-        let whole = f64::floor(rest);
-        let next = (whole * last.0 + before.0, whole * last.1 + before.1);
-        if next.0 > MOST || next.1 > MOST {
-            break;
-        }
-        (before, last) = (last, next);
-        let left = rest - whole;
-        if left < 1e-9 || (last.0 / last.1 - fps).abs() <= 1e-12 * fps {
-            break;
-        }
-        rest = 1.0 / left;
-    }
-    (last.0.max(1.0) as u64, last.1.max(1.0) as u64)
-}
-
 /// The planes with an even number of rows and columns, the last ones doubled where needed. The
 /// chroma planes of an odd size are rounded up already.
 fn pad(frame: &Frame, padded: &mut Vec<u8>) {
@@ -230,14 +219,6 @@ fn pad(frame: &Frame, padded: &mut Vec<u8>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn usual_and_odd_rates_become_their_own_fractions() {
-        assert_eq!(fraction(25.0), (25, 1));
-        assert_eq!(fraction(30000.0 / 1001.0), (30000, 1001));
-        assert_eq!(fraction(1_000_000.0 / 33333.0), (1_000_000, 33333));
-        assert_eq!(fraction(0.5), (1, 2));
-    }
 
     #[test]
     fn an_odd_frame_gains_copies_of_its_last_row_and_column() {

@@ -1,0 +1,235 @@
+//! What `flockreel flock` makes of a flock: the flags about its film, and what they mean for the files to
+//! make (DESIGN.md, Command line; ALGORITHMS.md 8).
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value, json};
+
+use crate::cli::Error;
+use crate::cli::sample::parse_size;
+use crate::flock::composite::params::{Background, Format, Render};
+use crate::jobs::flock::film::{Backdrop, Output, Target};
+use crate::media::{Limits, Video, read_image};
+use crate::raster::RgbImage;
+
+/// Flags about the film.
+#[derive(Debug, clap::Args)]
+pub(super) struct Outputs {
+    /// The film to make: .mp4, .webm, .mov (ProRes), .gif, .webp; one picture as .png or .jpg; a folder or
+    /// .zip of pictures with --format png.
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: PathBuf,
+    /// What to make, when the name does not tell.
+    #[arg(long, value_name = "mp4|webm|mov|png|gif|webp|poster")]
+    format: Option<String>,
+    /// Width and height of the film; the same field of view as the footage.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// What lies behind: plate, transparent, #rrggbb, a picture or a video.
+    #[arg(long, value_name = "WHAT")]
+    background: Option<String>,
+    /// How jumps are bridged: fade or morph.
+    #[arg(long, value_name = "fade|morph")]
+    cut: Option<String>,
+    /// How much of what is a body length farther is lost in haze, 0 to 1.
+    #[arg(long, value_name = "SHARE")]
+    haze: Option<f64>,
+    /// How dark the shadows on the floor are, 0 to 1.
+    #[arg(long, value_name = "SHARE")]
+    shadow: Option<f64>,
+    /// Also film where every boid is and heads, over the flock.
+    #[arg(long, value_name = "MP4")]
+    overlay: Option<PathBuf>,
+    /// Also write the frame in the middle, as .png or .jpg.
+    #[arg(long, value_name = "PICTURE")]
+    poster: Option<PathBuf>,
+    /// Write what is where in every frame into this folder: masks, coco.json, MOTChallenge, tracks.csv.
+    #[arg(long, value_name = "DIR")]
+    pub(super) ground_truth: Option<PathBuf>,
+}
+
+/// What lies behind, opened.
+pub(super) enum Behind {
+    /// What the parameters say.
+    AsAsked,
+    /// A picture.
+    Picture(RgbImage),
+    /// A video.
+    Film(Box<Video>),
+}
+
+impl Outputs {
+    /// The `render` parameters that the flags set.
+    pub(super) fn overrides(&self) -> Map<String, Value> {
+        let named = self.named_background().map(Value::from);
+        let given = [
+            ("size_px", self.size.map(|size| json!(size))),
+            ("background", named),
+            ("cut", self.cut.clone().map(Value::from)),
+            ("haze_per_bl", self.haze.map(Value::from)),
+            ("shadow", self.shadow.map(Value::from)),
+        ];
+        let given = given.into_iter();
+        given
+            .filter_map(|(name, value)| Some((name.to_owned(), value?)))
+            .collect()
+    }
+
+    /// The files to make. Fails when one cannot show what lies behind.
+    pub(super) fn targets(&self, render: &Render) -> Result<Vec<Target>, Error> {
+        let format = match &self.format {
+            Some(name) => serde_json::from_value(Value::from(name.as_str()))
+                .map_err(|_unknown| Error::Usage(format!("there is no such format: {name}")))?,
+            None => format_of(&self.output)?,
+        };
+        let mut targets = vec![Target {
+            output: Output::Film(format),
+            path: self.output.clone(),
+        }];
+        targets.extend(self.poster.clone().map(|path| Target {
+            output: Output::Film(Format::Poster),
+            path,
+        }));
+        targets.extend(self.overlay.clone().map(|path| Target {
+            output: Output::Overlay,
+            path,
+        }));
+        let clear = render.background == Background::Transparent;
+        match targets.iter().find(|target| clear && !keeps_alpha(target)) {
+            Some(target) => Err(Error::Usage(format!(
+                "no transparency in this kind of file, take .webm, .mov or --format png: {}",
+                target.path.display()
+            ))),
+            None => Ok(targets),
+        }
+    }
+
+    /// Opens the picture or video that lies behind, where one is named.
+    pub(super) fn behind(&self) -> Result<Behind, Error> {
+        let named = self.named_background();
+        let Some(path) = self.background.as_deref().filter(|_| named.is_none()) else {
+            return Ok(Behind::AsAsked);
+        };
+        let path = Path::new(path);
+        if !path.is_file() {
+            return Err(Error::Usage(format!(
+                "neither plate, transparent, #rrggbb nor a file: {}",
+                path.display()
+            )));
+        }
+        let (limits, work) = (Limits::default(), |e| Error::work_of_media(&e));
+        match ending(path).as_str() {
+            "png" | "jpg" | "jpeg" => read_image(path, &limits).map(Behind::Picture).map_err(work),
+            _ => Video::open(path, &limits)
+                .map(|video| Behind::Film(Box::new(video)))
+                .map_err(work),
+        }
+    }
+
+    /// The background, where it is no file.
+    fn named_background(&self) -> Option<String> {
+        let text = self.background.as_ref()?;
+        Background::try_from(text.clone()).ok().map(String::from)
+    }
+}
+
+impl Behind {
+    /// As a film takes it.
+    pub(super) fn backdrop(&self) -> Backdrop<'_> {
+        match self {
+            Behind::AsAsked => Backdrop::AsAsked,
+            Behind::Picture(picture) => Backdrop::Picture(picture),
+            Behind::Film(video) => Backdrop::Film(video.as_ref()),
+        }
+    }
+}
+
+fn keeps_alpha(target: &Target) -> bool {
+    match target.output {
+        Output::Overlay => true, // it has a backdrop of its own
+        Output::Film(Format::Poster) => !["jpg", "jpeg"].contains(&ending(&target.path).as_str()),
+        Output::Film(format) => format.has_alpha(),
+    }
+}
+
+/// The format that a file's name asks for.
+fn format_of(path: &Path) -> Result<Format, Error> {
+    match ending(path).as_str() {
+        "mp4" | "m4v" => Ok(Format::Mp4),
+        "webm" => Ok(Format::Webm),
+        "mov" => Ok(Format::Mov),
+        "gif" => Ok(Format::Gif),
+        "webp" => Ok(Format::Webp),
+        "png" | "jpg" | "jpeg" => Ok(Format::Poster),
+        "zip" => Ok(Format::Png),
+        _ => Err(Error::Usage(format!(
+            "the name does not tell what to make, say --format mp4, webm, mov, png, gif or webp: {}",
+            path.display()
+        ))),
+    }
+}
+
+fn ending(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Arguments {
+        #[command(flatten)]
+        outputs: Outputs,
+    }
+
+    fn outputs(words: &str) -> Outputs {
+        Arguments::parse_from(["flock"].into_iter().chain(words.split_whitespace())).outputs
+    }
+
+    fn render(outputs: &Outputs) -> Render {
+        let given = Value::Object(outputs.overrides());
+        serde_json::from_value(given).expect("good flags")
+    }
+
+    #[test]
+    fn the_name_tells_the_format_and_a_flag_overrules_it() {
+        for (words, format) in [
+            ("-o a.mp4", Format::Mp4),
+            ("-o a.WEBM", Format::Webm),
+            ("-o a.mov", Format::Mov),
+            ("-o a.jpg", Format::Poster),
+            ("-o frames --format png", Format::Png),
+            ("-o a.zip", Format::Png),
+        ] {
+            let targets = outputs(words)
+                .targets(&Render::default())
+                .expect("good flags");
+            assert_eq!(targets[0].output, Output::Film(format), "{words}");
+        }
+        let said = outputs("-o frames").targets(&Render::default());
+        assert!(
+            said.expect_err("no format")
+                .to_string()
+                .ends_with(": frames")
+        );
+    }
+
+    #[test]
+    fn what_has_no_transparency_is_refused_when_that_is_asked_for() {
+        for (words, is_good) in [
+            ("-o a.mp4 --background transparent", false),
+            ("-o a.gif --background transparent", false),
+            ("-o a.webm --background transparent", true),
+            ("-o a.webm --background transparent --poster p.jpg", false),
+            ("-o a.webm --background transparent --poster p.png", true),
+            ("-o a.mp4 --background #102030", true),
+        ] {
+            let outputs = outputs(words);
+            let targets = outputs.targets(&render(&outputs));
+            assert_eq!(targets.is_ok(), is_good, "{words}");
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! One individual as it is drawn into one frame: its sprite placed, and around a jump the second one
+//! faded in or out (ALGORITHMS.md 8).
+
+use super::morph::bend;
+use super::params::Cut;
+use super::shadow::Floor;
+use super::truth::{Drawn, Whole};
+use super::view::View;
+use crate::cpu::Level;
+use crate::flock::individual::{Fade, Individual};
+use crate::library::Sprites;
+use crate::raster::blend::{haze, mix};
+use crate::raster::resample::{Placement, Premultiplied, Quad, Resampled};
+
+/// What drawing needs besides the individual.
+#[derive(Clone, Copy)]
+pub(super) struct Scene<'a> {
+    pub(super) sprites: &'a Sprites,
+    pub(super) view: View,
+    pub(super) cpu: Level,
+    pub(super) cut: Cut,
+    pub(super) haze: Option<Haze>,
+}
+
+/// What is lost with distance.
+#[derive(Clone, Copy)]
+pub(super) struct Haze {
+    /// The share that is left after each pixel of depth.
+    pub(super) left_per_px: f64,
+    /// What takes the place of the rest.
+    pub(super) color: Quad,
+}
+
+/// One individual at one frame.
+#[derive(Clone, Copy)]
+pub(super) struct Appearance<'a> {
+    pub(super) individual: &'a Individual,
+    pub(super) frame_idx: usize,
+    pub(super) fade: Option<&'a Fade>,
+}
+
+/// Draws individuals, one after the other, in memory that it keeps.
+#[derive(Default)]
+pub(super) struct Painter {
+    packed: Vec<u8>,
+    sprite: Premultiplied,
+    /// What was drawn last.
+    pub(super) layer: Resampled,
+    second: Resampled,
+    mixed: Vec<Quad>,
+}
+
+impl Painter {
+    /// Draws an individual's layer for a picture of the film.
+    pub(super) fn paint(&mut self, scene: &Scene, who: &Appearance) {
+        self.paint_shifted(scene, who, scene.view.size_px, [0.0; 2]);
+        if let Some(veil) = scene.haze {
+            let depth_px = who.individual.boid.position_px[who.frame_idx][2].max(0.0);
+            haze(
+                &mut self.layer,
+                libm::pow(veil.left_per_px, depth_px),
+                veil.color,
+            );
+        }
+    }
+
+    /// Draws the shadow of an individual in place of it.
+    pub(super) fn shade(&mut self, floor: &Floor, scene: &Scene, who: &Appearance) {
+        floor.draw(who, &scene.view, &mut self.layer);
+    }
+
+    /// What was painted last, as the ground truth needs it.
+    pub(super) fn drawn(&mut self, scene: &Scene, who: &Appearance) -> Drawn {
+        let place = placement(scene, who);
+        let alpha = self.layer.pixels.iter().map(|pixel| pixel[3] as u16);
+        let mut drawn = Drawn {
+            id: who.individual.id,
+            centroid_px: place.center_px,
+            scale: place.scale,
+            rect: self.layer.rect,
+            alpha: alpha.collect(),
+            whole: None,
+        };
+        if self.is_clipped(scene) {
+            drawn.whole = Some(self.whole(scene, who));
+        }
+        drawn
+    }
+
+    /// Draws once more with room on all sides, to see what the border cut off.
+    fn whole(&mut self, scene: &Scene, who: &Appearance) -> Whole {
+        let (sprites, place) = (scene.sprites, placement(scene, who));
+        let [w, h] = [sprites.width(), sprites.height()].map(f64::from);
+        let diagonal = (w * w + h * h).sqrt();
+        let of_fade = who
+            .fade
+            .map_or(0.0, |fade| fade.scale[who.frame_idx - fade.start as usize]);
+        let scale = place.scale.max(of_fade * scene.view.scale);
+        let room = (diagonal * scale).ceil() as u32 + 4;
+        // From the nearest whole pixel inside of the picture, however far outside it is drawn.
+        let size = [2 * room, 2 * room];
+        let shift = place
+            .center_px
+            .map(|px| i64::from(room) - px.floor() as i64);
+        self.paint_shifted(scene, who, size, shift.map(|px| px as f64));
+        let alpha: Vec<u16> = self.layer.pixels.iter().map(|p| p[3] as u16).collect();
+        let whole = Whole::of(&alpha, self.layer.rect, shift);
+        self.paint(scene, who);
+        whole
+    }
+
+    /// A box that ends inside of the picture on every side has not been clipped.
+    fn is_clipped(&self, scene: &Scene) -> bool {
+        let (rect, [width, height]) = (self.layer.rect, scene.view.size_px);
+        let clipped_before = rect.x == 0 || rect.y == 0;
+        rect.is_empty() || clipped_before || rect.right() == width || rect.bottom() == height
+    }
+
+    fn paint_shifted(&mut self, scene: &Scene, who: &Appearance, size: [u32; 2], shift: [f64; 2]) {
+        let (individual, t) = (who.individual, who.frame_idx);
+        let mut place = placement(scene, who);
+        place.center_px = std::array::from_fn(|k| place.center_px[k] + shift[k]);
+        self.take(scene, individual.source_frame[t], place.scale);
+        self.layer.draw(&self.sprite, &place, size, scene.cpu);
+        let Some(fade) = who.fade else {
+            return;
+        };
+        let k = t - fade.start as usize;
+        place.rotation_rad = fade.rotation_rad[k];
+        place.scale = fade.scale[k] * scene.view.scale;
+        place.mirrored = fade.mirrored;
+        self.take(scene, fade.source_frame[k], place.scale);
+        self.second.draw(&self.sprite, &place, size, scene.cpu);
+        if scene.cut == Cut::Morph {
+            bend(&mut self.layer, &mut self.second, fade.weight[k]);
+        }
+        mix(
+            &mut self.layer,
+            &self.second,
+            fade.weight[k],
+            &mut self.mixed,
+        );
+    }
+
+    fn take(&mut self, scene: &Scene, frame: u32, scale: f64) {
+        let sprites = scene.sprites;
+        let bounds = sprites.read_cut(frame as usize, &mut self.packed);
+        let size = [sprites.width(), sprites.height()];
+        self.sprite.fill(&self.packed, size, bounds, scale);
+    }
+}
+
+/// Where the main sprite goes in the film.
+fn placement(scene: &Scene, who: &Appearance) -> Placement {
+    let (individual, t) = (who.individual, who.frame_idx);
+    Placement {
+        center_px: scene.view.point(individual.centroid_px[t]),
+        rotation_rad: individual.rotation_rad[t],
+        scale: individual.scale[t] * scene.view.scale,
+        mirrored: individual.mirrored[t],
+    }
+}

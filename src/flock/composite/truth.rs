@@ -1,0 +1,269 @@
+//! What of whom can be seen in a frame, told by the compositor from the very alpha it drew with:
+//! visible_i = alpha_i times the product of (1 - alpha_k) over all k nearer (ALGORITHMS.md 8).
+//!
+//! Everything is counted in 16384ths, so that what all individuals and the background show of a pixel
+//! adds up to exactly one.
+
+use crate::geometry::Rect;
+use crate::raster::Mask;
+
+/// Alpha 1, and the whole of a pixel.
+pub(super) const ONE: u32 = 1 << 14;
+/// What counts as shown.
+const HALF: u32 = ONE / 2;
+
+/// The ground truth of one frame, in pixels of the film.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct FrameTruth {
+    /// Width and height of the film.
+    pub size_px: [u32; 2],
+    /// By pixel: 0, or id + 1 of the individual that makes up at least half of it.
+    pub labels: Vec<u16>,
+    /// Everyone, by id.
+    pub seen: Vec<Seen>,
+}
+
+/// One individual in one frame. Boxes are [x, y, width, height].
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Seen {
+    /// Where its centroid is drawn.
+    pub centroid_px: [f64; 2],
+    /// Size relative to the footage's, times that of the film.
+    pub scale: f64,
+    /// The tightest box around its label; `None` when it has none.
+    pub visible_box: Option<Rect>,
+    /// Pixels of its label.
+    pub visible_area: u32,
+    /// Where its own alpha is at least a half, whoever is before it; within the picture.
+    pub silhouette: Mask,
+    /// The tightest box around its alpha of at least a half, whoever is before it; it may reach beyond
+    /// the picture. `None` when no pixel has that much.
+    pub amodal_box: Option<[i64; 4]>,
+    /// Pixels of that, beyond the picture too.
+    pub amodal_area: u32,
+    /// The share of its alpha that is in the picture and not covered, 0..=1.
+    pub visibility: f64,
+}
+
+/// What was drawn of an individual: alpha in 16384ths over a box.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Drawn {
+    pub(super) id: u32,
+    pub(super) centroid_px: [f64; 2],
+    pub(super) scale: f64,
+    pub(super) rect: Rect,
+    pub(super) alpha: Vec<u16>,
+    /// The same including what lies outside of the picture, where anything does.
+    pub(super) whole: Option<Whole>,
+}
+
+/// An individual's extent without regard to the picture's border.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Whole {
+    amodal_box: Option<[i64; 4]>,
+    amodal_area: u32,
+    alpha_sum: u64,
+}
+
+impl FrameTruth {
+    /// The truth of everyone drawn, far to near; ids are 0..n, each once.
+    pub(super) fn of(drawn: &[Drawn], size_px: [u32; 2]) -> FrameTruth {
+        let n_pixels = size_px[0] as usize * size_px[1] as usize;
+        let mut truth = FrameTruth {
+            size_px,
+            labels: vec![0; n_pixels],
+            seen: vec![Seen::default(); drawn.len()],
+        };
+        // What of each pixel is left for those farther.
+        let mut left = vec![ONE as u16; n_pixels];
+        for drawn in drawn.iter().rev() {
+            truth.seen[drawn.id as usize] = truth.look(drawn, &mut left);
+        }
+        truth
+    }
+
+    fn look(&mut self, drawn: &Drawn, left: &mut [u16]) -> Seen {
+        let rect = drawn.rect;
+        let mut extent = Extent::default();
+        let (mut visible_sum, mut visible_area) = (0, 0);
+        let rows = drawn.alpha.chunks_exact(rect.w.max(1) as usize);
+        for (row, y) in rows.zip(rect.y..) {
+            let at = y as usize * self.size_px[0] as usize + rect.x as usize;
+            let labels = &mut self.labels[at..at + row.len()];
+            let left = &mut left[at..at + row.len()];
+            for (k, &alpha) in row.iter().enumerate().filter(|(_, alpha)| **alpha > 0) {
+                let visible = (u32::from(alpha) * u32::from(left[k]) + HALF) / ONE;
+                left[k] -= visible as u16;
+                visible_sum += u64::from(visible);
+                // Two halves: the nearer one has the pixel.
+                if visible >= HALF && labels[k] == 0 {
+                    labels[k] = drawn.id as u16 + 1;
+                    extent.add(i64::from(rect.x) + k as i64, i64::from(y));
+                    visible_area += 1;
+                }
+            }
+        }
+        let whole = drawn
+            .whole
+            .unwrap_or_else(|| Whole::of(&drawn.alpha, rect, [0, 0]));
+        Seen {
+            centroid_px: drawn.centroid_px,
+            scale: drawn.scale,
+            visible_box: extent.edges.map(|[x, y, right, bottom]| {
+                Rect::clipped(x, y, right, bottom, u32::MAX, u32::MAX)
+            }),
+            visible_area,
+            silhouette: Mask {
+                rect,
+                bits: drawn
+                    .alpha
+                    .iter()
+                    .map(|&a| u8::from(u32::from(a) >= HALF))
+                    .collect(),
+            },
+            amodal_box: whole.amodal_box,
+            amodal_area: whole.amodal_area,
+            visibility: visible_sum as f64 / whole.alpha_sum.max(1) as f64,
+        }
+    }
+}
+
+impl Whole {
+    /// Of alpha over a box whose corner lies at `rect`'s less `shift`.
+    pub(super) fn of(alpha: &[u16], rect: Rect, shift: [i64; 2]) -> Whole {
+        let mut extent = Extent::default();
+        let (mut amodal_area, mut alpha_sum) = (0, 0);
+        for (row, y) in alpha
+            .chunks_exact(rect.w.max(1) as usize)
+            .zip(i64::from(rect.y)..)
+        {
+            for (&alpha, x) in row.iter().zip(i64::from(rect.x)..) {
+                alpha_sum += u64::from(alpha);
+                if u32::from(alpha) >= HALF {
+                    extent.add(x - shift[0], y - shift[1]);
+                    amodal_area += 1;
+                }
+            }
+        }
+        Whole {
+            amodal_box: extent
+                .edges
+                .map(|[x, y, right, bottom]| [x, y, right - x, bottom - y]),
+            amodal_area,
+            alpha_sum,
+        }
+    }
+}
+
+/// The tightest box around some pixels: left, top, right, bottom.
+#[derive(Default)]
+struct Extent {
+    edges: Option<[i64; 4]>,
+}
+
+impl Extent {
+    fn add(&mut self, x: i64, y: i64) {
+        let [left, top, right, bottom] = self.edges.unwrap_or([x, y, x + 1, y + 1]);
+        self.edges = Some([left.min(x), top.min(y), right.max(x + 1), bottom.max(y + 1)]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn layer(id: u32, rect: Rect, alpha: u16) -> Drawn {
+        Drawn {
+            id,
+            rect,
+            alpha: vec![alpha; rect.area() as usize],
+            ..Drawn::default()
+        }
+    }
+
+    fn rect(x: u32, y: u32, w: u32, h: u32) -> Rect {
+        Rect { x, y, w, h }
+    }
+
+    #[test]
+    fn the_nearer_hides_the_farther_by_its_alpha() {
+        let far = layer(1, rect(0, 0, 4, 2), ONE as u16);
+        let near = layer(0, rect(2, 0, 4, 2), 3 * ONE as u16 / 4);
+        let truth = FrameTruth::of(&[far, near], [8, 2]);
+        assert_eq!(truth.labels[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
+        // Half of the far one is covered by three quarters.
+        assert!((truth.seen[1].visibility - 0.625).abs() < 1e-4);
+        assert_eq!(truth.seen[0].visibility, 1.0);
+        assert_eq!(truth.seen[1].visible_box, Some(rect(0, 0, 2, 2)));
+        assert_eq!(truth.seen[1].amodal_box, Some([0, 0, 4, 2]));
+        assert_eq!(
+            (truth.seen[1].visible_area, truth.seen[1].amodal_area),
+            (4, 8)
+        );
+    }
+
+    #[test]
+    fn of_two_halves_the_nearer_has_the_pixel() {
+        let box_px = rect(0, 0, 1, 1);
+        let far = layer(0, box_px, ONE as u16);
+        let near = layer(1, box_px, HALF as u16);
+        assert_eq!(FrameTruth::of(&[far, near], [1, 1]).labels, [2]);
+    }
+
+    #[test]
+    fn whoever_is_wholly_hidden_has_no_label_but_an_extent() {
+        let far = layer(0, rect(1, 0, 2, 1), ONE as u16);
+        let near = layer(1, rect(0, 0, 4, 1), ONE as u16);
+        let hidden = &FrameTruth::of(&[far, near], [4, 1]).seen[0];
+        assert_eq!((hidden.visible_box, hidden.visible_area), (None, 0));
+        assert_eq!(
+            (hidden.amodal_box, hidden.visibility),
+            (Some([1, 0, 2, 1]), 0.0)
+        );
+    }
+
+    proptest! {
+        /// Labels partition what is drawn: a pixel has the label of the one that makes up half of it,
+        /// nobody's shares add up to more than the whole, and boxes touch their labels on all sides.
+        #[test]
+        fn labels_are_those_of_the_formula(
+            layers in prop::collection::vec((0u32..6, 0u32..6, 1u32..5, 1u32..5, 0u16..=ONE as u16), 1..7),
+        ) {
+            let drawn: Vec<Drawn> = (0u32..)
+                .zip(&layers)
+                .map(|(id, &(x, y, w, h, alpha))| layer(id, rect(x, y, w, h), alpha))
+                .collect();
+            let truth = FrameTruth::of(&drawn, [12, 12]);
+            for at in 0..144u32 {
+                let (x, y) = (at % 12, at / 12);
+                let mut through = 1.0;
+                let mut label = 0;
+                for layer in drawn.iter().rev().filter(|layer| layer.rect.contains(x, y)) {
+                    let alpha = f64::from(layer.alpha[0]) / f64::from(ONE);
+                    // Rounding decides the ties.
+                    if (alpha * through - 0.5f64).abs() < 1e-3 {
+                        label = truth.labels[at as usize];
+                    } else if alpha * through > 0.5 {
+                        label = layer.id as u16 + 1;
+                    }
+                    through *= 1.0 - alpha;
+                }
+                prop_assert_eq!(truth.labels[at as usize], label);
+            }
+            for (id, seen) in truth.seen.iter().enumerate() {
+                let own: Vec<(u32, u32)> = (0..144)
+                    .filter(|&at| truth.labels[at as usize] == id as u16 + 1)
+                    .map(|at| (at % 12, at / 12))
+                    .collect();
+                prop_assert_eq!(own.len(), seen.visible_area as usize);
+                let tight = own.iter().fold(None, |tight: Option<Rect>, &(x, y)| {
+                    let pixel = rect(x, y, 1, 1);
+                    Some(tight.map_or(pixel, |tight| tight.union(&pixel)))
+                });
+                prop_assert_eq!(tight, seen.visible_box);
+                prop_assert!((0.0..=1.0 + 1e-9).contains(&seen.visibility));
+            }
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! What the boids meant, drawn over the film of their flock (O's figure 10): for everyone the boid's place
+//! and where it heads, a line to the animal drawn for it, where that heads, and its number.
+
+use crate::flock::{Flock, Individual};
+use crate::raster::{Frame, Pen};
+
+const RIM: [u8; 3] = [16, 24, 28];
+const BOID: [u8; 3] = [84, 214, 230];
+const SHOWN: [u8; 3] = [255, 132, 60];
+const NUMBER: [u8; 3] = [236, 240, 238];
+
+/// Draws the boids of a flock over its film.
+pub struct FlockOverlay {
+    pen: Pen,
+    scale: f64,
+    offset_px: [f64; 2],
+    /// Strokes are wider on larger pictures.
+    unit_px: f64,
+    /// Length of the heading lines.
+    reach_px: f64,
+}
+
+impl FlockOverlay {
+    /// For films of `size_px`, which show the flock's picture as large as they can, in their middle.
+    pub fn new(flock: &Flock, size_px: [u32; 2]) -> FlockOverlay {
+        let [w, h] = flock.image_size_px.map(f64::from);
+        let [width, height] = size_px.map(f64::from);
+        let scale = (width / w).min(height / h);
+        let unit_px = (width.max(height) / 640.0).clamp(0.5, 4.0);
+        FlockOverlay {
+            pen: Pen::new(size_px[0], size_px[1]),
+            scale,
+            offset_px: [(width - w * scale) / 2.0, (height - h * scale) / 2.0],
+            unit_px,
+            reach_px: (0.5 * flock.length_px * scale).max(10.0 * unit_px),
+        }
+    }
+
+    /// Draws over a frame of the film.
+    pub fn draw(&mut self, flock: &Flock, frame_idx: usize, frame: &mut Frame) {
+        let unit = self.unit_px;
+        for individual in &flock.individuals {
+            let (boid, shown) = self.places(individual, frame_idx);
+            let (meant, seen) = (
+                self.arrow(boid, individual.boid.heading_rad[frame_idx]),
+                self.arrow(shown, individual.heading_rad[frame_idx]),
+            );
+            self.stroke(frame, &[boid, shown], 0.4 * unit, BOID);
+            self.stroke(frame, &meant, 0.8 * unit, BOID);
+            self.stroke(frame, &[boid, boid], 2.4 * unit, BOID);
+            self.stroke(frame, &seen, 0.8 * unit, SHOWN);
+            let at = [boid[0] + 5.0 * unit, boid[1] + 4.0 * unit];
+            self.number(frame, &individual.id.to_string(), at);
+        }
+    }
+
+    /// Where the boid and its animal are in the film.
+    fn places(&self, individual: &Individual, frame_idx: usize) -> ([f64; 2], [f64; 2]) {
+        let [x, y, _] = individual.boid.position_px[frame_idx];
+        let film = |at: [f64; 2]| [0, 1].map(|k| self.offset_px[k] + at[k] * self.scale);
+        (film([x, y]), film(individual.centroid_px[frame_idx]))
+    }
+
+    fn arrow(&self, from: [f64; 2], heading_rad: f64) -> [[f64; 2]; 5] {
+        let toward = |turn: f64, reach: f64, from: [f64; 2]| {
+            let angle = heading_rad + turn;
+            [
+                from[0] + reach * libm::cos(angle),
+                from[1] + reach * libm::sin(angle),
+            ]
+        };
+        let tip = toward(0.0, self.reach_px, from);
+        let barb = 5.0 * self.unit_px;
+        [
+            from,
+            tip,
+            toward(2.6, barb, tip),
+            tip,
+            toward(-2.6, barb, tip),
+        ]
+    }
+
+    fn number(&mut self, frame: &mut Frame, text: &str, at: [f64; 2]) {
+        let dot_px = 1.1 * self.unit_px;
+        for (dx, dy) in [(-0.7, 0.0), (0.7, 0.0), (0.0, -0.7), (0.0, 0.7)] {
+            let beside = [at[0] + dx * dot_px, at[1] + dy * dot_px];
+            self.pen.text(text, beside, dot_px);
+        }
+        self.pen.ink(frame, RIM);
+        self.pen.text(text, at, dot_px);
+        self.pen.ink(frame, NUMBER);
+    }
+
+    /// A line in one color on its rim.
+    fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
+        self.pen
+            .polyline(points, radius_px + 0.7 * self.unit_px, 0.45);
+        self.pen.ink(frame, RIM);
+        self.pen.polyline(points, radius_px, 1.0);
+        self.pen.ink(frame, rgb);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::{Params, plan_flock, synthetic};
+    use crate::library::View;
+    use crate::progress::Silent;
+    use crate::raster::ColorSpec;
+
+    #[test]
+    fn every_boid_has_its_mark_where_it_is_at_any_size() {
+        let params = Params {
+            count: 3,
+            frames: 10,
+            ..Params::default()
+        };
+        let library = synthetic::library(View::Side);
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        for (size_px, scale) in [([320, 240], 1.0), ([640, 480], 2.0)] {
+            let mut frame = Frame::new(size_px[0], size_px[1], ColorSpec::default());
+            FlockOverlay::new(&flock, size_px).draw(&flock, 5, &mut frame);
+            let luma = |x: f64, y: f64| frame.luma()[y as usize * size_px[0] as usize + x as usize];
+            for individual in &flock.individuals {
+                let [x, y, _] = individual.boid.position_px[5];
+                assert!(luma(x * scale, y * scale) > 80, "{x} {y}");
+            }
+            let n_marked = frame.luma().iter().filter(|&&value| value > 0).count();
+            assert!(n_marked < frame.luma().len() / 4, "{n_marked}");
+        }
+    }
+}

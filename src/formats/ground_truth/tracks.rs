@@ -1,0 +1,50 @@
+//! tracks.csv: one row for each frame and individual (ALGORITHMS.md 8), in pixels of the film; cells
+//! are empty where there is nothing.
+
+use std::io::{self, Write};
+
+use super::{FilmShape, everyone};
+use crate::flock::Flock;
+use crate::flock::composite::truth::FrameTruth;
+use crate::formats::poses_json::round;
+
+/// The header line.
+pub const COLUMNS: &str = "frame,time_s,id,x_px,y_px,heading_rad,scale,depth_m,source_frame,mirrored,\
+rotation_rad,visible_x_px,visible_y_px,visible_w_px,visible_h_px,visible_area_px,amodal_x_px,amodal_y_px,\
+amodal_w_px,amodal_h_px,amodal_area_px,visibility\n";
+
+/// The rows of one frame.
+pub fn write_frame(
+    out: &mut impl Write,
+    (flock, film): (&Flock, &FilmShape),
+    frame_idx: usize,
+    truth: &FrameTruth,
+) -> io::Result<()> {
+    let time_s = round(frame_idx as f64 / film.fps, 6);
+    for (individual, seen) in everyone(flock, truth) {
+        let [x, y] = seen.centroid_px.map(|px| round(px, 3));
+        let depth = individual.depth_m.as_ref().map(|depth| depth[frame_idx]);
+        write!(
+            out,
+            "{frame_idx},{time_s},{},{x},{y},{},{},{},{},{},{},",
+            individual.id,
+            individual.heading_rad[frame_idx],
+            round(seen.scale, 6),
+            depth.map(|depth| depth.to_string()).unwrap_or_default(),
+            individual.source_frame[frame_idx],
+            u8::from(individual.mirrored[frame_idx]),
+            individual.rotation_rad[frame_idx],
+        )?;
+        match seen.visible_box {
+            Some(rect) => write!(out, "{},{},{},{},", rect.x, rect.y, rect.w, rect.h)?,
+            None => out.write_all(b",,,,")?,
+        }
+        write!(out, "{},", seen.visible_area)?;
+        match seen.amodal_box {
+            Some([x, y, w, h]) => write!(out, "{x},{y},{w},{h},")?,
+            None => out.write_all(b",,,,")?,
+        }
+        writeln!(out, "{},{}", seen.amodal_area, round(seen.visibility, 4))?;
+    }
+    Ok(())
+}

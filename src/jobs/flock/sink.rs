@@ -1,0 +1,159 @@
+//! Where the frames of a film go: an encoder, a folder of pictures, or an archive of them; and one frame
+//! as one picture (ALGORITHMS.md 8).
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use zip::write::SimpleFileOptions;
+
+use super::film::{Output, Target};
+use crate::flock::composite::params::Format;
+use crate::flock::{Flock, Shot};
+use crate::formats::flock_overlay::FlockOverlay;
+use crate::formats::ground_truth::frame_name;
+use crate::formats::picture;
+use crate::jobs::Error;
+use crate::media::{Coding, VideoFormat, VideoWriter};
+use crate::raster::{Frame, RgbImage};
+
+/// A preview ends after so many seconds.
+const PREVIEW_S: f64 = 10.0;
+
+/// Takes the frames of a film, in order.
+pub(super) struct Sink {
+    size_px: [u32; 2],
+    /// Whether what is written has transparency.
+    alpha: bool,
+    /// Frames from here on are not wanted.
+    pub(super) n_wanted: usize,
+    kind: Kind,
+}
+
+enum Kind {
+    Video(VideoWriter),
+    Overlay(VideoWriter, Box<FlockOverlay>, Frame),
+    Folder(PathBuf),
+    Archive(Box<zip::ZipWriter<BufWriter<File>>>),
+}
+
+impl Sink {
+    /// Begins a file. `alpha` tells whether nothing lies behind the film.
+    pub(super) fn begin(
+        target: &Target,
+        format: &VideoFormat,
+        flock: &Flock,
+        alpha: bool,
+    ) -> Result<Sink, Error> {
+        let n_frames = flock.params.frames as usize;
+        let path = &target.path;
+        let video = |coding| VideoWriter::create_as(path, format, coding).map(Kind::Video);
+        let kind = match target.output {
+            Output::Overlay => {
+                let overlay = FlockOverlay::new(flock, [format.width, format.height]);
+                let writer = VideoWriter::create(path, format)?;
+                Kind::Overlay(writer, Box::new(overlay), Frame::default())
+            }
+            Output::Film(Format::Mp4) => video(Coding::H264(Default::default()))?,
+            Output::Film(Format::Webm) => video(Coding::Vp9 { alpha })?,
+            Output::Film(Format::Mov) => video(Coding::ProRes { alpha })?,
+            Output::Film(Format::Gif) => video(Coding::Gif)?,
+            Output::Film(Format::Webp) => video(Coding::Webp)?,
+            Output::Film(Format::Png | Format::Poster) => pictures(path)?,
+        };
+        let preview = matches!(target.output, Output::Film(Format::Gif | Format::Webp));
+        Ok(Sink {
+            size_px: [format.width, format.height],
+            alpha,
+            n_wanted: match preview {
+                true => n_frames.min((PREVIEW_S * format.fps).ceil() as usize),
+                false => n_frames,
+            },
+            kind,
+        })
+    }
+
+    /// Takes the next frame.
+    pub(super) fn take(
+        &mut self,
+        flock: &Flock,
+        frame_idx: usize,
+        shot: &Shot,
+    ) -> Result<(), Error> {
+        if frame_idx >= self.n_wanted {
+            return Ok(());
+        }
+        let (size_px, alpha) = (self.size_px, self.alpha);
+        match &mut self.kind {
+            Kind::Video(writer) if shot.rgba.is_empty() => writer.write(&shot.frame)?,
+            Kind::Video(writer) => writer.write_rgba(&shot.rgba)?,
+            Kind::Overlay(writer, overlay, frame) => {
+                frame.clone_from(&shot.frame);
+                overlay.draw(flock, frame_idx, frame);
+                writer.write(frame)?;
+            }
+            Kind::Folder(folder) => {
+                let png = png(size_px, alpha, &shot.rgba);
+                fs::write(folder.join(frame_name(frame_idx)), png)?;
+            }
+            Kind::Archive(archive) => {
+                let stored =
+                    SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+                archive
+                    .start_file(frame_name(frame_idx), stored)
+                    .map_err(io::Error::from)?;
+                archive.write_all(&png(size_px, alpha, &shot.rgba))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the file.
+    pub(super) fn finish(self) -> Result<(), Error> {
+        match self.kind {
+            Kind::Video(writer) | Kind::Overlay(writer, ..) => Ok(writer.finish()?),
+            Kind::Archive(archive) => Ok(archive.finish().map_err(io::Error::from)?.flush()?),
+            Kind::Folder(_) => Ok(()),
+        }
+    }
+}
+
+/// A folder of pictures, or an archive of them where the path ends so.
+fn pictures(path: &Path) -> io::Result<Kind> {
+    if path.extension().is_some_and(|extension| extension == "zip") {
+        let file = BufWriter::new(File::create(path)?);
+        return Ok(Kind::Archive(Box::new(zip::ZipWriter::new(file))));
+    }
+    fs::create_dir_all(path)?;
+    Ok(Kind::Folder(path.to_owned()))
+}
+
+fn png([width, height]: [u32; 2], alpha: bool, rgba: &[u8]) -> Vec<u8> {
+    match alpha {
+        true => picture::write_rgba(width, height, rgba),
+        false => picture::write_rgb(&without_alpha(width, height, rgba)),
+    }
+}
+
+/// Writes one picture, a JPEG where the path ends so.
+pub(super) fn poster(path: &Path, size_px: [u32; 2], alpha: bool, rgba: &[u8]) -> io::Result<()> {
+    let is_jpeg = path
+        .extension()
+        .is_some_and(|extension| extension == "jpg" || extension == "jpeg");
+    let bytes = match is_jpeg {
+        true => picture::write_jpeg(&without_alpha(size_px[0], size_px[1], rgba)),
+        false => png(size_px, alpha, rgba),
+    };
+    fs::write(path, bytes)
+}
+
+fn without_alpha(width: u32, height: u32, rgba: &[u8]) -> RgbImage {
+    RgbImage {
+        width,
+        height,
+        pixels: rgba
+            .chunks_exact(4)
+            .flat_map(|p| [p[0], p[1], p[2]])
+            .collect(),
+    }
+}

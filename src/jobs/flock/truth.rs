@@ -1,0 +1,92 @@
+//! A flock's ground truth as a folder, written while the film is drawn, and that folder as one file
+//! (ALGORITHMS.md 8). What the files hold is said in `formats::ground_truth::README`.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use zip::write::SimpleFileOptions;
+
+use crate::flock::Flock;
+use crate::flock::composite::truth::FrameTruth;
+use crate::formats::ground_truth::coco::Coco;
+use crate::formats::ground_truth::{FilmShape, README, frame_name, mot, tracks};
+use crate::formats::picture;
+
+/// A ground truth in the making.
+pub struct TruthFolder {
+    folder: PathBuf,
+    film: FilmShape,
+    coco: Coco<BufWriter<File>>,
+    mot: BufWriter<File>,
+    tracks: BufWriter<File>,
+}
+
+impl TruthFolder {
+    /// Begins in a folder, which is made if need be.
+    pub fn create(folder: &Path, film: FilmShape) -> io::Result<TruthFolder> {
+        fs::create_dir_all(folder.join("masks"))?;
+        fs::create_dir_all(folder.join("gt"))?;
+        let file =
+            |name: &str| Ok::<_, io::Error>(BufWriter::new(File::create(folder.join(name))?));
+        fs::write(folder.join("README.txt"), README)?;
+        fs::write(folder.join("seqinfo.ini"), mot::sequence(&film))?;
+        let mut tracks = file("tracks.csv")?;
+        tracks.write_all(tracks::COLUMNS.as_bytes())?;
+        Ok(TruthFolder {
+            folder: folder.to_owned(),
+            film,
+            coco: Coco::begin(file("coco.json")?, &film)?,
+            mot: file("gt/gt.txt")?,
+            tracks,
+        })
+    }
+
+    /// Adds the next frame.
+    pub fn add(&mut self, flock: &Flock, frame_idx: usize, truth: &FrameTruth) -> io::Result<()> {
+        let [width, height] = truth.size_px;
+        let mask = picture::write_labels(width, height, &truth.labels);
+        fs::write(self.folder.join("masks").join(frame_name(frame_idx)), mask)?;
+        self.coco.add(flock, frame_idx, truth)?;
+        mot::write_frame(&mut self.mot, flock, frame_idx, truth)?;
+        tracks::write_frame(&mut self.tracks, (flock, &self.film), frame_idx, truth)
+    }
+
+    /// Ends every file.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.coco.end()?;
+        self.mot.flush()?;
+        self.tracks.flush()
+    }
+}
+
+/// Puts a folder's files, and those of its subfolders, into an archive, stored, in the order of their
+/// names.
+pub fn pack(folder: &Path, archive: &Path) -> io::Result<()> {
+    let mut zip = zip::ZipWriter::new(BufWriter::new(File::create(archive)?));
+    let stored = SimpleFileOptions::default()
+        .compression_method(zip::CompressionMethod::Stored)
+        .large_file(true);
+    for path in files_below(folder)? {
+        let name = path.strip_prefix(folder).unwrap_or(&path);
+        zip.start_file(name.to_string_lossy(), stored)?;
+        io::copy(&mut File::open(&path)?, &mut zip)?;
+    }
+    zip.finish()?.flush()
+}
+
+fn files_below(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder)?
+        .map(|entry| Ok(entry?.path()))
+        .collect::<io::Result<_>>()?;
+    entries.sort();
+    let mut files = Vec::new();
+    for path in entries {
+        if path.is_dir() {
+            files.extend(files_below(&path)?);
+        } else {
+            files.push(path);
+        }
+    }
+    Ok(files)
+}

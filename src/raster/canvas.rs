@@ -1,0 +1,244 @@
+//! What sprites are drawn on: premultiplied pixels in 16384ths, opaque or not, and the way from there to
+//! planes and to straight alpha (ALGORITHMS.md 8).
+
+use super::resample::{ONE, Quad, Resampled, scaled};
+use super::{Frame, RgbImage};
+use crate::cpu::Level;
+use crate::geometry::Rect;
+
+/// A picture of premultiplied pixels.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct Canvas {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// By rows.
+    pub pixels: Vec<Quad>,
+}
+
+impl Canvas {
+    /// A wholly transparent canvas.
+    pub fn new(width: u32, height: u32) -> Canvas {
+        Canvas {
+            width,
+            height,
+            pixels: vec![[0; 4]; width as usize * height as usize],
+        }
+    }
+
+    /// An opaque picture.
+    pub fn of_rgb(image: &RgbImage) -> Canvas {
+        let pixels = image.pixels.chunks_exact(3);
+        Canvas {
+            width: image.width,
+            height: image.height,
+            pixels: pixels.map(|rgb| opaque([rgb[0], rgb[1], rgb[2]])).collect(),
+        }
+    }
+
+    /// Makes a box what it is on another canvas of the same size.
+    pub fn copy_box(&mut self, from: &Canvas, rect: Rect) {
+        for row in self.rows(rect) {
+            self.pixels[row.clone()].copy_from_slice(&from.pixels[row]);
+        }
+    }
+
+    /// Makes a box what a whole canvas of the box's size is.
+    pub fn put(&mut self, from: &Canvas, rect: Rect) {
+        let from_rows = from.pixels.chunks_exact(from.width.max(1) as usize);
+        for (row, from) in self.rows(rect).zip(from_rows) {
+            self.pixels[row].copy_from_slice(from);
+        }
+    }
+
+    /// Draws a placed sprite over what is there.
+    pub fn over(&mut self, sprite: &Resampled, cpu: Level) {
+        if sprite.rect.is_empty() {
+            return;
+        }
+        let rows = self.rows(sprite.rect);
+        let sprite_rows = sprite.pixels.chunks_exact(sprite.rect.w as usize);
+        for (row, sprite_row) in rows.zip(sprite_rows) {
+            let row = &mut self.pixels[row];
+            match cpu {
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+                    #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                    unsafe {
+                        over_row_avx2(row, sprite_row);
+                    }
+                }
+                _ => over_row(row, sprite_row),
+            }
+        }
+    }
+
+    /// The box as straight-alpha RGBA, into a picture of the canvas's size; a pixel without alpha keeps
+    /// the color that the picture has there.
+    pub fn straight_into(&self, rect: Rect, rgba: &mut [u8]) {
+        for row in self.rows(rect) {
+            let out = &mut rgba[row.start * 4..row.end * 4];
+            for (out, pixel) in out.chunks_exact_mut(4).zip(&self.pixels[row]) {
+                match pixel[3] {
+                    0 => out[3] = 0,
+                    _ => out.copy_from_slice(&straight(*pixel)),
+                }
+            }
+        }
+    }
+
+    /// Where the rows of a box lie among the pixels.
+    fn rows(&self, rect: Rect) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
+        let width = self.width as usize;
+        (rect.y..rect.bottom()).map(move |y| {
+            let first = y as usize * width + rect.x as usize;
+            first..first + rect.w as usize
+        })
+    }
+}
+
+/// A color of alpha 1.
+pub fn opaque(rgb: [u8; 3]) -> Quad {
+    let [r, g, b] = rgb.map(|value| ((u32::from(value) * ONE as u32 + 127) / 255) as i16);
+    [r, g, b, ONE]
+}
+
+/// A pixel as 8-bit straight alpha; without alpha it has no color.
+pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
+    if a <= 0 {
+        return [0; 4];
+    }
+    let whole = i32::from(a);
+    let color = |value: i16| ((i32::from(value) * 255 + whole / 2) / whole).min(255) as u8;
+    let alpha = ((whole * 255 + 8192) >> 14) as u8;
+    [color(r), color(g), color(b), alpha]
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn over_row_avx2(row: &mut [Quad], sprite: &[Quad]) {
+    over_row(row, sprite);
+}
+
+#[inline(always)]
+fn over_row(row: &mut [Quad], sprite: &[Quad]) {
+    for (below, above) in row.iter_mut().zip(sprite) {
+        // 16384 doubled is one more than fits; 32767 of 32768 leaves every value as it is.
+        let through = (2 * (i32::from(ONE) - i32::from(above[3]))).min(32767) as i16;
+        for channel in 0..4 {
+            below[channel] = above[channel] + scaled(below[channel], through);
+        }
+    }
+}
+
+impl Frame {
+    /// Writes the box of an opaque canvas of the frame's own size into the planes: luma of the box, chroma
+    /// of every 2 x 2 block that the box touches.
+    ///
+    /// Panics when the canvas has another size than the frame.
+    pub fn draw_canvas(&mut self, canvas: &Canvas, rect: Rect) {
+        assert_eq!(
+            (canvas.width, canvas.height),
+            (self.width, self.height),
+            "sizes differ"
+        );
+        if rect.is_empty() {
+            return;
+        }
+        let from = self.color.from_quads();
+        let (width, height) = (self.width as usize, self.height as usize);
+        let chroma_width = self.chroma_width() as usize;
+        let (luma, chroma) = self.planes.split_at_mut(width * height);
+        let (u_plane, v_plane) = chroma.split_at_mut(chroma.len() / 2);
+        let (x0, x1) = (rect.x as usize / 2, (rect.right() as usize).div_ceil(2));
+        let (left, right) = (2 * x0, (2 * x1).min(width));
+        for by in rect.y as usize / 2..(rect.bottom() as usize).div_ceil(2) {
+            // At an odd right or bottom edge the last pixel stands in for the missing one.
+            let lines = [2 * by, (2 * by + 1).min(height - 1)];
+            let rows = lines.map(|y| &canvas.pixels[y * width + left..y * width + right]);
+            for (row, y) in rows.iter().zip(lines) {
+                let out = &mut luma[y * width + left..y * width + right];
+                for (luma, pixel) in out.iter_mut().zip(*row) {
+                    *luma = from.luma(*pixel);
+                }
+            }
+            let out = by * chroma_width + x0..by * chroma_width + x1;
+            let (us, vs) = (&mut u_plane[out.clone()], &mut v_plane[out]);
+            for (k, (u, v)) in us.iter_mut().zip(vs).enumerate() {
+                let columns = [2 * k, (2 * k + 1).min(right - left - 1)];
+                let block = columns.map(|x| rows.map(|row| row[x]));
+                let sum = std::array::from_fn(|c| {
+                    block.as_flattened().iter().map(|p| i32::from(p[c])).sum()
+                });
+                [*u, *v] = from.chroma_of_block(sum);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::ColorSpec;
+    use proptest::prelude::*;
+
+    fn layer(rect: Rect, pixel: Quad) -> Resampled {
+        Resampled {
+            rect,
+            pixels: vec![pixel; rect.area() as usize],
+        }
+    }
+
+    #[test]
+    fn opaque_covers_half_halves_and_clear_leaves() {
+        let rect = Rect::of_size(1, 1);
+        let [r, g, b, _] = opaque([50, 25, 0]);
+        for (pixel, want) in [
+            (opaque([10, 20, 30]), [10, 20, 30, 255]),
+            ([r, g, b, ONE / 2], [100, 75, 50, 255]),
+            ([0; 4], [100, 100, 100, 255]),
+        ] {
+            for cpu in Level::available() {
+                let mut canvas = Canvas::new(1, 1);
+                canvas.pixels[0] = opaque([100; 3]);
+                canvas.over(&layer(rect, pixel), cpu);
+                assert_eq!(straight(canvas.pixels[0]), want, "{}", cpu.name());
+            }
+        }
+    }
+
+    #[test]
+    fn drawn_on_nothing_a_sprite_keeps_its_alpha_and_its_color() {
+        let mut canvas = Canvas::new(2, 1);
+        let [r, g, b, a] = opaque([200, 100, 40]);
+        let quarter = layer(Rect::of_size(1, 1), [r / 4, g / 4, b / 4, a / 4]);
+        canvas.over(&quarter, Level::detect());
+        let mut rgba = vec![9; 8];
+        canvas.straight_into(Rect::of_size(2, 1), &mut rgba);
+        assert_eq!(rgba, [200, 100, 40, 64, 9, 9, 9, 0]);
+    }
+
+    proptest! {
+        #[test]
+        fn every_opaque_color_comes_back_and_has_the_planes_of_its_rgb(
+            rgb in prop::array::uniform3(any::<u8>()),
+        ) {
+            let [r, g, b] = rgb;
+            prop_assert_eq!(straight(opaque(rgb)), [r, g, b, 255]);
+            let mut image = RgbImage::new(3, 3);
+            image.pixels = rgb.repeat(9);
+            let (mut ours, mut known) = (
+                Frame::new(3, 3, ColorSpec::default()),
+                Frame::new(3, 3, ColorSpec::default()),
+            );
+            let whole = Rect::of_size(3, 3);
+            ours.draw_canvas(&Canvas::of_rgb(&image), whole);
+            known.draw_rgb(&image, whole);
+            for (a, b) in ours.planes.iter().zip(&known.planes) {
+                prop_assert!(a.abs_diff(*b) <= 1, "{:?} {:?}", ours.planes, known.planes);
+            }
+        }
+    }
+}

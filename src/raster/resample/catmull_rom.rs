@@ -1,0 +1,173 @@
+//! Catmull and Rom's interpolation of one row of output: sixteen taps of four values each, weighted in
+//! 32768ths at 256 places between two pixels. The same code is compiled once plainly and once for AVX2
+//! (ALGORITHMS.md 8).
+
+use super::{ONE, Premultiplied, Quad};
+use crate::cpu::Level;
+
+/// Places told apart between two pixels.
+const PLACES: usize = 256;
+
+/// The four taps' weights at each place; they add up to 32767.
+static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
+/// The same, each weight once for every value of a pixel.
+static WIDE: [[i16; 16]; PLACES] = widened();
+
+impl Premultiplied {
+    /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
+    /// padded pixels. All must lie within reach of the sprite's bounds.
+    pub(super) fn interpolate(
+        &self,
+        row: &mut [Quad],
+        start: [i32; 2],
+        step: [i32; 2],
+        cpu: Level,
+    ) {
+        match cpu {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+                #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                unsafe {
+                    self.interpolate_avx2(row, start, step);
+                }
+            }
+            _ => self.interpolate_anywhere(row, start, step),
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn interpolate_avx2(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+        self.interpolate_anywhere(row, start, step);
+    }
+
+    #[inline(always)]
+    fn interpolate_anywhere(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+        // Half a place more, so that places are rounded to the nearest.
+        let [mut u, mut v] = start.map(|at| at + (1 << 16) / (2 * PLACES as i32));
+        let stride = self.stride();
+        let taps = self.pixels.as_flattened();
+        for pixel in row {
+            let [from, to] = self.spans[(v >> 16) as usize];
+            if u > from && u < to {
+                let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
+                let first = 4 * ((y - 1) * stride + x - 1);
+                *pixel = blend(
+                    std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
+                    &WIDE[(u >> 8) as usize % PLACES],
+                    &WEIGHTS[(v >> 8) as usize % PLACES],
+                );
+            }
+            u += step[0];
+            v += step[1];
+        }
+    }
+}
+
+/// Down the columns first, then along the row.
+#[inline(always)]
+fn blend(rows: [&[i16]; 4], across: &[i16; 16], down: &[i16; 4]) -> Quad {
+    let mut column = [0i16; 16];
+    for (row, &weight) in rows.iter().zip(down) {
+        let row: &[i16; 16] = (*row).try_into().unwrap_or(&[0; 16]);
+        for k in 0..16 {
+            column[k] = column[k].wrapping_add(scaled(row[k], weight));
+        }
+    }
+    let mut weighted = [0i16; 16];
+    for k in 0..16 {
+        weighted[k] = scaled(column[k], across[k]);
+    }
+    let mut sum = [0i16; 4];
+    for k in 0..4 {
+        sum[k] = (weighted[k].wrapping_add(weighted[4 + k]))
+            .wrapping_add(weighted[8 + k].wrapping_add(weighted[12 + k]));
+    }
+    // The curve may overshoot: no more than opaque, no color without its alpha.
+    let alpha = sum[3].clamp(0, ONE);
+    let color = |k: usize| sum[k].clamp(0, alpha);
+    [color(0), color(1), color(2), alpha]
+}
+
+/// A value times a weight in 32768ths, rounded.
+#[inline(always)]
+pub(in crate::raster) fn scaled(value: i16, weight: i16) -> i16 {
+    ((((i32::from(value) * i32::from(weight)) >> 14) + 1) >> 1) as i16
+}
+
+const fn all_weights() -> [[i16; 4]; PLACES] {
+    let mut all = [[0; 4]; PLACES];
+    let mut place = 0;
+    while place < PLACES {
+        all[place] = weights(place as i64);
+        place += 1;
+    }
+    all
+}
+
+/// At `f` 256ths of the way from the second tap to the third.
+const fn weights(f: i64) -> [i16; 4] {
+    // In 2^25ths: the cubic's halves stay whole.
+    let (f1, f2, f3) = (f << 16, f * f << 8, f * f * f);
+    let exact = [
+        -f1 + 2 * f2 - f3,
+        (2 << 24) - 5 * f2 + 3 * f3,
+        f1 + 4 * f2 - 3 * f3,
+        f3 - f2,
+    ];
+    let mut rounded = [0i16; 4];
+    let mut sum = 0i32;
+    let mut tap = 0;
+    while tap < 4 {
+        rounded[tap] = ((exact[tap] * 32767 + (1 << 24)) >> 25) as i16;
+        sum += rounded[tap] as i32;
+        tap += 1;
+    }
+    // What rounding left over goes to the greatest weight.
+    let greatest = if f < 128 { 1 } else { 2 };
+    rounded[greatest] += (32767 - sum) as i16;
+    rounded
+}
+
+const fn widened() -> [[i16; 16]; PLACES] {
+    let narrow = all_weights();
+    let mut wide = [[0; 16]; PLACES];
+    let mut place = 0;
+    while place < PLACES {
+        let mut k = 0;
+        while k < 16 {
+            wide[place][k] = narrow[place][k / 4];
+            k += 1;
+        }
+        place += 1;
+    }
+    wide
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_those_of_the_textbook_and_add_up() {
+        assert_eq!(WEIGHTS[0], [0, 32767, 0, 0]);
+        // At the middle: -1, 9, 9, -1 sixteenths.
+        let sixteenths = WEIGHTS[128].map(|w| (f64::from(w) / 2048.0).round());
+        assert_eq!(sixteenths, [-1.0, 9.0, 9.0, -1.0]);
+        for (place, weights) in WEIGHTS.iter().enumerate() {
+            let f = place as f64 / 256.0;
+            let exact = 1.0 - 2.5 * f * f + 1.5 * f * f * f;
+            assert!(
+                (f64::from(weights[1]) / 32767.0 - exact).abs() < 1e-4,
+                "{place}"
+            );
+            assert_eq!(weights.iter().map(|&w| i32::from(w)).sum::<i32>(), 32767);
+        }
+    }
+
+    #[test]
+    fn a_weight_of_one_changes_nothing() {
+        assert!((0..=ONE).all(|value| scaled(value, 32767) == value));
+    }
+}

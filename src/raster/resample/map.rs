@@ -1,0 +1,113 @@
+//! From the picture to a sprite: mirror, rotation, scale and place as one affine map (ALGORITHMS.md 8).
+
+use super::Placement;
+use super::premultiplied::{PAD, Premultiplied, REACH};
+use crate::geometry::Rect;
+
+/// Picture coordinates to coordinates of the sprite's padded pixels, the first at (0, 0).
+pub(super) struct Map {
+    origin: [f64; 2],
+    pub(super) per_column: [f64; 2],
+    per_row: [f64; 2],
+    place: Placement,
+}
+
+impl Map {
+    pub(super) fn new(sprite: &Premultiplied, place: &Placement) -> Map {
+        // One pixel of the level is so many of the sprite.
+        let unit = f64::from(1u32 << sprite.level);
+        let (cos, sin) = (
+            libm::cos(place.rotation_rad) / (place.scale * unit),
+            libm::sin(place.rotation_rad) / (place.scale * unit),
+        );
+        let flip = if place.mirrored { -1.0 } else { 1.0 };
+        let (per_column, per_row) = ([flip * cos, -sin], [flip * sin, cos]);
+        let [x, y] = place.center_px;
+        let origin = std::array::from_fn(|k| {
+            // Pixel k of a level has its center at k + 0.5 of its own pixels.
+            let middle = f64::from(sprite.size[k]) / (2.0 * unit) - 0.5;
+            let padded = PAD as f64 - sprite.bounds[k] as f64;
+            middle + padded - per_column[k] * x - per_row[k] * y
+        });
+        Map {
+            origin,
+            per_column,
+            per_row,
+            place: *place,
+        }
+    }
+
+    /// The place in the sprite of a point of the picture.
+    pub(super) fn source(&self, x: f64, y: f64) -> [f64; 2] {
+        std::array::from_fn(|k| self.origin[k] + self.per_column[k] * x + self.per_row[k] * y)
+    }
+
+    /// The box of the picture that the sprite may touch.
+    pub(super) fn covered(&self, sprite: &Premultiplied, [w, h]: [u32; 2]) -> Rect {
+        let unit = f64::from(1u32 << sprite.level);
+        let [left, top, right, bottom] = sprite.bounds.map(|bound| bound as f64);
+        if sprite.bounds[2] == 0 {
+            return Rect::default();
+        }
+        let reach = REACH as f64;
+        let (mut least, mut greatest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for u in [left - reach, right + reach] {
+            for v in [top - reach, bottom + reach] {
+                let corner = self.forward(
+                    u * unit - f64::from(sprite.size[0]) / 2.0,
+                    v * unit - f64::from(sprite.size[1]) / 2.0,
+                );
+                for axis in 0..2 {
+                    least[axis] = least[axis].min(corner[axis]);
+                    greatest[axis] = greatest[axis].max(corner[axis]);
+                }
+            }
+        }
+        let [left, top] = least.map(|edge| edge.floor() as i64);
+        let [right, bottom] = greatest.map(|edge| edge.ceil() as i64);
+        Rect::clipped(left, top, right, bottom, w, h)
+    }
+
+    /// A point given from the sprite's middle, in the picture.
+    fn forward(&self, u: f64, v: f64) -> [f64; 2] {
+        let place = &self.place;
+        let u = if place.mirrored { -u } else { u };
+        let (cos, sin) = (
+            libm::cos(place.rotation_rad) * place.scale,
+            libm::sin(place.rotation_rad) * place.scale,
+        );
+        [
+            place.center_px[0] + cos * u - sin * v,
+            place.center_px[1] + sin * u + cos * v,
+        ]
+    }
+
+    /// The columns `from..to` of a row of `n`, which begins at `start`, whose source shows anything.
+    pub(super) fn columns_within(
+        &self,
+        sprite: &Premultiplied,
+        n: usize,
+        start: [f64; 2],
+    ) -> (usize, usize) {
+        let (mut from, mut to) = (0.0f64, n as f64);
+        for axis in 0..2 {
+            let extent = (sprite.bounds[axis + 2] - sprite.bounds[axis]) as f64;
+            let (low, high) = ((PAD - REACH) as f64, (PAD + REACH) as f64 + extent - 1.0);
+            let step = self.per_column[axis];
+            if step.abs() < 1e-12 {
+                if start[axis] <= low || start[axis] >= high {
+                    return (0, 0);
+                }
+                continue;
+            }
+            let (a, b) = ((low - start[axis]) / step, (high - start[axis]) / step);
+            from = from.max(a.min(b).floor() + 1.0);
+            to = to.min(a.max(b).ceil());
+        }
+        if from < to {
+            (from as usize, to as usize)
+        } else {
+            (0, 0)
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! A sprite as interpolation takes it: premultiplied, in a transparent border so that no edge is a
+//! special case, halved as often as its scale asks (ALGORITHMS.md 8).
+
+use super::{ONE, Quad};
+use crate::geometry::Rect;
+
+/// Transparent pixels around a sprite.
+pub(super) const PAD: usize = 4;
+/// Pixels beyond its own that a sprite reaches by interpolation.
+pub(super) const REACH: usize = 2;
+/// Below this scale a sprite is halved first.
+const LEAST_SCALE: f64 = 0.6;
+
+/// A sprite, premultiplied, where it shows anything.
+#[derive(Clone, Debug, Default)]
+pub struct Premultiplied {
+    /// Width and height of the whole sprite, before halving.
+    pub(super) size: [u32; 2],
+    /// How often it has been halved.
+    pub(super) level: u32,
+    /// Where alpha is not 0: left, top, right, bottom in pixels of the level.
+    pub(super) bounds: [usize; 4],
+    /// The bounds and a border of `PAD`, by rows.
+    pub(super) pixels: Vec<Quad>,
+    /// Per row: the columns, in 65536ths, between which interpolation finds anything; from above to when
+    /// it finds nothing.
+    pub(super) spans: Vec<[i32; 2]>,
+    /// The level before, while the next one is made.
+    finer: Vec<Quad>,
+}
+
+impl Premultiplied {
+    /// Takes what a straight-alpha RGBA sprite of `size` pixels shows within `bounds` (rows of that
+    /// box), for being drawn at `scale`. Reuses memory.
+    pub fn fill(&mut self, rgba: &[u8], size: [u32; 2], bounds: Rect, scale: f64) {
+        self.size = size;
+        self.level = 0;
+        let edges = [bounds.x, bounds.y, bounds.right(), bounds.bottom()];
+        self.bounds = edges.map(|edge| edge as usize);
+        self.clear();
+        let stride = self.stride();
+        let rows = rgba.chunks_exact(bounds.w.max(1) as usize * 4);
+        for (row, y) in rows.zip(PAD..) {
+            let out = &mut self.pixels[y * stride + PAD..][..bounds.w as usize];
+            for (out, pixel) in out.iter_mut().zip(row.chunks_exact(4)) {
+                *out = premultiplied(pixel);
+            }
+        }
+        let mut scale = scale;
+        while scale < LEAST_SCALE && self.bounds[2] > 0 && self.level < 8 {
+            self.halve();
+            scale *= 2.0;
+        }
+        self.find_spans();
+    }
+
+    /// Columns of `pixels`.
+    pub(super) fn stride(&self) -> usize {
+        self.bounds[2] - self.bounds[0] + 2 * PAD
+    }
+
+    fn clear(&mut self) {
+        let n_rows = self.bounds[3] - self.bounds[1] + 2 * PAD;
+        self.pixels.clear();
+        self.pixels.resize(self.stride() * n_rows, [0; 4]);
+    }
+
+    /// The next level: means of two by two pixels.
+    fn halve(&mut self) {
+        std::mem::swap(&mut self.finer, &mut self.pixels);
+        let (before, stride_before) = (self.bounds, self.stride());
+        let [left, top, right, bottom] = before;
+        self.bounds = [left / 2, top / 2, right.div_ceil(2), bottom.div_ceil(2)];
+        self.level += 1;
+        self.clear();
+        let stride = self.stride();
+        let [left, top, right, bottom] = self.bounds;
+        for y in top..bottom {
+            for x in left..right {
+                // The border takes in what an odd edge lacks.
+                let at = (2 * y + PAD - before[1]) * stride_before + 2 * x + PAD - before[0];
+                let block = [at, at + 1, at + stride_before, at + stride_before + 1];
+                let mut sum = [2i32; 4];
+                for pixel in block.map(|at| self.finer[at]) {
+                    for (sum, value) in sum.iter_mut().zip(pixel) {
+                        *sum += i32::from(value);
+                    }
+                }
+                self.pixels[(y - top + PAD) * stride + x - left + PAD] =
+                    sum.map(|sum| (sum / 4) as i16);
+            }
+        }
+    }
+
+    fn find_spans(&mut self) {
+        let stride = self.stride();
+        let n_rows = self.pixels.len() / stride;
+        self.spans.clear();
+        self.spans.resize(n_rows, [i32::MAX, i32::MIN]);
+        for (y, row) in self.pixels.chunks_exact(stride).enumerate() {
+            let shows = |pixel: &Quad| pixel[3] > 0;
+            let (Some(first), Some(last)) =
+                (row.iter().position(shows), row.iter().rposition(shows))
+            else {
+                continue;
+            };
+            let (first, last) = ((first - REACH) as i32, (last + REACH) as i32);
+            // This row is a tap of the two rows before it, its own, and the one after.
+            for span in &mut self.spans[y - 2..y + 2] {
+                *span = [span[0].min(first << 16), span[1].max(last << 16)];
+            }
+        }
+    }
+}
+
+/// A straight-alpha pixel of 8 bits a channel.
+fn premultiplied(pixel: &[u8]) -> Quad {
+    let alpha = u32::from(pixel[3]);
+    let one = ONE as u32;
+    let color = |k: usize| ((u32::from(pixel[k]) * alpha * one + 32512) / 65025) as i16;
+    [
+        color(0),
+        color(1),
+        color(2),
+        ((alpha * one + 127) / 255) as i16,
+    ]
+}
+
+/// Where a straight-alpha RGBA sprite of `width` columns has any alpha; empty when it has none.
+pub fn bounds_of(rgba: &[u8], width: u32) -> Rect {
+    let mut bounds = [usize::MAX, usize::MAX, 0, 0];
+    for (y, row) in rgba.chunks_exact(width.max(1) as usize * 4).enumerate() {
+        let opaque = |pixel: &[u8]| pixel[3] > 0;
+        let first = row.chunks_exact(4).position(opaque);
+        let last = row.chunks_exact(4).rposition(opaque);
+        if let (Some(first), Some(last)) = (first, last) {
+            bounds[0] = bounds[0].min(first);
+            bounds[1] = bounds[1].min(y);
+            bounds[2] = bounds[2].max(last + 1);
+            bounds[3] = y + 1;
+        }
+    }
+    let [left, top, right, bottom] = bounds.map(|edge| edge as i64);
+    match bounds[2] {
+        0 => Rect::default(),
+        _ => Rect::clipped(left, top, right, bottom, u32::MAX, u32::MAX),
+    }
+}

@@ -1,0 +1,189 @@
+//! What a placed sprite looks like: exact where it can be, smooth where it cannot.
+
+use super::*;
+
+fn checkered(width: u32, height: u32) -> Vec<u8> {
+    (0..width * height)
+        .flat_map(|k| [(k * 7 % 256) as u8, (k * 13 % 256) as u8, 90, 255])
+        .collect()
+}
+
+fn place(center_px: [f64; 2]) -> Placement {
+    Placement {
+        center_px,
+        rotation_rad: 0.0,
+        scale: 1.0,
+        mirrored: false,
+    }
+}
+
+/// The part of a sprite that shows anything, as `fill` takes it.
+fn cut(rgba: &[u8], width: u32, bounds: Rect) -> Vec<u8> {
+    (bounds.y..bounds.bottom())
+        .flat_map(|y| {
+            let at = ((y * width + bounds.x) * 4) as usize;
+            &rgba[at..at + bounds.w as usize * 4]
+        })
+        .copied()
+        .collect()
+}
+
+fn drawn_with(rgba: &[u8], (w, h): (u32, u32), place: &Placement, cpu: Level) -> Resampled {
+    let mut sprite = Premultiplied::default();
+    let bounds = bounds_of(rgba, w);
+    sprite.fill(&cut(rgba, w, bounds), [w, h], bounds, place.scale);
+    let mut resampled = Resampled::default();
+    resampled.draw(&sprite, place, [40, 30], cpu);
+    resampled
+}
+
+fn drawn(rgba: &[u8], size: (u32, u32), place: &Placement) -> Resampled {
+    drawn_with(rgba, size, place, Level::detect())
+}
+
+fn alpha_sum(resampled: &Resampled) -> f64 {
+    let alphas = resampled.pixels.iter().map(|p| f64::from(p[3]));
+    alphas.sum::<f64>() / f64::from(ONE)
+}
+
+fn pixel(resampled: &Resampled, x: u32, y: u32) -> [u8; 4] {
+    let rect = resampled.rect;
+    if !rect.contains(x, y) {
+        return [0; 4];
+    }
+    let at = ((y - rect.y) * rect.w + x - rect.x) as usize;
+    crate::raster::canvas::straight(resampled.pixels[at])
+}
+
+#[test]
+fn on_whole_pixels_every_pixel_comes_out_as_it_is() {
+    let rgba = checkered(6, 4);
+    let plain = drawn(&rgba, (6, 4), &place([13.0, 12.0]));
+    let mirrored = Placement {
+        mirrored: true,
+        ..place([13.0, 12.0])
+    };
+    let mirrored = drawn(&rgba, (6, 4), &mirrored);
+    for y in 0..4 {
+        for x in 0..6 {
+            let want: [u8; 4] = rgba[((y * 6 + x) * 4) as usize..][..4].try_into().unwrap();
+            assert_eq!(pixel(&plain, 10 + x, 10 + y), want);
+            assert_eq!(pixel(&mirrored, 15 - x, 10 + y), want);
+        }
+    }
+    assert_eq!(alpha_sum(&plain), 24.0, "nothing is drawn outside");
+}
+
+#[test]
+fn a_quarter_turn_clockwise_leads_right_to_down() {
+    let mut rgba = vec![0; 8 * 8 * 4];
+    // One opaque pixel to the right of the middle.
+    rgba[(4 * 8 + 7) * 4..][..4].copy_from_slice(&[200, 100, 50, 255]);
+    let turned = Placement {
+        rotation_rad: std::f64::consts::FRAC_PI_2,
+        ..place([20.0, 15.0])
+    };
+    let resampled = drawn(&rgba, (8, 8), &turned);
+    assert_eq!(pixel(&resampled, 19, 18), [200, 100, 50, 255]);
+}
+
+/// A white square of 6 in a picture of 12.
+fn square() -> Vec<u8> {
+    let mut rgba = vec![0; 12 * 12 * 4];
+    for k in 0..12 * 12 {
+        let (x, y) = (k % 12, k / 12);
+        if (3..9).contains(&x) && (3..9).contains(&y) {
+            rgba[k * 4..][..4].copy_from_slice(&[255, 255, 255, 255]);
+        }
+    }
+    rgba
+}
+
+#[test]
+fn between_pixels_turned_and_scaled_the_amount_of_alpha_is_kept() {
+    for (center, rotation_rad, scale) in [
+        ([20.5, 15.25], 0.0, 1.0),
+        ([20.1, 15.7], 0.6, 1.0),
+        ([20.1, 15.7], 0.6, 1.7),
+        ([20.3, 15.1], 2.0, 0.7),
+        ([20.3, 15.1], 0.3, 0.45),
+        ([19.8, 15.4], 0.3, 0.3),
+    ] {
+        let turned = Placement {
+            rotation_rad,
+            scale,
+            ..place(center)
+        };
+        let (sum, want) = (
+            alpha_sum(&drawn(&square(), (12, 12), &turned)),
+            36.0 * scale * scale,
+        );
+        assert!(
+            (sum - want).abs() < 0.05 * want + 0.5,
+            "{scale}: {sum} {want}"
+        );
+    }
+}
+
+#[test]
+fn no_edge_is_darker_than_its_sprite_at_any_scale() {
+    for scale in [0.3, 0.45, 0.61, 0.8, 1.0, 1.3, 2.0] {
+        let turned = Placement {
+            rotation_rad: 0.37,
+            scale,
+            ..place([20.2, 14.9])
+        };
+        for pixel in drawn(&square(), (12, 12), &turned).pixels {
+            let [r, g, b, a] = crate::raster::canvas::straight(pixel);
+            // A fringe would be a pixel with alpha and less than the white of the square.
+            assert!(
+                a < 3 || [r, g, b].iter().all(|&c| c >= 252),
+                "{scale}: {pixel:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_fine_pattern_far_away_is_even() {
+    let rgba: Vec<u8> = (0..32 * 32)
+        .flat_map(|k| {
+            [if (k % 32 + k / 32) % 2 == 0 { 230 } else { 30 }; 3]
+                .into_iter()
+                .chain([255])
+        })
+        .collect();
+    let small = Placement {
+        scale: 0.3,
+        ..place([20.0, 15.0])
+    };
+    let resampled = drawn(&rgba, (32, 32), &small);
+    for (x, y) in [(18, 14), (19, 15), (21, 16), (20, 13)] {
+        assert!(pixel(&resampled, x, y)[0].abs_diff(130) < 12);
+    }
+}
+
+#[test]
+fn what_lies_outside_the_picture_is_not_drawn() {
+    let rgba = checkered(6, 4);
+    assert!(drawn(&rgba, (6, 4), &place([-30.0, 5.0])).rect.is_empty());
+    let corner = drawn(&rgba, (6, 4), &place([0.0, 0.0]));
+    assert_eq!((corner.rect.x, corner.rect.y), (0, 0));
+}
+
+#[test]
+fn every_instruction_set_gives_the_same_pixels() {
+    for k in 0..24 {
+        let turned = Placement {
+            rotation_rad: 0.27 * f64::from(k),
+            scale: 0.35 + 0.07 * f64::from(k),
+            mirrored: k % 2 == 0,
+            center_px: [20.0 + 0.13 * f64::from(k), 14.0],
+        };
+        let plain = drawn_with(&checkered(14, 9), (14, 9), &turned, Level::Scalar);
+        for cpu in Level::available() {
+            let other = drawn_with(&checkered(14, 9), (14, 9), &turned, cpu);
+            assert_eq!(plain.pixels, other.pixels, "{}", cpu.name());
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! The other kinds of file that we write: right in size, rate and color tags, alpha and color as they were
+//! given (ALGORITHMS.md 8, alpha output; ECOSYSTEM.md 5).
+
+use std::path::Path;
+use std::process::Command;
+
+use flockreel::media::{Coding, VideoFormat, VideoWriter};
+use flockreel::raster::{ColorSpec, Frame};
+
+use crate::common::film::Films;
+
+const N_FRAMES: usize = 12;
+const FORMAT: VideoFormat = VideoFormat {
+    width: 98,
+    height: 66,
+    fps: 30000.0 / 1001.0,
+    color: ColorSpec {
+        matrix: flockreel::raster::Matrix::Bt601,
+        range: flockreel::raster::Range::Limited,
+    },
+};
+
+/// An orange disc with a soft rim that moves; the color goes on beyond its alpha, as we write it.
+fn disc(frame_idx: usize) -> Vec<u8> {
+    let center = [30.0 + 3.0 * frame_idx as f64, 33.0];
+    (0..98 * 66)
+        .flat_map(|k| {
+            let (x, y) = (f64::from(k % 98) - center[0], f64::from(k / 98) - center[1]);
+            let alpha = (20.5 - x.hypot(y)).clamp(0.0, 4.0) / 4.0;
+            [230, 120, 40, (255.0 * alpha).round() as u8]
+        })
+        .collect()
+}
+
+fn written(films: &Films, name: &str, coding: Coding) -> std::path::PathBuf {
+    let path = films.path(name);
+    let mut writer = VideoWriter::create_as(&path, &FORMAT, coding).expect("an encoder");
+    for frame_idx in 0..N_FRAMES {
+        if coding.takes_rgba() {
+            writer.write_rgba(&disc(frame_idx)).expect("it takes RGBA");
+        } else {
+            let mut frame = Frame::new(98, 66, FORMAT.color);
+            frame.planes.fill(128);
+            frame.planes[frame_idx * 98..][..98].fill(20);
+            writer.write(&frame).expect("it takes planes");
+        }
+    }
+    writer.finish().expect("a whole file");
+    path
+}
+
+/// What ffprobe says of the first stream.
+fn said(path: &Path, entries: &str) -> Vec<String> {
+    let done = Command::new("ffprobe")
+        .args(["-v", "error", "-count_frames", "-of", "default=nw=1"])
+        .args(["-show_entries", entries])
+        .arg(path)
+        .output()
+        .expect("ffprobe is installed");
+    let text = String::from_utf8(done.stdout).expect("it is text");
+    text.lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn size_rate_and_color_tags_are_told_by_the_file() {
+    let films = Films::new();
+    for (name, coding) in [
+        ("a.webm", Coding::Vp9 { alpha: true }),
+        ("b.webm", Coding::Vp9 { alpha: false }),
+        ("a.mov", Coding::ProRes { alpha: true }),
+        ("b.mov", Coding::ProRes { alpha: false }),
+    ] {
+        let path = written(&films, name, coding);
+        let entries = "stream=width,height,avg_frame_rate,nb_read_frames,color_range,color_space,\
+                       color_transfer,color_primaries:stream_tags=alpha_mode";
+        let said = said(&path, entries);
+        for wanted in [
+            "width=98",
+            "height=66",
+            "nb_read_frames=12",
+            "color_range=tv",
+            "color_space=bt709",
+            "color_transfer=bt709",
+            "color_primaries=bt709",
+        ] {
+            assert!(
+                said.iter().any(|line| line == wanted),
+                "{name}: {wanted} {said:?}"
+            );
+        }
+        let rate = said
+            .iter()
+            .find_map(|line| line.strip_prefix("avg_frame_rate="));
+        let (over, under) = rate.expect("a rate").split_once('/').expect("a fraction");
+        let fps = over.parse::<f64>().unwrap() / under.parse::<f64>().unwrap();
+        assert!((fps - FORMAT.fps).abs() < 0.15, "{name}: {fps}");
+        let tagged = said.contains(&"TAG:alpha_mode=1".to_owned());
+        assert_eq!(tagged, name == "a.webm", "{said:?}");
+    }
+}
+
+#[test]
+fn alpha_comes_back_and_no_rim_is_dark() {
+    let films = Films::new();
+    for (name, coding, decoder, most) in [
+        ("a.webm", Coding::Vp9 { alpha: true }, "libvpx-vp9", 3.0),
+        ("a.mov", Coding::ProRes { alpha: true }, "prores", 0.6),
+    ] {
+        written(&films, name, coding);
+        let args = format!("-c:v {decoder} -i {name} -pix_fmt rgba -f rawvideo back.raw");
+        let back = std::fs::read(films.run(&args)).expect("frames");
+        assert_eq!(back.len(), N_FRAMES * 98 * 66 * 4, "{name}");
+        let (mut error, mut n) = (0.0, 0.0);
+        for (frame_idx, picture) in back.chunks_exact(98 * 66 * 4).enumerate() {
+            for (found, given) in picture.chunks_exact(4).zip(disc(frame_idx).chunks_exact(4)) {
+                error += f64::from(found[3].abs_diff(given[3]));
+                n += 1.0;
+                if given[3] > 40 {
+                    let off = (0..3).map(|k| found[k].abs_diff(given[k])).max();
+                    assert!(off < Some(14), "{name}: {found:?} {given:?}");
+                }
+            }
+        }
+        assert!(
+            error / n < most,
+            "{name}: mean error of alpha {}",
+            error / n
+        );
+    }
+}
+
+#[test]
+fn previews_are_small_move_and_repeat() {
+    let films = Films::new();
+    let gif = written(&films, "a.gif", Coding::Gif);
+    let counted = said(&gif, "stream=nb_read_frames,width,height");
+    // 12 frames of 29.97 a second are 0.4 s: six of 15.
+    assert!(
+        counted.contains(&"nb_read_frames=6".to_owned()),
+        "{counted:?}"
+    );
+    assert!(counted.contains(&"width=98".to_owned()), "{counted:?}");
+    let webp = std::fs::read(written(&films, "a.webp", Coding::Webp)).expect("a file");
+    assert_eq!((&webp[..4], &webp[8..12]), (&b"RIFF"[..], &b"WEBP"[..]));
+    let n_frames = webp.windows(4).filter(|w| w == b"ANMF").count();
+    assert!((5..=7).contains(&n_frames), "{n_frames}");
+}
+
+#[test]
+fn equal_frames_give_equal_bytes_of_every_kind() {
+    let films = Films::new();
+    for coding in [
+        Coding::Vp9 { alpha: true },
+        Coding::ProRes { alpha: true },
+        Coding::Webp,
+        Coding::Gif,
+    ] {
+        let [a, b] = ["a", "b"].map(|name| std::fs::read(written(&films, name, coding)).unwrap());
+        assert!(a == b, "{coding:?}");
+    }
+}
+
+#[test]
+fn planes_and_rgba_are_not_taken_for_one_another() {
+    let films = Films::new();
+    let coding = Coding::ProRes { alpha: true };
+    let mut writer = VideoWriter::create_as(&films.path("a.mov"), &FORMAT, coding).unwrap();
+    assert!(writer.write(&Frame::new(98, 66, FORMAT.color)).is_err());
+    assert!(writer.write_rgba(&disc(0)[4..]).is_err());
+    let mut writer = VideoWriter::create(&films.path("a.mp4"), &FORMAT).unwrap();
+    assert!(writer.write_rgba(&disc(0)).is_err());
+}
