@@ -6,7 +6,7 @@ use super::steps::Taken;
 use super::violation::Violation;
 use crate::flock::Flock;
 use crate::flock::plan::cost::{CEILING, Feature, Weights, motion_of};
-use crate::flock::plan::crowd::{Crowd, Lookalike, n_watched};
+use crate::flock::plan::crowd::{Crowd, Lookalike};
 use crate::flock::plan::trellis::Trellis;
 use crate::flock::plan::turn_rates;
 use crate::geometry::Turns;
@@ -190,7 +190,9 @@ impl<'a> Ledger<'a> {
     fn lookalikes(&self, id: usize) -> Vec<Vec<Lookalike>> {
         let individuals = &self.flock.individuals;
         let others = || {
-            let plans = self.plans[..n_watched(id)].iter().map(Vec::as_slice);
+            let plans = self.plans[..self.crowd.n_watched(id)]
+                .iter()
+                .map(Vec::as_slice);
             individuals.iter().map(|other| &other.boid).zip(plans)
         };
         (0..self.plans[id].len())
