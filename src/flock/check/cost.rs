@@ -8,7 +8,7 @@ use crate::flock::Flock;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
 use crate::flock::plan::cost::{CEILING, Feature, Weights};
-use crate::flock::plan::crowd::{Crowd, Lookalike, n_watched};
+use crate::flock::plan::crowd::{Crowd, Lookalike};
 use crate::flock::plan::trellis::Trellis;
 use crate::geometry::Turns;
 use crate::library::Library;
@@ -184,7 +184,9 @@ impl<'a> Ledger<'a> {
     fn lookalikes(&self, id: usize) -> Vec<Vec<Lookalike>> {
         let individuals = &self.flock.individuals;
         let others = || {
-            let plans = self.plans[..n_watched(id)].iter().map(Vec::as_slice);
+            let plans = self.plans[..self.crowd.n_watched(id)]
+                .iter()
+                .map(Vec::as_slice);
             individuals.iter().map(|other| &other.boid).zip(plans)
         };
         (0..self.plans[id].len())

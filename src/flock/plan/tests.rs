@@ -44,7 +44,7 @@ fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
             .state(other.source_frame[t], other.mirrored[t])
             .expect("a frame of the component")
     };
-    let states: Vec<Vec<u32>> = (0..crowd::n_watched(id))
+    let states: Vec<Vec<u32>> = (0..crowd.n_watched(id))
         .map(|i| (0..wanted.len()).map(|t| state(i, t)).collect())
         .collect();
     let mut total = 0;
@@ -100,7 +100,7 @@ fn the_plans_of_a_flock_hold_their_certificates() {
         let wanted = planner.weights.wanted(boid, planner.fps);
         let rows = || rows::InCrowd::new(&planner, &settled, [id], [&wanted]);
         let film = planner.film();
-        let [path] = film.cheapest_paths(&mut rows()).unwrap();
+        let [path] = film.cheapest_paths(&rows()).unwrap();
         let columns = film.potentials(&mut rows());
         let (mut rows, n_states) = (rows(), planner.trellis.n_states());
         let costs: Vec<Vec<[u32; 1]>> = (0..wanted.len())
@@ -163,11 +163,12 @@ fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
 
 #[test]
 fn whoever_is_in_a_later_round_looks_out_for_all_rounds_before() {
-    assert_eq!([0, 1, 63].map(crowd::n_watched), [0, 1, 63]);
-    assert_eq!(
-        [64, 79, 80, 95, 96].map(crowd::n_watched),
-        [64, 64, 80, 80, 96]
-    );
+    let crowd = Crowd::new(0.3, 30.0, 40.0);
+    assert_eq!([0, 1, 63].map(|id| crowd.n_watched(id)), [0, 1, 63]);
+    let later = [64, 79, 80, 95, 96].map(|id| crowd.n_watched(id));
+    assert_eq!(later, [64, 64, 80, 80, 96]);
+    let indifferent = Crowd::new(0.0, 30.0, 40.0);
+    assert_eq!([1, 63, 80].map(|id| indifferent.n_watched(id)), [0; 3]);
 }
 
 #[test]
