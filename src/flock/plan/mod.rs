@@ -98,7 +98,7 @@ impl<'a> Planner<'a> {
         let mut settled = Settled::new(self.places.len());
         let (paths, bounds) = rayon::join(
             || self.paths(&wanted, &mut settled, progress),
-            || self.round(&wanted, 0, wanted.len()).least_costs(),
+            || self.round(&wanted, 0, wanted.len()).least_costs(progress),
         );
         let (paths, bounds) = (paths?, bounds?);
         Ok((paths.par_iter().enumerate())

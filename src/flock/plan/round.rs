@@ -10,6 +10,7 @@ use super::rows::{Alone, InCrowd};
 use super::viterbi::Path;
 use super::{LANES, Planner};
 use crate::flock::error::Error;
+use crate::progress::Progress;
 
 /// Individuals of consecutive ids.
 pub(super) struct Round<'a> {
@@ -33,8 +34,9 @@ impl Round<'_> {
     }
 
     /// What the cheapest path of each costs alone, turns.
-    pub(super) fn least_costs(&self) -> Result<Vec<u32>, Error> {
+    pub(super) fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         self.batches(|first| match self.wanted.len() - first {
+            _ if progress.cancelled() => Err(Error::Cancelled),
             ..=4 => self.alone(self.lanes::<4>(first)).map(Vec::from),
             _ => self.alone(self.lanes::<LANES>(first)).map(Vec::from),
         })
