@@ -114,10 +114,10 @@ impl ColorSpec {
 /// Fixed-point factors from premultiplied colors of alpha 1, in 16384ths, to YUV.
 #[derive(Clone, Copy, Debug)]
 pub struct FromQuads {
-    y_offset: i32,
-    y: [i32; 3],
-    u: [i32; 3],
-    v: [i32; 3],
+    pub(super) y_offset: i32,
+    pub(super) y: [i32; 3],
+    pub(super) u: [i32; 3],
+    pub(super) v: [i32; 3],
 }
 
 impl ColorSpec {

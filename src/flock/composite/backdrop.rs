@@ -4,6 +4,7 @@
 use super::params::Background;
 use super::view::View;
 use super::{Form, Shot};
+use crate::cpu::Level;
 use crate::geometry::Rect;
 use crate::raster::canvas::opaque;
 use crate::raster::resize::resized;
@@ -63,7 +64,8 @@ impl Backdrop {
         match form {
             Form::Planar(color) => {
                 backdrop.frame = Frame::new(whole.w, whole.h, color);
-                backdrop.frame.draw_canvas(&backdrop.canvas, whole);
+                let cpu = Level::detect();
+                backdrop.frame.draw_canvas(&backdrop.canvas, whole, cpu);
             }
             Form::Straight => {
                 backdrop.rgba = vec![0; whole.area() as usize * 4];

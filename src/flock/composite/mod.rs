@@ -196,7 +196,7 @@ impl<'a> Compositor<'a> {
         self.backdrop.begin(shot);
         for &rect in &desk.dirty {
             match self.form {
-                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect),
+                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect, self.cpu),
                 Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
             }
         }

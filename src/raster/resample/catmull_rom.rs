@@ -1,17 +1,19 @@
 //! Catmull and Rom's interpolation of one row of output: sixteen taps of four values each, weighted in
-//! 32768ths at 256 places between two pixels. The same code is compiled once plainly and once for AVX2
-//! (ALGORITHMS.md 8).
+//! 32768ths at 256 places between two pixels (ALGORITHMS.md 8). The plain code here says what the kernel
+//! for AVX2 computes.
 
 use super::{ONE, Premultiplied, Quad};
 use crate::cpu::Level;
 
 /// Places told apart between two pixels.
-const PLACES: usize = 256;
+pub(super) const PLACES: usize = 256;
+/// Half a place, in 65536ths: added, so that places are rounded to the nearest.
+pub(super) const HALF_PLACE: i32 = (1 << 16) / (2 * PLACES as i32);
 
 /// The four taps' weights at each place; they add up to 32767.
-static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
+pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
 /// The same, each weight once for every value of a pixel.
-static WIDE: [[i16; 16]; PLACES] = widened();
+pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
 
 impl Premultiplied {
     /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
@@ -26,7 +28,7 @@ impl Premultiplied {
         match cpu {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                #[expect(unsafe_code, reason = "a kernel for AVX2")]
                 // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
                     self.interpolate_avx2(row, start, step);
@@ -36,16 +38,9 @@ impl Premultiplied {
         }
     }
 
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn interpolate_avx2(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
-        self.interpolate_anywhere(row, start, step);
-    }
-
-    #[inline(always)]
+    /// The definition of what vector instructions do.
     fn interpolate_anywhere(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
-        // Half a place more, so that places are rounded to the nearest.
-        let [mut u, mut v] = start.map(|at| at + (1 << 16) / (2 * PLACES as i32));
+        let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
         let taps = self.pixels.as_flattened();
         for pixel in row {
@@ -109,7 +104,7 @@ const fn all_weights() -> [[i16; 4]; PLACES] {
 /// At `f` 256ths of the way from the second tap to the third.
 const fn weights(f: i64) -> [i16; 4] {
     // In 2^25ths: the cubic's halves stay whole.
-    let (f1, f2, f3) = (f << 16, f * f << 8, f * f * f);
+    let (f1, f2, f3) = (f << 16, (f * f) << 8, f * f * f);
     let exact = [
         -f1 + 2 * f2 - f3,
         (2 << 24) - 5 * f2 + 3 * f3,

@@ -5,6 +5,8 @@
 //! Everything is done in integers, 16384 for alpha 1 and for a full color: the same on every machine,
 //! and sixteen values at a time where it has AVX2.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2; // the same with vector instructions
 mod catmull_rom; // the interpolation of one row
 mod map; // from picture to sprite
 mod premultiplied; // a sprite as it is interpolated

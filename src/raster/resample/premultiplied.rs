@@ -115,6 +115,12 @@ impl Premultiplied {
 
 /// A straight-alpha pixel of 8 bits a channel.
 fn premultiplied(pixel: &[u8]) -> Quad {
+    // Most pixels are opaque or clear.
+    match pixel[3] {
+        0 => return [0; 4],
+        255 => return crate::raster::canvas::opaque([pixel[0], pixel[1], pixel[2]]),
+        _ => {}
+    }
     let alpha = u32::from(pixel[3]);
     let one = ONE as u32;
     let color = |k: usize| ((u32::from(pixel[k]) * alpha * one + 32512) / 65025) as i16;

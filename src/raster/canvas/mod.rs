@@ -1,8 +1,12 @@
 //! What sprites are drawn on: premultiplied pixels in 16384ths, opaque or not, and the way from there to
 //! planes and to straight alpha (ALGORITHMS.md 8).
 
+#[cfg(target_arch = "x86_64")]
+mod avx2; // rows, sixteen values at a time
+mod planes; // to an encoder's planes
+
+use super::RgbImage;
 use super::resample::{ONE, Quad, Resampled, scaled};
-use super::{Frame, RgbImage};
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
@@ -64,10 +68,10 @@ impl Canvas {
             match cpu {
                 #[cfg(target_arch = "x86_64")]
                 Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                    #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                    #[expect(unsafe_code, reason = "a kernel for AVX2")]
                     // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                     unsafe {
-                        over_row_avx2(row, sprite_row);
+                        avx2::over_row(row, sprite_row);
                     }
                 }
                 _ => over_row(row, sprite_row),
@@ -101,9 +105,20 @@ impl Canvas {
 
 /// A color of alpha 1.
 pub fn opaque(rgb: [u8; 3]) -> Quad {
-    let [r, g, b] = rgb.map(|value| ((u32::from(value) * ONE as u32 + 127) / 255) as i16);
+    let [r, g, b] = rgb.map(|value| FULL[usize::from(value)]);
     [r, g, b, ONE]
 }
+
+/// Every 8-bit value in 16384ths.
+static FULL: [i16; 256] = {
+    let mut full = [0; 256];
+    let mut value = 0;
+    while value < 256 {
+        full[value] = ((value * ONE as usize + 127) / 255) as i16;
+        value += 1;
+    }
+    full
+};
 
 /// A pixel as 8-bit straight alpha; without alpha it has no color.
 pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
@@ -116,13 +131,7 @@ pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
     [color(r), color(g), color(b), alpha]
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn over_row_avx2(row: &mut [Quad], sprite: &[Quad]) {
-    over_row(row, sprite);
-}
-
-#[inline(always)]
+/// The definition of what vector instructions do.
 fn over_row(row: &mut [Quad], sprite: &[Quad]) {
     for (below, above) in row.iter_mut().zip(sprite) {
         // 16384 doubled is one more than fits; 32767 of 32768 leaves every value as it is.
@@ -133,55 +142,10 @@ fn over_row(row: &mut [Quad], sprite: &[Quad]) {
     }
 }
 
-impl Frame {
-    /// Writes the box of an opaque canvas of the frame's own size into the planes: luma of the box, chroma
-    /// of every 2 x 2 block that the box touches.
-    ///
-    /// Panics when the canvas has another size than the frame.
-    pub fn draw_canvas(&mut self, canvas: &Canvas, rect: Rect) {
-        assert_eq!(
-            (canvas.width, canvas.height),
-            (self.width, self.height),
-            "sizes differ"
-        );
-        if rect.is_empty() {
-            return;
-        }
-        let from = self.color.from_quads();
-        let (width, height) = (self.width as usize, self.height as usize);
-        let chroma_width = self.chroma_width() as usize;
-        let (luma, chroma) = self.planes.split_at_mut(width * height);
-        let (u_plane, v_plane) = chroma.split_at_mut(chroma.len() / 2);
-        let (x0, x1) = (rect.x as usize / 2, (rect.right() as usize).div_ceil(2));
-        let (left, right) = (2 * x0, (2 * x1).min(width));
-        for by in rect.y as usize / 2..(rect.bottom() as usize).div_ceil(2) {
-            // At an odd right or bottom edge the last pixel stands in for the missing one.
-            let lines = [2 * by, (2 * by + 1).min(height - 1)];
-            let rows = lines.map(|y| &canvas.pixels[y * width + left..y * width + right]);
-            for (row, y) in rows.iter().zip(lines) {
-                let out = &mut luma[y * width + left..y * width + right];
-                for (luma, pixel) in out.iter_mut().zip(*row) {
-                    *luma = from.luma(*pixel);
-                }
-            }
-            let out = by * chroma_width + x0..by * chroma_width + x1;
-            let (us, vs) = (&mut u_plane[out.clone()], &mut v_plane[out]);
-            for (k, (u, v)) in us.iter_mut().zip(vs).enumerate() {
-                let columns = [2 * k, (2 * k + 1).min(right - left - 1)];
-                let block = columns.map(|x| rows.map(|row| row[x]));
-                let sum = std::array::from_fn(|c| {
-                    block.as_flattened().iter().map(|p| i32::from(p[c])).sum()
-                });
-                [*u, *v] = from.chroma_of_block(sum);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::raster::ColorSpec;
+    use crate::raster::{ColorSpec, Frame};
     use proptest::prelude::*;
 
     fn layer(rect: Rect, pixel: Quad) -> Resampled {
@@ -234,10 +198,51 @@ mod tests {
                 Frame::new(3, 3, ColorSpec::default()),
             );
             let whole = Rect::of_size(3, 3);
-            ours.draw_canvas(&Canvas::of_rgb(&image), whole);
+            ours.draw_canvas(&Canvas::of_rgb(&image), whole, Level::Scalar);
             known.draw_rgb(&image, whole);
             for (a, b) in ours.planes.iter().zip(&known.planes) {
                 prop_assert!(a.abs_diff(*b) <= 1, "{:?} {:?}", ours.planes, known.planes);
+            }
+        }
+    }
+
+    /// A canvas of any colors and alphas, and a layer over part of it.
+    fn anything(seed: u32, width: u32, height: u32) -> Canvas {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 17) as i16 & 0x3fff
+        };
+        let mut canvas = Canvas::new(width, height);
+        for (k, pixel) in canvas.pixels.iter_mut().enumerate() {
+            let alpha = if k % 3 == 0 { ONE } else { next() };
+            *pixel = [
+                next().min(alpha),
+                next().min(alpha),
+                next().min(alpha),
+                alpha,
+            ];
+        }
+        canvas
+    }
+
+    #[test]
+    fn every_instruction_set_draws_and_develops_the_same() {
+        for (seed, width, height) in [(1, 37, 21), (2, 64, 16), (3, 5, 7), (4, 23, 2)] {
+            let base = anything(seed, width, height);
+            let rect = Rect::clipped(1, 1, i64::from(width) - 1, i64::from(height), width, height);
+            let mut sprite = layer(rect, [0; 4]);
+            let other = anything(seed + 9, rect.w, rect.h);
+            sprite.pixels = other.pixels;
+            let with = |cpu: Level| {
+                let mut canvas = base.clone();
+                canvas.over(&sprite, cpu);
+                let mut frame = Frame::new(width, height, ColorSpec::default());
+                frame.draw_canvas(&canvas, rect, cpu);
+                (canvas, frame)
+            };
+            for cpu in Level::available() {
+                assert!(with(Level::Scalar) == with(cpu), "{} {width}", cpu.name());
             }
         }
     }

@@ -1,0 +1,98 @@
+//! Rows of a canvas with AVX2: the same integers as the plain code beside it, sixteen at a time
+//! (ALGORITHMS.md 8).
+
+#![expect(unsafe_code, reason = "vector loads and stores go through pointers")]
+
+use std::arch::x86_64::*;
+
+use crate::raster::color::FromQuads;
+use crate::raster::resample::{ONE, Quad};
+
+/// Premultiplied pixels over others.
+#[target_feature(enable = "avx2")]
+pub(super) fn over_row(row: &mut [Quad], sprite: &[Quad]) {
+    let one = _mm256_set1_epi16(ONE);
+    let (row_fours, row_rest) = row.as_chunks_mut::<4>();
+    let (sprite_fours, sprite_rest) = sprite.as_chunks::<4>();
+    for (below, above) in row_fours.iter_mut().zip(sprite_fours) {
+        let (above, was) = (load(above), load(below));
+        let alpha = _mm256_shufflehi_epi16::<0xff>(_mm256_shufflelo_epi16::<0xff>(above));
+        let left = _mm256_sub_epi16(one, alpha);
+        // Doubled with saturation: 32767 of 32768 leaves every value as it is.
+        let through = _mm256_adds_epi16(left, left);
+        let sum = _mm256_add_epi16(above, _mm256_mulhrs_epi16(was, through));
+        // SAFETY: `below` is 32 bytes that are ours to write.
+        unsafe { _mm256_storeu_si256(below.as_mut_ptr().cast(), sum) };
+    }
+    super::over_row(row_rest, sprite_rest);
+}
+
+/// Luma of the first pixels of a row, eight at a time; returns of how many.
+#[target_feature(enable = "avx2")]
+pub(super) fn luma_row(from: &FromQuads, row: &[Quad], luma: &mut [u8]) -> usize {
+    let weights = weights_of(from.y);
+    let half = _mm256_set1_epi32(1 << 20);
+    let offset = _mm256_set1_epi32(from.y_offset);
+    let (eights, _) = row.as_chunks::<8>();
+    for (out, pixels) in luma.as_chunks_mut::<8>().0.iter_mut().zip(eights) {
+        let dots = eight_dots(pixels, weights);
+        let values = _mm256_srai_epi32::<21>(_mm256_add_epi32(dots, half));
+        *out = bytes_of(_mm256_add_epi32(values, offset));
+    }
+    luma.len().min(eights.len() * 8) / 8 * 8
+}
+
+/// Chroma of the first blocks of two rows, four at a time; returns of how many.
+#[target_feature(enable = "avx2")]
+pub(super) fn chroma_row(from: &FromQuads, rows: [&[Quad]; 2], planes: [&mut [u8]; 2]) -> usize {
+    let (u_weights, v_weights) = (weights_of(from.u), weights_of(from.v));
+    let half = _mm256_set1_epi32(1 << 22);
+    let middle = _mm256_set1_epi32(128);
+    let [us, vs] = planes.map(|plane| plane.as_chunks_mut::<4>().0);
+    let [above, below] = rows.map(|row| row.as_chunks::<8>().0);
+    for (k, (above, below)) in above.iter().zip(below).enumerate() {
+        let dots =
+            |weights| _mm256_add_epi32(eight_dots(above, weights), eight_dots(below, weights));
+        // Pairs: u u v v of the first four pixels, then of the last four.
+        let pairs = _mm256_hadd_epi32(dots(u_weights), dots(v_weights));
+        let values = _mm256_srai_epi32::<23>(_mm256_add_epi32(pairs, half));
+        let [u0, u1, v0, v1, u2, u3, v2, v3] = bytes_of(_mm256_add_epi32(values, middle));
+        us[k] = [u0, u1, u2, u3];
+        vs[k] = [v0, v1, v2, v3];
+    }
+    above.len().min(below.len()) * 4
+}
+
+/// Each of eight pixels times the weights of its channels, added up, in the order of the pixels.
+#[target_feature(enable = "avx2")]
+fn eight_dots(pixels: &[Quad; 8], weights: __m256i) -> __m256i {
+    let (halves, _) = pixels.as_chunks::<4>();
+    let [first, last] = [0, 1].map(|k| _mm256_madd_epi16(load(&halves[k]), weights));
+    let mixed = _mm256_hadd_epi32(first, last);
+    _mm256_permute4x64_epi64::<0b11_01_10_00>(mixed)
+}
+
+/// Three weights and none for alpha, four times. They fit 16 bits: a span of 255 in 128ths is less.
+#[target_feature(enable = "avx2")]
+fn weights_of(weights: [i32; 3]) -> __m256i {
+    let [r, g, b] = weights.map(|weight| i64::from(weight as i16 as u16));
+    _mm256_set1_epi64x(r | g << 16 | b << 32)
+}
+
+/// Eight values as bytes, clamped.
+#[target_feature(enable = "avx2")]
+fn bytes_of(values: __m256i) -> [u8; 8] {
+    let words = _mm256_packs_epi32(values, values);
+    let bytes = _mm256_packus_epi16(words, words);
+    let low = _mm256_extract_epi32::<0>(bytes).to_le_bytes();
+    let high = _mm256_extract_epi32::<4>(bytes).to_le_bytes();
+    [
+        low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3],
+    ]
+}
+
+#[target_feature(enable = "avx2")]
+fn load(pixels: &[Quad; 4]) -> __m256i {
+    // SAFETY: `pixels` is 32 bytes that can be read.
+    unsafe { _mm256_loadu_si256(pixels.as_ptr().cast()) }
+}
