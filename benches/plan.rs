@@ -9,8 +9,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flockreel::cpu::Level;
+use flockreel::flock::lens::Lens;
+use flockreel::flock::motion::motion_of;
 use flockreel::flock::plan::Planner;
-use flockreel::flock::plan::cost::motion_of;
 use flockreel::flock::{BoidTrack, Params, Stats, plan_flock};
 use flockreel::formats::library_dir;
 use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Poses, Sprites, View};
@@ -74,7 +75,7 @@ fn time(
         .num_threads(n_threads)
         .build()
         .expect("threads");
-    let motion = motion_of(library);
+    let motion = motion_of(library, &Lens::of(library, params));
     let run = || {
         let start = Instant::now();
         let plans = pool.install(|| Planner::new(library, &motion, boids, params).plan(&Silent));

@@ -19,6 +19,8 @@ pub struct Individual {
     pub centroid_px: Vec<[f64; 2]>,
     /// The direction of the head as shown.
     pub heading_rad: Vec<f64>,
+    /// The direction in space as shown, a unit vector; only where the tank has depth.
+    pub forward: Option<Vec<[f64; 3]>>,
     /// Size relative to the footage.
     pub scale: Vec<f64>,
     /// Depth in the camera's frame; only with a camera.
@@ -32,8 +34,10 @@ pub struct Individual {
 /// Where a boid was and what it did.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct BoidTrack {
-    /// x, y in the picture, and z away from the viewer, all in pixels.
+    /// x, y in the picture, and z behind the front of the tank; all in pixels, z at the flock's body length.
     pub position_px: Vec<[f64; 3]>,
+    /// Direction of its motion in space, a unit vector; only where the tank has depth.
+    pub forward: Option<Vec<[f64; 3]>>,
     /// Direction of its motion in the picture.
     pub heading_rad: Vec<f64>,
     /// Speed in the picture, body lengths a second.
@@ -51,6 +55,8 @@ pub struct Fade {
     pub mirrored: bool,
     /// Its rotation.
     pub rotation_rad: Vec<f64>,
+    /// Its size relative to the footage.
+    pub scale: Vec<f64>,
     /// Its weight at each frame, 0..=1; the main sprite has the rest.
     pub weight: Vec<f64>,
 }
@@ -86,6 +92,8 @@ impl Individual {
             self.heading_rad.len(),
             self.scale.len(),
             self.depth_m.as_ref().map_or(n_frames, Vec::len),
+            self.forward.as_ref().map_or(n_frames, Vec::len),
+            boid.forward.as_ref().map_or(n_frames, Vec::len),
             boid.position_px.len(),
             boid.heading_rad.len(),
             boid.speed_bl_per_s.len(),
@@ -93,7 +101,8 @@ impl Individual {
         lengths.iter().all(|&length| length == n_frames)
             && self.fades.iter().all(|fade| {
                 let n = fade.weight.len();
-                (fade.source_frame.len(), fade.rotation_rad.len()) == (n, n)
+                let lengths = [&fade.rotation_rad, &fade.scale].map(Vec::len);
+                (fade.source_frame.len(), lengths) == (n, [n; 2])
                     && fade.start as usize + n <= n_frames
             })
     }

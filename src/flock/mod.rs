@@ -6,6 +6,8 @@ pub mod check;
 pub mod composite;
 pub mod error;
 pub mod individual;
+pub mod lens;
+pub mod motion;
 pub mod params;
 pub mod placement;
 pub mod plan;
@@ -23,11 +25,14 @@ use rayon::prelude::*;
 
 use self::boids::Boids;
 use self::boids::calibration::Calibration;
-use self::boids::measures::{self, Order};
+use self::boids::measures::Order;
 use self::boids::tank::Tank;
+use self::boids::vector::{Vec3, unit};
 use self::individual::rounded;
+use self::lens::Lens;
+use self::motion::motion_of;
+use self::params::MatchBy;
 use self::placement::Stage;
-use self::plan::cost::motion_of;
 use self::plan::{Plan, Planner};
 use crate::geometry::Turns;
 use crate::library::Library;
@@ -46,6 +51,8 @@ pub struct Flock {
     pub params: Params,
     /// By id.
     pub individuals: Vec<Individual>,
+    /// Where the predator was at every frame, as boids' positions are; empty without one.
+    pub predator_px: Vec<[f64; 3]>,
     /// How good it is.
     pub stats: Stats,
 }
@@ -80,69 +87,117 @@ pub fn plan_flock(
     if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
         return Err(Error::NoTransitions);
     }
-    let motion = motion_of(library);
-    let calibration = Calibration::of(library, &motion, params);
-    let tank = Tank::of(library, calibration.length_px, params);
-    let (tracks, orders) = simulate(library, params, &calibration, &tank, progress)?;
-    let plans = Planner::new(library, &motion, &tracks, params).plan(progress)?;
+    let lens = Lens::of(library, params);
+    let params = &told(params, library, &lens);
+    let motion = motion_of(library, &lens);
+    let tank = Tank::of(library, &lens, &motion, params);
+    let calibration = Calibration::of(library, &motion, lens.is_flat());
+    let boids = Boids::new(params, &calibration, (&lens, &tank), library.poses.fps);
+    let course = simulate(boids, &lens, params.frames, progress)?;
+    let plans = Planner::new(library, &motion, &course.tracks, params).plan(progress)?;
     let stage = Stage {
         library,
         motion: &motion,
         params,
-        length_px: calibration.length_px,
-        corners_px: tank
-            .corners
-            .map(|corner| [corner[0], corner[1]].map(|bl| bl * calibration.length_px)),
+        lens: &lens,
+        tank: &tank,
     };
-    let individuals = place(&stage, tracks, plans);
+    let individuals = place(&stage, course.tracks, plans);
     Ok(Flock {
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
-        length_px: calibration.length_px,
+        length_px: lens.length_px,
         stats: quality::measure(
             &individuals,
-            &orders,
+            &course.orders,
             library,
             params,
-            calibration.length_px,
+            lens.length_px,
         ),
         params: params.clone(),
+        predator_px: course.predator_px,
         individuals,
     })
 }
 
-/// The boids' tracks as files hold them, by id, and the order of every frame.
+/// The parameters with what they leave open.
+fn told(params: &Params, library: &Library, lens: &Lens) -> Params {
+    let mut params = params.clone();
+    let is_known = library
+        .poses
+        .frames
+        .iter()
+        .any(|pose| pose.forward.is_some());
+    params.matching.by = Some(match params.matching.by {
+        None if is_known && !lens.is_flat() => MatchBy::Direction,
+        Some(MatchBy::Direction) if lens.is_flat() => MatchBy::Heading,
+        by => by.unwrap_or(MatchBy::Heading),
+    });
+    params
+}
+
+/// How a simulation went, as files hold it.
+struct Course {
+    /// By id.
+    tracks: Vec<BoidTrack>,
+    /// By frame.
+    orders: Vec<Order>,
+    /// By frame; empty without one.
+    predator_px: Vec<[f64; 3]>,
+}
+
 fn simulate(
-    library: &Library,
-    params: &Params,
-    calibration: &Calibration,
-    tank: &Tank,
+    mut boids: Boids,
+    lens: &Lens,
+    n_frames: u32,
     progress: &dyn Progress,
-) -> Result<(Vec<BoidTrack>, Vec<Order>), Error> {
+) -> Result<Course, Error> {
     progress.report("simulating", 0.0);
-    let mut boids = Boids::new(params, calibration, tank, library.poses.fps);
-    let mut tracks = vec![BoidTrack::default(); params.count as usize];
-    let mut orders = Vec::with_capacity(params.frames as usize);
-    for t in 0..params.frames {
+    let track = BoidTrack {
+        forward: (!lens.is_flat()).then(Vec::new),
+        ..BoidTrack::default()
+    };
+    let mut course = Course {
+        tracks: vec![track; boids.positions.len()],
+        orders: Vec::with_capacity(n_frames as usize),
+        predator_px: Vec::new(),
+    };
+    for t in 0..n_frames {
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
         if t > 0 {
             boids.advance();
         }
-        for (id, track) in tracks.iter_mut().enumerate() {
-            let velocity = boids.velocities[id];
-            let heading = Turns::from_rad(libm::atan2(velocity[1], velocity[0]));
-            let place = boids.positions[id].map(|bl| rounded(bl * calibration.length_px, 2));
-            track.position_px.push(place);
-            track.heading_rad.push(rounded(heading.to_rad(), 5));
-            let speed = velocity[0].hypot(velocity[1]);
-            track.speed_bl_per_s.push(rounded(speed, 3));
+        for (id, track) in course.tracks.iter_mut().enumerate() {
+            record(track, lens, &boids, id);
         }
-        orders.push(measures::order(&boids.positions, &boids.velocities));
-        progress.report("simulating", f64::from(t + 1) / f64::from(params.frames));
+        let predator = boids.predator().map(|place| seen(place, lens, &boids));
+        course.predator_px.extend(predator);
+        course.orders.push(boids.order());
+        progress.report("simulating", f64::from(t + 1) / f64::from(n_frames));
     }
-    Ok((tracks, orders))
+    Ok(course)
+}
+
+/// A place in the picture, and how far behind the front of the tank: pixels.
+fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
+    let [x, y] = lens.picture_px(place);
+    let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
+    [x, y, behind_px].map(|px| rounded(px, 2))
+}
+
+/// A boid's moment, as it is seen.
+fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
+    let (place, velocity) = (boids.positions[id], boids.velocities[id]);
+    track.position_px.push(seen(place, lens, boids));
+    if let Some(forward) = &mut track.forward {
+        forward.push(unit(velocity).map(|part| rounded(part, 5)));
+    }
+    let [vx, vy] = lens.picture_velocity(place, velocity);
+    let heading = Turns::from_rad(libm::atan2(vy, vx));
+    track.heading_rad.push(rounded(heading.to_rad(), 5));
+    track.speed_bl_per_s.push(rounded(vx.hypot(vy), 3));
 }
 
 fn place(stage: &Stage, tracks: Vec<BoidTrack>, plans: Vec<Plan>) -> Vec<Individual> {
@@ -161,8 +216,9 @@ fn place(stage: &Stage, tracks: Vec<BoidTrack>, plans: Vec<Plan>) -> Vec<Individ
                 fades: placed.fades,
                 centroid_px: placed.centroid_px,
                 heading_rad: placed.heading_rad,
-                scale: vec![1.0; plan.shown.len()],
-                depth_m: None,
+                forward: placed.forward,
+                scale: placed.scale,
+                depth_m: placed.depth_m,
                 boid,
                 cost: plan.cost,
             }

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+pub use super::boids::params::{Goal, Obstacle, Predator, Rules, Zones};
 use super::composite::params::Render;
 
 /// Parameters of a flock; all have defaults.
@@ -34,49 +35,31 @@ pub struct Params {
     pub leaders: bool,
     /// Where the flock may go.
     pub tank: TankExtent,
-    /// Depth of the tank in side view, body lengths, 0..=100; null = half its width, at most 3. Top
-    /// view has none.
+    /// Where it is drawn to, at most 64.
+    pub goals: Vec<Goal>,
+    /// What it swims round, at most 64.
+    pub obstacles: Vec<Obstacle>,
+    /// What it flees from.
+    pub predator: Option<Predator>,
+    /// Depth of the tank in side view, body lengths, 0..=100; null = as deep as the animal was seen to be, 1 to 6.
+    /// Top view has none.
     pub depth_bl: Option<f64>,
     /// The film.
     pub render: Render,
-}
-
-/// How the boids steer (ALGORITHMS.md 7). Weights 0..=20, radii in body lengths 0.1..=50.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Rules {
-    /// Weight of separation.
-    pub separation: f64,
-    /// Weight of alignment.
-    pub alignment: f64,
-    /// Weight of cohesion.
-    pub cohesion: f64,
-    /// Weight of the walls.
-    pub walls: f64,
-    /// Weight of the wander: 1 = turn rates as varied as the animal's own.
-    pub wander: f64,
-    /// Weight of circling about the middle of the tank.
-    pub circling: f64,
-    /// Neighbors nearer than this push apart.
-    pub separation_bl: f64,
-    /// Neighbors nearer than this are aligned with.
-    pub alignment_bl: f64,
-    /// Neighbors nearer than this attract.
-    pub cohesion_bl: f64,
-    /// Field of view, degrees, 1..=360.
-    pub view_deg: f64,
-    /// At most this many nearest neighbors count, 1..=64.
-    pub neighbors: u32,
 }
 
 /// How real frames are matched with boids (ALGORITHMS.md 6). Weights 0..=4.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Matching {
-    /// What is matched: directions, or places.
-    pub by: MatchBy,
+    /// What is matched; null = directions in space where the library knows them and the tank has depth, headings
+    /// otherwise. A flock says which it was.
+    pub by: Option<MatchBy>,
     /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
     pub w_h: f64,
+    /// Share of a difference along the line of sight that counts when directions are matched, 0..=1: 1 = the whole
+    /// angle in space. A wrong heading is seen at once, a wrong foreshortening hardly.
+    pub w_d: f64,
     /// Cost of a radian that rotating the sprite must make up for.
     pub w_r: f64,
     /// How far a sprite may be rotated in side view, degrees, 0..=45.
@@ -93,8 +76,11 @@ pub struct Matching {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatchBy {
-    /// O: where the animal points, and how fast it is.
+    /// O: where the animal points in the picture, and how fast it is.
     Heading,
+    /// The same, but where it points in space. Only where the tank has depth. What stays wrong is the chord
+    /// between two unit vectors; without a camera, away from the viewer and toward are one.
+    Direction,
     /// Colqui et al. 2008: how the animal moved in the picture against how the boid moves, frame by
     /// frame. `w_h` is then the cost of a body length a second each way; `w_r`, `rho_deg` and `w_v` play
     /// no part in the plan.
@@ -133,29 +119,12 @@ pub enum TankExtent {
     Picture,
 }
 
-impl Default for Rules {
-    fn default() -> Rules {
-        Rules {
-            separation: 1.5,
-            alignment: 1.0,
-            cohesion: 0.8,
-            walls: 4.0,
-            wander: 0.5,
-            circling: 0.0,
-            separation_bl: 1.0,
-            alignment_bl: 3.0,
-            cohesion_bl: 6.0,
-            view_deg: 300.0,
-            neighbors: 16,
-        }
-    }
-}
-
 impl Default for Matching {
     fn default() -> Matching {
         Matching {
-            by: MatchBy::Heading,
+            by: None,
             w_h: 1.0,
+            w_d: 0.3,
             w_r: 0.1,
             rho_deg: 10.0,
             w_v: 0.1,
@@ -180,6 +149,9 @@ impl Default for Params {
             position: Position::Leash,
             leaders: true,
             tank: TankExtent::Seen,
+            goals: Vec::new(),
+            obstacles: Vec::new(),
+            predator: None,
             depth_bl: None,
             render: Render::default(),
         }
@@ -188,7 +160,8 @@ impl Default for Params {
 
 impl Params {
     /// The names that `preset` knows.
-    pub const PRESETS: [&'static str; 5] = ["school", "swarm", "mill", "scatter", "papers"];
+    pub const PRESETS: [&'static str; 6] =
+        ["school", "swarm", "mill", "scatter", "zonal", "papers"];
 
     /// The parameters of a named preset; `None` for an unknown name. `school` is the default.
     pub fn preset(name: &str) -> Option<Params> {
@@ -206,7 +179,7 @@ impl Params {
             })),
             "mill" => Some(with_rules(Rules {
                 circling: 1.5,
-                alignment: 0.3,
+                alignment: 0.0,
                 cohesion: 0.0,
                 ..Rules::default()
             })),
@@ -216,6 +189,11 @@ impl Params {
                 cohesion: 0.0,
                 wander: 1.0,
                 separation_bl: 3.0,
+                ..Rules::default()
+            })),
+            "zonal" => Some(with_rules(Rules {
+                zones: Some(Zones::default()),
+                neighbors: 256,
                 ..Rules::default()
             })),
             "papers" => Some(Params::papers()),
@@ -228,8 +206,9 @@ impl Params {
     pub fn papers() -> Params {
         Params {
             matching: Matching {
-                by: MatchBy::Heading,
+                by: Some(MatchBy::Heading),
                 w_h: 1.0,
+                w_d: 1.0,
                 w_r: 0.0,
                 rho_deg: 0.0,
                 w_v: 0.0,
@@ -264,33 +243,12 @@ impl Params {
         }
         self.render.check()?;
         self.rules.check()?;
+        within("goals", self.goals.len() as f64, 0.0, 64.0)?;
+        within("obstacles", self.obstacles.len() as f64, 0.0, 64.0)?;
+        self.goals.iter().try_for_each(Goal::check)?;
+        self.obstacles.iter().try_for_each(Obstacle::check)?;
+        self.predator.iter().try_for_each(Predator::check)?;
         self.matching.check()
-    }
-}
-
-impl Rules {
-    fn check(&self) -> Result<(), String> {
-        let weights = [
-            ("rules.separation", self.separation),
-            ("rules.alignment", self.alignment),
-            ("rules.cohesion", self.cohesion),
-            ("rules.walls", self.walls),
-            ("rules.wander", self.wander),
-            ("rules.circling", self.circling),
-        ];
-        let radii = [
-            ("rules.separation_bl", self.separation_bl),
-            ("rules.alignment_bl", self.alignment_bl),
-            ("rules.cohesion_bl", self.cohesion_bl),
-        ];
-        for (name, value) in weights {
-            within(name, value, 0.0, 20.0)?;
-        }
-        for (name, value) in radii {
-            within(name, value, 0.1, 50.0)?;
-        }
-        within("rules.view_deg", self.view_deg, 1.0, 360.0)?;
-        within("rules.neighbors", f64::from(self.neighbors), 1.0, 64.0)
     }
 }
 
@@ -306,11 +264,12 @@ impl Matching {
         for (name, value) in weights {
             within(name, value, 0.0, 4.0)?;
         }
+        within("matching.w_d", self.w_d, 0.0, 1.0)?;
         within("matching.rho_deg", self.rho_deg, 0.0, 45.0)
     }
 }
 
-fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
+pub(super) fn within(name: &str, value: f64, least: f64, most: f64) -> Result<(), String> {
     (least..=most)
         .contains(&value)
         .then_some(())

@@ -1,9 +1,11 @@
 //! Where and how each frame of a plan is shown: rotation within the budget, position along the shown
 //! heading on a leash to the boid, cross-fades at jumps (ALGORITHMS.md 8; O 5.2).
 
+use super::boids::tank::Tank;
 use super::individual::{BoidTrack, Fade, rounded};
+use super::lens::Lens;
+use super::motion::FrameMotion;
 use super::params::{Params, Position};
-use super::plan::cost::FrameMotion;
 use crate::geometry::angle::mirrored_rad;
 use crate::geometry::wrap_rad;
 use crate::library::{Library, View};
@@ -15,6 +17,10 @@ const LEASH_S: f64 = 0.5;
 /// The leash's length.
 const LEASH_BL: f64 = 0.5;
 
+/// A sprite is drawn no smaller and no larger than this.
+const LEAST_SCALE: f64 = 0.2;
+const GREATEST_SCALE: f64 = 1.5;
+
 /// Everything that placing depends on besides the individual.
 pub struct Stage<'a> {
     /// The library shown.
@@ -23,10 +29,10 @@ pub struct Stage<'a> {
     pub motion: &'a [FrameMotion],
     /// What was asked for.
     pub params: &'a Params,
-    /// A body length.
-    pub length_px: f64,
-    /// Least and greatest place of a centroid.
-    pub corners_px: [[f64; 2]; 2],
+    /// How the tank is seen.
+    pub lens: &'a Lens,
+    /// Where individuals may be.
+    pub tank: &'a Tank,
 }
 
 /// How an individual is shown.
@@ -38,8 +44,21 @@ pub struct Placed {
     pub heading_rad: Vec<f64>,
     /// Its centroid.
     pub centroid_px: Vec<[f64; 2]>,
+    /// The direction in space, where the tank has depth.
+    pub forward: Option<Vec<[f64; 3]>>,
+    /// Its size relative to the footage.
+    pub scale: Vec<f64>,
+    /// Its depth in the camera's frame, where metres are known.
+    pub depth_m: Option<Vec<f64>>,
     /// Second sprites around jumps.
     pub fades: Vec<Fade>,
+}
+
+/// What fades are made of: what is shown when, pointing where, at which depth.
+struct Way<'a> {
+    shown: &'a [(u32, bool)],
+    heading_rad: &'a [f64],
+    depth_bl: &'a [f64],
 }
 
 /// Whether something else than the next frame is shown after `before`.
@@ -51,17 +70,51 @@ impl Stage<'_> {
     /// Places one individual.
     pub fn place(&self, shown: &[(u32, bool)], boid: &BoidTrack) -> Placed {
         let heading_rad = self.headings(shown, boid);
-        let rotation_rad = shown
+        let depth_bl: Vec<f64> = (boid.position_px.iter())
+            .map(|position| self.depth_bl(position[2]))
+            .collect();
+        let rotation_rad: Vec<f64> = shown
             .iter()
             .zip(&heading_rad)
             .map(|(&state, &heading)| rounded(self.rotation(state, heading), 5))
             .collect();
         Placed {
+            forward: (!self.lens.is_flat()).then(|| {
+                let turned = shown.iter().zip(&rotation_rad);
+                turned
+                    .map(|(&state, &turn)| self.forward(state, turn))
+                    .collect()
+            }),
             rotation_rad,
             centroid_px: self.positions(&heading_rad, boid),
-            fades: self.fades(shown, &heading_rad),
+            scale: (shown.iter().zip(&depth_bl))
+                .map(|(state, &depth_bl)| self.scale(state.0, depth_bl))
+                .collect(),
+            depth_m: (depth_bl.iter())
+                .map(|&bl| Some(rounded(self.lens.metres(bl)?, 5)))
+                .collect(),
+            fades: self.fades(&Way {
+                shown,
+                heading_rad: &heading_rad,
+                depth_bl: &depth_bl,
+            }),
             heading_rad,
         }
+    }
+
+    /// How far from the camera is what lies so far behind the tank's front.
+    fn depth_bl(&self, behind_px: f64) -> f64 {
+        self.tank.corners[0][2] + behind_px / self.lens.length_px
+    }
+
+    /// How much larger than in its frame an animal looks at another depth (ALGORITHMS.md 8).
+    fn scale(&self, frame: u32, depth_bl: f64) -> f64 {
+        if self.lens.is_flat() {
+            return 1.0;
+        }
+        let filmed_px = self.lens.px_per_bl(self.motion[frame as usize].depth_bl);
+        let scale = self.lens.px_per_bl(depth_bl) / filmed_px;
+        rounded(scale.clamp(LEAST_SCALE, GREATEST_SCALE), 4)
     }
 
     /// The heading of a source frame on its mirror side.
@@ -72,6 +125,14 @@ impl Stage<'_> {
         } else {
             heading
         }
+    }
+
+    /// The direction in space of a source frame on its mirror side, turned in the picture.
+    fn forward(&self, (frame, mirrored): (u32, bool), turn_rad: f64) -> [f64; 3] {
+        let [x, y, z] = self.motion[frame as usize].forward;
+        let x = if mirrored { -x } else { x };
+        let (cos, sin) = (libm::cos(turn_rad), libm::sin(turn_rad));
+        [cos * x - sin * y, sin * x + cos * y, z].map(|part| rounded(part, 5))
     }
 
     /// The rotation that shows a source frame with a heading, as far as the view allows.
@@ -118,7 +179,7 @@ impl Stage<'_> {
         for (t, &heading) in heading_rad.iter().enumerate() {
             let goal = [boid.position_px[t][0], boid.position_px[t][1]];
             if t > 0 {
-                let step_px = boid.speed_bl_per_s[t] * self.length_px / fps;
+                let step_px = boid.speed_bl_per_s[t] * self.lens.length_px / fps;
                 place[0] += step_px * libm::cos(heading);
                 place[1] += step_px * libm::sin(heading);
             }
@@ -126,26 +187,25 @@ impl Stage<'_> {
                 *place += pull * (goal - *place);
             }
             if self.params.position != Position::Papers {
-                self.keep_near(&mut place, goal);
+                place = self.near(place, goal, self.depth_bl(boid.position_px[t][2]));
             }
             places.push(place.map(|px| rounded(px, 2)));
         }
         places
     }
 
-    /// Within the leash of the boid, and inside the picture.
-    fn keep_near(&self, place: &mut [f64; 2], goal: [f64; 2]) {
+    /// Within the leash of the boid at `goal`, and inside the tank.
+    fn near(&self, place: [f64; 2], goal: [f64; 2], depth_bl: f64) -> [f64; 2] {
         let off = [place[0] - goal[0], place[1] - goal[1]];
         let distance = (off[0] * off[0] + off[1] * off[1]).sqrt();
-        let most = LEASH_BL * self.length_px;
-        if distance > most {
-            *place = std::array::from_fn(|axis| goal[axis] + off[axis] * most / distance);
-        }
-        let [least, greatest] = self.corners_px;
-        *place = std::array::from_fn(|axis| place[axis].clamp(least[axis], greatest[axis]));
+        let share = (LEASH_BL * self.lens.px_per_bl(depth_bl) / distance.max(1e-9)).min(1.0);
+        let leashed = [0, 1].map(|axis| goal[axis] + share * off[axis]);
+        let [from, to] = [goal, leashed].map(|px| self.lens.place_bl(px, depth_bl));
+        self.lens.picture_px(self.tank.on_the_way(from, to))
     }
 
-    fn fades(&self, shown: &[(u32, bool)], heading_rad: &[f64]) -> Vec<Fade> {
+    fn fades(&self, way: &Way) -> Vec<Fade> {
+        let shown = way.shown;
         let jumps: Vec<usize> = (1..shown.len())
             .filter(|&t| is_jump(shown[t - 1], shown[t]))
             .collect();
@@ -157,7 +217,7 @@ impl Stage<'_> {
                 .min(before / 2)
                 .min(after / 2);
             if half > 0 {
-                let halves = self.fade(shown, heading_rad, t, half);
+                let halves = self.fade(way, t, half);
                 fades.extend(halves.into_iter().flatten());
             }
         }
@@ -166,22 +226,17 @@ impl Stage<'_> {
 
     /// The `half` frames before the jump at `t`, under which comes what follows, and the `half`
     /// after it, under which goes what was; `None` when the footage lacks one of them.
-    fn fade(
-        &self,
-        shown: &[(u32, bool)],
-        heading_rad: &[f64],
-        t: usize,
-        half: usize,
-    ) -> Option<[Fade; 2]> {
-        let (old, new) = (shown[t - 1], shown[t]);
+    fn fade(&self, way: &Way, t: usize, half: usize) -> Option<[Fade; 2]> {
+        let (old, new) = (way.shown[t - 1], way.shown[t]);
         let mut sides: [Fade; 2] = [(t - half, new.1), (t, old.1)].map(|(start, mirrored)| Fade {
             start: start as u32,
             source_frame: Vec::new(),
             mirrored,
             rotation_rad: Vec::new(),
+            scale: Vec::new(),
             weight: Vec::new(),
         });
-        for (u, &heading) in heading_rad.iter().enumerate().take(t + half).skip(t - half) {
+        for u in t - half..t + half {
             let share = ((u + half - t) as f64 + 0.5) / (2 * half) as f64;
             let coming = share * share * (3.0 - 2.0 * share);
             let (side, frame, mirrored, weight) = match u < t {
@@ -192,9 +247,10 @@ impl Stage<'_> {
             if frame as usize >= sprites.n_frames() || !sprites.is_present(frame as usize) {
                 return None;
             }
-            let rotation = self.rotation((frame, mirrored), heading);
+            let rotation = self.rotation((frame, mirrored), way.heading_rad[u]);
             sides[side].source_frame.push(frame);
             sides[side].rotation_rad.push(rounded(rotation, 5));
+            sides[side].scale.push(self.scale(frame, way.depth_bl[u]));
             sides[side].weight.push(rounded(weight, 4));
         }
         Some(sides)

@@ -1,8 +1,9 @@
 //! How good a flock is: the measures of ALGORITHMS.md 9 that need no pixels.
 
 use super::boids::measures::Order;
+use super::boids::vector::angle_between;
 use super::individual::{Individual, rounded};
-use super::params::Params;
+use super::params::{MatchBy, Params};
 use super::placement::is_jump;
 use crate::geometry::wrap_rad;
 use crate::library::Library;
@@ -16,7 +17,8 @@ const MOVING_BL_PER_S: f64 = 0.1;
 /// Measures of a whole flock.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Stats {
-    /// Median of |shown heading - boid's heading|, radians.
+    /// Median of |shown heading - boid's heading|, or of the angle between their directions in space where those were
+    /// matched; radians.
     pub heading_error_median_rad: f64,
     /// Its 90th percentile.
     pub heading_error_p90_rad: f64,
@@ -50,7 +52,11 @@ pub fn measure(
     length_px: f64,
 ) -> Stats {
     let fps = library.poses.fps;
-    let headings = sorted(individuals.iter().flat_map(heading_errors).collect());
+    let errors = |one| match params.matching.by {
+        Some(MatchBy::Direction) => direction_errors(one),
+        _ => heading_errors(one),
+    };
+    let headings = sorted(individuals.iter().flat_map(errors).collect());
     let deviations = individuals.iter().flat_map(deviations_px).collect();
     let least_step_px = MOVING_BL_PER_S * length_px / fps;
     let slips = individuals.iter().flat_map(|i| slips(i, least_step_px));
@@ -91,12 +97,23 @@ impl Stats {
     }
 }
 
-fn heading_errors(individual: &Individual) -> impl Iterator<Item = f64> {
+fn heading_errors(individual: &Individual) -> Vec<f64> {
     let pairs = individual
         .heading_rad
         .iter()
         .zip(&individual.boid.heading_rad);
-    pairs.map(|(shown, wanted)| wrap_rad(shown - wanted).abs())
+    pairs
+        .map(|(shown, wanted)| wrap_rad(shown - wanted).abs())
+        .collect()
+}
+
+/// Angles between directions in space.
+fn direction_errors(individual: &Individual) -> Vec<f64> {
+    let shown = individual.forward.iter().flatten();
+    let pairs = shown.zip(individual.boid.forward.iter().flatten());
+    pairs
+        .map(|(&shown, &wanted)| angle_between(shown, wanted))
+        .collect()
 }
 
 fn deviations_px(individual: &Individual) -> impl Iterator<Item = f64> {

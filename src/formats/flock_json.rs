@@ -21,6 +21,7 @@ pub fn write(flock: &Flock) -> Vec<u8> {
         image_size_px: flock.image_size_px,
         length_px: flock.length_px,
         stats: StatsFile::of(&flock.stats),
+        predator: flock.predator_px.clone(),
         individuals: (), // written line by line below
     };
     let head = serde_json::to_string(&file).expect("plain values serialise");
@@ -46,6 +47,7 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
         image_size_px: file.image_size_px,
         length_px: file.length_px,
         params: file.params,
+        predator_px: file.predator,
         individuals: file
             .individuals
             .into_iter()
@@ -65,6 +67,9 @@ struct FlockFile<Individuals> {
     image_size_px: [u32; 2],
     length_px: f64,
     stats: StatsFile,
+    /// Absent in files of before.
+    #[serde(default)]
+    predator: Vec<[f64; 3]>,
     individuals: Individuals,
 }
 
@@ -77,6 +82,7 @@ struct IndividualFile {
     fade: Vec<FadeFile>,
     centroid_px: Vec<[f64; 2]>,
     heading_rad: Vec<f64>,
+    forward: Option<Vec<[f64; 3]>>,
     scale: Vec<f64>,
     depth_m: Option<Vec<f64>>,
     boid: BoidFile,
@@ -89,13 +95,17 @@ struct FadeFile {
     source_frame: Vec<u32>,
     mirrored: bool,
     rotation_rad: Vec<f64>,
+    scale: Vec<f64>,
     weight: Vec<f64>,
 }
 
-/// `position`: x, y and depth behind the picture, pixels; `speed`: body lengths a second.
+/// `position`: x, y and depth behind the tank's front, pixels; `speed`: body lengths a second.
 #[derive(Serialize, Deserialize)]
 struct BoidFile {
     position: Vec<[f64; 3]>,
+    /// Absent in files of before.
+    #[serde(default)]
+    forward: Option<Vec<[f64; 3]>>,
     heading_rad: Vec<f64>,
     speed: Vec<f64>,
 }
@@ -139,10 +149,12 @@ impl IndividualFile {
             fade: individual.fades.into_iter().map(FadeFile::of).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
+            forward: individual.forward,
             scale: individual.scale,
             depth_m: individual.depth_m,
             boid: BoidFile {
                 position: individual.boid.position_px,
+                forward: individual.boid.forward,
                 heading_rad: individual.boid.heading_rad,
                 speed: individual.boid.speed_bl_per_s,
             },
@@ -159,10 +171,12 @@ impl IndividualFile {
             fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,
+            forward: self.forward,
             scale: self.scale,
             depth_m: self.depth_m,
             boid: BoidTrack {
                 position_px: self.boid.position,
+                forward: self.boid.forward,
                 heading_rad: self.boid.heading_rad,
                 speed_bl_per_s: self.boid.speed,
             },
@@ -178,6 +192,7 @@ impl FadeFile {
             source_frame: fade.source_frame,
             mirrored: fade.mirrored,
             rotation_rad: fade.rotation_rad,
+            scale: fade.scale,
             weight: fade.weight,
         }
     }
@@ -188,6 +203,7 @@ impl FadeFile {
             source_frame: self.source_frame,
             mirrored: self.mirrored,
             rotation_rad: self.rotation_rad,
+            scale: self.scale,
             weight: self.weight,
         }
     }

@@ -1,48 +1,65 @@
 //! What a boid may do is what the animal was seen to do: speeds, turn rates, and in side view how
 //! steeply it points (ALGORITHMS.md 7, "from the footage").
 
-use crate::flock::individual::rounded;
-use crate::flock::params::Params;
-use crate::flock::plan::cost::FrameMotion;
+use crate::flock::motion::FrameMotion;
 use crate::library::{Library, View};
 
 /// The limits of a boid, in body lengths and seconds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// A body length in the picture.
-    pub length_px: f64,
     /// The speed it returns to.
     pub cruise_bl_per_s: f64,
     /// Least and greatest speed.
     pub speed_limits_bl_per_s: [f64; 2],
     /// Greatest turn rate.
     pub turn_rad_per_s: f64,
-    /// In side view: greatest slope upward and downward, vertical to horizontal speed. `None` where
+    /// Root mean square of the turn rate.
+    pub wander_rad_per_s: f64,
+    /// In side view: greatest slope upward and downward, vertical to level speed. `None` where
     /// every direction can be shown.
     pub slopes: Option<[f64; 2]>,
 }
 
-/// Share of the frames that the steepest headings may leave out.
-const STEEPEST: f64 = 0.95;
+/// Share of the frames that the steepest directions, and the fastest turns, may leave out.
+const STEEPEST: f64 = 0.98;
+const FASTEST: f64 = 0.95;
+/// And the slowest.
+const SLOWEST: f64 = 0.05;
+/// A boid may point this steeply whatever was seen.
+const LEAST_STEEP_RAD: f64 = 0.05;
+const MOST_STEEP_RAD: f64 = 1.2;
 
 impl Calibration {
-    /// Measured on the frames that may be shown.
-    pub fn of(library: &Library, motion: &[FrameMotion], params: &Params) -> Calibration {
-        let stats = &library.stats;
-        let [slow, cruise, fast] = stats.speed_bl_per_s.unwrap_or([0.5, 1.0, 1.5]);
+    /// Measured on the frames that may be shown. `flat`: without depth, where there is no way to turn round
+    /// but through the vertical.
+    pub fn of(library: &Library, motion: &[FrameMotion], flat: bool) -> Calibration {
+        let shown = || (library.playback.component.iter()).map(|&frame| &motion[frame as usize]);
+        let paces = sorted(shown().filter_map(|m| m.pace_bl_per_s));
+        let [slow, cruise, fast] = [(SLOWEST, 0.5), (0.5, 1.0), (FASTEST, 1.5)]
+            .map(|(share, usual)| quantile(&paces, share).unwrap_or(usual));
         // An animal that mostly sits still would make a flock of statues: a quarter of its best.
         let cruise = cruise.max(0.25 * fast).max(0.05);
+        let swings = sorted(shown().filter_map(|m| m.swing_rad_per_s));
+        let turn_rad_per_s = quantile(&swings, FASTEST).map_or(2.0, |rate| rate.clamp(0.5, 6.0));
         Calibration {
-            length_px: rounded(stats.length_px.unwrap_or(1.0).max(1.0), 2),
             cruise_bl_per_s: cruise,
             speed_limits_bl_per_s: [slow.max(0.25 * cruise).min(cruise), fast.max(cruise)],
-            turn_rad_per_s: stats.turn_rate_rad_per_s.unwrap_or(2.0).clamp(0.5, 6.0),
-            slopes: match (library.poses.view, params.depth_bl) {
-                // Without depth there would be no way to turn round but through the vertical.
-                (View::Top, _) | (View::Side, Some(0.0)) => None,
-                (View::Side, _) => Some(slopes(library, motion, params)),
-            },
+            turn_rad_per_s,
+            wander_rad_per_s: root_mean_square(&swings, turn_rad_per_s),
+            slopes: (library.poses.view == View::Side && !flat).then(|| {
+                let pitches = sorted(shown().map(|m| libm::asin(m.forward[1].clamp(-1.0, 1.0))));
+                [
+                    slope(quantile(&pitches, 1.0 - STEEPEST).map(|up| -up)),
+                    slope(quantile(&pitches, STEEPEST)),
+                ]
+            }),
         }
+    }
+
+    /// The usual acceleration: what turns half again as fast as the animal does on average, at cruising speed.
+    pub fn usual_acceleration_bl_per_s2(&self) -> f64 {
+        let usual = 1.5 * self.wander_rad_per_s;
+        self.cruise_bl_per_s * usual.min(self.turn_rad_per_s)
     }
 
     /// The greatest acceleration: what turns at the greatest rate at cruising speed.
@@ -51,20 +68,28 @@ impl Calibration {
     }
 }
 
-/// Slopes up and down that nearly all frames stay within, with what rotation adds.
-fn slopes(library: &Library, motion: &[FrameMotion], params: &Params) -> [f64; 2] {
-    let rise = |frame: &u32| libm::sin(motion[*frame as usize].heading_rad);
-    let mut rises: Vec<f64> = library.playback.component.iter().map(rise).collect();
-    rises.sort_unstable_by(f64::total_cmp);
-    let at = |share: f64| match rises.len() {
-        0 => 0.0,
-        n => rises[((n - 1) as f64 * share).round() as usize],
-    };
-    // A heading's budget, not all of it: the rest is for what the plan cannot meet.
-    let budget_rad = params.matching.rho_deg.to_radians();
-    let slope = |rise: f64| {
-        let steepest = (libm::asin(rise.clamp(0.0, 1.0)) + budget_rad).clamp(0.1, 1.2);
-        libm::tan(steepest)
-    };
-    [slope(-at(1.0 - STEEPEST)), slope(at(STEEPEST))]
+fn slope(pitch_rad: Option<f64>) -> f64 {
+    libm::tan(
+        pitch_rad
+            .unwrap_or(0.0)
+            .clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD),
+    )
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values
+}
+
+fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    sorted
+        .get((sorted.len().saturating_sub(1) as f64 * share).round() as usize)
+        .copied()
+}
+
+/// Of values up to `most`: what was measured beyond is noise.
+fn root_mean_square(values: &[f64], most: f64) -> f64 {
+    let squares: f64 = values.iter().map(|v| v.min(most) * v.min(most)).sum();
+    (squares / values.len().max(1) as f64).sqrt()
 }

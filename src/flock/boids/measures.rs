@@ -1,31 +1,33 @@
 //! How a flock moves as a whole: polarization, milling, distances (ALGORITHMS.md 7; Tunstrom et al.
 //! 2013).
 
-use super::vector::{Vec3, add_scaled, cross, minus, norm, scaled, unit};
+use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
 
 /// The order of one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Order {
     /// |sum of unit velocities| / N: 1 when all point one way.
     pub polarization: f64,
-    /// |sum of u x r| / N, r the unit vectors from the centroid: 1 when all circle one way.
+    /// |sum of u x r| / N, r the unit vectors from the centroid, both seen along the axis about which boids turn: 1
+    /// when all circle one way.
     pub milling: f64,
     /// Mean distance to the nearest other, body lengths; 0 for one alone.
     pub nearest_bl: f64,
 }
 
-/// The order of boids at `positions` (body lengths) with `velocities`.
-pub fn order(positions: &[Vec3], velocities: &[Vec3]) -> Order {
+/// The order of boids at `positions` (body lengths) with `velocities`, who turn about `up`, a unit vector.
+pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3) -> Order {
     let n = positions.len() as f64;
     let sum = |vectors: &mut dyn Iterator<Item = Vec3>| {
         vectors.fold([0.0; 3], |sum, v| add_scaled(sum, 1.0, v))
     };
+    let level = |v: Vec3| add_scaled(v, -dot(v, up), up);
     let center = scaled(1.0 / n, sum(&mut positions.iter().copied()));
     let heading = sum(&mut velocities.iter().map(|&v| unit(v)));
     let spin = sum(&mut positions
         .iter()
         .zip(velocities)
-        .map(|(&p, &v)| cross(unit(v), unit(minus(p, center)))));
+        .map(|(&p, &v)| cross(unit(level(v)), unit(level(minus(p, center))))));
     Order {
         polarization: norm(heading) / n,
         milling: norm(spin) / n,
@@ -58,7 +60,10 @@ mod tests {
             .collect();
         let same: Vec<Vec3> = vec![[0.3, 0.1, 0.0]; 8];
         let around: Vec<Vec3> = ring.iter().map(|p| [-p[1], p[0], 0.0]).collect();
-        let (column, mill) = (order(&ring, &same), order(&ring, &around));
+        let (column, mill) = (
+            order(&ring, &same, [0.0, 0.0, 1.0]),
+            order(&ring, &around, [0.0, 0.0, 1.0]),
+        );
         assert!((column.polarization - 1.0).abs() < 1e-12 && column.milling < 1e-12);
         assert!((mill.milling - 1.0).abs() < 1e-12 && mill.polarization < 1e-12);
         let chord = 2.0 * libm::sin(std::f64::consts::FRAC_PI_8);

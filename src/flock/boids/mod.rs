@@ -8,19 +8,24 @@
 
 pub mod calibration;
 pub mod grid;
+pub mod habitat;
 pub mod leadership;
 pub mod measures;
+pub mod params;
 pub mod rules;
 pub mod tank;
 pub mod vector;
+pub mod zones;
 
 use rayon::prelude::*;
 
 use self::calibration::Calibration;
 use self::grid::{Grid, Neighbor};
+use self::habitat::{Habitat, Hunter};
 use self::rules::{Moment, Steering};
 use self::tank::Tank;
 use self::vector::{Vec3, add_scaled, norm, scaled, turned_at_most, unit};
+use super::lens::Lens;
 use super::params::Params;
 use crate::random;
 
@@ -29,9 +34,11 @@ const LONGEST_STEP_BL: f64 = 0.2;
 /// Boids nearer than this are pushed apart after each step, where the tank has room.
 const OVERLAP_BL: f64 = 0.5;
 /// How long they swim before the first frame, so that the flock has formed.
-const WARM_UP_S: f64 = 6.0;
+const WARM_UP_S: f64 = 10.0;
 /// Time constant of the wandering turn rate.
 const WANDER_S: f64 = 1.0;
+/// In flight the greatest speed is so many times the animal's.
+const FLIGHT_PACE: f64 = 1.6;
 /// Boids of one unit of parallel work.
 const CHUNK: usize = 64;
 
@@ -40,6 +47,8 @@ mod draw {
     pub(super) const START: u64 = 1;
     pub(super) const WANDER: u64 = 2;
     pub(super) const LEAD: u64 = 3;
+    pub(super) const COURSE: u64 = 4;
+    pub(super) const NOISE: u64 = 5;
 }
 
 /// Boids in their tank.
@@ -49,46 +58,75 @@ pub struct Boids<'a> {
     overlap_bl: f64,
     calibration: &'a Calibration,
     tank: &'a Tank,
+    habitat: Habitat<'a>,
     step_s: f64,
     n_substeps: u32,
     step_idx: u64,
+    /// Of the film; negative before it.
+    time_s: f64,
     /// Positions, body lengths.
     pub positions: Vec<Vec3>,
     /// Velocities, body lengths a second.
     pub velocities: Vec<Vec3>,
     wander: Vec<[f64; 2]>,
     leads_for_s: Vec<f64>,
+    hunter: Option<Hunter>,
 }
 
 impl<'a> Boids<'a> {
     /// Boids at random places with random directions, then left to swim until they have formed.
-    pub fn new(params: &Params, calibration: &'a Calibration, tank: &'a Tank, fps: f64) -> Self {
+    pub fn new(
+        params: &'a Params,
+        calibration: &'a Calibration,
+        (lens, tank): (&'a Lens, &'a Tank),
+        fps: f64,
+    ) -> Self {
         let longest_s = LONGEST_STEP_BL / calibration.speed_limits_bl_per_s[1];
         let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
         let n = params.count as usize;
         let closeness = tank.closeness(n);
-        let mut params = params.clone();
-        params.rules.separation_bl *= closeness;
-        params.rules.alignment_bl *= closeness;
-        params.rules.cohesion_bl *= closeness;
+        let n_steps = (WARM_UP_S * fps).ceil() * f64::from(n_substeps);
+        let step_s = 1.0 / (fps * f64::from(n_substeps));
         let mut boids = Boids {
-            params,
+            params: Params {
+                rules: params.rules.closer(closeness),
+                ..params.clone()
+            },
+            habitat: Habitat::new(params, lens, tank),
             overlap_bl: OVERLAP_BL * closeness,
             calibration,
             tank,
-            step_s: 1.0 / (fps * f64::from(n_substeps)),
+            step_s,
             n_substeps,
             step_idx: 0,
+            time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],
             wander: vec![[0.0; 2]; n],
             leads_for_s: vec![0.0; n],
+            hunter: None,
         };
         boids.start();
         for _ in 0..(WARM_UP_S * fps).ceil() as u64 {
             boids.advance();
         }
+        boids.hunter = boids.habitat.hunter();
         boids
+    }
+
+    /// Where the predator is, if there is one.
+    pub fn predator(&self) -> Option<Vec3> {
+        Some(self.hunter?.position)
+    }
+
+    /// How they move as a whole at this moment.
+    pub fn order(&self) -> measures::Order {
+        measures::order(&self.positions, &self.velocities, self.tank.up())
+    }
+
+    /// The depth of the tank's front, body lengths from the camera.
+    pub fn front_bl(&self) -> f64 {
+        self.tank.corners[0][2]
     }
 
     /// One output frame.
@@ -100,10 +138,14 @@ impl<'a> Boids<'a> {
 
     fn start(&mut self) {
         let [least, greatest] = self.tank.corners;
+        // Who aligns starts aligned: a school takes long to form, and is wanted from the first frame.
+        let course =
+            std::f64::consts::PI * (2.0 * random::unit(self.params.seed, &[draw::COURSE])).floor();
+        let spread = std::f64::consts::PI / (1.0 + 4.0 * self.params.rules.alignment);
         for id in 0..self.positions.len() {
             let key = |word| [draw::START, id as u64, word];
             let at = |word| random::unit(self.params.seed, &key(word));
-            let angle = std::f64::consts::TAU * at(3);
+            let angle = course + spread * (2.0 * at(3) - 1.0);
             let (cos, sin) = (libm::cos(angle), libm::sin(angle));
             let direction = match self.tank.is_flat() {
                 true => [cos, sin, 0.0],
@@ -113,23 +155,29 @@ impl<'a> Boids<'a> {
                 least[axis] + at(axis as u64) * (greatest[axis] - least[axis])
             });
             self.velocities[id] = scaled(self.calibration.cruise_bl_per_s, direction);
-            self.tank
-                .keep_inside(&mut self.positions[id], &mut self.velocities[id]);
+            self.habitat
+                .keep_out(&mut self.positions[id], &mut self.velocities[id]);
         }
     }
 
     fn step(&mut self) {
+        self.time_s += self.step_s;
+        if let Some(hunter) = &mut self.hunter {
+            let (time_s, step_s) = (self.time_s, self.step_s);
+            self.habitat
+                .advance(hunter, time_s, step_s, &self.positions, self.calibration);
+        }
         let rules = &self.params.rules;
-        let reach = rules
-            .separation_bl
-            .max(rules.alignment_bl)
-            .max(rules.cohesion_bl);
+        let reach = rules.reach_bl();
         let grid = Grid::new(&self.positions, reach);
         let half_view_rad = rules.view_deg.to_radians() / 2.0;
         let steering = Steering {
             params: &self.params,
             calibration: self.calibration,
             tank: self.tank,
+            habitat: &self.habitat,
+            time_s: self.time_s,
+            hunter: self.hunter.as_ref(),
             cos_half_view: libm::cos(half_view_rad.min(std::f64::consts::PI)),
             velocities: &self.velocities,
         };
@@ -183,6 +231,7 @@ impl<'a> Boids<'a> {
             neighbors,
             wander_rad_per_s: wander,
             leads: leads_for_s > 0.0,
+            noise: self.noise(id),
         });
         let wished = add_scaled(velocity, self.step_s, acceleration);
         let aside = match self.tank.is_flat() {
@@ -192,23 +241,26 @@ impl<'a> Boids<'a> {
         let turned = turned_at_most(velocity, wished, cos_sin, aside);
         let mut next = Next {
             position,
-            velocity: self.within_limits(turned, velocity),
+            velocity: self.within_limits(turned, position, velocity),
             wander,
             leads_for_s,
         };
         next.position = add_scaled(position, self.step_s, next.velocity);
-        self.tank
-            .keep_inside(&mut next.position, &mut next.velocity);
+        self.habitat
+            .keep_out(&mut next.position, &mut next.velocity);
         next
     }
 
-    /// Speed and slope as the animal was seen to have them; the direction of `before` when it stands.
-    fn within_limits(&self, mut velocity: Vec3, before: Vec3) -> Vec3 {
+    /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
+    /// stands.
+    fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
         if let Some([up, down]) = self.calibration.slopes {
             let level = velocity[0].hypot(velocity[2]);
             velocity[1] = velocity[1].clamp(-up * level, down * level);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;
+        let flees = self.habitat.flee(position, self.hunter.as_ref()).is_some();
+        let most = if flees { FLIGHT_PACE * most } else { most };
         let speed = norm(velocity);
         let direction = if speed > 1e-9 {
             unit(velocity)
@@ -218,10 +270,23 @@ impl<'a> Boids<'a> {
         scaled(speed.clamp(least, most), direction)
     }
 
-    /// Ornstein-Uhlenbeck turn rates; the level one as varied as half the animal's greatest.
+    /// The error of a course with zones, in each direction.
+    fn noise(&self, id: usize) -> Vec3 {
+        let Some(zones) = &self.params.rules.zones else {
+            return [0.0; 3];
+        };
+        let n_axes = if self.tank.is_flat() { 2 } else { 3 };
+        std::array::from_fn(|axis| {
+            let key = [draw::NOISE, id as u64, self.step_idx, axis as u64];
+            let is_free = axis < n_axes;
+            f64::from(u8::from(is_free)) * zones.noise_rad * random::normal(self.params.seed, &key)
+        })
+    }
+
+    /// Ornstein-Uhlenbeck turn rates; at weight 1 the level one is as varied as the animal's own.
     fn next_wander(&self, id: usize) -> [f64; 2] {
         let keep = libm::exp(-self.step_s / WANDER_S);
-        let spread = 0.5 * self.params.rules.wander * self.calibration.turn_rad_per_s;
+        let spread = self.params.rules.wander * self.calibration.wander_rad_per_s;
         let fresh = spread * (1.0 - keep * keep).sqrt();
         std::array::from_fn(|k| {
             let key = [draw::WANDER, id as u64, self.step_idx, k as u64];
@@ -259,7 +324,7 @@ impl<'a> Boids<'a> {
                 *position = add_scaled(*position, 0.5 * (self.overlap_bl - distance), away);
             }
             if *position != from {
-                self.tank.keep_inside(position, &mut self.velocities[id]);
+                self.habitat.keep_out(position, &mut self.velocities[id]);
             }
         }
         self.positions = moved;

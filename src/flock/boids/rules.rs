@@ -1,20 +1,26 @@
 //! What a boid asks of itself: separation, alignment, cohesion, walls, circling and wander, granted
 //! in order of priority (Reynolds 1987; O 4; ALGORITHMS.md 7).
 //!
-//! Requests are measured against the greatest acceleration that the animal was seen to make, so that
-//! one set of weights serves a slow animal and a fast one.
+//! Requests are measured against the acceleration that the animal usually makes, so that one set of weights
+//! serves a slow animal and a fast one, and their sum is cut to the greatest it was seen to make.
 
 use super::calibration::Calibration;
 use super::grid::Neighbor;
+use super::habitat::{Habitat, Hunter};
 use super::tank::Tank;
 use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
-use crate::flock::params::{Params, Rules, Separation};
+use super::zones;
+use crate::flock::params::{Params, Rules, Separation, Zones};
 
 /// A wall is steered from when the path over this time meets it.
 const WALL_HORIZON_S: f64 = 1.0;
 
+/// So strong a wish is granted as far as the turn rate allows.
+const WITHOUT_DELAY: f64 = 20.0;
+/// Whoever circles does so at this share of the way from the middle to the walls.
+const RING: f64 = 0.65;
 /// Weight of swimming across the picture rather than into it.
-const BROADSIDE: f64 = 0.15;
+const BROADSIDE: f64 = 0.3;
 
 /// One boid's moment.
 pub struct Moment<'a> {
@@ -28,6 +34,8 @@ pub struct Moment<'a> {
     pub wander_rad_per_s: [f64; 2],
     /// It leads: alignment and cohesion are off.
     pub leads: bool,
+    /// What its course is wrong by, with zones.
+    pub noise: Vec3,
 }
 
 /// Everything that steering depends on besides the moment.
@@ -38,6 +46,12 @@ pub struct Steering<'a> {
     pub calibration: &'a Calibration,
     /// Where the walls are.
     pub tank: &'a Tank,
+    /// What else there is.
+    pub habitat: &'a Habitat<'a>,
+    /// Seconds of the film.
+    pub time_s: f64,
+    /// The predator.
+    pub hunter: Option<&'a Hunter>,
     /// cos of half the field of view.
     pub cos_half_view: f64,
     /// The velocity of every boid.
@@ -47,35 +61,83 @@ pub struct Steering<'a> {
 impl Steering<'_> {
     /// The acceleration granted, at most the calibration's, BL/s^2.
     pub fn acceleration(&self, moment: &Moment) -> Vec3 {
-        let rules = &self.params.rules;
         let most = self.calibration.acceleration_bl_per_s2();
+        let usual = self.calibration.usual_acceleration_bl_per_s2();
+        let (position, velocity) = (moment.position, moment.velocity);
+        let walls = add_scaled(
+            self.tank.push(position, velocity, WALL_HORIZON_S),
+            1.0,
+            self.habitat.push(position, velocity, WALL_HORIZON_S),
+        );
+        let flight = self.habitat.flee(position, self.hunter).unwrap_or_default();
+        let walls = add_scaled(flight, self.params.rules.walls, walls);
+        let goals = self.habitat.toward_goals(
+            self.time_s,
+            position,
+            velocity,
+            self.calibration.cruise_bl_per_s,
+        );
+        let (urgent, wishes) = match &self.params.rules.zones {
+            Some(zones) => (
+                [0.0; 3],
+                [self.with_zones(zones, moment), [0.0; 3], [0.0; 3], [0.0; 3]],
+            ),
+            None => self.with_rules(moment),
+        };
+        let urgent = add_scaled(urgent, 1.0, walls);
+        let [together, around, broadside, near] = wishes;
+        let wishes = [urgent, together, around, broadside, near, goals].map(|w| scaled(usual, w));
+        let wander = match self.params.rules.zones {
+            Some(_) => [0.0; 3],
+            None => self.wander(moment),
+        };
+        let [urgent, together, around, broadside, near, goals] = wishes;
+        let cruise = self.cruise(moment);
+        granted(
+            &[
+                urgent, together, around, broadside, near, goals, wander, cruise,
+            ],
+            most,
+        )
+    }
+
+    /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
+    fn with_rules(&self, moment: &Moment) -> (Vec3, [Vec3; 4]) {
+        let rules = &self.params.rules;
         let seen: Vec<&Neighbor> = moment
             .neighbors
             .iter()
             .filter(|n| self.sees(moment.velocity, n))
             .collect();
-        let walls = self
-            .tank
-            .push(moment.position, moment.velocity, WALL_HORIZON_S);
         let apart = match self.params.separation {
             Separation::Repulsion => separation(&seen, rules),
             Separation::Papers => self.rule_a_of_the_papers(&seen, moment),
         };
         let together = if moment.leads { 0.0 } else { 1.0 };
-        let urgent = add_scaled(scaled(rules.separation, apart), rules.walls, walls);
-        let requests = [
-            scaled(most, urgent),
-            scaled(
-                most * together * rules.alignment,
-                self.alignment(&seen, moment),
-            ),
-            scaled(most * rules.circling, self.circling(moment)),
-            scaled(most * BROADSIDE, self.broadside(moment)),
-            scaled(most * together * rules.cohesion, cohesion(&seen, rules)),
-            self.wander(moment),
-            self.cruise(moment),
+        let wishes = [
+            scaled(together * rules.alignment, self.alignment(&seen, moment)),
+            scaled(rules.circling, self.circling(moment)),
+            scaled(BROADSIDE, self.broadside(&seen, moment)),
+            scaled(together * rules.cohesion, cohesion(&seen, rules)),
         ];
-        granted(&requests, most)
+        (scaled(rules.separation, apart), wishes)
+    }
+
+    /// Couzin et al. 2002: as fast as may be onto the course of the zones.
+    fn with_zones(&self, zones: &Zones, moment: &Moment) -> Vec3 {
+        let around = (moment.neighbors, self.velocities);
+        let course = zones::course(
+            zones,
+            moment.velocity,
+            around.0,
+            around.1,
+            self.cos_half_view,
+        );
+        let course = course.unwrap_or_else(|| unit(moment.velocity));
+        let wished = unit(add_scaled(course, 1.0, moment.noise));
+        let cruise = self.calibration.cruise_bl_per_s;
+        let gap = minus(scaled(cruise, wished), moment.velocity);
+        scaled(WITHOUT_DELAY / cruise, gap)
     }
 
     fn sees(&self, velocity: Vec3, neighbor: &Neighbor) -> bool {
@@ -110,35 +172,46 @@ impl Steering<'_> {
         add_scaled(scaled(pace, ahead), 0.5, self.alignment(seen, moment))
     }
 
-    /// Toward swimming round the middle: sideways to the line from it, in the plane of swimming.
+    /// Toward swimming round the middle of the tank, on a ring that its narrower side holds, in
+    /// the plane of swimming.
     fn circling(&self, moment: &Moment) -> Vec3 {
         if self.params.rules.circling == 0.0 {
             return [0.0; 3];
         }
-        let up = self.up();
-        let mut from_middle = minus(moment.position, self.tank.middle());
-        from_middle = add_scaled(from_middle, -dot(from_middle, up), up);
-        let around = scaled(
-            self.calibration.cruise_bl_per_s,
-            unit(cross(up, from_middle)),
+        let up = self.tank.up();
+        let level = |v: Vec3| add_scaled(v, -dot(v, up), up);
+        let from_middle = level(minus(moment.position, self.tank.middle));
+        let [width, height, depth] = self.tank.reach_bl;
+        let room = width.min(if self.tank.is_flat() { height } else { depth });
+        let outward = unit(from_middle);
+        let inward = scaled(
+            2.0 * (RING - norm(from_middle) / room.max(1e-6)).clamp(-1.0, 1.0),
+            outward,
         );
-        let gap = minus(around, moment.velocity);
-        scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
+        let course = add_scaled(inward, 1.0, cross(up, outward));
+        let cruise = self.calibration.cruise_bl_per_s;
+        let gap = minus(scaled(cruise, unit(course)), moment.velocity);
+        scaled(1.0 / cruise, gap)
     }
 
-    /// In side view: out of the line of sight. Footage shows an animal best broadside, and a flock
-    /// that circles in depth would be seen end-on half the time.
-    fn broadside(&self, moment: &Moment) -> Vec3 {
+    /// In side view: out of the line of sight, to the side where the neighbors go. Footage shows an animal best
+    /// broadside, and a flock that lingers in depth would be seen end-on half the time.
+    fn broadside(&self, seen: &[&Neighbor], moment: &Moment) -> Vec3 {
         if self.tank.is_flat() || self.params.rules.circling > 0.0 {
             return [0.0; 3];
         }
-        let into = moment.velocity[2] / self.calibration.cruise_bl_per_s;
-        [0.0, 0.0, -into]
+        let others: f64 = seen.iter().map(|n| self.velocities[n.id as usize][0]).sum();
+        let cruise = self.calibration.cruise_bl_per_s;
+        let follow = 2.0 * self.params.rules.alignment.min(1.0) / seen.len().max(1) as f64;
+        let side = moment.velocity[0] + follow * others;
+        let side = (side / cruise).clamp(-1.0, 1.0);
+        let into = moment.velocity[2] / cruise;
+        [side * into.abs(), 0.0, -into]
     }
 
     /// The wandering turn, as the acceleration that makes it.
     fn wander(&self, moment: &Moment) -> Vec3 {
-        let up = self.up();
+        let up = self.tank.up();
         let sideways = cross(up, moment.velocity);
         let turn = scaled(moment.wander_rad_per_s[0], sideways);
         if self.tank.is_flat() {
@@ -153,14 +226,6 @@ impl Steering<'_> {
         let pace = if moment.leads { 1.4 } else { 1.0 };
         let gap = pace * self.calibration.cruise_bl_per_s - speed;
         scaled(gap * self.calibration.turn_rad_per_s, unit(moment.velocity))
-    }
-
-    /// The axis about which boids turn: out of the picture when flat, the vertical otherwise.
-    fn up(&self) -> Vec3 {
-        match self.tank.is_flat() {
-            true => [0.0, 0.0, 1.0],
-            false => [0.0, 1.0, 0.0],
-        }
     }
 }
 

@@ -1,26 +1,28 @@
 //! What a flock of boids promises: order, walls, limits, and the same numbers on any threads.
 
-use super::measures::{Order, order};
+use super::measures::Order;
 use super::*;
-use crate::flock::plan::cost::motion_of;
+use crate::flock::lens::Lens;
+use crate::flock::motion::motion_of;
+use crate::flock::params::{Goal, Obstacle, Predator, Zones};
 use crate::flock::synthetic;
-use crate::library::View;
+use crate::library::{Library, View};
 
 /// Every frame's positions and velocities of `n_frames`, and the mean order of them.
 fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Vec<Vec3>>, Order) {
     let library = synthetic::library(view);
-    let calibration = Calibration::of(&library, &motion_of(&library), params);
+    let calibration = calibrated(&library, params);
     let tank = Tank::new(
         [0.5, 0.5, 0.0],
         [15.5, 11.5, if view == View::Side { 3.0 } else { 0.0 }],
-        vec![],
     );
-    let mut boids = Boids::new(params, &calibration, &tank, 30.0);
+    let lens = Lens::of(&library, params);
+    let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
     let (mut positions, mut velocities) = (Vec::new(), Vec::new());
     let mut mean = Order::default();
     for _ in 0..n_frames {
         boids.advance();
-        let now = order(&boids.positions, &boids.velocities);
+        let now = boids.order();
         mean.polarization += now.polarization / n_frames as f64;
         mean.milling += now.milling / n_frames as f64;
         mean.nearest_bl += now.nearest_bl / n_frames as f64;
@@ -28,6 +30,11 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
         velocities.push(boids.velocities.clone());
     }
     (positions, velocities, mean)
+}
+
+fn calibrated(library: &Library, params: &Params) -> Calibration {
+    let lens = Lens::of(library, params);
+    Calibration::of(library, &motion_of(library, &lens), lens.is_flat())
 }
 
 fn preset(name: &str) -> Params {
@@ -40,14 +47,18 @@ fn a_school_is_polarized_and_a_swarm_is_not() {
         let (_, _, school) = swim(view, &preset("school"), 600);
         assert!(school.polarization > 0.65, "{view:?} {school:?}");
         let (_, _, swarm) = swim(view, &preset("swarm"), 600);
-        assert!(swarm.polarization < 0.35, "{view:?} {swarm:?}");
+        let swarms = swarm.polarization < 0.35 && swarm.milling < 0.35;
+        assert!(swarms, "{view:?} {swarm:?}");
     }
 }
 
 #[test]
 fn a_mill_turns_about_its_middle() {
-    let (_, _, mill) = swim(View::Top, &preset("mill"), 600);
-    assert!(mill.milling > 0.65 && mill.polarization < 0.35, "{mill:?}");
+    for view in [View::Top, View::Side] {
+        let (_, _, mill) = swim(view, &preset("mill"), 600);
+        let mills = mill.milling > 0.65 && mill.polarization < 0.35;
+        assert!(mills, "{view:?} {mill:?}");
+    }
 }
 
 #[test]
@@ -58,7 +69,7 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
             ..preset(name)
         };
         let (positions, velocities, _) = swim(View::Side, &params, 200);
-        let tank = Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 3.0], vec![]);
+        let tank = Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 3.0]);
         assert!(positions.iter().flatten().all(|&p| tank.holds(p)), "{name}");
         let fastest = velocities
             .iter()
@@ -73,7 +84,7 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
 fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
     let library = synthetic::library(View::Side);
     let params = preset("swarm");
-    let calibration = Calibration::of(&library, &motion_of(&library), &params);
+    let calibration = calibrated(&library, &params);
     let [up, down] = calibration.slopes.expect("side view has a reach");
     let (_, velocities, _) = swim(View::Side, &params, 300);
     for v in velocities.iter().flatten() {
@@ -118,4 +129,161 @@ fn another_seed_gives_another_flock() {
     };
     assert_ne!(seeded(1), seeded(2));
     assert_eq!(seeded(1), seeded(1));
+}
+
+/// Boids in the open sea, as Couzin et al. have them: 3 units a second, 40 degrees a second.
+fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
+    let mut params = Params {
+        count: 100,
+        ..preset("zonal")
+    };
+    params.leaders = false;
+    params.rules.view_deg = 270.0;
+    params.rules.zones = Some(Zones {
+        orientation_bl,
+        attraction_bl: 14.0,
+        ..Zones::default()
+    });
+    let calibration = Calibration {
+        cruise_bl_per_s: 3.0,
+        speed_limits_bl_per_s: [3.0, 3.0],
+        turn_rad_per_s: 40f64.to_radians(),
+        wander_rad_per_s: 40f64.to_radians(),
+        slopes: None,
+    };
+    (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
+}
+
+/// Polarization and rotation about the group's own axis, after `n_frames` from one heap.
+fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
+    let (params, calibration, tank) = at_sea(orientation_bl);
+    let lens = Lens::flat(40.0);
+    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
+    for id in 0..boids.positions.len() {
+        let draw = |word| 2.0 * random::unit(7, &[id as u64, word]) - 1.0;
+        boids.positions[id] = [0, 1, 2].map(|axis| 5.0 * draw(axis));
+        boids.velocities[id] = scaled(3.0, unit([3, 4, 5].map(draw)));
+    }
+    let (mut polarization, mut rotation) = (0.0, 0.0);
+    for frame in 0..n_frames {
+        boids.advance();
+        if frame >= n_frames / 2 {
+            let n = boids.positions.len() as f64;
+            let sum = |of: &dyn Fn(usize) -> Vec3| {
+                (0..boids.positions.len()).fold([0.0; 3], |sum, id| add_scaled(sum, 1.0, of(id)))
+            };
+            let middle = scaled(1.0 / n, sum(&|id| boids.positions[id]));
+            let spin = |id: usize| {
+                let out = vector::minus(boids.positions[id], middle);
+                vector::cross(unit(out), unit(boids.velocities[id]))
+            };
+            polarization += norm(sum(&|id| unit(boids.velocities[id]))) / n;
+            rotation += norm(sum(&spin)) / n;
+        }
+    }
+    let half = f64::from(n_frames - n_frames / 2);
+    (polarization / half, rotation / half)
+}
+
+#[test]
+fn wider_zones_of_orientation_make_a_swarm_then_a_torus_then_a_school_as_couzin_found() {
+    let [swarm, torus, school] = [0.0, 2.0, 10.0].map(|width| group(width, 2000));
+    assert!(swarm.0 < 0.35 && swarm.1 < 0.35, "{swarm:?}");
+    assert!(torus.0 < 0.35 && torus.1 > 0.6, "{torus:?}");
+    assert!(school.0 > 0.9 && school.1 < 0.35, "{school:?}");
+}
+
+/// The flock in a tank with something else in it, at every frame.
+fn with(params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Option<Vec3>>) {
+    let library = synthetic::library(View::Top);
+    let calibration = calibrated(&library, params);
+    let (lens, tank) = (
+        Lens::flat(40.0),
+        Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 0.0]),
+    );
+    let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
+    let frame = |_| {
+        boids.advance();
+        (boids.positions.clone(), boids.predator())
+    };
+    (0..n_frames).map(frame).unzip()
+}
+
+#[test]
+fn nobody_swims_through_an_obstacle() {
+    let obstacles = vec![
+        Obstacle::Circle {
+            center_px: [200.0, 200.0],
+            radius_px: 60.0,
+        },
+        Obstacle::Box {
+            box_px: [400.0, 100.0, 60.0, 200.0],
+        },
+    ];
+    let params = Params {
+        obstacles,
+        ..preset("swarm")
+    };
+    let (positions, _) = with(&params, 300);
+    for p in positions.iter().flatten() {
+        let from_disk = norm(vector::minus(*p, [5.0, 5.0, 0.0]));
+        assert!(from_disk > 1.5 + 0.25, "{p:?}");
+        let in_box = p[0] > 9.8 && p[0] < 11.7 && p[1] > 2.3 && p[1] < 7.7;
+        assert!(!in_box, "{p:?}");
+    }
+}
+
+#[test]
+fn a_flock_comes_to_its_goal_and_leaves_it_when_the_time_is_over() {
+    let at = |at_px, from_s, until_s| Goal {
+        at_px,
+        depth_bl: None,
+        from_s,
+        until_s,
+        weight: 2.0,
+    };
+    let params = Params {
+        goals: vec![
+            at([80.0, 80.0], 0.0, Some(10.0)),
+            at([560.0, 400.0], 10.0, None),
+        ],
+        ..preset("school")
+    };
+    let (positions, _) = with(&params, 900);
+    // An animal that cannot stand still passes its goal again and again.
+    let nearest = |frames: std::ops::Range<usize>, place: Vec3| {
+        let off = |frame: usize| {
+            let all = positions[frame]
+                .iter()
+                .map(|&p| norm(vector::minus(p, place)));
+            all.sum::<f64>() / positions[frame].len() as f64
+        };
+        frames.map(off).fold(f64::INFINITY, f64::min)
+    };
+    let (first, second) = ([2.0, 2.0, 0.0], [14.0, 10.0, 0.0]);
+    let came = [nearest(150..300, first), nearest(600..900, second)];
+    assert!(came.iter().all(|&bl| bl < 2.5), "{came:?}");
+    let stayed_away = [nearest(0..300, second), nearest(600..900, first)];
+    assert!(stayed_away.iter().all(|&bl| bl > 5.0), "{stayed_away:?}");
+}
+
+#[test]
+fn a_flock_keeps_away_from_a_predator() {
+    let hunted = Params {
+        predator: Some(Predator::default()),
+        ..preset("school")
+    };
+    let (positions, predator) = with(&hunted, 400);
+    let nearest = |frame: usize, place: Vec3| {
+        let all = positions[frame]
+            .iter()
+            .map(|&p| norm(vector::minus(p, place)));
+        all.fold(f64::INFINITY, f64::min)
+    };
+    let mean = (100..400)
+        .map(|frame| nearest(frame, predator[frame].expect("it hunts")))
+        .sum::<f64>()
+        / 300.0;
+    assert!(mean > 1.0, "{mean}");
+    assert_eq!(with(&preset("school"), 1).1, [None]);
 }

@@ -38,6 +38,11 @@ pub fn unit(a: Vec3) -> Vec3 {
     }
 }
 
+/// The angle between two directions, 0..=pi.
+pub fn angle_between(a: Vec3, b: Vec3) -> f64 {
+    libm::atan2(norm(cross(a, b)), dot(a, b))
+}
+
 /// a x b
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [

@@ -5,10 +5,11 @@ use super::graph::Graph;
 use super::steps::Taken;
 use super::violation::Violation;
 use crate::flock::Flock;
-use crate::flock::plan::cost::{CEILING, Feature, Weights, motion_of};
-use crate::flock::plan::crowd::{Crowd, Lookalike, n_watched};
+use crate::flock::lens::Lens;
+use crate::flock::motion::motion_of;
+use crate::flock::plan::cost::{CEILING, Feature, Weights};
+use crate::flock::plan::crowd::{Crowd, Lookalike};
 use crate::flock::plan::trellis::Trellis;
-use crate::flock::plan::turn_rates;
 use crate::geometry::Turns;
 use crate::library::Library;
 
@@ -74,7 +75,7 @@ impl<'a> Ledger<'a> {
         Ledger {
             flock,
             crowd: Crowd::new(params.matching.w_c, library.poses.fps, length_px),
-            features: weights.features(&trellis, &motion_of(library)),
+            features: weights.features(&trellis, &motion_of(library, &Lens::of(library, params))),
             plans: plans.iter().map(named).collect(),
             names,
             dwell: params
@@ -89,7 +90,9 @@ impl<'a> Ledger<'a> {
     /// Sums an individual's costs and compares them with what the file says.
     pub(super) fn bill(&self, id: usize, jumps: &[Taken]) -> Result<Bill, Violation> {
         let mut bill = Bill {
-            wanted: self.wanted(id),
+            wanted: self
+                .weights
+                .wanted(&self.flock.individuals[id].boid, self.flock.fps),
             lookalikes: self.lookalikes(id),
             before: vec![0],
         };
@@ -178,19 +181,12 @@ impl<'a> Ledger<'a> {
         u64::from((alone + crowd).min(CEILING - 1))
     }
 
-    fn wanted(&self, id: usize) -> Vec<Feature> {
-        let boid = &self.flock.individuals[id].boid;
-        let turns = turn_rates(&boid.heading_rad, self.flock.fps);
-        let wanted = |(t, turn): (usize, f64)| {
-            (self.weights).wanted(boid.heading_rad[t], turn, boid.speed_bl_per_s[t])
-        };
-        turns.into_iter().enumerate().map(wanted).collect()
-    }
-
     fn lookalikes(&self, id: usize) -> Vec<Vec<Lookalike>> {
         let individuals = &self.flock.individuals;
         let others = || {
-            let plans = self.plans[..n_watched(id)].iter().map(Vec::as_slice);
+            let plans = self.plans[..self.crowd.n_watched(id)]
+                .iter()
+                .map(Vec::as_slice);
             individuals.iter().map(|other| &other.boid).zip(plans)
         };
         (0..self.plans[id].len())

@@ -93,7 +93,11 @@ impl Painter {
         let (sprites, place) = (scene.sprites, placement(scene, who));
         let [w, h] = [sprites.width(), sprites.height()].map(f64::from);
         let diagonal = (w * w + h * h).sqrt();
-        let room = (diagonal * place.scale).ceil() as u32 + 4;
+        let of_fade = who
+            .fade
+            .map_or(0.0, |fade| fade.scale[who.frame_idx - fade.start as usize]);
+        let scale = place.scale.max(of_fade * scene.view.scale);
+        let room = (diagonal * scale).ceil() as u32 + 4;
         // From the nearest whole pixel inside of the picture, however far outside it is drawn.
         let size = [2 * room, 2 * room];
         let shift = place
@@ -123,6 +127,7 @@ impl Painter {
         };
         let k = t - fade.start as usize;
         place.rotation_rad = fade.rotation_rad[k];
+        place.scale = fade.scale[k] * scene.view.scale;
         place.mirrored = fade.mirrored;
         let frame = fade.source_frame[k];
         let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);

@@ -5,12 +5,19 @@
 //! compared is how far animal and boid turn in a quarter of a second.
 
 use super::trellis::Trellis;
+use crate::flock::boids::vector::Vec3;
+use crate::flock::individual::BoidTrack;
+use crate::flock::motion::FrameMotion;
 use crate::flock::params::{MatchBy, Matching};
-use crate::geometry::Turns;
+use crate::geometry::angle::mirrored_rad;
+use crate::geometry::{Turns, wrap_rad};
 use crate::library::{Library, View};
 
 /// Every cost of a state at a frame stays below.
 pub const CEILING: u32 = 1 << 17;
+
+/// A unit vector's length in a feature.
+const UNIT: f64 = 16384.0;
 
 /// Turn rates are compared over this time.
 const TURN_SPAN_S: f64 = 0.25;
@@ -22,6 +29,10 @@ pub struct Feature {
     pub turns: u16,
     /// ln(speed + v0) in turns, shifted to be positive.
     pub log_speed: u16,
+    /// What the picture shows of a unit vector in the direction, 16384ths.
+    pub level: i16,
+    /// What leads away from the viewer of it, 16384ths.
+    pub away: i16,
 }
 
 /// The weights as integers: 256ths, and turns.
@@ -34,6 +45,10 @@ pub struct Weights {
     jump_turns: f64,
     view: View,
     by: MatchBy,
+    /// Weight of what leads along the line of sight.
+    away: f32,
+    /// Whether it is known if the animal points away from the viewer or toward.
+    is_signed: bool,
     v0_bl_per_s: f64,
 }
 
@@ -42,21 +57,28 @@ impl Weights {
     pub fn new(matching: &Matching, library: &Library) -> Weights {
         let fixed = |w: f64| (w * 256.0).round() as u32;
         let view = library.poses.view;
+        let by = matching.by.unwrap_or(MatchBy::Heading);
         let cruise = library.stats.speed_bl_per_s.map_or(1.0, |speeds| speeds[1]);
         Weights {
             heading: fixed(matching.w_h),
             rotation: fixed(matching.w_r),
-            speed: match matching.by {
-                MatchBy::Heading => fixed(matching.w_v),
+            speed: match by {
+                MatchBy::Heading | MatchBy::Direction => fixed(matching.w_v),
                 MatchBy::Position => fixed(matching.w_h),
             },
-            rho_turns: match (view, matching.by) {
-                (View::Side, MatchBy::Heading) => Turns::from_rad(matching.rho_deg.to_radians()).0,
-                _ => 0,
+            rho_turns: match (view, by) {
+                (View::Top, _) | (_, MatchBy::Position) => 0,
+                _ => Turns::from_rad(matching.rho_deg.to_radians()).0,
             },
             jump_turns: matching.wx * Turns::PER_RAD,
             view,
-            by: matching.by,
+            by,
+            away: matching.w_d as f32,
+            is_signed: library
+                .poses
+                .frames
+                .iter()
+                .any(|pose| pose.forward.is_some()),
             v0_bl_per_s: (0.25 * cruise).max(0.05),
         }
     }
@@ -72,12 +94,31 @@ impl Weights {
     pub fn of_state(&self, wanted: Feature, state: Feature) -> [u32; 2] {
         let gap = (wanted.turns.wrapping_sub(state.turns) as i16).unsigned_abs();
         let within = u32::from(gap.min(self.rho_turns));
-        let beyond = u32::from(gap) - within;
+        let beyond = match self.by {
+            MatchBy::Direction => self.chord_turns(wanted, state, u32::from(gap) - within),
+            _ => u32::from(gap) - within,
+        };
         let speed_gap = u32::from(wanted.log_speed.abs_diff(state.log_speed));
         [
             (self.heading * beyond + self.rotation * within) >> 8,
             (self.speed * speed_gap) >> 8,
         ]
+    }
+
+    /// The chord between two directions whose headings are `beyond` turns apart, turns to the radian: the angle
+    /// between them where it is small. |a - b|^2 = (difference of levels)^2 + 2 levels (1 - cos beyond)
+    /// + (difference of aways)^2, the last with its weight.
+    #[inline(always)]
+    fn chord_turns(&self, a: Feature, b: Feature, beyond: u32) -> u32 {
+        // Additions, products and one root in single precision: the same on any machine.
+        let half = beyond as f32 * (std::f32::consts::PI / 65536.0);
+        let square = half * half;
+        let sine = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
+        let [level_a, level_b] = [a, b].map(|f| f32::from(f.level));
+        let level = level_a - level_b;
+        let away = self.away * (f32::from(a.away) - f32::from(b.away));
+        let squared = level * level + away * away + 4.0 * level_a * level_b * sine * sine;
+        (squared.sqrt() * (Turns::PER_RAD / UNIT) as f32 + 0.5) as u32
     }
 
     /// The sum of `of_state`, below the ceiling.
@@ -87,18 +128,52 @@ impl Weights {
         (heading + speed).min(CEILING - 1)
     }
 
-    /// What a boid wants: its heading, how fast that turns, and its speed.
-    pub fn wanted(&self, heading_rad: f64, turn_rad_per_s: f64, speed_bl_per_s: f64) -> Feature {
-        if self.by == MatchBy::Position {
-            let along = [libm::cos(heading_rad), libm::sin(heading_rad)];
-            return moving(along.map(|axis| speed_bl_per_s * axis));
-        }
-        Feature {
-            turns: match self.view {
-                View::Side => Turns::from_rad(heading_rad).0,
-                View::Top => turn_of_rate(turn_rad_per_s),
+    /// What a boid wants at every frame, from its track as the file holds it.
+    pub fn wanted(&self, boid: &BoidTrack, fps: f64) -> Vec<Feature> {
+        let turns = turn_rates(&boid.heading_rad, fps);
+        let forward = |t: usize| boid.forward.as_ref().map_or([1.0, 0.0, 0.0], |all| all[t]);
+        (turns.into_iter().enumerate())
+            .map(|(t, turn)| {
+                let (heading, speed) = (boid.heading_rad[t], boid.speed_bl_per_s[t]);
+                self.wants(heading, turn, speed, forward(t))
+            })
+            .collect()
+    }
+
+    fn wants(&self, heading_rad: f64, turn: f64, speed_bl_per_s: f64, forward: Vec3) -> Feature {
+        match self.by {
+            MatchBy::Position => {
+                let along = [libm::cos(heading_rad), libm::sin(heading_rad)];
+                moving(along.map(|axis| speed_bl_per_s * axis))
+            }
+            MatchBy::Direction => Feature {
+                turns: Turns::from_rad(libm::atan2(forward[1], forward[0])).0,
+                log_speed: log_speed(speed_bl_per_s, self.v0_bl_per_s),
+                ..self.in_space(forward)
             },
-            log_speed: log_speed(speed_bl_per_s, self.v0_bl_per_s),
+            MatchBy::Heading => Feature {
+                turns: match self.view {
+                    View::Side => Turns::from_rad(heading_rad).0,
+                    View::Top => turn_of_rate(turn),
+                },
+                log_speed: log_speed(speed_bl_per_s, self.v0_bl_per_s),
+                ..Feature::default()
+            },
+        }
+    }
+
+    /// The part of a feature that tells a direction's foreshortening.
+    fn in_space(&self, forward: Vec3) -> Feature {
+        let away = if self.is_signed {
+            forward[2]
+        } else {
+            forward[2].abs()
+        };
+        let whole = |part: f64| (part.clamp(-1.0, 1.0) * UNIT).round() as i16;
+        Feature {
+            level: whole(forward[0].hypot(forward[1])),
+            away: whole(away),
+            ..Feature::default()
         }
     }
 
@@ -113,23 +188,37 @@ impl Weights {
                 let [x, y] = moved.velocity_bl_per_s;
                 return moving([if mirrored { -x } else { x }, y]);
             }
-            let (heading, turn) = match mirrored {
-                false => (Turns::from_rad(moved.heading_rad), moved.turn_rad_per_s),
-                true => (
-                    Turns::from_rad(moved.heading_rad).mirrored(),
-                    -moved.turn_rad_per_s,
-                ),
+            let (x, turn) = match mirrored {
+                false => (1.0, moved.turn_rad_per_s),
+                true => (-1.0, -moved.turn_rad_per_s),
             };
-            Feature {
-                turns: match self.view {
-                    View::Side => heading.0,
-                    View::Top => turn_of_rate(turn),
-                },
-                log_speed: log_speed(moved.speed_bl_per_s, self.v0_bl_per_s),
-            }
+            let heading = match (self.by, mirrored) {
+                (MatchBy::Direction, _) => libm::atan2(moved.forward[1], x * moved.forward[0]),
+                (_, false) => moved.heading_rad,
+                (_, true) => mirrored_rad(moved.heading_rad),
+            };
+            let [_, y, z] = moved.forward;
+            self.wants(
+                heading,
+                turn,
+                moved.speed_bl_per_s,
+                [x * moved.forward[0], y, z],
+            )
         };
         (0..trellis.n_states()).map(feature).collect()
     }
+}
+
+/// The turn rate at every frame of a track: central differences, one-sided at the ends.
+pub fn turn_rates(heading_rad: &[f64], fps: f64) -> Vec<f64> {
+    let last = heading_rad.len().saturating_sub(1);
+    (0..heading_rad.len())
+        .map(|t| {
+            let (before, after) = (t.saturating_sub(1), (t + 1).min(last));
+            let span_s = (after - before).max(1) as f64 / fps;
+            wrap_rad(heading_rad[after] - heading_rad[before]) / span_s
+        })
+        .collect()
 }
 
 /// A velocity in the picture in the place of heading and speed: a body length a second is a radian, and
@@ -140,6 +229,7 @@ fn moving(velocity_bl_per_s: [f64; 2]) -> Feature {
     Feature {
         turns: x as u16,
         log_speed: (y as u16).wrapping_add(1 << 15),
+        ..Feature::default()
     }
 }
 
@@ -153,50 +243,4 @@ fn log_speed(speed_bl_per_s: f64, v0_bl_per_s: f64) -> u16 {
     // From 0.05 to 100 BL/s the logarithm spans -3 to 5: 2 radians to the 65536 would not hold it.
     let log = libm::log(speed_bl_per_s.clamp(0.0, 100.0) + v0_bl_per_s);
     ((log + 3.0).clamp(0.0, 6.2) * Turns::PER_RAD).round() as u16
-}
-
-/// How the animal itself moved at a frame of the footage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FrameMotion {
-    /// Direction of the head, image axes.
-    pub heading_rad: f64,
-    /// How fast the heading changed.
-    pub turn_rad_per_s: f64,
-    /// Speed of the centroid in the image, body lengths a second.
-    pub speed_bl_per_s: f64,
-    /// Its velocity, image axes.
-    pub velocity_bl_per_s: [f64; 2],
-}
-
-/// The motion at every frame: central differences over two frames either way where the animal was
-/// found; zero speed and turn where its neighbors in time were not.
-pub fn motion_of(library: &Library) -> Vec<FrameMotion> {
-    let poses = &library.poses;
-    let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
-    let at = |frame: usize| {
-        let pose = poses.frames.get(frame)?;
-        Some((pose.centroid_px?, pose.heading_rad?))
-    };
-    let motion = |frame: usize| {
-        let heading_rad = at(frame).map_or(0.0, |pose| pose.1);
-        let ends = (1..=2).rev().find_map(|reach| {
-            let before = at(frame.checked_sub(reach)?)?;
-            let after = at(frame + reach)?;
-            Some((before, after, 2.0 * reach as f64 / poses.fps))
-        });
-        let Some((before, after, span_s)) = ends else {
-            return FrameMotion {
-                heading_rad,
-                ..FrameMotion::default()
-            };
-        };
-        let (dx, dy) = (after.0[0] - before.0[0], after.0[1] - before.0[1]);
-        FrameMotion {
-            heading_rad,
-            turn_rad_per_s: crate::geometry::wrap_rad(after.1 - before.1) / span_s,
-            speed_bl_per_s: (dx * dx + dy * dy).sqrt() / length_px / span_s,
-            velocity_bl_per_s: [dx, dy].map(|px| px / length_px / span_s),
-        }
-    };
-    (0..poses.frames.len()).map(motion).collect()
 }

@@ -20,20 +20,10 @@ const STEPS: usize = 16;
 /// `ROUND` at a time, who look out for the rounds before.
 const ONE_BY_ONE: usize = 64;
 /// Individuals in a round.
-pub const ROUND: usize = 16;
+const ROUND: usize = 16;
 
 /// Where a boid is, in 32nds of a body length.
 pub type Place = [i32; 3];
-
-/// How many individuals number `id` looks out for: all of smaller id up to the 64th, from there on
-/// those before its round of 16.
-pub fn n_watched(id: usize) -> usize {
-    if id < ONE_BY_ONE {
-        id
-    } else {
-        id / ROUND * ROUND
-    }
-}
 
 /// The crowd term's measures, in frames, parts and turns.
 #[derive(Clone, Debug)]
@@ -67,6 +57,16 @@ impl Crowd {
             costs: (0..n_steps).map(cost).chain([0]).collect(),
             window: ((LOOKALIKE_S * fps).ceil() as u32).saturating_sub(1),
             length_px,
+        }
+    }
+
+    /// How many individuals number `id` looks out for: all of smaller id up to the 64th, from there on
+    /// those before its round of 16; nobody, when looking alike costs nothing.
+    pub fn n_watched(&self, id: usize) -> usize {
+        match id {
+            _ if self.costs[0] == 0 => 0,
+            0..ONE_BY_ONE => id,
+            _ => id / ROUND * ROUND,
         }
     }
 

@@ -4,6 +4,7 @@
 pub mod certificate;
 pub mod cost;
 pub mod crowd;
+pub mod landings;
 mod round;
 mod rows;
 pub mod trellis;
@@ -11,16 +12,17 @@ pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::cost::{CEILING, Feature, FrameMotion, Weights};
-use self::crowd::{Crowd, Place, ROUND, Settled, n_watched};
+use self::cost::{Feature, Weights};
+use self::crowd::{Crowd, Place, Settled};
 use self::round::Round;
 use self::trellis::Trellis;
-use self::viterbi::{Film, Path};
+use self::viterbi::{Film, Path, Shelf};
 use super::error::Error;
 use super::individual::{BoidTrack, PlanCost, rounded};
+use super::motion::FrameMotion;
 use super::params::Params;
 use crate::cpu::Level;
-use crate::geometry::{Turns, wrap_rad};
+use crate::geometry::Turns;
 use crate::library::Library;
 use crate::progress::Progress;
 
@@ -47,6 +49,7 @@ pub struct Planner<'a> {
     places: Vec<Vec<Place>>,
     dwell: usize,
     fps: f64,
+    shelf: Shelf,
     boids: &'a [BoidTrack],
 }
 
@@ -80,31 +83,62 @@ impl<'a> Planner<'a> {
             trellis,
             weights,
             fps,
+            shelf: Shelf::default(),
             boids,
         }
     }
 
-    /// The plans of all boids, by id: each as if alone, then again whoever looks like a near neighbor
-    /// that it looks out for.
+    /// The plans of all boids, by id, each the cheapest among those that it looks out for; meanwhile
+    /// what each would cost alone.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         progress.report("planning", 0.0);
-        let n_boids = self.boids.len();
-        let wanted: Vec<Vec<Feature>> = self.boids.par_iter().map(|b| self.wanted(b)).collect();
+        let wanted: Vec<Vec<Feature>> = (self.boids.par_iter())
+            .map(|boid| self.weights.wanted(boid, self.fps))
+            .collect();
         let mut settled = Settled::new(self.places.len());
-        let mut plans = Vec::with_capacity(n_boids);
-        for first in (0..n_boids).step_by(ROUND) {
+        let (paths, bounds) = rayon::join(
+            || self.paths(&wanted, &mut settled, progress),
+            || self.round(&wanted, 0, wanted.len()).least_costs(progress),
+        );
+        let (paths, bounds) = (paths?, bounds?);
+        Ok((paths.par_iter().enumerate())
+            .map(|(id, path)| self.costed(path, &wanted[id], bounds[id]))
+            .collect())
+    }
+
+    /// The paths of all boids, by id, round after round; each round is settled before the next.
+    fn paths(
+        &self,
+        wanted: &[Vec<Feature>],
+        settled: &mut Settled,
+        progress: &dyn Progress,
+    ) -> Result<Vec<Path>, Error> {
+        let mut paths = Vec::with_capacity(wanted.len());
+        while paths.len() < wanted.len() {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }
-            let round = Round {
-                planner: self,
-                first,
-                wanted: &wanted[first..(first + ROUND).min(n_boids)],
-            };
-            plans.extend(round.plan(&mut settled)?);
-            progress.report("planning", plans.len() as f64 / n_boids as f64);
+            let first = paths.len();
+            let n_watched = self.crowd.n_watched(first);
+            let alike = |id: &usize| self.crowd.n_watched(*id) == n_watched;
+            let end = first + (first..wanted.len()).take_while(alike).count();
+            let round = self.round(wanted, first, end).paths(settled)?;
+            for path in &round {
+                settled.push(&path.states);
+            }
+            paths.extend(round);
+            progress.report("planning", paths.len() as f64 / wanted.len() as f64);
         }
-        Ok(plans)
+        Ok(paths)
+    }
+
+    fn round<'b>(&'b self, wanted: &'b [Vec<Feature>], first: usize, end: usize) -> Round<'b> {
+        let wanted = &wanted[first..end];
+        Round {
+            planner: self,
+            first,
+            wanted,
+        }
     }
 
     fn film(&self) -> Film<'_> {
@@ -113,56 +147,20 @@ impl<'a> Planner<'a> {
             n_frames: self.places.len(),
             dwell: self.dwell,
             cpu: Level::detect(),
+            shelf: &self.shelf,
         }
     }
 
-    /// What looking like those it looks out for adds to each frame of a path, turns.
-    fn crowd_costs<'b>(
-        &'b self,
-        id: usize,
-        path: &'b Path,
-        settled: &'b Settled,
-    ) -> impl Iterator<Item = u32> + 'b {
-        let n_watched = n_watched(id);
-        path.states.iter().enumerate().map(move |(t, &state)| {
-            let [low, high] = self.alike[state as usize];
-            let others = settled.at(t)[..n_watched].iter().zip(&self.places[t]);
-            others
-                .filter(|(other, _)| (low..high).contains(*other))
-                .map(|(_, place)| u32::from(self.crowd.cost_at(self.places[t][id], *place)))
-                .sum()
-        })
-    }
-
-    /// What a boid wants at every frame, from its track as the file holds it.
-    fn wanted(&self, boid: &BoidTrack) -> Vec<Feature> {
-        let turns = turn_rates(&boid.heading_rad, self.fps);
-        let speeds = &boid.speed_bl_per_s;
-        (0..turns.len())
-            .map(|t| {
-                self.weights
-                    .wanted(boid.heading_rad[t], turns[t], speeds[t])
-            })
-            .collect()
-    }
-
-    /// The plan with its cost in parts: summed anew from the states. `crowd[t]` is what the crowd
-    /// would add without the ceiling.
-    fn costed(
-        &self,
-        path: &Path,
-        wanted: &[Feature],
-        crowd: impl Iterator<Item = u32>,
-        lower_bound: u32,
-    ) -> Plan {
-        let (mut heading, mut speed, mut transition, mut alike) = (0u32, 0u32, 0u32, 0u32);
-        for ((t, &state), crowd) in path.states.iter().enumerate().zip(crowd) {
+    /// The plan with its cost in parts, summed anew from the states; what is left of the path's cost is
+    /// the crowd's.
+    fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
+        let (mut heading, mut speed, mut transition, mut alone) = (0, 0, 0, 0);
+        for (t, &state) in path.states.iter().enumerate() {
             let feature = self.features[state as usize];
             let [h, s] = self.weights.of_state(wanted[t], feature);
             heading += h;
             speed += s;
-            let alone = self.weights.total(wanted[t], feature);
-            alike += (alone + crowd).min(CEILING - 1) - alone;
+            alone += self.weights.total(wanted[t], feature);
             if t > 0 && path.states[t - 1] + 1 != state {
                 transition += self.jump_cost(path.states[t - 1], state);
             }
@@ -179,7 +177,7 @@ impl<'a> Planner<'a> {
                 heading: rad(heading),
                 speed: rad(speed),
                 transition: rad(transition),
-                crowd: rad(alike),
+                crowd: rad(path.cost - alone - transition),
                 lower_bound: rad(lower_bound),
                 exact: true,
             },
@@ -192,18 +190,6 @@ impl<'a> Planner<'a> {
         let at = sources.binary_search_by_key(&from, |source| source.0);
         at.map_or(0, |at| sources[at].1)
     }
-}
-
-/// The turn rate at every frame of a track: central differences, one-sided at the ends.
-pub fn turn_rates(heading_rad: &[f64], fps: f64) -> Vec<f64> {
-    let last = heading_rad.len().saturating_sub(1);
-    (0..heading_rad.len())
-        .map(|t| {
-            let (before, after) = (t.saturating_sub(1), (t + 1).min(last));
-            let span_s = (after - before).max(1) as f64 / fps;
-            wrap_rad(heading_rad[after] - heading_rad[before]) / span_s
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -3,10 +3,11 @@
 
 use super::Planner;
 use super::cost::{CEILING, Feature};
-use super::crowd::{Settled, n_watched};
+use super::crowd::Settled;
 use super::viterbi::Rows;
 
-/// Heading, rotation and speed alone, as time runs.
+/// Heading, rotation and speed alone.
+#[derive(Clone)]
 pub(super) struct Alone<'a, const LANES: usize> {
     pub(super) planner: &'a Planner<'a>,
     pub(super) wanted: [&'a [Feature]; LANES],
@@ -26,6 +27,7 @@ impl<const LANES: usize> Rows<LANES> for Alone<'_, LANES> {
 }
 
 /// The same with what the crowd adds.
+#[derive(Clone)]
 pub(super) struct InCrowd<'a, const LANES: usize> {
     planner: &'a Planner<'a>,
     settled: &'a Settled,
@@ -49,7 +51,7 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
         InCrowd {
             planner,
             settled,
-            n_watched: n_watched(ids[0]),
+            n_watched: planner.crowd.n_watched(ids[0]),
             ids,
             wanted,
             added: vec![[0; LANES]; planner.trellis.n_states() + 1],

@@ -4,6 +4,7 @@
 //! A barrier state stands before each run, so that "continue" is always "from the state before":
 //! nothing ever leaves a barrier.
 
+use super::landings::{Landings, Way};
 use crate::library::Playback;
 
 /// Stands for the frame of a barrier.
@@ -17,21 +18,18 @@ pub struct Trellis {
     barriers: Vec<u32>,
     /// Which run a state belongs to.
     runs: Vec<u32>,
+    /// How many states of its run come up to each state, itself counted: 0 for barriers.
+    since: Vec<u32>,
+    /// How many come from it on.
+    until: Vec<u32>,
     /// States that some jump leads to, rising.
     targets: Vec<u32>,
     /// `sources[first_source[k]..first_source[k + 1]]` lead to target k.
     first_source: Vec<u32>,
     /// (state, cost in turns) of each jump, by target, then source.
     sources: Vec<(u32, u32)>,
-    /// States that some jump leaves, rising.
-    leaving: Vec<u32>,
-    /// The targets by how many jumps lead to them, so that a loop over those is of one length for
-    /// many targets in a row.
-    by_degree: Vec<u32>,
-    /// Where each target stands in `by_degree`.
-    order: Vec<u32>,
-    /// Of each target in that order, its jumps: (number of the leaving state, cost).
-    jumps: Vec<(u32, u32)>,
+    ahead: Landings,
+    back: Landings,
 }
 
 impl Trellis {
@@ -43,18 +41,19 @@ impl Trellis {
             mirrored: Vec::new(),
             barriers: Vec::new(),
             runs: Vec::new(),
+            since: Vec::new(),
+            until: Vec::new(),
             targets: Vec::new(),
             first_source: vec![0],
             sources: Vec::new(),
-            leaving: Vec::new(),
-            by_degree: Vec::new(),
-            order: Vec::new(),
-            jumps: Vec::new(),
+            ahead: Landings::default(),
+            back: Landings::default(),
         };
         let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
         for &side in sides {
             trellis.lay_side(&playback.component, side);
         }
+        trellis.count_runs();
         let mut jumps: Vec<(u32, u32, u32)> = Vec::new();
         for jump in &playback.jumps {
             for &side in sides {
@@ -112,28 +111,21 @@ impl Trellis {
         &self.sources[range]
     }
 
-    /// The states that jumps leave, rising.
-    pub fn leaving(&self) -> &[u32] {
-        &self.leaving
+    /// The jumps as the recursion takes them: by where they lead as time runs, or against it.
+    pub fn landings(&self, way: Way) -> &Landings {
+        match way {
+            Way::Ahead => &self.ahead,
+            Way::Back => &self.back,
+        }
     }
 
-    /// Where target `k` stands in `jumps`.
-    pub fn order(&self, k: usize) -> usize {
-        self.order[k] as usize
-    }
-
-    /// The targets by how many jumps lead to them: (state, jumps), those as `sources` gives them but
-    /// with the number of the leaving state.
-    #[inline(always)]
-    pub fn jumps(&self) -> impl Iterator<Item = (usize, &[(u32, u32)])> {
-        let mut rest = self.jumps.as_slice();
-        self.by_degree.iter().map(move |&k| {
-            let k = k as usize;
-            let n_jumps = (self.first_source[k + 1] - self.first_source[k]) as usize;
-            let (jumps, after) = rest.split_at(n_jumps);
-            rest = after;
-            (self.targets[k] as usize, jumps)
-        })
+    /// How many states of its run one has gone through to each state when going that way, itself
+    /// counted; 0 for barriers.
+    pub fn gone_through(&self, way: Way) -> &[u32] {
+        match way {
+            Way::Ahead => &self.since,
+            Way::Back => &self.until,
+        }
     }
 
     /// Whether `state + ahead` is reached from `state` by continuing alone.
@@ -158,9 +150,29 @@ impl Trellis {
         }
     }
 
+    fn count_runs(&mut self) {
+        let count = |count: &mut u32, frame: u32| {
+            *count = if frame == NO_FRAME { 0 } else { *count + 1 };
+            *count
+        };
+        let (mut since, mut until) = (0, 0);
+        self.since = self.frames.iter().map(|&f| count(&mut since, f)).collect();
+        self.until = (self.frames.iter().rev())
+            .map(|&f| count(&mut until, f))
+            .collect();
+        self.until.reverse();
+    }
+
     fn lay_jumps(&mut self, mut jumps: Vec<(u32, u32, u32)>) {
         jumps.sort_unstable();
         jumps.dedup_by_key(|jump| (jump.0, jump.1));
+        self.ahead = Landings::new(self.n_states(), &jumps);
+        let mut back: Vec<_> = jumps
+            .iter()
+            .map(|&(to, from, cost)| (from, to, cost))
+            .collect();
+        back.sort_unstable();
+        self.back = Landings::new(self.n_states(), &back);
         for (target, source, cost) in jumps {
             if self.targets.last() != Some(&target) {
                 self.targets.push(target);
@@ -171,23 +183,6 @@ impl Trellis {
                 *end = self.sources.len() as u32;
             }
         }
-        self.leaving = self.sources.iter().map(|source| source.0).collect();
-        self.leaving.sort_unstable();
-        self.leaving.dedup();
-        let leaving = &self.leaving;
-        let number = |state| leaving.partition_point(|&other| other < state) as u32;
-        let n_targets = self.targets.len() as u32;
-        let mut by_degree: Vec<u32> = (0..n_targets).collect();
-        by_degree.sort_by_key(|&k| self.sources(k as usize).len());
-        self.order = vec![0; by_degree.len()];
-        for (place, &k) in (0u32..).zip(&by_degree) {
-            self.order[k as usize] = place;
-        }
-        let sources = by_degree.iter().flat_map(|&k| self.sources(k as usize));
-        self.jumps = sources
-            .map(|&(source, cost)| (number(source), cost))
-            .collect();
-        self.by_degree = by_degree;
     }
 }
 

@@ -57,6 +57,7 @@ fn longest_run(library: &Library) -> (usize, usize) {
 fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock {
     let poses = &library.poses.frames[first..first + n_frames];
     let individual = Individual {
+        forward: None,
         id: 0,
         source_frame: (first as u32..(first + n_frames) as u32).collect(),
         mirrored: vec![false; n_frames],
@@ -70,6 +71,7 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
         scale: vec![1.0; n_frames],
         depth_m: None,
         boid: BoidTrack {
+            forward: None,
             position_px: vec![[0.0; 3]; n_frames],
             heading_rad: vec![0.0; n_frames],
             speed_bl_per_s: vec![0.0; n_frames],
@@ -77,6 +79,7 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
         cost: PlanCost::default(),
     };
     Flock {
+        predator_px: Vec::new(),
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
         length_px: 50.0,

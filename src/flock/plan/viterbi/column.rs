@@ -1,80 +1,76 @@
 //! The recursion itself, one frame at a time (ALGORITHMS.md 6).
 //!
-//! What continues stays in its place: state `s` at frame `t` lies at `(s - t) mod n`, so a frame adds
-//! each state's cost to one sum along the diagonal, and only what jumps touches anything else. V is
-//! kept as that sum and a lead over it, which changes where a run of `dwell` frames after a jump ends.
-//! The same portable code is compiled once plainly and once for AVX2; results are the same integers.
+//! What continues stays in its place: state `s` lies at `s + origin`, and the origin goes one place a
+//! frame, so a frame adds each state's cost to one sum along the diagonal. V is kept as that sum and a
+//! lead over it, which a landing lowers at once; who may jump is told by the leads of `dwell - 1` frames
+//! ago, which know nothing of later landings. The same portable code is compiled once plainly and once
+//! for AVX2; results are the same integers.
 
-use super::walk::{Back, Trace};
+use super::landing;
+use super::walk::Trace;
 use super::{Film, Rows, UNREACHED};
 use crate::cpu::Level;
-use crate::flock::plan::trellis::Trellis;
+use crate::flock::plan::landings::{GROUP, Way};
 
 /// The lead of a state that no path leads to. Sums stay below 2^31, so V fits 32 bits.
 const NO_LEAD: i32 = UNREACHED as i32;
 /// States whose costs are filled in at a time, so that they stay in the nearest cache.
 const BLOCK: usize = 64;
+/// Frames that the origin can go before all is moved back.
+const ROOM: usize = 256;
 
 /// The state of the recursion after one frame.
 #[derive(Clone)]
 pub(super) struct Column<const LANES: usize> {
+    way: Way,
     dwell: usize,
-    /// V less the sum, by place.
-    leads: Vec<[i32; LANES]>,
+    /// Frames gone since the first.
+    age: usize,
+    /// The place of state 0.
+    origin: usize,
+    /// `[age mod slots]`, by place: V less the sum, of the last `dwell` frames and at least two.
+    leads: Vec<Vec<[i32; LANES]>>,
     /// Costs of continuing since the film began, by place.
     sums: Vec<[u32; LANES]>,
-    /// V of each leaving state at the frame before.
-    leaving: Vec<[u32; LANES]>,
-    /// `landed[(t mod dwell) * n_targets + order]`: the lead of landing on a target at frame t.
-    landed: Vec<[i32; LANES]>,
-    /// The targets from which `dwell` frames can be played, rising: (order, state).
-    arriving: Vec<(u32, u32)>,
-}
-
-/// The place of state 0 at frame `t`.
-fn origin(t: usize, n: usize) -> usize {
-    match t % n {
-        0 => 0,
-        gone => n - gone,
-    }
-}
-
-fn place(state: usize, origin: usize, n: usize) -> usize {
-    let place = state + origin;
-    if place >= n { place - n } else { place }
+    /// V of each state that may jump, by state.
+    values: Vec<[u32; LANES]>,
+    /// V of each state just landed on, without its own cost, by state.
+    landed: Vec<[u32; LANES]>,
+    /// Costs of a block of states.
+    row: [[u32; LANES]; BLOCK],
+    /// States too soon in their runs to jump, by how soon: (states gone through, state).
+    soon: Vec<(u32, u32)>,
 }
 
 impl<const LANES: usize> Column<LANES> {
-    pub(super) fn start(
-        trellis: &Trellis,
-        dwell: usize,
-        rows: &mut impl Rows<LANES>,
-    ) -> Column<LANES> {
-        let n_states = trellis.n_states();
-        let n_targets = trellis.targets().len();
+    pub(super) fn start(film: &Film<'_>, way: Way, rows: &mut impl Rows<LANES>) -> Column<LANES> {
+        let (n_states, dwell) = (film.trellis.n_states(), film.dwell);
+        let gone = film.trellis.gone_through(way).iter().copied();
+        let mut soon: Vec<(u32, u32)> = gone.zip(0..).filter(|s| (s.0 as usize) < dwell).collect();
+        soon.sort_unstable();
         let mut column = Column {
+            way,
             dwell,
-            leads: vec![[0; LANES]; n_states],
-            sums: vec![[0; LANES]; n_states],
-            leaving: vec![[0; LANES]; trellis.leaving().len()],
-            landed: vec![[NO_LEAD; LANES]; n_targets * dwell],
-            arriving: (trellis.targets().iter().enumerate())
-                .filter(|(_, target)| trellis.continues(**target as usize, dwell - 1))
-                .map(|(k, &target)| (trellis.order(k) as u32, target))
-                .collect(),
+            age: 0,
+            origin: if way == Way::Ahead { ROOM } else { 0 },
+            leads: vec![vec![[0; LANES]; n_states + ROOM]; dwell.max(2)],
+            sums: vec![[0; LANES]; n_states + ROOM],
+            values: vec![[UNREACHED; LANES]; n_states],
+            landed: vec![[UNREACHED; LANES]; n_states],
+            row: [[0; LANES]; BLOCK],
+            soon,
         };
-        column.go_on(0, rows);
-        column.close_barriers(trellis, 0);
+        column.close_barriers();
+        column.pay(film.time(way, 0), rows);
         column
     }
 
-    /// Goes on to frame `t`.
+    /// Goes on by a frame.
     pub(super) fn advance<R: Rows<LANES>>(
         &mut self,
         film: &Film<'_>,
-        t: usize,
         rows: &mut R,
-        trace: &mut Trace<LANES>,
+        trace: &mut Trace<'_, LANES>,
     ) {
         match film.cpu {
             #[cfg(target_arch = "x86_64")]
@@ -82,10 +78,10 @@ impl<const LANES: usize> Column<LANES> {
                 #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
                 // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
-                    self.advance_avx2(film.trellis, t, rows, trace);
+                    self.advance_avx2(film, rows, trace);
                 }
             }
-            _ => self.advance_anywhere(film.trellis, t, rows, trace),
+            _ => self.advance_with::<R, false>(film, rows, trace),
         }
     }
 
@@ -93,163 +89,178 @@ impl<const LANES: usize> Column<LANES> {
     #[target_feature(enable = "avx2")]
     fn advance_avx2<R: Rows<LANES>>(
         &mut self,
-        trellis: &Trellis,
-        t: usize,
+        film: &Film<'_>,
         rows: &mut R,
-        trace: &mut Trace<LANES>,
+        trace: &mut Trace<'_, LANES>,
     ) {
-        self.advance_anywhere(trellis, t, rows, trace);
+        self.advance_with::<R, true>(film, rows, trace);
     }
 
     #[inline(always)]
-    fn advance_anywhere<R: Rows<LANES>>(
+    fn advance_with<R: Rows<LANES>, const AVX2: bool>(
         &mut self,
-        trellis: &Trellis,
-        t: usize,
+        film: &Film<'_>,
         rows: &mut R,
-        trace: &mut Trace<LANES>,
+        trace: &mut Trace<'_, LANES>,
     ) {
-        self.leave(trellis, t - 1);
-        self.land(trellis, t, trace);
-        self.go_on(t, rows);
-        self.close_barriers(trellis, t);
-        self.arrive(trellis, t, trace);
+        let (ranks, wins) = trace.next_frame();
+        self.land::<AVX2>(film, ranks);
+        self.slide();
+        self.settle(wins);
+        self.close_barriers();
+        self.pay(film.time(self.way, self.age), rows);
     }
 
-    /// V of each state that jumps leave.
+    /// The cheapest jump to each state that jumps lead to.
     #[inline(always)]
-    fn leave(&mut self, trellis: &Trellis, t: usize) {
-        let n = self.leads.len();
-        let origin = origin(t, n);
-        for (v, &state) in self.leaving.iter_mut().zip(trellis.leaving()) {
-            let at = place(state as usize, origin, n);
-            for lane in 0..LANES {
-                v[lane] = (self.leads[at][lane] as u32).wrapping_add(self.sums[at][lane]);
-            }
-        }
-    }
-
-    /// The cheapest jump to each target; in the air until `dwell` frames are played.
-    #[inline(always)]
-    fn land(&mut self, trellis: &Trellis, t: usize, trace: &mut Trace<LANES>) {
-        let n = self.leads.len();
-        let origin = origin(t, n);
-        let n_targets = trellis.targets().len();
-        let landed = &mut self.landed[t % self.dwell * n_targets..][..n_targets];
-        let winners = trace.next_frame(n_targets);
-        for ((landed, winner), (target, jumps)) in
-            landed.iter_mut().zip(winners).zip(trellis.jumps())
-        {
-            let mut best = [UNREACHED; LANES];
-            let mut rank_of_best = [0u32; LANES];
-            for (rank, &(j, cost)) in (0u32..).zip(jumps) {
-                let from = &self.leaving[j as usize];
-                for lane in 0..LANES {
-                    let through = from[lane] + cost;
-                    let better = through < best[lane];
-                    best[lane] = if better { through } else { best[lane] };
-                    rank_of_best[lane] = if better { rank } else { rank_of_best[lane] };
+    fn land<const AVX2: bool>(&mut self, film: &Film<'_>, ranks: &mut [[u16; LANES]]) {
+        let landings = film.trellis.landings(self.way);
+        let (values, n_states) = (&self.values[..], landings.n_states());
+        assert_eq!(values.len(), n_states, "one trellis all along");
+        let (ranks, _) = ranks.as_chunks_mut::<GROUP>();
+        for ((states, jumps), ranks) in landings.groups().zip(ranks) {
+            #[cfg(target_arch = "x86_64")]
+            if AVX2 && LANES == 1 {
+                let ranks = ranks.as_flattened_mut().try_into();
+                let ranks = ranks.expect("one rank for each state");
+                #[expect(unsafe_code, reason = "a kernel of AVX2 that looks at no bounds")]
+                // SAFETY: landings name states below `n_states`, all of which have values; and who
+                // says AVX2 has made sure of it.
+                let landed = unsafe { landing::alone_avx2(jumps, values.as_flattened(), ranks) };
+                for (&state, landed) in states.iter().zip(landed) {
+                    self.landed[state as usize] = [landed; LANES];
                 }
+                continue;
             }
-            let sums = &self.sums[place(target, origin, n)];
-            for lane in 0..LANES {
-                landed[lane] = best[lane] as i32 - sums[lane] as i32;
-                winner[lane] = rank_of_best[lane] as u16;
+            #[expect(unsafe_code, reason = "a kernel that looks at no bounds")]
+            // SAFETY: landings name states below `n_states`, all of which have values.
+            let landed = unsafe { landing::lanes(jumps, values, ranks) };
+            for (&state, landed) in states.iter().zip(landed) {
+                self.landed[state as usize] = landed;
             }
         }
     }
 
-    /// Every state from the one before it.
-    #[inline(always)]
-    fn go_on<R: Rows<LANES>>(&mut self, t: usize, rows: &mut R) {
-        let n = self.sums.len();
-        let (low, high) = self.sums.split_at_mut(origin(t, n));
-        let mut first = 0;
-        for block in high.chunks_mut(BLOCK).chain(low.chunks_mut(BLOCK)) {
-            let mut row = [[0; LANES]; BLOCK];
-            let row = &mut row[..block.len()];
-            rows.fill(t, first, row);
-            for (sum, cost) in block.iter_mut().zip(row) {
-                for lane in 0..LANES {
-                    sum[lane] += cost[lane];
-                }
-            }
-            first += block.len();
-        }
-    }
-
-    fn close_barriers(&mut self, trellis: &Trellis, t: usize) {
-        let n = self.leads.len();
-        for &at in trellis.barriers() {
-            self.leads[place(at as usize, origin(t, n), n)] = [NO_LEAD; LANES];
-        }
-    }
-
-    /// Whoever landed `dwell - 1` frames ago is free again.
-    #[inline(always)]
-    fn arrive(&mut self, trellis: &Trellis, t: usize, trace: &mut Trace<LANES>) {
-        let Some(landed_at) = (t + 1).checked_sub(self.dwell).filter(|&at| at > 0) else {
-            return;
+    /// Moves the origin by a place.
+    fn slide(&mut self) {
+        let n_states = self.values.len();
+        let (end, other) = match self.way {
+            Way::Ahead => (0, ROOM),
+            Way::Back => (ROOM, 0),
         };
-        let n = self.leads.len();
-        let origin = origin(landed_at, n);
-        let n_targets = trellis.targets().len();
-        let landed = &self.landed[landed_at % self.dwell * n_targets..][..n_targets];
-        let arrivals = trace.arrivals(self.arriving.len());
-        let mut n_arrived = 0;
-        for &(order, target) in &self.arriving {
-            let new = &landed[order as usize];
-            let lead = &mut self.leads[place(target as usize, origin, n)];
-            let mut lanes = 0;
-            for lane in 0..LANES {
-                lanes |= u32::from(new[lane] < lead[lane]) << lane;
-                lead[lane] = lead[lane].min(new[lane]);
+        if self.origin == end {
+            let window = end..end + n_states;
+            self.sums.copy_within(window.clone(), other);
+            for leads in &mut self.leads {
+                leads.copy_within(window.clone(), other);
             }
-            // Without a branch: whether it is cheaper is hard to foresee.
-            arrivals[n_arrived] = (target + self.dwell as u32 - 1, lanes as u8);
-            n_arrived += usize::from(lanes != 0);
+            self.origin = other;
         }
-        trace.keep(n_arrived);
+        let coming = match self.way {
+            Way::Ahead => self.origin - 1,
+            Way::Back => self.origin + n_states,
+        };
+        self.origin = match self.way {
+            Way::Ahead => self.origin - 1,
+            Way::Back => self.origin + 1,
+        };
+        self.sums[coming] = [0; LANES];
+        let slot = self.slot(0);
+        self.leads[slot][coming] = [NO_LEAD; LANES];
+        self.age += 1;
     }
 
-    /// V of every state at frame `t`, the last one advanced to, for one individual.
-    pub(super) fn costs(&self, t: usize, lane: usize) -> impl Iterator<Item = u32> {
-        let n = self.leads.len();
-        let first = origin(t, n);
-        (0..n).map(move |state| {
-            let at = place(state, first, n);
-            (self.leads[at][lane] as u32).wrapping_add(self.sums[at][lane])
-        })
+    /// Every state from the one before it, or from a landing where that is cheaper.
+    #[inline(always)]
+    fn settle(&mut self, wins: &mut [[u8; LANES]]) {
+        let window = self.window();
+        let slot = self.slot(0);
+        let mut leads = std::mem::take(&mut self.leads[slot]);
+        let before = self.leads[self.slot(1)][window.clone()].as_flattened();
+        let sums = self.sums[window.clone()].as_flattened();
+        let now = leads[window].as_flattened_mut().iter_mut();
+        let offers = self.landed.as_flattened().iter().zip(sums);
+        let wins = wins.as_flattened_mut().iter_mut();
+        for ((now, &before), ((&landed, &sum), win)) in now.zip(before).zip(offers.zip(wins)) {
+            let lead = landed as i32 - sum as i32;
+            *win = u8::from(lead < before);
+            *now = lead.min(before);
+        }
+        self.leads[slot] = leads;
     }
 
-    /// The cheapest place to be at the last frame: free, or in a run that the end cuts short.
-    pub(super) fn cheapest_end(
+    fn close_barriers(&mut self) {
+        let slot = self.slot(0);
+        for &(gone, state) in &self.soon {
+            if gone > 0 {
+                break;
+            }
+            self.leads[slot][self.origin + state as usize] = [NO_LEAD; LANES];
+        }
+    }
+
+    /// Adds what each state costs; then V of those that may jump.
+    #[inline(always)]
+    fn pay<R: Rows<LANES>>(&mut self, t: usize, rows: &mut R) {
+        let window = self.window();
+        let held = (self.dwell - 1).min(self.age);
+        let leads = &self.leads[self.slot(held)][window.clone()];
+        let blocks = self.sums[window].chunks_mut(BLOCK);
+        let blocks = blocks
+            .zip(leads.chunks(BLOCK))
+            .zip(self.values.chunks_mut(BLOCK));
+        for (first, ((sums, leads), values)) in (0..).step_by(BLOCK).zip(blocks) {
+            let row = &mut self.row[..sums.len()];
+            rows.fill(t, first, row);
+            let sums = sums.as_flattened_mut().iter_mut().zip(row.as_flattened());
+            let values = values.as_flattened_mut().iter_mut();
+            for (((sum, &cost), &lead), value) in sums.zip(leads.as_flattened()).zip(values) {
+                *sum += cost;
+                *value = (lead as u32).wrapping_add(*sum);
+            }
+        }
+        for &(gone, state) in &self.soon {
+            if gone as usize > held {
+                break;
+            }
+            self.values[state as usize] = [UNREACHED; LANES];
+        }
+    }
+
+    fn window(&self) -> std::ops::Range<usize> {
+        self.origin..self.origin + self.values.len()
+    }
+
+    /// Where the leads of so many frames ago are.
+    fn slot(&self, ago: usize) -> usize {
+        // No more is asked for than there are slots, which may be one more than frames gone.
+        (self.age + self.leads.len() - ago) % self.leads.len()
+    }
+
+    /// V of every state that may jump, by state.
+    pub(super) fn values(&self) -> &[[u32; LANES]] {
+        &self.values
+    }
+
+    /// The least V of each state over paths whose last landing was at least `since - 1` frames ago, for
+    /// one individual: `UNREACHED` or more where there is none. 1 <= since <= max(dwell, 2).
+    pub(super) fn landed_since(
         &self,
-        trellis: &Trellis,
-        n_frames: usize,
+        film: &Film<'_>,
+        since: usize,
         lane: usize,
-    ) -> Option<(u32, Back)> {
-        let (last, n) = (n_frames - 1, self.leads.len());
-        let mut best = (UNREACHED, Back::Free { at: 0, t: 0 });
-        for (at, cost) in self.costs(last, lane).enumerate() {
-            if cost < best.0 {
-                best = (cost, Back::Free { at, t: last });
+    ) -> impl Iterator<Item = u32> {
+        let ago = (since - 1).min(self.age);
+        let leads = &self.leads[self.slot(ago)][self.window()];
+        let gone = film.trellis.gone_through(self.way).iter();
+        let places = leads.iter().zip(&self.sums[self.window()]);
+        places.zip(gone).map(move |((lead, sum), &gone)| {
+            let cost = (lead[lane] as u32).wrapping_add(sum[lane]);
+            if gone as usize > ago {
+                cost.min(UNREACHED)
+            } else {
+                UNREACHED
             }
-        }
-        let n_targets = trellis.targets().len();
-        for t in (n_frames + 1).saturating_sub(self.dwell).max(1)..n_frames {
-            let landed = &self.landed[t % self.dwell * n_targets..][..n_targets];
-            for (k, &target) in trellis.targets().iter().enumerate() {
-                let leads = landed[trellis.order(k)];
-                if trellis.continues(target as usize, last - t) {
-                    let sums = self.sums[place(target as usize, origin(t, n), n)];
-                    let cost = (leads[lane] as u32).wrapping_add(sums[lane]);
-                    if cost < best.0 {
-                        best = (cost, Back::Landed { k, t });
-                    }
-                }
-            }
-        }
-        (best.0 < UNREACHED).then_some(best)
+        })
     }
 }

@@ -1,17 +1,24 @@
 //! The exact plan: for each individual the cheapest path through the trellis (ALGORITHMS.md 6),
 //! by dynamic programming over frames with `LANES` individuals side by side.
 //!
-//! After a jump at least `dwell` frames are played; only the end of the plan may cut that run short.
-//! A jump is thus an edge of `dwell` frames, whose forced costs come from sums along the diagonal.
-//! Ties go to continuing, then to the smaller state, as time runs. What led where is kept as one
-//! winner a jump target and the ends of runs; above a budget the film is cut into segments, each
-//! played again from its checkpoint.
+//! After a jump at least `dwell` frames are played; only the end of the plan may cut that run short, as
+//! its beginning may. So a plan read backward is a plan too, and is found from both ends at once: one half
+//! as time runs, the other against it, each on a thread of its own, until they meet. Ties go to continuing,
+//! then to the smaller state, seen from either end.
 
 mod column;
+mod half;
+mod landing;
+mod meeting;
+mod shelf;
 mod walk;
 
 use self::column::Column;
-use self::walk::{Trace, Walk};
+use self::half::Half;
+use self::meeting::Meeting;
+pub use self::shelf::Shelf;
+use self::walk::Trace;
+use super::landings::Way;
 use super::trellis::Trellis;
 use crate::cpu::Level;
 
@@ -19,8 +26,8 @@ use crate::cpu::Level;
 /// a jump of less than 2^16 each), and what is added to it along a film stays below 2^32.
 pub(super) const UNREACHED: u32 = i32::MAX as u32;
 
-/// Memory for what led where, before the film is cut into segments.
-const TRACE_BUDGET_BYTES: usize = 128 << 20;
+/// Memory for what led where in one half, before that is cut into segments.
+const TRACE_BUDGET_BYTES: usize = 64 << 20;
 
 /// The cheapest way through the trellis for one individual.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,8 +40,8 @@ pub struct Path {
 
 /// What showing each state costs each individual.
 pub trait Rows<const LANES: usize> {
-    /// Fills in the costs at frame `t` of the states from `first` on, turns below 2^17. Each frame is
-    /// asked for from state 0 up; barriers may cost anything below 2^17.
+    /// Fills in the costs at frame `t` of the states from `first` on, turns below 2^17. Frames are asked
+    /// for in either order, each from state 0 up; barriers may cost anything below 2^17.
     fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]);
 }
 
@@ -56,33 +63,54 @@ pub struct Film<'a> {
     pub dwell: usize,
     /// Which instructions to use; this machine must have them.
     pub cpu: Level,
+    /// Where memory lies between plans.
+    pub shelf: &'a Shelf,
 }
 
 impl Film<'_> {
     /// The cheapest paths of `LANES` individuals, each exactly. `None` when no path is long enough.
-    pub fn cheapest_paths<const LANES: usize>(
-        &self,
-        rows: &mut impl Rows<LANES>,
-    ) -> Option<[Path; LANES]> {
-        self.cheapest_paths_by_segments(rows, self.segment_frames(LANES))
+    pub fn cheapest_paths<const LANES: usize, R>(&self, rows: &R) -> Option<[Path; LANES]>
+    where
+        R: Rows<LANES> + Clone + Send + Sync,
+    {
+        self.cheapest_paths_by_segments(rows, self.segment_frames::<LANES>())
     }
 
-    /// Every state's cheapest cost at every frame, for one individual: what the certificate checks.
+    /// What the cheapest paths of `LANES` individuals cost, turns. `None` when no path is long enough.
+    pub fn least_costs<const LANES: usize>(
+        &self,
+        rows: &mut impl Rows<LANES>,
+    ) -> Option<[u32; LANES]> {
+        let mut column = Column::start(self, Way::Ahead, rows);
+        let mut trace = Trace::new(self, Way::Ahead, 1);
+        for _ in 1..self.n_frames {
+            column.advance(self, rows, &mut trace);
+        }
+        let least = |lane| column.landed_since(self, 1, lane).min();
+        let costs = std::array::from_fn(|lane| least(lane).unwrap_or(UNREACHED));
+        (!costs.contains(&UNREACHED)).then_some(costs)
+    }
+
+    /// What the cheapest way costs to every state that may jump, at every frame, for one individual: what
+    /// the certificate checks.
     pub fn potentials(&self, rows: &mut impl Rows<1>) -> Vec<Vec<u32>> {
-        let mut column = Column::start(self.trellis, self.dwell, rows);
-        let mut trace = Trace::default();
-        let mut columns = vec![column.costs(0, 0).collect()];
-        for t in 1..self.n_frames {
-            trace.restart(t);
-            column.advance(self, t, rows, &mut trace);
-            columns.push(column.costs(t, 0).collect());
+        let mut column = Column::start(self, Way::Ahead, rows);
+        let mut trace = Trace::new(self, Way::Ahead, 1);
+        let values = |column: &Column<1>| {
+            let values = column.values().as_flattened().iter();
+            values.map(|&v| v.min(UNREACHED)).collect()
+        };
+        let mut columns = vec![values(&column)];
+        for _ in 1..self.n_frames {
+            column.advance(self, rows, &mut trace);
+            columns.push(values(&column));
         }
         columns
     }
 
-    fn segment_frames(&self, lanes: usize) -> usize {
-        let frame_bytes = self.trellis.targets().len() * (lanes * 2 + 8);
-        if frame_bytes * self.n_frames <= TRACE_BUDGET_BYTES {
+    fn segment_frames<const LANES: usize>(&self) -> usize {
+        let frame_bytes = Trace::<LANES>::frame_bytes(self, Way::Ahead);
+        if frame_bytes * self.n_frames / 2 <= TRACE_BUDGET_BYTES {
             self.n_frames
         } else {
             self.n_frames.isqrt() + 1
@@ -90,49 +118,56 @@ impl Film<'_> {
     }
 
     /// As `cheapest_paths`, keeping what led where for `segment` frames at a time.
-    fn cheapest_paths_by_segments<const LANES: usize>(
+    fn cheapest_paths_by_segments<const LANES: usize, R>(
         &self,
-        rows: &mut impl Rows<LANES>,
+        rows: &R,
         segment: usize,
-    ) -> Option<[Path; LANES]> {
-        let (n_frames, dwell) = (self.n_frames, self.dwell);
-        assert!(n_frames > 0 && dwell > 0 && segment > 0, "nothing to plan");
+    ) -> Option<[Path; LANES]>
+    where
+        R: Rows<LANES> + Clone + Send + Sync,
+    {
+        assert!(
+            self.n_frames > 0 && self.dwell > 0 && segment > 0,
+            "nothing to plan"
+        );
         if self.trellis.n_states() == 0 {
             return None;
         }
-        let mut column = Column::start(self.trellis, dwell, rows);
-        let mut trace = Trace::default();
-        let mut play = |column: &mut Column<LANES>, trace: &mut Trace<LANES>, from, to| {
-            trace.restart(from);
-            for t in from..to {
-                column.advance(self, t, rows, trace);
-            }
-        };
-        let mut checkpoints = Vec::new();
-        let starts: Vec<usize> = (1..n_frames).step_by(segment).collect();
-        for &start in &starts {
-            if starts.len() > 1 {
-                checkpoints.push(column.clone());
-            }
-            let end = (start + segment).min(n_frames);
-            play(&mut column, &mut trace, start, end);
-        }
-        let mut walks = Vec::with_capacity(LANES);
+        let n_second = self.n_frames / 2;
+        let n_first = self.n_frames - n_second;
+        let half = |way, n_frames| Half::run(self, way, rows.clone(), n_frames, segment);
+        let (first, second) = rayon::join(
+            || half(Way::Ahead, n_first),
+            || (n_second > 0).then(|| half(Way::Back, n_second)),
+        );
+        let mut meetings = Vec::with_capacity(LANES);
         for lane in 0..LANES {
-            let end = column.cheapest_end(self.trellis, n_frames, lane)?;
-            walks.push(Walk::from_end(self.trellis, n_frames, end));
+            meetings.push(match &second {
+                Some(second) => meeting::across(&first, second, lane)?,
+                None => meeting::end(&first, lane)?,
+            });
         }
-        for (segment_idx, &start) in starts.iter().enumerate().rev() {
-            if segment_idx + 1 < starts.len() {
-                column = checkpoints.swap_remove(segment_idx);
-                play(&mut column, &mut trace, start, starts[segment_idx + 1]);
-            }
-            for (lane, walk) in walks.iter_mut().enumerate() {
-                walk.back_to(start, self.trellis, dwell, &trace, lane);
-            }
+        let meetings: [Meeting; LANES] = meetings.try_into().ok()?;
+        let (mut firsts, seconds) = rayon::join(
+            || first.walk(meetings.map(|meeting| meeting.first)),
+            || second.map(|second| second.walk(meetings.map(|meeting| meeting.second))),
+        );
+        for (first, second) in firsts.iter_mut().zip(seconds.iter().flatten()) {
+            first.extend(second.iter().rev());
         }
-        let paths: Vec<Path> = walks.into_iter().map(Walk::finish).collect();
-        paths.try_into().ok()
+        let mut costs = meetings.iter().map(|meeting| meeting.cost);
+        Some(firsts.map(|states| Path {
+            states,
+            cost: costs.next().unwrap_or(UNREACHED),
+        }))
+    }
+
+    /// The output frame that is gone to after `age` others.
+    fn time(&self, way: Way, age: usize) -> usize {
+        match way {
+            Way::Ahead => age,
+            Way::Back => self.n_frames - 1 - age,
+        }
     }
 }
 

@@ -1,141 +1,133 @@
-//! What led where, and the way back through it (ALGORITHMS.md 6): for each frame the source that
-//! won each jump target, and the runs that ended there cheaper than what continued.
+//! What led where, and the way back through it (ALGORITHMS.md 6): for each frame the source that won
+//! each landing, and the states that were landed on cheaper than continued to.
 
-use super::Path;
-use crate::flock::plan::trellis::Trellis;
+use super::Film;
+use super::shelf::{Sheets, Shelf};
+use crate::flock::plan::landings::{GROUP, Way};
 
 /// What led where, for some frames in a row.
-#[derive(Default)]
-pub(super) struct Trace<const LANES: usize> {
+pub(super) struct Trace<'a, const LANES: usize> {
+    shelf: &'a Shelf,
+    /// The age of the first frame kept.
     first: usize,
-    n_targets: usize,
-    /// `[(t - first) * n_targets + order]`: which of a target's sources.
-    winners: Vec<[u16; LANES]>,
-    /// Where each frame's arrivals begin.
-    arrivals: Vec<usize>,
-    /// States where a run ended, rising; bit `lane`: cheaper than continuing.
-    arrived: Vec<(u32, u8)>,
+    /// Frames kept, and how many there is room for; past those the last is overwritten.
+    n_frames: usize,
+    room: usize,
+    n_landings: usize,
+    n_states: usize,
+    /// By frame and the landings' order, which of a state's jumps; and by frame and state, whether
+    /// landing was cheaper than continuing.
+    sheets: Sheets,
 }
 
-impl<const LANES: usize> Trace<LANES> {
-    /// Forgets all, to begin at frame `first`.
+impl<'a, const LANES: usize> Trace<'a, LANES> {
+    /// With room for so many frames, at least one.
+    pub(super) fn new(film: &Film<'a>, way: Way, room: usize) -> Trace<'a, LANES> {
+        let n_landings = film.trellis.landings(way).n_groups() * GROUP;
+        let n_states = film.trellis.n_states();
+        let room = room.max(1);
+        let (n_ranks, n_wins) = (room * n_landings * LANES, room * n_states * LANES);
+        let (first, n_frames, shelf) = (0, 0, film.shelf);
+        let sheets = shelf.take(n_ranks, n_wins);
+        Trace {
+            shelf,
+            first,
+            n_frames,
+            room,
+            n_landings,
+            n_states,
+            sheets,
+        }
+    }
+
+    /// Bytes that a frame takes.
+    pub(super) fn frame_bytes(film: &Film<'_>, way: Way) -> usize {
+        LANES * (2 * film.trellis.landings(way).n_groups() * GROUP + film.trellis.n_states())
+    }
+
+    /// Forgets all, to begin at the frame of age `first`.
     pub(super) fn restart(&mut self, first: usize) {
-        self.first = first;
-        self.winners.clear();
-        self.arrivals.clear();
-        self.arrived.clear();
+        (self.first, self.n_frames) = (first, 0);
     }
 
-    /// The next frame; gives the place for its winners, in the trellis's order. Its arrivals come now.
+    /// The next frame: the places for its ranks and its wins, all to be written.
     #[inline(always)]
-    pub(super) fn next_frame(&mut self, n_targets: usize) -> &mut [[u16; LANES]] {
-        self.n_targets = n_targets;
-        self.arrivals.push(self.arrived.len());
-        let from = self.winners.len();
-        self.winners.resize(from + n_targets, [0; LANES]);
-        &mut self.winners[from..]
+    pub(super) fn next_frame(&mut self) -> (&mut [[u16; LANES]], &mut [[u8; LANES]]) {
+        self.n_frames = (self.n_frames + 1).min(self.room);
+        let frame = self.n_frames - 1;
+        let (ranks, _) = self.sheets.ranks.as_chunks_mut();
+        let (wins, _) = self.sheets.wins.as_chunks_mut();
+        (
+            &mut ranks[frame * self.n_landings..][..self.n_landings],
+            &mut wins[frame * self.n_states..][..self.n_states],
+        )
     }
 
-    /// Gives the place for up to `most` arrivals of the frame, states rising; `keep` says how many
-    /// of them there are.
-    #[inline(always)]
-    pub(super) fn arrivals(&mut self, most: usize) -> &mut [(u32, u8)] {
-        let from = self.arrived.len();
-        self.arrived.resize(from + most, (0, 0));
-        &mut self.arrived[from..]
-    }
-
-    /// Keeps the first `n_arrived` of the frame's arrivals.
-    #[inline(always)]
-    pub(super) fn keep(&mut self, n_arrived: usize) {
-        let from = self.arrivals.last().copied().unwrap_or(0);
-        self.arrived.truncate(from + n_arrived);
-    }
-
-    fn is_arrival(&self, t: usize, state: u32, lane: usize) -> bool {
-        let idx = t - self.first;
-        let end = self.arrivals.get(idx + 1).copied();
-        let arrived = &self.arrived[self.arrivals[idx]..end.unwrap_or(self.arrived.len())];
-        let found = arrived.binary_search_by_key(&state, |arrival| arrival.0);
-        found.is_ok_and(|at| arrived[at].1 >> lane & 1 == 1)
-    }
-
-    fn winner(&self, t: usize, order: usize, lane: usize) -> usize {
-        usize::from(self.winners[(t - self.first) * self.n_targets + order][lane])
+    /// Which of its jumps led to a state, if one did.
+    fn landing(&self, age: usize, state: usize, order: usize, lane: usize) -> Option<usize> {
+        let frame = age - self.first;
+        let won = self.sheets.wins[(frame * self.n_states + state) * LANES + lane] != 0;
+        let rank = (frame * self.n_landings + order) * LANES + lane;
+        won.then(|| usize::from(self.sheets.ranks[rank]))
     }
 }
 
-/// Where a walk back stands.
-#[derive(Clone, Copy)]
-pub(super) enum Back {
-    /// Free in state `at` at frame `t`.
-    Free { at: usize, t: usize },
-    /// Just landed on target `k` at frame `t`.
-    Landed { k: usize, t: usize },
+impl<const LANES: usize> Drop for Trace<'_, LANES> {
+    fn drop(&mut self) {
+        self.shelf.give_back(std::mem::take(&mut self.sheets));
+    }
 }
 
 /// A path read backward.
 pub(super) struct Walk {
-    path: Path,
-    back: Back,
+    /// The states gone through, by age.
+    states: Vec<u32>,
+    age: usize,
+    state: usize,
+    /// Frames, this one counted, in which nothing landed.
+    held: usize,
 }
 
 impl Walk {
-    /// From the end of the cheapest path.
-    pub(super) fn from_end(trellis: &Trellis, n_frames: usize, (cost, back): (u32, Back)) -> Walk {
-        let mut states = vec![0; n_frames];
-        if let Back::Landed { k, t } = back {
-            lay_run(&mut states[t..], trellis.targets()[k]);
-        }
+    /// From a path's last state, before which nothing landed for `held` frames.
+    pub(super) fn new(n_frames: usize, state: usize, held: usize) -> Walk {
         Walk {
-            path: Path { states, cost },
-            back,
+            states: vec![0; n_frames],
+            age: n_frames - 1,
+            state,
+            held,
         }
     }
 
-    /// Goes on until what led here lies before frame `start`.
+    /// Goes back to the age before `start`, or to the first frame.
     pub(super) fn back_to<const LANES: usize>(
         &mut self,
         start: usize,
-        trellis: &Trellis,
-        dwell: usize,
-        trace: &Trace<LANES>,
+        film: &Film<'_>,
+        way: Way,
+        trace: &Trace<'_, LANES>,
         lane: usize,
     ) {
-        loop {
-            match self.back {
-                Back::Free { at, t } if t >= start => {
-                    if trace.is_arrival(t, at as u32, lane) {
-                        let (target, t) = ((at + 1 - dwell) as u32, t + 1 - dwell);
-                        lay_run(&mut self.path.states[t..t + dwell], target);
-                        let k = trellis.targets().partition_point(|&other| other < target);
-                        self.back = Back::Landed { k, t };
-                    } else {
-                        self.path.states[t] = at as u32;
-                        let (at, t) = (at - 1, t - 1);
-                        self.back = Back::Free { at, t };
-                    }
-                }
-                Back::Landed { k, t } if t >= start => {
-                    let winner = trace.winner(t, trellis.order(k), lane);
-                    let at = trellis.sources(k)[winner].0 as usize;
-                    self.back = Back::Free { at, t: t - 1 };
-                }
-                _ => return,
-            }
+        let landings = film.trellis.landings(way);
+        while self.age >= start {
+            self.states[self.age] = self.state as u32;
+            let order = landings.order(self.state);
+            let landing = match self.held {
+                0 => trace.landing(self.age, self.state, order, lane),
+                _ => None,
+            };
+            (self.state, self.held) = match (landing, way) {
+                (Some(rank), _) => (landings.source(order, rank), film.dwell - 1),
+                (None, Way::Ahead) => (self.state - 1, self.held.saturating_sub(1)),
+                (None, Way::Back) => (self.state + 1, self.held.saturating_sub(1)),
+            };
+            self.age -= 1;
         }
     }
 
-    pub(super) fn finish(mut self) -> Path {
-        if let Back::Free { at, t } = self.back {
-            self.path.states[t] = at as u32;
-        }
-        self.path
-    }
-}
-
-fn lay_run(states: &mut [u32], target: u32) {
-    for (state, shown) in states.iter_mut().zip(target..) {
-        *state = shown;
+    /// The states by age, all of which have been gone back through but the first.
+    pub(super) fn finish(mut self) -> Vec<u32> {
+        self.states[self.age] = self.state as u32;
+        self.states
     }
 }

@@ -1,0 +1,216 @@
+//! What is in the tank besides the flock: goals, obstacles and a predator (ALGORITHMS.md 7), in body lengths.
+
+use super::calibration::Calibration;
+use super::params::{Goal, Obstacle, Predator, Waypoint};
+use super::tank::Tank;
+use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, unit};
+use crate::flock::lens::Lens;
+use crate::flock::params::Params;
+
+/// Between a boid and an obstacle.
+const CLEARANCE_BL: f64 = 0.3;
+/// Whoever is this near a goal is there.
+const THERE_BL: f64 = 2.0;
+/// A hunter's speed and turn rate, in those of the flock's animal.
+const HUNTER_PACE: f64 = 1.3;
+const HUNTER_TURN: f64 = 1.5;
+/// How urgent it is to flee.
+const FLEE_WEIGHT: f64 = 3.0;
+
+/// Goals and obstacles, and how the picture tells where they are.
+#[derive(Clone, Debug)]
+pub struct Habitat<'a> {
+    lens: &'a Lens,
+    tank: &'a Tank,
+    goals: &'a [Goal],
+    obstacles: &'a [Obstacle],
+    predator: Option<&'a Predator>,
+}
+
+/// The predator at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hunter {
+    /// Where it is.
+    pub position: Vec3,
+    velocity: Vec3,
+}
+
+impl<'a> Habitat<'a> {
+    /// What the parameters put into a tank.
+    pub fn new(params: &'a Params, lens: &'a Lens, tank: &'a Tank) -> Habitat<'a> {
+        Habitat {
+            lens,
+            tank,
+            goals: &params.goals,
+            obstacles: &params.obstacles,
+            predator: params.predator.as_ref(),
+        }
+    }
+
+    /// The course to the goals of a time, in cruising speeds; nothing when there are none.
+    pub fn toward_goals(&self, time_s: f64, position: Vec3, velocity: Vec3, cruise: f64) -> Vec3 {
+        let now = self.goals.iter().filter(|goal| {
+            goal.from_s <= time_s && goal.until_s.is_none_or(|until_s| time_s < until_s)
+        });
+        now.fold([0.0; 3], |sum, goal| {
+            let way = minus(self.place(goal.at_px, goal.depth_bl), position);
+            let pace = cruise * (norm(way) / THERE_BL).min(1.0);
+            let gap = minus(scaled(pace, unit(way)), velocity);
+            add_scaled(sum, goal.weight / cruise, gap)
+        })
+    }
+
+    /// Pushes away from obstacles that would be met within `horizon_s`, growing to 1 where they begin.
+    pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
+        self.obstacles.iter().fold([0.0; 3], |push, obstacle| {
+            let (room, outward) = self.room(obstacle, position);
+            let approach = -dot(outward, velocity) * horizon_s;
+            match approach > room.max(0.0) {
+                true => add_scaled(push, (approach - room.max(0.0)) / approach, outward),
+                false => push,
+            }
+        })
+    }
+
+    /// Whether a position is clear of all obstacles.
+    pub fn is_clear(&self, position: Vec3) -> bool {
+        (self.obstacles.iter()).all(|obstacle| self.room(obstacle, position).0 >= -1e-9)
+    }
+
+    /// Puts a position out of the obstacles and inside the tank, and turns back what leads in or out.
+    pub fn keep_out(&self, position: &mut Vec3, velocity: &mut Vec3) {
+        // Between an obstacle and a wall it may take a few rounds; the tank has the last word.
+        for _ in 0..4 {
+            for obstacle in self.obstacles {
+                let (room, outward) = self.room(obstacle, *position);
+                if room < 0.0 {
+                    let inward_speed = dot(outward, *velocity).min(0.0);
+                    *position = add_scaled(*position, -room, outward);
+                    *velocity = add_scaled(*velocity, -2.0 * inward_speed, outward);
+                }
+            }
+            if !self.tank.keep_inside(position, velocity) || self.obstacles.is_empty() {
+                break;
+            }
+        }
+    }
+
+    /// The predator at the start.
+    pub fn hunter(&self) -> Option<Hunter> {
+        let predator = self.predator?;
+        let far_off = [
+            self.tank.corners[0][0],
+            self.tank.middle[1],
+            self.tank.middle[2],
+        ];
+        let position = match predator.path.first() {
+            Some(waypoint) => self.waypoint(waypoint),
+            None => self.tank.on_the_way(self.tank.middle, far_off),
+        };
+        Some(Hunter {
+            position,
+            velocity: [0.0; 3],
+        })
+    }
+
+    /// The predator a step later: along its path, or after the nearest of the flock.
+    pub fn advance(
+        &self,
+        hunter: &mut Hunter,
+        time_s: f64,
+        step_s: f64,
+        flock: &[Vec3],
+        speeds: &Calibration,
+    ) {
+        let path = self.predator.map_or(&[][..], |predator| &predator.path);
+        if !path.is_empty() {
+            hunter.position = self.on_path(path, time_s);
+            return;
+        }
+        let far = |p: &&Vec3| norm(minus(**p, hunter.position));
+        let Some(prey) = flock.iter().min_by(|a, b| far(a).total_cmp(&far(b))) else {
+            return;
+        };
+        let pace = HUNTER_PACE * speeds.cruise_bl_per_s;
+        let wished = scaled(pace, unit(minus(*prey, hunter.position)));
+        let turn_rad = HUNTER_TURN * speeds.turn_rad_per_s * step_s;
+        let aside = [-hunter.velocity[1], hunter.velocity[0], 0.0];
+        let cos_sin = (libm::cos(turn_rad), libm::sin(turn_rad));
+        hunter.velocity = turned_at_most(hunter.velocity, wished, cos_sin, aside);
+        hunter.position = add_scaled(hunter.position, step_s, hunter.velocity);
+        self.keep_out(&mut hunter.position, &mut hunter.velocity);
+    }
+
+    /// The wish to get away from a hunter, growing as it comes near; nothing from beyond the reach.
+    pub fn flee(&self, position: Vec3, hunter: Option<&Hunter>) -> Option<Vec3> {
+        let away = minus(position, hunter?.position);
+        let share = norm(away) / self.predator?.flee_bl();
+        (share < 1.0).then(|| scaled(FLEE_WEIGHT * (1.0 - share), unit(away)))
+    }
+
+    fn on_path(&self, path: &[Waypoint], time_s: f64) -> Vec3 {
+        let next = path.partition_point(|waypoint| waypoint.time_s <= time_s);
+        let [before, after] =
+            [next.saturating_sub(1), next.min(path.len() - 1)].map(|at| &path[at]);
+        let (from, to) = (self.waypoint(before), self.waypoint(after));
+        let span_s = after.time_s - before.time_s;
+        match span_s > 0.0 {
+            true => add_scaled(from, (time_s - before.time_s) / span_s, minus(to, from)),
+            false => from,
+        }
+    }
+
+    fn waypoint(&self, waypoint: &Waypoint) -> Vec3 {
+        self.place(waypoint.at_px, waypoint.depth_bl)
+    }
+
+    fn place(&self, at_px: [f64; 2], depth_bl: Option<f64>) -> Vec3 {
+        let front = self.tank.corners[0][2];
+        let depth = depth_bl.map_or(self.tank.middle[2], |depth| front + depth);
+        self.lens.place_bl(at_px, depth)
+    }
+
+    /// How far a position is from an obstacle with its clearance, negative within, and the unit vector away from it.
+    fn room(&self, obstacle: &Obstacle, position: Vec3) -> (f64, Vec3) {
+        let place = |px| self.lens.place_bl(px, position[2]);
+        let px_per_bl = self.lens.px_per_bl(position[2]);
+        let (middle, half) = match *obstacle {
+            Obstacle::Circle {
+                center_px,
+                radius_px,
+            } => {
+                let out = minus(position, place(center_px));
+                let room = norm(out) - radius_px / px_per_bl - CLEARANCE_BL;
+                return (
+                    room,
+                    if norm(out) > 1e-9 {
+                        unit(out)
+                    } else {
+                        [1.0, 0.0, 0.0]
+                    },
+                );
+            }
+            Obstacle::Box {
+                box_px: [x, y, w, h],
+            } => {
+                let half = [0.5 * w, 0.5 * h].map(|px| px / px_per_bl);
+                (place([x + 0.5 * w, y + 0.5 * h]), half)
+            }
+        };
+        let off = minus(position, middle);
+        let beyond = [0, 1].map(|axis| off[axis].abs() - half[axis]);
+        let sign = [0, 1].map(|axis| if off[axis] < 0.0 { -1.0 } else { 1.0 });
+        if beyond[0] <= 0.0 && beyond[1] <= 0.0 {
+            let axis = usize::from(beyond[1] > beyond[0]);
+            let mut outward = [0.0; 3];
+            outward[axis] = sign[axis];
+            return (beyond[axis] - CLEARANCE_BL, outward);
+        }
+        let out = [
+            sign[0] * beyond[0].max(0.0),
+            sign[1] * beyond[1].max(0.0),
+            0.0,
+        ];
+        (norm(out) - CLEARANCE_BL, unit(out))
+    }
+}

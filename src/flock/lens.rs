@@ -1,0 +1,254 @@
+//! How the tank is seen: from a place in body lengths to a point in the picture, and back to walls
+//! (N 5.1; ALGORITHMS.md 7 and 8).
+//!
+//! In top view, and in a plane, a body length has the same size everywhere. In side view the camera
+//! is the given one, or a usual one before an animal whose size in the picture tells how far it is.
+
+use super::boids::tank::Wall;
+use super::boids::vector::{Vec3, norm};
+use super::individual::rounded;
+use super::params::Params;
+use crate::geometry::Camera;
+use crate::library::{Library, View};
+
+/// Focal length of a usual camera, widths of its picture: what a phone's main camera has.
+const USUAL_FOCAL_WIDTHS: f64 = 1.0;
+/// A silhouette's height is taken as the median over this much time: fins open and close.
+const HEIGHT_SPAN_S: f64 = 0.5;
+
+/// From tank to picture. Places are body lengths: from the picture's corner where it is flat, from the
+/// camera's axis and center otherwise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// A body length (BL) at depth 0 when flat; the flock's measure in the picture in any case.
+    pub length_px: f64,
+    camera: Option<Pinhole>,
+}
+
+/// A camera with the body length as its unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Pinhole {
+    focal_px: f64,
+    center_px: [f64; 2],
+    pane_bl: f64,
+    medium_index: f64,
+    /// Metres to the body length, where they are known.
+    metres: Option<f64>,
+}
+
+impl Lens {
+    /// The lens of a library's picture; flat in top view and where no depth is wanted.
+    pub fn of(library: &Library, params: &Params) -> Lens {
+        let poses = &library.poses;
+        let length_px = rounded(library.stats.length_px.unwrap_or(1.0).max(1.0), 2);
+        let flat = poses.view == View::Top || params.depth_bl == Some(0.0);
+        let known = (poses.camera)
+            .zip(poses.animal)
+            .filter(|_| poses.frames.iter().any(|pose| pose.position_m.is_some()));
+        let pinhole = || match known {
+            Some((camera, animal)) => Pinhole::given(&camera, animal.length_m),
+            None => Pinhole::usual(poses.image_size_px.map(f64::from)),
+        };
+        Lens {
+            length_px,
+            camera: (!flat).then(pinhole),
+        }
+    }
+
+    /// One that shows every place at the same size.
+    #[cfg(test)]
+    pub(crate) fn flat(length_px: f64) -> Lens {
+        Lens {
+            length_px,
+            camera: None,
+        }
+    }
+
+    /// Whether every place has the same size in the picture.
+    pub fn is_flat(&self) -> bool {
+        self.camera.is_none()
+    }
+
+    /// Where in the picture a place is, pixels.
+    pub fn picture_px(&self, place: Vec3) -> [f64; 2] {
+        let px = self.px_per_bl(place[2]);
+        let center = self.camera.map_or([0.0; 2], |camera| camera.center_px);
+        [center[0] + px * place[0], center[1] + px * place[1]]
+    }
+
+    /// The place that is seen at a point of the picture, at a depth.
+    pub fn place_bl(&self, point_px: [f64; 2], depth_bl: f64) -> Vec3 {
+        let px = self.px_per_bl(depth_bl);
+        let center = self.camera.map_or([0.0; 2], |camera| camera.center_px);
+        let [x, y] = [0, 1].map(|axis| (point_px[axis] - center[axis]) / px);
+        [x, y, depth_bl]
+    }
+
+    /// The size of a body length at a depth, pixels.
+    pub fn px_per_bl(&self, depth_bl: f64) -> f64 {
+        match &self.camera {
+            None => self.length_px,
+            Some(camera) => camera.focal_px / camera.apparent_bl(depth_bl),
+        }
+    }
+
+    /// The velocity in the picture, body lengths (of `length_px`) a second, of what moves at `velocity`.
+    pub fn picture_velocity(&self, place: Vec3, velocity: Vec3) -> [f64; 2] {
+        let Some(camera) = &self.camera else {
+            return [velocity[0], velocity[1]];
+        };
+        let apparent = camera.apparent_bl(place[2]);
+        let receding = velocity[2] / camera.medium_index / apparent;
+        let px = camera.focal_px / apparent / self.length_px;
+        [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
+    }
+
+    /// The depth, body lengths from the camera, at which a body length has so many pixels; 0 when flat.
+    pub fn depth_at_bl(&self, px_per_bl: f64) -> f64 {
+        self.camera.map_or(0.0, |camera| {
+            camera.pane_bl
+                + camera.medium_index * (camera.focal_px / px_per_bl.max(1e-6) - camera.pane_bl)
+        })
+    }
+
+    /// The metres of so many body lengths, where they are known.
+    pub fn metres(&self, bl: f64) -> Option<f64> {
+        Some(self.camera?.metres? * bl)
+    }
+
+    /// The wall, `margin_bl` within the tank, that is seen as the line `outward . p = offset_px`: `outward`
+    /// is a unit vector in the picture.
+    pub fn wall(&self, outward: [f64; 2], offset_px: f64, margin_bl: f64) -> Wall {
+        let Some(camera) = &self.camera else {
+            return Wall {
+                outward: [outward[0], outward[1], 0.0],
+                offset_bl: offset_px / self.length_px - margin_bl,
+            };
+        };
+        // outward . (x, y) <= slope (pane + (z - pane) / n): a plane, which need not meet the camera.
+        let [cx, cy] = camera.center_px;
+        let slope = (offset_px - outward[0] * cx - outward[1] * cy) / camera.focal_px;
+        let normal = [outward[0], outward[1], -slope / camera.medium_index];
+        let length = norm(normal);
+        Wall {
+            outward: normal.map(|part| part / length),
+            offset_bl: slope * camera.pane_bl * (1.0 - 1.0 / camera.medium_index) / length
+                - margin_bl,
+        }
+    }
+}
+
+impl Pinhole {
+    fn given(camera: &Camera, length_m: f64) -> Pinhole {
+        Pinhole {
+            focal_px: camera.focal_px(),
+            center_px: camera.center_px,
+            pane_bl: camera.z_min_m / length_m,
+            medium_index: camera.medium_index,
+            metres: Some(length_m),
+        }
+    }
+
+    fn usual(size_px: [f64; 2]) -> Pinhole {
+        Pinhole {
+            focal_px: USUAL_FOCAL_WIDTHS * size_px[0],
+            center_px: size_px.map(|side| side / 2.0),
+            pane_bl: 0.0,
+            medium_index: 1.0,
+            metres: None,
+        }
+    }
+
+    fn apparent_bl(&self, depth_bl: f64) -> f64 {
+        (self.pane_bl + (depth_bl - self.pane_bl) / self.medium_index).max(0.05)
+    }
+}
+
+/// The depth of the animal in every frame, body lengths: from its position where that is known, from the height
+/// of its silhouette otherwise; 0 where neither is, and where the lens is flat.
+pub fn depths_bl(library: &Library, lens: &Lens) -> Vec<f64> {
+    let frames = &library.poses.frames;
+    if lens.is_flat() {
+        return vec![0.0; frames.len()];
+    }
+    if let Some(length_m) = lens.camera.and_then(|camera| camera.metres) {
+        let depth = |pose: &crate::library::Pose| pose.position_m.map_or(0.0, |p| p[2] / length_m);
+        return frames.iter().map(depth).collect();
+    }
+    let heights: Vec<Option<f64>> = frames.iter().map(|pose| pose.height_px).collect();
+    let mut all: Vec<f64> = heights.iter().flatten().copied().collect();
+    let usual_px = median(&mut all).unwrap_or(1.0);
+    let reach = (HEIGHT_SPAN_S * library.poses.fps / 2.0).round() as usize;
+    let depth = |frame: usize| {
+        let around = frame.saturating_sub(reach)..(frame + reach + 1).min(frames.len());
+        let mut near: Vec<f64> = heights[around].iter().flatten().copied().collect();
+        median(&mut near).map_or(0.0, |px| lens.depth_at_bl(lens.length_px * px / usual_px))
+    };
+    (0..frames.len()).map(depth).collect()
+}
+
+fn median(values: &mut [f64]) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::boids::vector::dot;
+    use proptest::prelude::*;
+
+    fn lens(medium_index: f64) -> Lens {
+        let camera = Camera {
+            z_min_m: 0.7,
+            pane_px_per_m: 1000.0,
+            center_px: [320.0, 240.0],
+            medium_index,
+        };
+        Lens {
+            length_px: 90.0,
+            camera: Some(Pinhole::given(&camera, 0.1)),
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn who_is_inside_a_wall_is_seen_inside_its_line(
+            x in -6.0..6.0f64, y in -6.0..6.0f64, z in 7.0..14.0f64,
+            turn in 0.0..std::f64::consts::TAU, offset_px in 0.0..600.0f64, n in 1.0..1.5f64,
+        ) {
+            for lens in [lens(n), Lens::flat(90.0)] {
+                let outward = [libm::cos(turn), libm::sin(turn)];
+                let wall = lens.wall(outward, offset_px, 0.0);
+                let [px, py] = lens.picture_px([x, y, z]);
+                let beyond_px = outward[0] * px + outward[1] * py - offset_px;
+                let beyond_bl = dot(wall.outward, [x, y, z]) - wall.offset_bl;
+                prop_assert!(beyond_px.abs() < 1e-6 || (beyond_px > 0.0) == (beyond_bl > 0.0));
+            }
+        }
+
+        #[test]
+        fn the_velocity_in_the_picture_is_the_rate_of_the_place_in_it(
+            x in -4.0..4.0f64, y in -4.0..4.0f64, z in 7.0..14.0f64,
+            v in prop::array::uniform3(-2.0..2.0f64), n in 1.0..1.5f64,
+        ) {
+            let (lens, dt) = (lens(n), 1e-6);
+            let [from, to] = [0.0, dt].map(|t| {
+                lens.picture_px([x + t * v[0], y + t * v[1], z + t * v[2]])
+            });
+            let velocity = lens.picture_velocity([x, y, z], v);
+            for axis in 0..2 {
+                let rate = (to[axis] - from[axis]) / dt / 90.0;
+                prop_assert!((rate - velocity[axis]).abs() < 1e-3, "{rate} {velocity:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_depth_of_a_size_has_that_size() {
+        for lens in [lens(1.0), lens(4.0 / 3.0)] {
+            let depth = lens.depth_at_bl(60.0);
+            assert!((lens.px_per_bl(depth) - 60.0).abs() < 1e-9);
+        }
+    }
+}
