@@ -9,7 +9,7 @@ use crate::geometry::Rect;
 use crate::library::{Sprites, View};
 use crate::raster::RgbaImage;
 use crate::raster::canvas::straight;
-use crate::raster::resample::{Placement, Premultiplied, Resampled};
+use crate::raster::resample::{Placement, Premultiplied, Resampled, Room};
 use crate::scratch::Full;
 
 /// Room around the largest silhouette.
@@ -96,7 +96,9 @@ fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting, image
     let whole = Rect::of_size(image.width, image.height);
     let matte = Premultiplied::of(&image.pixels, [image.width, image.height], whole, 1.0);
     let mut placed = Resampled::default();
-    placed.draw(&matte, &place, [width, height], Level::detect());
+    let size = [width, height];
+    let room = Room { size, nearer: None };
+    placed.draw(&matte, &place, room, Level::detect());
     let rows = placed.pixels.chunks_exact(placed.rect.w.max(1) as usize);
     for (row, y) in rows.zip(placed.rect.y as usize..) {
         let at = (y * width as usize + placed.rect.x as usize) * 4;

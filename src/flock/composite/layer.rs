@@ -10,8 +10,9 @@ use super::view::View;
 use crate::cpu::Level;
 use crate::flock::individual::{Fade, Individual};
 use crate::library::Sprites;
+use crate::raster::Canvas;
 use crate::raster::blend::{haze, mix};
-use crate::raster::resample::{Placement, Quad, Resampled};
+use crate::raster::resample::{Placement, Quad, Resampled, Room};
 
 /// What drawing needs besides the individual.
 #[derive(Clone, Copy)]
@@ -53,8 +54,15 @@ pub(super) struct Painter {
 
 impl Painter {
     /// Draws an individual's layer for a picture of the film.
-    pub(super) fn paint(&mut self, scene: &Scene, who: &Appearance) {
-        self.paint_shifted(scene, who, scene.view.size_px, [0.0; 2]);
+    /// What is hidden by what is `nearer` may be left out.
+    pub(super) fn paint(&mut self, scene: &Scene, who: &Appearance, nearer: Option<&Canvas>) {
+        let is_bent = who.fade.is_some() && scene.cut == Cut::Morph;
+        let room = Room {
+            size: scene.view.size_px,
+            // Sprites are bent by all that they show.
+            nearer: nearer.filter(|_| !is_bent),
+        };
+        self.paint_shifted(scene, who, room, [0.0; 2]);
         if let Some(veil) = scene.haze {
             let depth_px = who.individual.boid.position_px[who.frame_idx][2].max(0.0);
             haze(
@@ -103,7 +111,8 @@ impl Painter {
         let shift = place
             .center_px
             .map(|px| i64::from(room) - px.floor() as i64);
-        self.paint_shifted(scene, who, size, shift.map(|px| px as f64));
+        let room = Room { size, nearer: None };
+        self.paint_shifted(scene, who, room, shift.map(|px| px as f64));
         let alpha: Vec<u16> = self.layer.pixels.iter().map(|p| p[3] as u16).collect();
         Whole::of(&alpha, self.layer.rect, shift)
     }
@@ -115,13 +124,13 @@ impl Painter {
         rect.is_empty() || clipped_before || rect.right() == width || rect.bottom() == height
     }
 
-    fn paint_shifted(&mut self, scene: &Scene, who: &Appearance, size: [u32; 2], shift: [f64; 2]) {
+    fn paint_shifted(&mut self, scene: &Scene, who: &Appearance, room: Room, shift: [f64; 2]) {
         let (individual, t) = (who.individual, who.frame_idx);
         let mut place = placement(scene, who);
         place.center_px = std::array::from_fn(|k| place.center_px[k] + shift[k]);
         let frame = individual.source_frame[t];
         let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);
-        self.layer.draw(&sprite, &place, size, scene.cpu);
+        self.layer.draw(&sprite, &place, room, scene.cpu);
         let Some(fade) = who.fade else {
             return;
         };
@@ -131,7 +140,7 @@ impl Painter {
         place.mirrored = fade.mirrored;
         let frame = fade.source_frame[k];
         let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);
-        self.second.draw(&sprite, &place, size, scene.cpu);
+        self.second.draw(&sprite, &place, room, scene.cpu);
         if scene.cut == Cut::Morph {
             bend(&mut self.layer, &mut self.second, fade.weight[k]);
         }

@@ -1,10 +1,10 @@
 //! The film of a flock: real frames over the background, only where something is drawn
 //! (ALGORITHMS.md 8).
 //!
-//! Sprites are drawn far to near, ties by id, premultiplied, by Catmull-Rom interpolation; whole
-//! pixels without rotation come out as they are. A frame starts from the background already in the
-//! encoder's form; what is drawn is converted box by box, so the cost follows the area drawn. The ground
-//! truth comes from the same layers.
+//! Sprites are drawn near to far, each under those before it, premultiplied, by Catmull-Rom interpolation:
+//! what is hidden costs nothing, and whole pixels without rotation come out as they are. A frame starts
+//! from the background already in the encoder's form; what is drawn is converted box by box, so the cost
+//! follows the area seen. The ground truth comes from the same layers.
 
 mod backdrop; // what lies behind
 mod bleed; // color beyond the edges of alpha
@@ -77,7 +77,10 @@ pub struct Shot {
 
 /// What one thread draws on and with, kept from frame to frame.
 struct Desk {
+    /// Everyone drawn so far, the nearest first, on nothing.
     canvas: Canvas,
+    /// The same before what lies behind.
+    shown: Canvas,
     dirty: Vec<Rect>,
     painter: Painter,
     drawn: Vec<Drawn>,
@@ -162,14 +165,14 @@ impl<'a> Compositor<'a> {
         let mut desk = self.take_desk();
         self.clean(&mut desk, shot);
         desk.drawn.clear();
-        let order = self.far_to_near(frame_idx);
+        let order = self.near_to_far(frame_idx);
+        for individual in &order {
+            self.draw(self.appearance(individual, frame_idx), &mut desk);
+        }
         if let Some(floor) = &self.floor {
             for individual in &order {
                 self.shade(floor, self.appearance(individual, frame_idx), &mut desk);
             }
-        }
-        for individual in order {
-            self.draw(self.appearance(individual, frame_idx), &mut desk);
         }
         if self.with_truth {
             shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);
@@ -181,15 +184,14 @@ impl<'a> Compositor<'a> {
             .push(desk);
     }
 
-    /// Makes a desk's canvas what lies behind the shot.
+    /// Wipes what was drawn before off a desk, and lays out what lies behind the shot.
     fn clean(&self, desk: &mut Desk, shot: &Shot) {
-        let dirty = std::mem::take(&mut desk.dirty);
-        if shot.behind.planes.is_empty() {
-            for rect in dirty {
-                desk.canvas.copy_box(&self.backdrop.canvas, rect);
-            }
-        } else {
-            desk.canvas = backdrop::filling(&shot.behind.to_rgb(), self.view.size_px);
+        for rect in std::mem::take(&mut desk.dirty) {
+            desk.canvas.clear_box(rect);
+            desk.shown.copy_box(&self.backdrop.canvas, rect);
+        }
+        if !shot.behind.planes.is_empty() {
+            desk.shown = backdrop::filling(&shot.behind.to_rgb(), self.view.size_px);
             desk.dirty.push(self.view.whole());
         }
     }
@@ -198,10 +200,16 @@ impl<'a> Compositor<'a> {
     fn develop(&self, desk: &mut Desk, shot: &mut Shot) {
         merge_overlapping(&mut desk.dirty);
         self.backdrop.begin(shot);
+        let is_plain = shot.behind.planes.is_empty();
         for &rect in &desk.dirty {
+            if is_plain {
+                // Boxes may still overlap: what one has covered the next begins anew.
+                desk.shown.copy_box(&self.backdrop.canvas, rect);
+            }
+            desk.shown.over(&desk.canvas, rect, self.cpu);
             match self.form {
-                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect, self.cpu),
-                Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
+                Form::Planar(_) => shot.frame.draw_canvas(&desk.shown, rect, self.cpu),
+                Form::Straight => desk.shown.straight_into(rect, &mut shot.rgba),
             }
         }
         if self.form == Form::Straight && self.backdrop.is_clear {
@@ -255,20 +263,22 @@ impl<'a> Compositor<'a> {
             .unwrap_or_else(PoisonError::into_inner)
             .pop();
         spare.unwrap_or_else(|| Desk {
-            canvas: self.backdrop.canvas.clone(),
+            canvas: Canvas::new(self.view.size_px[0], self.view.size_px[1]),
+            shown: self.backdrop.canvas.clone(),
             dirty: Vec::new(),
             painter: Painter::default(),
             drawn: Vec::new(),
         })
     }
 
-    fn far_to_near(&self, frame_idx: usize) -> Vec<&'a Individual> {
+    /// Ties by id: the greater one is nearer.
+    fn near_to_far(&self, frame_idx: usize) -> Vec<&'a Individual> {
         let depth = |individual: &&Individual| match &individual.depth_m {
             Some(depth_m) => depth_m[frame_idx],
             None => individual.boid.position_px[frame_idx][2],
         };
         let mut order: Vec<&'a Individual> = self.flock.individuals.iter().collect();
-        order.sort_by(|a, b| depth(b).total_cmp(&depth(a)).then(a.id.cmp(&b.id)));
+        order.sort_by(|a, b| depth(a).total_cmp(&depth(b)).then(b.id.cmp(&a.id)));
         order
     }
 
@@ -293,7 +303,9 @@ impl<'a> Compositor<'a> {
     }
 
     fn draw(&self, who: Appearance, desk: &mut Desk) {
-        desk.painter.paint(&self.scene(), &who);
+        // The truth asks for everyone whole.
+        let nearer = (!self.with_truth).then_some(&desk.canvas);
+        desk.painter.paint(&self.scene(), &who, nearer);
         desk.put(self.cpu);
         if self.with_truth {
             let drawn = desk.painter.drawn(&self.scene(), &who);
@@ -308,10 +320,10 @@ impl<'a> Compositor<'a> {
 }
 
 impl Desk {
-    /// Puts what the painter has drawn over the canvas.
+    /// Puts what the painter has drawn under what is on the canvas.
     fn put(&mut self, cpu: Level) {
         let layer = &self.painter.layer;
-        self.canvas.over(layer, cpu);
+        self.canvas.under(layer, cpu);
         if !layer.rect.is_empty() {
             self.dirty.push(layer.rect);
         }

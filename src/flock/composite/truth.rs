@@ -66,7 +66,7 @@ pub(super) struct Whole {
 }
 
 impl FrameTruth {
-    /// The truth of everyone drawn, far to near; ids are 0..n, each once.
+    /// The truth of everyone drawn, near to far; ids are 0..n, each once.
     pub(super) fn of(drawn: &[Drawn], size_px: [u32; 2]) -> FrameTruth {
         let n_pixels = size_px[0] as usize * size_px[1] as usize;
         let mut truth = FrameTruth {
@@ -76,7 +76,7 @@ impl FrameTruth {
         };
         // What of each pixel is left for those farther.
         let mut left = vec![ONE as u16; n_pixels];
-        for drawn in drawn.iter().rev() {
+        for drawn in drawn {
             truth.seen[drawn.id as usize] = truth.look(drawn, &mut left);
         }
         truth
@@ -190,7 +190,7 @@ mod tests {
     fn the_nearer_hides_the_farther_by_its_alpha() {
         let far = layer(1, rect(0, 0, 4, 2), ONE as u16);
         let near = layer(0, rect(2, 0, 4, 2), 3 * ONE as u16 / 4);
-        let truth = FrameTruth::of(&[far, near], [8, 2]);
+        let truth = FrameTruth::of(&[near, far], [8, 2]);
         assert_eq!(truth.labels[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
         // Half of the far one is covered by three quarters.
         assert!((truth.seen[1].visibility - 0.625).abs() < 1e-4);
@@ -208,14 +208,14 @@ mod tests {
         let box_px = rect(0, 0, 1, 1);
         let far = layer(0, box_px, ONE as u16);
         let near = layer(1, box_px, HALF as u16);
-        assert_eq!(FrameTruth::of(&[far, near], [1, 1]).labels, [2]);
+        assert_eq!(FrameTruth::of(&[near, far], [1, 1]).labels, [2]);
     }
 
     #[test]
     fn whoever_is_wholly_hidden_has_no_label_but_an_extent() {
         let far = layer(0, rect(1, 0, 2, 1), ONE as u16);
         let near = layer(1, rect(0, 0, 4, 1), ONE as u16);
-        let hidden = &FrameTruth::of(&[far, near], [4, 1]).seen[0];
+        let hidden = &FrameTruth::of(&[near, far], [4, 1]).seen[0];
         assert_eq!((hidden.visible_box, hidden.visible_area), (None, 0));
         assert_eq!(
             (hidden.amodal_box, hidden.visibility),
@@ -239,7 +239,7 @@ mod tests {
                 let (x, y) = (at % 12, at / 12);
                 let mut through = 1.0;
                 let mut label = 0;
-                for layer in drawn.iter().rev().filter(|layer| layer.rect.contains(x, y)) {
+                for layer in drawn.iter().filter(|layer| layer.rect.contains(x, y)) {
                     let alpha = f64::from(layer.alpha[0]) / f64::from(ONE);
                     // Rounding decides the ties.
                     if (alpha * through - 0.5f64).abs() < 1e-3 {

@@ -11,20 +11,32 @@ use crate::raster::resample::{ONE, Quad};
 /// Premultiplied pixels over others.
 #[target_feature(enable = "avx2")]
 pub(super) fn over_row(row: &mut [Quad], sprite: &[Quad]) {
-    let one = _mm256_set1_epi16(ONE);
     let (row_fours, row_rest) = row.as_chunks_mut::<4>();
     let (sprite_fours, sprite_rest) = sprite.as_chunks::<4>();
     for (below, above) in row_fours.iter_mut().zip(sprite_fours) {
-        let (above, was) = (load(above), load(below));
-        let alpha = _mm256_shufflehi_epi16::<0xff>(_mm256_shufflelo_epi16::<0xff>(above));
-        let left = _mm256_sub_epi16(one, alpha);
-        // Doubled with saturation: 32767 of 32768 leaves every value as it is.
-        let through = _mm256_adds_epi16(left, left);
-        let sum = _mm256_add_epi16(above, _mm256_mulhrs_epi16(was, through));
-        // SAFETY: `below` is 32 bytes that are ours to write.
-        unsafe { _mm256_storeu_si256(below.as_mut_ptr().cast(), sum) };
+        store(below, four_over(load(above), load(below)));
     }
     super::over_row(row_rest, sprite_rest);
+}
+
+/// Premultiplied pixels under others.
+#[target_feature(enable = "avx2")]
+pub(super) fn under_row(row: &mut [Quad], sprite: &[Quad]) {
+    let (row_fours, row_rest) = row.as_chunks_mut::<4>();
+    let (sprite_fours, sprite_rest) = sprite.as_chunks::<4>();
+    for (above, below) in row_fours.iter_mut().zip(sprite_fours) {
+        store(above, four_over(load(above), load(below)));
+    }
+    super::under_row(row_rest, sprite_rest);
+}
+
+#[target_feature(enable = "avx2")]
+fn four_over(above: __m256i, below: __m256i) -> __m256i {
+    let alpha = _mm256_shufflehi_epi16::<0xff>(_mm256_shufflelo_epi16::<0xff>(above));
+    let left = _mm256_sub_epi16(_mm256_set1_epi16(ONE), alpha);
+    // Doubled with saturation: 32767 of 32768 leaves every value as it is.
+    let through = _mm256_adds_epi16(left, left);
+    _mm256_add_epi16(above, _mm256_mulhrs_epi16(below, through))
 }
 
 /// Luma of the first pixels of a row, eight at a time; returns of how many.
@@ -89,6 +101,12 @@ fn bytes_of(values: __m256i) -> [u8; 8] {
     [
         low[0], low[1], low[2], low[3], high[0], high[1], high[2], high[3],
     ]
+}
+
+#[target_feature(enable = "avx2")]
+fn store(pixels: &mut [Quad; 4], values: __m256i) {
+    // SAFETY: `pixels` is 32 bytes that are ours to write.
+    unsafe { _mm256_storeu_si256(pixels.as_mut_ptr().cast(), values) };
 }
 
 #[target_feature(enable = "avx2")]

@@ -56,14 +56,40 @@ impl Canvas {
         }
     }
 
-    /// Draws a placed sprite over what is there.
-    pub fn over(&mut self, sprite: &Resampled, cpu: Level) {
+    /// Makes a box wholly transparent.
+    pub fn clear_box(&mut self, rect: Rect) {
+        for row in self.rows(rect) {
+            self.pixels[row].fill([0; 4]);
+        }
+    }
+
+    /// Draws a placed sprite under what is there: nearer ones come first.
+    pub fn under(&mut self, sprite: &Resampled, cpu: Level) {
         if sprite.rect.is_empty() {
             return;
         }
         let rows = self.rows(sprite.rect);
         let sprite_rows = sprite.pixels.chunks_exact(sprite.rect.w as usize);
         for (row, sprite_row) in rows.zip(sprite_rows) {
+            let row = &mut self.pixels[row];
+            match cpu {
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+                    #[expect(unsafe_code, reason = "a kernel for AVX2")]
+                    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                    unsafe {
+                        avx2::under_row(row, sprite_row);
+                    }
+                }
+                _ => under_row(row, sprite_row),
+            }
+        }
+    }
+
+    /// Draws a box of another canvas of the same size over what is there.
+    pub fn over(&mut self, above: &Canvas, rect: Rect, cpu: Level) {
+        for row in self.rows(rect) {
+            let sprite_row = &above.pixels[row.clone()];
             let row = &mut self.pixels[row];
             match cpu {
                 #[cfg(target_arch = "x86_64")]
@@ -134,12 +160,21 @@ pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
 /// The definition of what vector instructions do.
 fn over_row(row: &mut [Quad], sprite: &[Quad]) {
     for (below, above) in row.iter_mut().zip(sprite) {
-        // 16384 doubled is one more than fits; 32767 of 32768 leaves every value as it is.
-        let through = (2 * (i32::from(ONE) - i32::from(above[3]))).min(32767) as i16;
-        for channel in 0..4 {
-            below[channel] = above[channel] + scaled(below[channel], through);
-        }
+        *below = one_over(*above, *below);
     }
+}
+
+/// The same, the other way.
+fn under_row(row: &mut [Quad], sprite: &[Quad]) {
+    for (above, below) in row.iter_mut().zip(sprite) {
+        *above = one_over(*above, *below);
+    }
+}
+
+fn one_over(above: Quad, below: Quad) -> Quad {
+    // 16384 doubled is one more than fits; 32767 of 32768 leaves every value as it is.
+    let through = (2 * (i32::from(ONE) - i32::from(above[3]))).min(32767) as i16;
+    std::array::from_fn(|channel| above[channel] + scaled(below[channel], through))
 }
 
 #[cfg(test)]
@@ -166,8 +201,12 @@ mod tests {
         ] {
             for cpu in Level::available() {
                 let mut canvas = Canvas::new(1, 1);
-                canvas.pixels[0] = opaque([100; 3]);
-                canvas.over(&layer(rect, pixel), cpu);
+                canvas.under(&layer(rect, pixel), cpu);
+                let mut shown = Canvas::new(1, 1);
+                shown.pixels[0] = opaque([100; 3]);
+                shown.over(&canvas, rect, cpu);
+                assert_eq!(straight(shown.pixels[0]), want, "{}", cpu.name());
+                canvas.under(&layer(rect, opaque([100; 3])), cpu);
                 assert_eq!(straight(canvas.pixels[0]), want, "{}", cpu.name());
             }
         }
@@ -178,7 +217,7 @@ mod tests {
         let mut canvas = Canvas::new(2, 1);
         let [r, g, b, a] = opaque([200, 100, 40]);
         let quarter = layer(Rect::of_size(1, 1), [r / 4, g / 4, b / 4, a / 4]);
-        canvas.over(&quarter, Level::detect());
+        canvas.under(&quarter, Level::detect());
         let mut rgba = vec![9; 8];
         canvas.straight_into(Rect::of_size(2, 1), &mut rgba);
         assert_eq!(rgba, [200, 100, 40, 64, 9, 9, 9, 0]);
@@ -236,7 +275,8 @@ mod tests {
             sprite.pixels = other.pixels;
             let with = |cpu: Level| {
                 let mut canvas = base.clone();
-                canvas.over(&sprite, cpu);
+                canvas.under(&sprite, cpu);
+                canvas.over(&anything(seed + 5, width, height), rect, cpu);
                 let mut frame = Frame::new(width, height, ColorSpec::default());
                 frame.draw_canvas(&canvas, rect, cpu);
                 (canvas, frame)

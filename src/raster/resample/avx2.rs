@@ -5,17 +5,22 @@
 
 use std::arch::x86_64::*;
 
-use super::catmull_rom::{HALF_PLACE, PLACES, WEIGHTS, WIDE};
+use super::catmull_rom::{HALF_PLACE, PLACES, WEIGHTS, WIDE, is_opaque};
 use super::{ONE, Premultiplied, Quad};
 
 impl Premultiplied {
     #[target_feature(enable = "avx2")]
-    pub(super) fn interpolate_avx2(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+    pub(super) fn interpolate_avx2(
+        &self,
+        (row, hidden): (&mut [Quad], &[Quad]),
+        start: [i32; 2],
+        step: [i32; 2],
+    ) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
-        for pixel in row {
+        for (k, pixel) in row.iter_mut().enumerate() {
             let [from, to] = self.spans[(v >> 16) as usize];
-            if u > from && u < to {
+            if u > from && u < to && !is_opaque(hidden, k) {
                 let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
                 let first = (y - 1) * stride + x - 1;
                 let down = &WEIGHTS[(v >> 8) as usize % PLACES];

@@ -17,10 +17,11 @@ pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
 
 impl Premultiplied {
     /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
-    /// padded pixels. All must lie within reach of the sprite's bounds.
+    /// padded pixels. All must lie within reach of the sprite's bounds. Where `hidden`, if it has anything,
+    /// is opaque, nothing is done.
     pub(super) fn interpolate(
         &self,
-        row: &mut [Quad],
+        (row, hidden): (&mut [Quad], &[Quad]),
         start: [i32; 2],
         step: [i32; 2],
         cpu: Level,
@@ -31,21 +32,26 @@ impl Premultiplied {
                 #[expect(unsafe_code, reason = "a kernel for AVX2")]
                 // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
-                    self.interpolate_avx2(row, start, step);
+                    self.interpolate_avx2((row, hidden), start, step);
                 }
             }
-            _ => self.interpolate_anywhere(row, start, step),
+            _ => self.interpolate_anywhere((row, hidden), start, step),
         }
     }
 
     /// The definition of what vector instructions do.
-    fn interpolate_anywhere(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+    fn interpolate_anywhere(
+        &self,
+        (row, hidden): (&mut [Quad], &[Quad]),
+        start: [i32; 2],
+        step: [i32; 2],
+    ) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
         let taps = self.pixels.as_flattened();
-        for pixel in row {
+        for (k, pixel) in row.iter_mut().enumerate() {
             let [from, to] = self.spans[(v >> 16) as usize];
-            if u > from && u < to {
+            if u > from && u < to && !is_opaque(hidden, k) {
                 let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
                 let first = 4 * ((y - 1) * stride + x - 1);
                 *pixel = blend(
@@ -58,6 +64,12 @@ impl Premultiplied {
             v += step[1];
         }
     }
+}
+
+/// Whether a pixel of a row, which may be empty, lets nothing through.
+#[inline]
+pub(super) fn is_opaque(row: &[Quad], k: usize) -> bool {
+    row.get(k).is_some_and(|pixel| pixel[3] >= ONE)
 }
 
 /// Down the columns first, then along the row.

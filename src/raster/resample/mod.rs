@@ -15,6 +15,7 @@ pub(super) use catmull_rom::scaled;
 pub use premultiplied::{Premultiplied, bounds_of};
 
 use self::map::Map;
+use super::Canvas;
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
@@ -37,6 +38,15 @@ pub struct Placement {
     pub mirrored: bool,
 }
 
+/// What a sprite is drawn into.
+#[derive(Clone, Copy, Debug)]
+pub struct Room<'a> {
+    /// Width and height of the picture.
+    pub size: [u32; 2],
+    /// What is nearer, on a canvas of that size: pixels that are opaque there are not drawn.
+    pub nearer: Option<&'a Canvas>,
+}
+
 /// A placed sprite: premultiplied pixels of a box of the picture.
 #[derive(Clone, Debug, Default)]
 pub struct Resampled {
@@ -47,11 +57,11 @@ pub struct Resampled {
 }
 
 impl Resampled {
-    /// Draws a placed sprite, clipped to a picture of `size` pixels, reusing memory. The sprite must
-    /// have been filled for the placement's scale.
-    pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, size: [u32; 2], cpu: Level) {
+    /// Draws a placed sprite, clipped to its room, reusing memory. The sprite must have been made for the
+    /// placement's scale.
+    pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, room: Room, cpu: Level) {
         let map = Map::new(sprite, place);
-        self.rect = map.covered(sprite, size);
+        self.rect = map.covered(sprite, room.size);
         self.pixels.clear();
         self.pixels.resize(self.rect.area() as usize, [0; 4]);
         if self.rect.is_empty() {
@@ -65,7 +75,11 @@ impl Resampled {
             if from < to {
                 let first: [f64; 2] =
                     std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
-                sprite.interpolate(&mut row[from..to], first.map(fixed), step, cpu);
+                let at = y as usize * room.size[0] as usize + self.rect.x as usize;
+                let hidden = room
+                    .nearer
+                    .map_or(&[][..], |c| &c.pixels[at + from..at + to]);
+                sprite.interpolate((&mut row[from..to], hidden), first.map(fixed), step, cpu);
             }
         }
     }

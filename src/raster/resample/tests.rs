@@ -32,7 +32,8 @@ fn drawn_with(rgba: &[u8], (w, h): (u32, u32), place: &Placement, cpu: Level) ->
     let bounds = bounds_of(rgba, w);
     let sprite = Premultiplied::of(&cut(rgba, w, bounds), [w, h], bounds, place.scale);
     let mut resampled = Resampled::default();
-    resampled.draw(&sprite, place, [40, 30], cpu);
+    let size = [40, 30];
+    resampled.draw(&sprite, place, Room { size, nearer: None }, cpu);
     resampled
 }
 
@@ -168,6 +169,37 @@ fn what_lies_outside_the_picture_is_not_drawn() {
     assert!(drawn(&rgba, (6, 4), &place([-30.0, 5.0])).rect.is_empty());
     let corner = drawn(&rgba, (6, 4), &place([0.0, 0.0]));
     assert_eq!((corner.rect.x, corner.rect.y), (0, 0));
+}
+
+#[test]
+fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
+    let turned = Placement {
+        rotation_rad: 0.4,
+        ..place([20.0, 14.0])
+    };
+    let mut nearer = Canvas::new(40, 30);
+    for (k, pixel) in nearer.pixels.iter_mut().enumerate() {
+        pixel[3] = [0, ONE - 1, ONE][k % 3];
+    }
+    let bounds = Rect::of_size(12, 12);
+    let sprite = Premultiplied::of(&square(), [12, 12], bounds, 1.0);
+    for cpu in Level::available() {
+        let (mut all, mut rest) = (Resampled::default(), Resampled::default());
+        let size = [40, 30];
+        all.draw(&sprite, &turned, Room { size, nearer: None }, cpu);
+        let nearer = Some(&nearer);
+        rest.draw(&sprite, &turned, Room { size, nearer }, cpu);
+        assert_eq!(all.rect, rest.rect);
+        let mut n_hidden = 0;
+        let rect = all.rect;
+        for (k, (all, rest)) in (0u32..).zip(all.pixels.iter().zip(&rest.pixels)) {
+            let at = (rect.y + k / rect.w) * 40 + rect.x + k % rect.w;
+            let is_hidden = at % 3 == 2;
+            assert_eq!(*rest, if is_hidden { [0; 4] } else { *all });
+            n_hidden += usize::from(is_hidden && all[3] > 0);
+        }
+        assert!(n_hidden > 5, "{n_hidden}");
+    }
 }
 
 #[test]
