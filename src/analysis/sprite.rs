@@ -170,3 +170,62 @@ fn visible(pixel: [u8; 4]) -> [u8; 4] {
         _ => pixel,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Camera;
+    use crate::library::Pose;
+
+    fn poses(frames: Vec<Pose>) -> Poses {
+        Poses {
+            tail_beat: None,
+            // So slow that every frame is looked at by itself.
+            fps: 1.0,
+            image_size_px: [640, 480],
+            view: View::Side,
+            camera: None,
+            animal: None,
+            frames,
+        }
+    }
+
+    #[test]
+    fn who_looks_half_as_tall_is_enlarged_but_not_beyond_the_limit_and_who_was_not_seen_stays() {
+        let of_height = |height_px| Pose {
+            height_px,
+            ..Pose::default()
+        };
+        let heights = [
+            Some(40.0),
+            Some(32.0),
+            Some(80.0),
+            Some(10.0),
+            None,
+            Some(40.0),
+            Some(40.0),
+        ];
+        let frames = heights.map(of_height).to_vec();
+        assert_eq!(scales(&poses(frames)), [1.0, 1.25, 0.5, 1.5, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn where_depth_was_measured_it_decides_and_not_the_fins() {
+        let at = |z_m| Pose {
+            position_m: Some([0.0, 0.0, z_m]),
+            height_px: Some(1000.0 * z_m * z_m),
+            ..Pose::default()
+        };
+        let camera = Camera {
+            z_min_m: 0.7,
+            pane_px_per_m: 1000.0,
+            center_px: [320.0, 240.0],
+            medium_index: 1.0,
+        };
+        let poses = Poses {
+            camera: Some(camera),
+            ..poses(vec![at(0.8), at(1.0), at(1.2)])
+        };
+        assert_eq!(scales(&poses), [0.8, 1.0, 1.2]);
+    }
+}
