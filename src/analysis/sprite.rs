@@ -148,9 +148,8 @@ fn draw(
         scale,
         mirrored: false,
     };
-    let mut matte = Premultiplied::default();
     let whole = Rect::of_size(image.width, image.height);
-    matte.fill(&image.pixels, [image.width, image.height], whole, scale);
+    let matte = Premultiplied::of(&image.pixels, [image.width, image.height], whole, scale);
     let mut placed = Resampled::default();
     placed.draw(&matte, &place, [width, height], Level::detect());
     let rows = placed.pixels.chunks_exact(placed.rect.w.max(1) as usize);

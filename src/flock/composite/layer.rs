@@ -4,18 +4,20 @@
 use super::morph::bend;
 use super::params::Cut;
 use super::shadow::Floor;
+use super::stock::Stock;
 use super::truth::{Drawn, Whole};
 use super::view::View;
 use crate::cpu::Level;
 use crate::flock::individual::{Fade, Individual};
 use crate::library::Sprites;
 use crate::raster::blend::{haze, mix};
-use crate::raster::resample::{Placement, Premultiplied, Quad, Resampled};
+use crate::raster::resample::{Placement, Quad, Resampled};
 
 /// What drawing needs besides the individual.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub(super) sprites: &'a Sprites,
+    pub(super) stock: &'a Stock,
     pub(super) view: View,
     pub(super) cpu: Level,
     pub(super) cut: Cut,
@@ -43,7 +45,6 @@ pub(super) struct Appearance<'a> {
 #[derive(Default)]
 pub(super) struct Painter {
     packed: Vec<u8>,
-    sprite: Premultiplied,
     /// What was drawn last.
     pub(super) layer: Resampled,
     second: Resampled,
@@ -69,7 +70,7 @@ impl Painter {
         floor.draw(who, &scene.view, &mut self.layer);
     }
 
-    /// What was painted last, as the ground truth needs it.
+    /// What was painted last, as the ground truth needs it; the layer is used up.
     pub(super) fn drawn(&mut self, scene: &Scene, who: &Appearance) -> Drawn {
         let place = placement(scene, who);
         let alpha = self.layer.pixels.iter().map(|pixel| pixel[3] as u16);
@@ -104,9 +105,7 @@ impl Painter {
             .map(|px| i64::from(room) - px.floor() as i64);
         self.paint_shifted(scene, who, size, shift.map(|px| px as f64));
         let alpha: Vec<u16> = self.layer.pixels.iter().map(|p| p[3] as u16).collect();
-        let whole = Whole::of(&alpha, self.layer.rect, shift);
-        self.paint(scene, who);
-        whole
+        Whole::of(&alpha, self.layer.rect, shift)
     }
 
     /// A box that ends inside of the picture on every side has not been clipped.
@@ -120,8 +119,9 @@ impl Painter {
         let (individual, t) = (who.individual, who.frame_idx);
         let mut place = placement(scene, who);
         place.center_px = std::array::from_fn(|k| place.center_px[k] + shift[k]);
-        self.take(scene, individual.source_frame[t], place.scale);
-        self.layer.draw(&self.sprite, &place, size, scene.cpu);
+        let frame = individual.source_frame[t];
+        let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);
+        self.layer.draw(&sprite, &place, size, scene.cpu);
         let Some(fade) = who.fade else {
             return;
         };
@@ -129,8 +129,9 @@ impl Painter {
         place.rotation_rad = fade.rotation_rad[k];
         place.scale = fade.scale[k] * scene.view.scale;
         place.mirrored = fade.mirrored;
-        self.take(scene, fade.source_frame[k], place.scale);
-        self.second.draw(&self.sprite, &place, size, scene.cpu);
+        let frame = fade.source_frame[k];
+        let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);
+        self.second.draw(&sprite, &place, size, scene.cpu);
         if scene.cut == Cut::Morph {
             bend(&mut self.layer, &mut self.second, fade.weight[k]);
         }
@@ -140,13 +141,6 @@ impl Painter {
             fade.weight[k],
             &mut self.mixed,
         );
-    }
-
-    fn take(&mut self, scene: &Scene, frame: u32, scale: f64) {
-        let sprites = scene.sprites;
-        let bounds = sprites.read_cut(frame as usize, &mut self.packed);
-        let size = [sprites.width(), sprites.height()];
-        self.sprite.fill(&self.packed, size, bounds, scale);
     }
 }
 

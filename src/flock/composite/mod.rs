@@ -12,6 +12,7 @@ mod layer; // one individual in one frame
 mod morph; // two sprites bent to each other at a jump
 pub mod params;
 mod shadow; // on the floor
+mod stock; // sprites ready to be drawn
 pub mod truth; // what of whom can be seen
 mod view; // from pixels of the footage to those of the film
 
@@ -24,6 +25,7 @@ use self::bleed::bleed;
 use self::layer::{Appearance, Haze, Painter, Scene};
 use self::params::Background;
 use self::shadow::Floor;
+use self::stock::Stock;
 use self::truth::{Drawn, FrameTruth};
 use self::view::View;
 use super::individual::{Fade, Individual};
@@ -43,6 +45,7 @@ pub struct Compositor<'a> {
     backdrop: Backdrop,
     haze: Option<Haze>,
     floor: Option<Floor>,
+    stock: Stock,
     cpu: Level,
     n_frames: usize,
     /// Per individual and output frame: which of its fades concerns it.
@@ -105,6 +108,7 @@ impl<'a> Compositor<'a> {
                 color: opaque(backdrop::mean(&library.background)),
             }),
             floor: (render.shadow > 0.0).then_some(floor),
+            stock: Stock::default(),
             cpu: Level::detect(),
             n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
@@ -277,9 +281,10 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    fn scene(&self) -> Scene<'a> {
+    fn scene(&self) -> Scene<'_> {
         Scene {
             sprites: &self.library.sprites,
+            stock: &self.stock,
             view: self.view,
             cpu: self.cpu,
             cut: self.flock.params.render.cut,

@@ -19,10 +19,12 @@ impl Premultiplied {
                 let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
                 let first = (y - 1) * stride + x - 1;
                 let down = &WEIGHTS[(v >> 8) as usize % PLACES];
+                let block = &self.pixels[first..first + 3 * stride + 4];
                 let tap = |k: usize| {
-                    let taps = &self.pixels[first + k * stride..][..4];
+                    // SAFETY: k is at most 3, so the four pixels read lie within `block`.
+                    let taps = unsafe { block.as_ptr().add(k * stride) };
                     // SAFETY: four pixels are 32 bytes that can be read.
-                    let taps = unsafe { _mm256_loadu_si256(taps.as_ptr().cast()) };
+                    let taps = unsafe { _mm256_loadu_si256(taps.cast()) };
                     _mm256_mulhrs_epi16(taps, _mm256_set1_epi16(down[k]))
                 };
                 let column = _mm256_add_epi16(

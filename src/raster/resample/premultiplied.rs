@@ -10,6 +10,8 @@ pub(super) const PAD: usize = 4;
 pub(super) const REACH: usize = 2;
 /// Below this scale a sprite is halved first.
 const LEAST_SCALE: f64 = 0.6;
+/// A sprite is a dot by then.
+const MOST_HALVED: u32 = 8;
 
 /// A sprite, premultiplied, where it shows anything.
 #[derive(Clone, Debug, Default)]
@@ -25,14 +27,36 @@ pub struct Premultiplied {
     /// Per row: the columns, in 65536ths, between which interpolation finds anything; from above to when
     /// it finds nothing.
     pub(super) spans: Vec<[i32; 2]>,
-    /// The level before, while the next one is made.
-    finer: Vec<Quad>,
 }
 
 impl Premultiplied {
     /// Takes what a straight-alpha RGBA sprite of `size` pixels shows within `bounds` (rows of that
-    /// box), for being drawn at `scale`. Reuses memory.
-    pub fn fill(&mut self, rgba: &[u8], size: [u32; 2], bounds: Rect, scale: f64) {
+    /// box), for being drawn at `scale`.
+    pub fn of(rgba: &[u8], size: [u32; 2], bounds: Rect, scale: f64) -> Premultiplied {
+        let mut sprite = Premultiplied::default();
+        sprite.fill(rgba, size, bounds);
+        if sprite.bounds[2] > 0 {
+            (0..Premultiplied::level_for(scale)).for_each(|_| sprite.halve());
+        }
+        sprite.find_spans();
+        sprite
+    }
+
+    /// How often a sprite that is drawn at `scale` is halved.
+    pub fn level_for(scale: f64) -> u32 {
+        let mut level = 0;
+        while level < MOST_HALVED && scale * f64::from(1u32 << level) < LEAST_SCALE {
+            level += 1;
+        }
+        level
+    }
+
+    /// Memory that it takes.
+    pub fn n_bytes(&self) -> usize {
+        size_of_val(&*self.pixels) + size_of_val(&*self.spans)
+    }
+
+    fn fill(&mut self, rgba: &[u8], size: [u32; 2], bounds: Rect) {
         self.size = size;
         self.level = 0;
         let edges = [bounds.x, bounds.y, bounds.right(), bounds.bottom()];
@@ -46,12 +70,6 @@ impl Premultiplied {
                 *out = premultiplied(pixel);
             }
         }
-        let mut scale = scale;
-        while scale < LEAST_SCALE && self.bounds[2] > 0 && self.level < 8 {
-            self.halve();
-            scale *= 2.0;
-        }
-        self.find_spans();
     }
 
     /// Columns of `pixels`.
@@ -67,7 +85,7 @@ impl Premultiplied {
 
     /// The next level: means of two by two pixels.
     fn halve(&mut self) {
-        std::mem::swap(&mut self.finer, &mut self.pixels);
+        let finer = std::mem::take(&mut self.pixels);
         let (before, stride_before) = (self.bounds, self.stride());
         let [left, top, right, bottom] = before;
         self.bounds = [left / 2, top / 2, right.div_ceil(2), bottom.div_ceil(2)];
@@ -81,7 +99,7 @@ impl Premultiplied {
                 let at = (2 * y + PAD - before[1]) * stride_before + 2 * x + PAD - before[0];
                 let block = [at, at + 1, at + stride_before, at + stride_before + 1];
                 let mut sum = [2i32; 4];
-                for pixel in block.map(|at| self.finer[at]) {
+                for pixel in block.map(|at| finer[at]) {
                     for (sum, value) in sum.iter_mut().zip(pixel) {
                         *sum += i32::from(value);
                     }

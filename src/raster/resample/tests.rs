@@ -29,9 +29,8 @@ fn cut(rgba: &[u8], width: u32, bounds: Rect) -> Vec<u8> {
 }
 
 fn drawn_with(rgba: &[u8], (w, h): (u32, u32), place: &Placement, cpu: Level) -> Resampled {
-    let mut sprite = Premultiplied::default();
     let bounds = bounds_of(rgba, w);
-    sprite.fill(&cut(rgba, w, bounds), [w, h], bounds, place.scale);
+    let sprite = Premultiplied::of(&cut(rgba, w, bounds), [w, h], bounds, place.scale);
     let mut resampled = Resampled::default();
     resampled.draw(&sprite, place, [40, 30], cpu);
     resampled

@@ -30,14 +30,11 @@ fn a_flock_of_one_along_its_own_path_is_the_footage() {
         let seen = &shot.truth.seen[0];
         let [x, y, w, h] = seen.amodal_box.unwrap();
         let known = library.poses.frames[frame_idx].box_px.unwrap();
-        let edges = [x, y, x + w, y + h];
-        let wanted = [known.x, known.y, known.right(), known.bottom()].map(i64::from);
-        for (edge, wanted) in edges.iter().zip(wanted) {
-            assert!(
-                (edge - wanted).abs() <= 4,
-                "frame {frame_idx}: {edges:?} {wanted}"
-            );
-        }
+        // The silhouette's box has what is hardly there too.
+        let known = [known.x, known.y, known.right(), known.bottom()].map(i64::from);
+        let inside = x >= known[0] - 2 && y >= known[1] - 2;
+        let inside = inside && x + w <= known[2] + 2 && y + h <= known[3] + 2;
+        assert!(inside, "frame {frame_idx}: {:?} {known:?}", seen.amodal_box);
     }
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     assert!(mean < 2.0, "{mean}");

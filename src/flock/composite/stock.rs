@@ -1,0 +1,81 @@
+//! Sprites ready to be drawn, kept while there is room: most are shown several times by several
+//! individuals (ALGORITHMS.md 8). What is kept is bounded, however long the footage and the film.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::library::Sprites;
+use crate::raster::resample::Premultiplied;
+
+/// What is kept at most.
+const MOST_BYTES: usize = 96 << 20;
+
+/// Premultiplied sprites by frame and level.
+#[derive(Default)]
+pub(super) struct Stock {
+    shelf: Mutex<Shelf>,
+}
+
+#[derive(Default)]
+struct Shelf {
+    sprites: HashMap<(u32, u32), Arc<Premultiplied>>,
+    n_bytes: usize,
+}
+
+impl Stock {
+    /// The sprite of a frame for being drawn at `scale`. `packed` is lent.
+    pub(super) fn take(
+        &self,
+        sprites: &Sprites,
+        frame: u32,
+        scale: f64,
+        packed: &mut Vec<u8>,
+    ) -> Arc<Premultiplied> {
+        let key = (frame, Premultiplied::level_for(scale));
+        let kept = self.with(|shelf| shelf.sprites.get(&key).cloned());
+        kept.unwrap_or_else(|| {
+            let bounds = sprites.read_cut(frame as usize, packed);
+            let size = [sprites.width(), sprites.height()];
+            let sprite = Arc::new(Premultiplied::of(packed, size, bounds, scale));
+            self.with(|shelf| shelf.keep(key, &sprite));
+            sprite
+        })
+    }
+
+    fn with<T>(&self, work: impl FnOnce(&mut Shelf) -> T) -> T {
+        work(&mut self.shelf.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Shelf {
+    fn keep(&mut self, key: (u32, u32), sprite: &Arc<Premultiplied>) {
+        let n_bytes = sprite.n_bytes();
+        if self.n_bytes + n_bytes > MOST_BYTES {
+            self.sprites.clear();
+            self.n_bytes = 0;
+        }
+        if self.sprites.insert(key, Arc::clone(sprite)).is_none() {
+            self.n_bytes += n_bytes;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::synthetic;
+    use crate::library::View;
+
+    #[test]
+    fn a_sprite_is_made_once_for_each_level_and_the_shelf_never_overflows() {
+        let library = synthetic::library(View::Side);
+        let (stock, mut packed) = (Stock::default(), Vec::new());
+        let mut take = |frame, scale| stock.take(&library.sprites, frame, scale, &mut packed);
+        let first = take(3, 1.0);
+        assert!(Arc::ptr_eq(&first, &take(3, 0.9)));
+        assert!(!Arc::ptr_eq(&first, &take(3, 0.5)));
+        stock.with(|shelf| shelf.n_bytes = MOST_BYTES);
+        take(4, 1.0);
+        stock.with(|shelf| assert!(shelf.n_bytes < MOST_BYTES && shelf.sprites.len() == 1));
+    }
+}
