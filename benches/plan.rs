@@ -134,6 +134,7 @@ fn made_library() -> Library {
         clip_frames: 8,
         epsilon: EPSILON,
         natural_step: EPSILON / 2,
+        sprite_scale: None,
         transitions: Vec::new(),
         patches: Vec::new(),
         playback: Playback {

@@ -33,14 +33,14 @@ pub mod stats;
 pub mod transition;
 
 pub use error::Error;
-use params::CutSprites;
 pub use params::Params;
+use params::{CutSprites, ScaleMode};
 
 use std::sync::Arc;
 
 use crate::cpu;
 use crate::footage::FrameSource;
-use crate::library::{Library, LibraryStats};
+use crate::library::{Library, LibraryStats, View};
 use crate::progress::Progress;
 use crate::raster::RgbImage;
 use crate::scratch::Scratch;
@@ -74,18 +74,28 @@ pub fn analyze(
     let view = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
-    let (poses, sprites) = rayon::join(
-        || {
-            let mut poses = pose::measure(&track.frames, view, &source.format(), params);
-            midline::trace(&mut poses, &track);
-            poses.tail_beat = midline::tail_beat::measure(&poses);
-            poses
-        },
-        || match animal_too_small {
-            true => Ok(sprite::none(track.frames.len())),
-            false => sprite::align(&track, view),
-        },
-    );
+    let measured = || {
+        let mut poses = pose::measure(&track.frames, view, &source.format(), params);
+        midline::trace(&mut poses, &track);
+        poses.tail_beat = midline::tail_beat::measure(&poses);
+        poses
+    };
+    let cut_out = |scales: Option<&[f64]>| match animal_too_small {
+        true => Ok(sprite::none(track.frames.len())),
+        false => sprite::align(&track, view, scales),
+    };
+    let (poses, sprite_scale, sprites) = match params.scale_mode {
+        ScaleMode::Depth if view == View::Side => {
+            let poses = measured();
+            let scales = sprite::scales(&poses);
+            let sprites = cut_out(Some(&scales));
+            (poses, Some(scales), sprites)
+        }
+        _ => {
+            let (poses, sprites) = rayon::join(measured, || cut_out(None));
+            (poses, None, sprites)
+        }
+    };
     let sprites = sprites?;
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
@@ -99,6 +109,7 @@ pub fn analyze(
         poses,
         background: plate.rgb,
         sprites,
+        sprite_scale,
         clip_frames: connections.clip_frames,
         epsilon: connections.epsilon,
         natural_step: connections.natural_step,

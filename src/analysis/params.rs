@@ -25,6 +25,8 @@ pub struct Params {
     pub follow: Follow,
     /// Whether sprites are cut out of an animal too small to be looked at.
     pub sprites: CutSprites,
+    /// At which size sprites are cut out.
+    pub scale_mode: ScaleMode,
     /// Where the head is, once and for all, in one frame: decides between head and tail.
     pub head: Option<HeadParam>,
     /// Smooth positions and directions over time; off gives each frame's raw values.
@@ -47,6 +49,17 @@ pub struct Params {
     pub eq7: Eq7,
     /// How axis and head are told: `corrected`, or as N and O are `printed`.
     pub axis_and_head: AxisAndHead,
+}
+
+/// At which size sprites are cut out (ALGORITHMS.md 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ScaleMode {
+    /// As filmed (O).
+    Native,
+    /// In side view at one height, as if the animal had always been as far from the camera, so that what it does
+    /// far away compares with what it does near by. Enlarged at most 1.5 times. From above as filmed.
+    Depth,
 }
 
 /// From where the animal is seen.
@@ -178,6 +191,7 @@ impl Default for Params {
             search: Search::Window,
             follow: Follow::One,
             sprites: CutSprites::Auto,
+            scale_mode: ScaleMode::Native,
             head: None,
             smooth: true,
             clip_frames: None,

@@ -6,7 +6,7 @@ use super::sighting::Sighting;
 use super::tracking::{Track, Tracked};
 use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::library::{Sprites, View};
+use crate::library::{Poses, Sprites, View};
 use crate::raster::RgbaImage;
 use crate::raster::canvas::straight;
 use crate::raster::resample::{Placement, Premultiplied, Resampled, Room};
@@ -19,19 +19,65 @@ const LEAST_AREA_PX: f64 = 24.0;
 /// Sides are multiples of this.
 const MULTIPLE: u32 = 8;
 
-/// The sprites of a track. The box holds the largest extent from the centroid over the frames in
+/// Sprites of one height: never enlarged by more, nor reduced by more.
+const SCALES: [f64; 2] = [0.25, 1.5];
+/// A height is the median over so much time: fins open and close.
+const HEIGHT_SPAN_S: f64 = 0.5;
+
+/// The size of every frame's sprite relative to the frame at which the animal has its median height; by its depth
+/// where that was measured. To 5 decimals, as files hold them.
+pub fn scales(poses: &Poses) -> Vec<f64> {
+    let frames = &poses.frames;
+    let reach = (HEIGHT_SPAN_S * poses.fps / 2.0).round() as usize;
+    let near = |frame: usize| {
+        let around = frame.saturating_sub(reach)..(frame + reach + 1).min(frames.len());
+        median(frames[around].iter().filter_map(|pose| pose.height_px))
+    };
+    let depth = |frame: usize| {
+        let z_m = frames[frame].position_m?[2];
+        Some(poses.camera?.apparent_from_true_depth_m(z_m))
+    };
+    // What grows as the animal gets smaller in the picture.
+    let is_deep = frames.iter().any(|pose| pose.position_m.is_some());
+    let farness: Vec<Option<f64>> = (0..frames.len())
+        .map(|frame| match is_deep {
+            true => depth(frame),
+            false => near(frame).map(|height_px| 1.0 / height_px),
+        })
+        .collect();
+    let usual = median(farness.iter().flatten().copied()).unwrap_or(1.0);
+    let scale = |far: &Option<f64>| {
+        let scale = far.map_or(1.0, |far| (far / usual).clamp(SCALES[0], SCALES[1]));
+        (scale * 1e5).round() / 1e5
+    };
+    farness.iter().map(scale).collect()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// The sprites of a track, of the size filmed or of `scales`. The box holds the largest extent from the centroid over the frames in
 /// which the animal is not cut off; from above it is a square that holds the animal at any turn.
 ///
 /// The centroid's sub-pixel rest is interpolated by Catmull and Rom's curve in premultiplied alpha: a sprite
 /// is drawn between pixels once more, and would be soft if either step were bilinear.
-pub fn align(track: &Track, view: View) -> Result<Sprites, Full> {
-    let size = common_size(&track.frames, view);
+pub fn align(track: &Track, view: View, scales: Option<&[f64]>) -> Result<Sprites, Full> {
+    let scale = |frame_idx: usize| scales.map_or(1.0, |scales| scales[frame_idx]);
+    let size = common_size(&track.frames, view, &scale);
     let n_frames = track.frames.len();
     let scratch = Arc::clone(&track.scratch);
     Sprites::drawn(size, n_frames, scratch, |frame_idx, sprite| {
         let sighting = track.frames[frame_idx].sighting.as_ref();
         if let Some(sighting) = sighting {
-            draw(sprite, size, sighting, &track.image(sighting));
+            draw(
+                sprite,
+                size,
+                &track.image(sighting),
+                (sighting, scale(frame_idx)),
+            );
         }
         Ok(sighting.is_some())
     })
@@ -52,11 +98,15 @@ pub fn none(n_frames: usize) -> Sprites {
     Sprites::missing(MULTIPLE, MULTIPLE, n_frames)
 }
 
-fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
-    let all = || track.iter().filter_map(|t| t.sighting.as_ref());
-    let reach = |sightings: &mut dyn Iterator<Item = &Sighting>| {
+fn common_size(track: &[Tracked], view: View, scale: &dyn Fn(usize) -> f64) -> [u32; 2] {
+    let seen = |(idx, tracked): (usize, &Tracked)| {
+        let sighting = tracked.sighting.as_ref()?;
+        Some((sighting.cut, sighting.reach_px.map(|px| px * scale(idx))))
+    };
+    let all = || track.iter().enumerate().filter_map(seen);
+    let reach = |sightings: &mut dyn Iterator<Item = (bool, [f64; 3])>| {
         sightings
-            .map(|s| s.reach_px)
+            .map(|seen| seen.1)
             .fold([0.0f64; 3], |most, reach| {
                 [
                     most[0].max(reach[0]),
@@ -65,7 +115,7 @@ fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
                 ]
             })
     };
-    let whole = reach(&mut all().filter(|s| !s.cut));
+    let whole = reach(&mut all().filter(|seen| !seen.0));
     // An animal that is never seen whole has sprites all the same.
     let [x, y, radius] = if whole[2] > 0.0 {
         whole
@@ -80,21 +130,26 @@ fn common_size(track: &[Tracked], view: View) -> [u32; 2] {
 }
 
 /// Draws a matte into a sprite, its centroid at the middle.
-fn draw(sprite: &mut [u8], [width, height]: [u32; 2], sighting: &Sighting, image: &RgbaImage) {
+fn draw(
+    sprite: &mut [u8],
+    [width, height]: [u32; 2],
+    image: &RgbaImage,
+    (sighting, scale): (&Sighting, f64),
+) {
     let rect = sighting.rect;
     let [cx, cy] = sighting.moments.centroid_px;
     let middle = |from: u32, side: u32, c: f64| f64::from(from) + f64::from(side) / 2.0 - c;
     let place = Placement {
         center_px: [
-            f64::from(width) / 2.0 + middle(rect.x, rect.w, cx),
-            f64::from(height) / 2.0 + middle(rect.y, rect.h, cy),
+            f64::from(width) / 2.0 + scale * middle(rect.x, rect.w, cx),
+            f64::from(height) / 2.0 + scale * middle(rect.y, rect.h, cy),
         ],
         rotation_rad: 0.0,
-        scale: 1.0,
+        scale,
         mirrored: false,
     };
     let whole = Rect::of_size(image.width, image.height);
-    let matte = Premultiplied::of(&image.pixels, [image.width, image.height], whole, 1.0);
+    let matte = Premultiplied::of(&image.pixels, [image.width, image.height], whole, scale);
     let mut placed = Resampled::default();
     let size = [width, height];
     let room = Room { size, nearer: None };
@@ -114,5 +169,64 @@ fn visible(pixel: [u8; 4]) -> [u8; 4] {
     match pixel[3] {
         0 => [0; 4],
         _ => pixel,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Camera;
+    use crate::library::Pose;
+
+    fn poses(frames: Vec<Pose>) -> Poses {
+        Poses {
+            tail_beat: None,
+            // So slow that every frame is looked at by itself.
+            fps: 1.0,
+            image_size_px: [640, 480],
+            view: View::Side,
+            camera: None,
+            animal: None,
+            frames,
+        }
+    }
+
+    #[test]
+    fn who_looks_half_as_tall_is_enlarged_but_not_beyond_the_limit_and_who_was_not_seen_stays() {
+        let of_height = |height_px| Pose {
+            height_px,
+            ..Pose::default()
+        };
+        let heights = [
+            Some(40.0),
+            Some(32.0),
+            Some(80.0),
+            Some(10.0),
+            None,
+            Some(40.0),
+            Some(40.0),
+        ];
+        let frames = heights.map(of_height).to_vec();
+        assert_eq!(scales(&poses(frames)), [1.0, 1.25, 0.5, 1.5, 1.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn where_depth_was_measured_it_decides_and_not_the_fins() {
+        let at = |z_m| Pose {
+            position_m: Some([0.0, 0.0, z_m]),
+            height_px: Some(1000.0 * z_m * z_m),
+            ..Pose::default()
+        };
+        let camera = Camera {
+            z_min_m: 0.7,
+            pane_px_per_m: 1000.0,
+            center_px: [320.0, 240.0],
+            medium_index: 1.0,
+        };
+        let poses = Poses {
+            camera: Some(camera),
+            ..poses(vec![at(0.8), at(1.0), at(1.2)])
+        };
+        assert_eq!(scales(&poses), [0.8, 1.0, 1.2]);
     }
 }

@@ -49,6 +49,9 @@ pub struct Args {
     /// How much each frame of a clip counts: uniform or binomial.
     #[arg(long, value_name = "uniform|binomial")]
     clip_weights: Option<String>,
+    /// At which size sprites are cut out: native (as filmed) or depth (at one height).
+    #[arg(long, value_name = "native|depth")]
+    scale_mode: Option<String>,
     /// Clips nearer than this are alike; a multiple of the natural step when absent.
     #[arg(long, value_name = "E")]
     epsilon: Option<u64>,
@@ -120,6 +123,10 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
     let weights = args.clip_weights.as_ref();
     put("clip_weights", weights.map(|weights| json!(weights)));
+    put(
+        "scale_mode",
+        args.scale_mode.as_ref().map(|mode| json!(mode)),
+    );
     put("epsilon", args.epsilon.map(|epsilon| json!(epsilon)));
     let animal = args.animal_length.zip(args.animal_height);
     put(

@@ -56,8 +56,7 @@ impl Lens {
     }
 
     /// One that shows every place at the same size.
-    #[cfg(test)]
-    pub(crate) fn flat(length_px: f64) -> Lens {
+    pub fn flat(length_px: f64) -> Lens {
         Lens {
             length_px,
             camera: None,

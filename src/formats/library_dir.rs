@@ -120,10 +120,20 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "library.json names a frame that poses.json does not have",
         ));
     }
+    let scales = summary.sprite_scale.as_deref().unwrap_or_default();
+    let is_sound = |&scale: &f64| (0.01..=100.0).contains(&scale);
+    if summary.sprite_scale.is_some() && scales.len() != poses.frames.len()
+        || !scales.iter().all(is_sound)
+    {
+        return Err(Error::Mismatch(
+            "library.json must name a size for the sprite of every frame",
+        ));
+    }
     let library = Library {
         poses,
         background,
         sprites,
+        sprite_scale: summary.sprite_scale,
         clip_frames: summary.clip_frames,
         epsilon: summary.epsilon,
         natural_step: summary.natural_step,
@@ -274,6 +284,7 @@ mod tests {
             clip_frames: 2,
             epsilon: 77,
             natural_step: 38,
+            sprite_scale: None,
             transitions: vec![Transition {
                 from: 0,
                 to: 1,

@@ -28,6 +28,8 @@ pub struct Summary {
     pub params: Params,
     /// Width and height of the sprites.
     pub sprite_size_px: [u32; 2],
+    /// Sizes of the sprites relative to the footage, unless all are as filmed.
+    pub sprite_scale: Option<Vec<f64>>,
     /// f.
     pub clip_frames: usize,
     /// Clips nearer than this are alike.
@@ -52,6 +54,7 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
         params: params.clone(),
         footage: footage.clone(),
         sprite_size_px: [library.sprites.width(), library.sprites.height()],
+        sprite_scale: library.sprite_scale.clone(),
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
         natural_step: library.natural_step,
@@ -76,6 +79,7 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
         footage: file.footage,
         params: file.params,
         sprite_size_px: file.sprite_size_px,
+        sprite_scale: file.sprite_scale,
         clip_frames: file.clip_frames,
         epsilon: file.epsilon,
         natural_step: file.natural_step,
@@ -104,6 +108,9 @@ struct LibraryFile {
     params: Params,
     footage: FootageSummary,
     sprite_size_px: [u32; 2],
+    /// Absent in files of before.
+    #[serde(default)]
+    sprite_scale: Option<Vec<f64>>,
     clip_frames: usize,
     epsilon: u64,
     natural_step: u64,

@@ -21,6 +21,8 @@ pub struct Library {
     pub background: RgbImage,
     /// The animal cut out of every frame in which it was found.
     pub sprites: Sprites,
+    /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
+    pub sprite_scale: Option<Vec<f64>>,
     /// f: how many sprites a clip holds.
     pub clip_frames: usize,
     /// Clips nearer than this (strictly) are alike.

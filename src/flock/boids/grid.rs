@@ -1,14 +1,21 @@
-//! Who is near whom, in time proportional to the number of boids: cells as wide as the farthest rule,
-//! filled by a counting sort, positions and velocities laid out in cell order (ALGORITHMS.md 7).
+//! Who is near whom, in time proportional to the number of boids: cells a third as wide as the farthest rule
+//! reaches, filled by a counting sort, positions laid out in cell order (ALGORITHMS.md 7). Rings of cells are
+//! searched from the inside out, until no farther one can hold a nearer neighbor.
 //!
 //! Neighbors come nearest first, equal distances by id: an order that does not depend on the grid.
 
 use super::vector::{Vec3, dot, minus};
 
+/// Cells to the reach of the farthest rule.
+const RINGS: f64 = 3.0;
+
 /// Boids sorted by cell.
 pub struct Grid {
     least: Vec3,
-    cell_bl: f64,
+    /// The width of a cell along each axis.
+    cell_bl: Vec3,
+    /// The narrowest of them along an axis with more than one.
+    ring_bl: f64,
     n_cells: [usize; 3],
     /// `first[c]..first[c + 1]` are the boids of cell c.
     first: Vec<u32>,
@@ -28,8 +35,8 @@ pub struct Neighbor {
 }
 
 impl Grid {
-    /// Sorts boids into cells of at least `cell_bl`, and no more cells than a few per boid.
-    pub fn new(positions: &[Vec3], cell_bl: f64) -> Grid {
+    /// Sorts boids into cells for neighbors within `reach_bl`, no more cells than a few per boid.
+    pub fn new(positions: &[Vec3], reach_bl: f64) -> Grid {
         let mut least = [f64::INFINITY; 3];
         let mut greatest = [f64::NEG_INFINITY; 3];
         for position in positions {
@@ -41,12 +48,19 @@ impl Grid {
         let most = (positions.len() as f64).sqrt().ceil() as usize + 1;
         let n_cells = std::array::from_fn(|axis| {
             let span = (greatest[axis] - least[axis]).max(0.0);
-            ((span / cell_bl) as usize + 1).min(most)
+            ((span * RINGS / reach_bl) as usize + 1).min(most)
         });
-        let span = (0..3).map(|a| (greatest[a] - least[a]) / n_cells[a] as f64);
+        let cell_bl: Vec3 = std::array::from_fn(|axis| {
+            let span = (greatest[axis] - least[axis]).max(0.0);
+            (span / n_cells[axis] as f64).max(1e-9)
+        });
+        let several = (0..3).filter(|&axis| n_cells[axis] > 1);
         let mut grid = Grid {
             least,
-            cell_bl: span.fold(cell_bl, f64::max),
+            cell_bl,
+            ring_bl: several
+                .map(|axis| cell_bl[axis])
+                .fold(f64::INFINITY, f64::min),
             n_cells,
             first: Vec::new(),
             ids: Vec::new(),
@@ -56,9 +70,12 @@ impl Grid {
         grid
     }
 
+    /// The boids in the order of their cells: who follows whom here is near it.
+    pub fn by_cell(&self) -> &[u32] {
+        &self.ids
+    }
+
     /// The `limit` nearest others within `radius_bl` of boid `id`, nearest first, in `found`.
-    ///
-    /// `radius_bl` must not be above the cell's width.
     pub fn nearest(
         &self,
         id: u32,
@@ -67,29 +84,61 @@ impl Grid {
         limit: usize,
         found: &mut Vec<Neighbor>,
     ) {
-        debug_assert!(radius_bl <= self.cell_bl, "a neighbor may be two cells off");
         found.clear();
         let center = self.cell_of(position);
-        let around = |axis: usize| {
-            let c = center[axis];
-            c.saturating_sub(1)..=(c + 1).min(self.n_cells[axis] - 1)
-        };
-        for z in around(2) {
-            for y in around(1) {
-                // Cells along x lie one behind the other.
-                let row = (z * self.n_cells[1] + y) * self.n_cells[0];
-                let (from, to) = (row + around(0).start(), row + around(0).end() + 1);
-                for at in self.first[from] as usize..self.first[to] as usize {
+        let square_bl2 = radius_bl * radius_bl;
+        for ring in 0.. {
+            self.search_ring(center, ring, |from, to| {
+                for at in from..to {
                     let offset = minus(self.positions[at], position);
-                    let square_bl2 = dot(offset, offset);
-                    if square_bl2 < radius_bl * radius_bl && self.ids[at] != id {
-                        let neighbor = Neighbor {
-                            id: self.ids[at],
-                            offset,
-                            square_bl2,
-                        };
+                    let neighbor = Neighbor {
+                        id: self.ids[at],
+                        offset,
+                        square_bl2: dot(offset, offset),
+                    };
+                    if neighbor.square_bl2 < square_bl2 && neighbor.id != id {
                         keep_nearest(found, neighbor, limit);
                     }
+                }
+            });
+            // Whoever is in a farther ring is at least so many cells away.
+            let searched_bl = ring as f64 * self.ring_bl;
+            let is_full = found.len() == limit;
+            let farthest = found.last().filter(|_| is_full);
+            let is_enough =
+                farthest.is_some_and(|last| last.square_bl2 < searched_bl * searched_bl);
+            if is_enough
+                || searched_bl >= radius_bl
+                || ring >= self.n_cells.into_iter().max().unwrap_or(0)
+            {
+                return;
+            }
+        }
+    }
+
+    /// Calls `visit` with the boids of every row of cells in a ring about a cell; ring 0 is the cell itself.
+    fn search_ring(&self, center: [usize; 3], ring: usize, mut visit: impl FnMut(usize, usize)) {
+        let span = |axis: usize| {
+            let c = center[axis];
+            c.saturating_sub(ring)..=(c + ring).min(self.n_cells[axis] - 1)
+        };
+        let mut row = |from: [usize; 3], n: usize| {
+            let cell = self.index(from);
+            visit(self.first[cell] as usize, self.first[cell + n] as usize);
+        };
+        let (x_from, x_to) = (*span(0).start(), *span(0).end());
+        for z in span(2) {
+            for y in span(1) {
+                let is_rim = z.abs_diff(center[2]) == ring || y.abs_diff(center[1]) == ring;
+                if is_rim {
+                    row([x_from, y, z], x_to + 1 - x_from);
+                    continue;
+                }
+                if center[0] >= ring {
+                    row([center[0] - ring, y, z], 1);
+                }
+                if center[0] + ring < self.n_cells[0] {
+                    row([center[0] + ring, y, z], 1);
                 }
             }
         }
@@ -121,7 +170,7 @@ impl Grid {
 
     fn cell_of(&self, position: Vec3) -> [usize; 3] {
         std::array::from_fn(|axis| {
-            let cell = (position[axis] - self.least[axis]) / self.cell_bl;
+            let cell = (position[axis] - self.least[axis]) / self.cell_bl[axis];
             (cell.max(0.0) as usize).min(self.n_cells[axis] - 1)
         })
     }

@@ -74,8 +74,23 @@ pub struct Boids<'a> {
 }
 
 impl<'a> Boids<'a> {
-    /// Boids at random places with random directions, then left to swim until they have formed.
+    /// Boids that have swum until they have formed.
     pub fn new(
+        params: &'a Params,
+        calibration: &'a Calibration,
+        place: (&'a Lens, &'a Tank),
+        fps: f64,
+    ) -> Self {
+        let mut boids = Boids::at_random(params, calibration, place, fps);
+        for _ in 0..(WARM_UP_S * fps).ceil() as u64 {
+            boids.advance();
+        }
+        boids.hunter = boids.habitat.hunter();
+        boids
+    }
+
+    /// Boids at random places, all of one course as far as they align, `WARM_UP_S` before the film.
+    pub fn at_random(
         params: &'a Params,
         calibration: &'a Calibration,
         (lens, tank): (&'a Lens, &'a Tank),
@@ -107,10 +122,6 @@ impl<'a> Boids<'a> {
             hunter: None,
         };
         boids.start();
-        for _ in 0..(WARM_UP_S * fps).ceil() as u64 {
-            boids.advance();
-        }
-        boids.hunter = boids.habitat.hunter();
         boids
     }
 
@@ -185,27 +196,24 @@ impl<'a> Boids<'a> {
             let turn_rad = self.calibration.turn_rad_per_s * self.step_s;
             (libm::cos(turn_rad), libm::sin(turn_rad))
         };
-        let ids: Vec<u32> = (0..self.positions.len() as u32).collect();
-        let next: Vec<Next> = ids
+        // In the order of cells: whoever is looked at next has nearly the same neighbors.
+        let next: Vec<Next> = grid
+            .by_cell()
             .par_chunks(CHUNK)
             .flat_map_iter(|chunk| {
                 let mut neighbors = Vec::new();
                 let mut next = Vec::with_capacity(chunk.len());
                 for &id in chunk {
+                    let position = self.positions[id as usize];
                     let limit = rules.neighbors as usize;
-                    grid.nearest(
-                        id,
-                        self.positions[id as usize],
-                        reach,
-                        limit,
-                        &mut neighbors,
-                    );
+                    grid.nearest(id, position, reach, limit, &mut neighbors);
                     next.push(self.next(id as usize, &neighbors, &steering, cos_sin));
                 }
                 next
             })
             .collect();
-        for (id, next) in next.into_iter().enumerate() {
+        for (&id, next) in grid.by_cell().iter().zip(next) {
+            let id = id as usize;
             self.positions[id] = next.position;
             self.velocities[id] = next.velocity;
             self.wander[id] = next.wander;
@@ -309,25 +317,44 @@ impl<'a> Boids<'a> {
     /// One relaxation: each pair that overlaps moves apart by half of what is missing.
     fn push_apart(&mut self) {
         let grid = Grid::new(&self.positions, self.overlap_bl);
-        let mut neighbors = Vec::new();
-        let mut moved = self.positions.clone();
-        for (id, position) in moved.iter_mut().enumerate() {
-            grid.nearest(id as u32, *position, self.overlap_bl, 16, &mut neighbors);
-            let from = *position;
-            for neighbor in &neighbors {
-                let distance = neighbor.square_bl2.sqrt();
-                let away = match distance > 1e-9 {
-                    true => scaled(-1.0 / distance, neighbor.offset),
-                    // In one place: apart along x, by id.
-                    false => [if (id as u32) < neighbor.id { -1.0 } else { 1.0 }, 0.0, 0.0],
-                };
-                *position = add_scaled(*position, 0.5 * (self.overlap_bl - distance), away);
-            }
-            if *position != from {
-                self.habitat.keep_out(position, &mut self.velocities[id]);
-            }
+        let moved: Vec<(u32, Vec3, Vec3)> = grid
+            .by_cell()
+            .par_chunks(CHUNK)
+            .flat_map_iter(|chunk| {
+                let mut neighbors = Vec::new();
+                let mut moved = Vec::new();
+                for &id in chunk {
+                    let position = self.positions[id as usize];
+                    grid.nearest(id, position, self.overlap_bl, 16, &mut neighbors);
+                    if !neighbors.is_empty() {
+                        let (position, velocity) = self.apart(id, &neighbors);
+                        moved.push((id, position, velocity));
+                    }
+                }
+                moved
+            })
+            .collect();
+        for (id, position, velocity) in moved {
+            self.positions[id as usize] = position;
+            self.velocities[id as usize] = velocity;
         }
-        self.positions = moved;
+    }
+
+    /// Where one goes that others are too near to.
+    fn apart(&self, id: u32, neighbors: &[Neighbor]) -> (Vec3, Vec3) {
+        let mut position = self.positions[id as usize];
+        let mut velocity = self.velocities[id as usize];
+        for neighbor in neighbors {
+            let distance = neighbor.square_bl2.sqrt();
+            let away = match distance > 1e-9 {
+                true => scaled(-1.0 / distance, neighbor.offset),
+                // In one place: apart along x, by id.
+                false => [if id < neighbor.id { -1.0 } else { 1.0 }, 0.0, 0.0],
+            };
+            position = add_scaled(position, 0.5 * (self.overlap_bl - distance), away);
+        }
+        self.habitat.keep_out(&mut position, &mut velocity);
+        (position, velocity)
     }
 }
 

@@ -85,9 +85,8 @@ impl Tank {
         }
     }
 
-    /// A box.
-    #[cfg(test)]
-    pub(crate) fn new(least: Vec3, greatest: Vec3) -> Tank {
+    /// A box; flat when it has no depth.
+    pub fn new(least: Vec3, greatest: Vec3) -> Tank {
         Tank::within([least, greatest], Vec::new())
     }
 

@@ -1,0 +1,91 @@
+#!/usr/bin/env python3
+"""Boids a second: flockreel's against a loop of NumPy and scipy.spatial.cKDTree, and against Mesa's BoidFlockers.
+
+    bench/boids.py [--count 100000] [--steps 10] [--engine PROGRAM]
+
+The loop does the same three rules on the same number of agents with the same 16 nearest neighbors within 6 body
+lengths, in the plane, without field of view, wander or overlap; it may use all cores where SciPy can. Mesa's model runs as
+it comes, with 1000 agents: more would take minutes a step. Prints a line of JSON and ends with 1 when
+flockreel makes less than 20 times the loop's agent-steps a second, or 1000 times Mesa's. Needs numpy and scipy; Mesa with
+networkx if it is to be compared.
+"""
+import argparse
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+LEAST_OF_LOOP, LEAST_OF_MESA = 20, 1000
+STEP_S, CRUISE, TURN = 1 / 30, 1.0, 3.0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=100_000)
+    parser.add_argument("--steps", type=int, default=10)
+    parser.add_argument("--engine", help="the built benchmark; cargo builds and runs it when absent")
+    args = parser.parse_args()
+    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "--bench", "boids", "--"]
+    done = subprocess.run([*command, str(args.count), str(args.steps)], check=True, stdout=subprocess.PIPE)
+    result = json.loads(done.stdout.splitlines()[-1])
+    rate = args.count / result["all_threads_s"]
+    loop, mesa = loop_rate(args.count, max(args.steps // 3, 2)), mesa_rate()
+    result.update(agent_steps_per_s=round(rate), loop_per_s=round(loop), of_loop=round(rate / loop, 1))
+    within = rate >= LEAST_OF_LOOP * loop
+    if mesa is not None:
+        result.update(mesa_per_s=round(mesa), of_mesa=round(rate / mesa))
+        within &= rate >= LEAST_OF_MESA * mesa
+    print(json.dumps({**result, "within": bool(within)}))
+    return int(not within)
+
+
+def loop_rate(count, steps):
+    """Agent-steps a second of the loop."""
+    draw = np.random.default_rng(1)
+    side = (1.5 * count) ** 0.5
+    places, turns = draw.uniform(0, side, (count, 2)), draw.uniform(0, 2 * np.pi, count)
+    velocities = CRUISE * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    start = time.perf_counter()
+    for _ in range(steps):
+        places, velocities = step(places, velocities, side)
+    return count * steps / (time.perf_counter() - start)
+
+
+def step(places, velocities, side):
+    distances, ids = cKDTree(places).query(places, k=17, distance_upper_bound=6.0, workers=-1)
+    distances, ids = distances[:, 1:], ids[:, 1:]
+    found = np.isfinite(distances)
+    ids = np.where(found, ids, 0)
+    offsets = places[ids] - places[:, None]
+    near, beside = found & (distances < 1.0), found & (distances < 3.0)
+    push = np.where(near, (1.0 / np.maximum(distances, 0.05) - 1.0) / np.maximum(distances, 0.05), 0.0)
+    apart = -(offsets * push[..., None]).sum(axis=1)
+    n_beside, n_found = (np.maximum(which.sum(axis=1), 1)[:, None] for which in (beside, found))
+    along = (velocities[ids] * beside[..., None]).sum(axis=1) / n_beside - velocities * (n_beside > 0)
+    toward = (offsets * found[..., None]).sum(axis=1) / n_found / 6.0
+    walls = (places < 1.0).astype(float) - (places > side - 1.0)
+    wished = 1.5 * apart + 4.0 * walls + 2.0 * along + 0.8 * toward
+    size = np.linalg.norm(wished, axis=1, keepdims=True)
+    velocities = velocities + STEP_S * CRUISE * TURN * wished / np.maximum(size, 1.0)
+    velocities *= CRUISE / np.maximum(np.linalg.norm(velocities, axis=1, keepdims=True), 1e-9)
+    return np.clip(places + STEP_S * velocities, 0.0, side), velocities
+
+
+def mesa_rate():
+    """Agent-steps a second of Mesa's example; None without it."""
+    try:
+        from mesa.examples.basic.boid_flockers.model import BoidFlockers
+    except ImportError:
+        return None
+    model, steps = BoidFlockers(), 5
+    start = time.perf_counter()
+    for _ in range(steps):
+        model.step()
+    return len(model.agents) * steps / (time.perf_counter() - start)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

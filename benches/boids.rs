@@ -1,0 +1,64 @@
+//! How fast boids swim (ALGORITHMS.md 7 and 9), for `bench/boids.py`.
+//!
+//! Arguments: COUNT STEPS. A school in a flat tank with room for all, one step to a frame, on one thread and on
+//! all. Prints one line of JSON with the seconds of a step.
+
+use std::time::Instant;
+
+use flockreel::flock::Params;
+use flockreel::flock::boids::Boids;
+use flockreel::flock::boids::calibration::Calibration;
+use flockreel::flock::boids::tank::Tank;
+use flockreel::flock::lens::Lens;
+
+/// Square body lengths to a boid.
+const ROOM_BL2: f64 = 1.5;
+
+fn main() {
+    let arguments: Vec<String> = (std::env::args().skip(1))
+        .filter(|argument| argument != "--bench")
+        .collect();
+    let [count, steps] = &arguments[..] else {
+        // `cargo test --benches` runs this without arguments.
+        return println!("arguments: COUNT STEPS");
+    };
+    let count: u32 = count.parse().expect("a number");
+    let steps: u32 = steps.parse().expect("a number");
+    let n_threads = rayon::current_num_threads();
+    let (one, all) = (time(count, steps, 1), time(count, steps, n_threads));
+    println!(
+        "{{\"count\":{count},\"steps\":{steps},\"one_thread_s\":{one:.6},\"threads\":{n_threads},\
+         \"all_threads_s\":{all:.6}}}"
+    );
+}
+
+/// Seconds of a step: the least of three times `steps`.
+fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
+    let params = Params {
+        count,
+        leaders: false,
+        ..Params::default()
+    };
+    let calibration = Calibration {
+        cruise_bl_per_s: 1.0,
+        speed_limits_bl_per_s: [0.5, 1.5],
+        turn_rad_per_s: 3.0,
+        wander_rad_per_s: 1.5,
+        slopes: None,
+    };
+    let side = (f64::from(count) * ROOM_BL2).sqrt();
+    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [side, side, 0.0]));
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads)
+        .build()
+        .expect("threads");
+    pool.install(|| {
+        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        let mut run = || {
+            let start = Instant::now();
+            (0..steps).for_each(|_| boids.advance());
+            start.elapsed().as_secs_f64() / f64::from(steps)
+        };
+        (0..3).map(|_| run()).fold(f64::INFINITY, f64::min)
+    })
+}
