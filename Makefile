@@ -60,12 +60,13 @@ deny: ## licences, bans and sources of the dependencies, offline
 
 bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
-	@target/bench-venv/bin/python -c "import numpy, scipy, cv2, faiss" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless faiss-cpu
+	@target/bench-venv/bin/python -c "import numpy, scipy, cv2, faiss, mesa, networkx" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless faiss-cpu mesa networkx
 	-target/bench-venv/bin/python bench/analyze.py $(RELEASE)
 	python3 bench/run.py $(RELEASE)
 	target/bench-venv/bin/python bench/distance.py
 	python3 bench/transitions.py
 	python3 bench/plan.py
+	target/bench-venv/bin/python bench/boids.py
 	@test -d target/demo/library || $(MAKE) --no-print-directory demo
 	python3 bench/render.py target/demo/library $(RELEASE)
 

@@ -11,7 +11,7 @@ use crate::library::{Library, Pose, View};
 const N_SIDES: usize = 16;
 /// A flock without room gets it farther out until the tank is this share of the picture. From above, what
 /// bounds the animal is mostly a wall; from the side, mostly its whim.
-const MOST_OF_ARENA: f64 = 0.2;
+const MOST_OF_ARENA: f64 = 0.35;
 const MOST_OF_TANK: f64 = 0.7;
 /// By so much at a time.
 const FARTHER_BL: f64 = 0.25;
