@@ -75,7 +75,7 @@ pub enum Job {
     /// Footage to library.
     Analysis(analysis::Input),
     /// Library to flock.
-    Flock(flock::Input),
+    Flock(Box<flock::Input>),
     /// Library to virtual fish.
     Fish(fish::Input),
 }
