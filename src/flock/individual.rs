@@ -64,7 +64,7 @@ pub struct Fade {
 /// The plan's cost, radians: sums of integers times 2 pi / 65536, to 6 decimals (ALGORITHMS.md 6).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PlanCost {
-    /// The sum of the four below.
+    /// The sum of the five below.
     pub total: f64,
     /// Headings and rotations.
     pub heading: f64,
@@ -74,9 +74,13 @@ pub struct PlanCost {
     pub transition: f64,
     /// Looking like a neighbor of smaller id.
     pub crowd: f64,
+    /// Frames shown again too soon.
+    pub repetition: f64,
     /// No plan costs less, crowd or not.
     pub lower_bound: f64,
-    /// The plan is the cheapest of all, not just of those tried.
+    /// Among those that it looks out for, no plan costs less than the total less this.
+    pub gap: f64,
+    /// The plan is the cheapest of all, not just of those tried: its gap is 0.
     pub exact: bool,
 }
 

@@ -70,6 +70,8 @@ pub struct Matching {
     pub wx: f64,
     /// Cost of looking like a neighbor, radians for each at no distance.
     pub w_c: f64,
+    /// Cost of each frame that an individual shows again within 3 s, radians; 0 = no matter.
+    pub w_p: f64,
 }
 
 /// What real frames and boids are matched by.
@@ -130,6 +132,7 @@ impl Default for Matching {
             w_v: 0.1,
             wx: 0.8,
             w_c: 0.3,
+            w_p: 0.0,
         }
     }
 }
@@ -214,6 +217,7 @@ impl Params {
                 w_v: 0.0,
                 wx: 0.0,
                 w_c: 0.0,
+                w_p: 0.0,
             },
             dwell_frames: Some(1),
             fade_frames: 0,
@@ -260,6 +264,7 @@ impl Matching {
             ("matching.w_v", self.w_v),
             ("matching.wx", self.wx),
             ("matching.w_c", self.w_c),
+            ("matching.w_p", self.w_p),
         ];
         for (name, value) in weights {
             within(name, value, 0.0, 4.0)?;

@@ -117,7 +117,13 @@ struct CostFile {
     speed: f64,
     transition: f64,
     crowd: f64,
+    /// Absent in files of before.
+    #[serde(default)]
+    repetition: f64,
     lower_bound: f64,
+    /// Absent in files of before.
+    #[serde(default)]
+    gap: f64,
     exact: bool,
 }
 
@@ -126,6 +132,9 @@ struct StatsFile {
     heading_error_median_rad: f64,
     heading_error_p90_rad: f64,
     jumps_per_100_frames: f64,
+    /// Absent in files of before; 0 then.
+    #[serde(default)]
+    repeats_per_100_frames: f64,
     path_deviation_p95_bl: f64,
     slip_median_rad: f64,
     clone_share: f64,
@@ -217,7 +226,9 @@ impl CostFile {
             speed: cost.speed,
             transition: cost.transition,
             crowd: cost.crowd,
+            repetition: cost.repetition,
             lower_bound: cost.lower_bound,
+            gap: cost.gap,
             exact: cost.exact,
         }
     }
@@ -229,7 +240,9 @@ impl CostFile {
             speed: self.speed,
             transition: self.transition,
             crowd: self.crowd,
+            repetition: self.repetition,
             lower_bound: self.lower_bound,
+            gap: self.gap,
             exact: self.exact,
         }
     }
@@ -241,6 +254,7 @@ impl StatsFile {
             heading_error_median_rad: stats.heading_error_median_rad,
             heading_error_p90_rad: stats.heading_error_p90_rad,
             jumps_per_100_frames: stats.jumps_per_100_frames,
+            repeats_per_100_frames: stats.repeats_per_100_frames,
             path_deviation_p95_bl: stats.path_deviation_p95_bl,
             slip_median_rad: stats.slip_median_rad,
             clone_share: stats.clone_share,
@@ -257,6 +271,7 @@ impl StatsFile {
             heading_error_median_rad: self.heading_error_median_rad,
             heading_error_p90_rad: self.heading_error_p90_rad,
             jumps_per_100_frames: self.jumps_per_100_frames,
+            repeats_per_100_frames: self.repeats_per_100_frames,
             path_deviation_p95_bl: self.path_deviation_p95_bl,
             slip_median_rad: self.slip_median_rad,
             clone_share: self.clone_share,

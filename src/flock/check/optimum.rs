@@ -48,6 +48,18 @@ pub(super) fn check(
             cheapest,
         });
     }
+    let gap = ledger.gap(id)?;
+    if ledger.is_exact(id) != (gap == 0) {
+        return Err(Violation::Exact { id, gap });
+    }
+    if bill.total() > cheapest + gap {
+        let found = bill.total() - cheapest;
+        return Err(Violation::Gap {
+            id,
+            said: gap,
+            found,
+        });
+    }
     let alone = match bill.has_crowd() {
         true => search.cheapest(n_frames, |t| ledger.row(graph, bill, t, false), |_, _| {})?,
         false => cheapest,

@@ -5,6 +5,7 @@ pub mod certificate;
 pub mod cost;
 pub mod crowd;
 pub mod landings;
+pub mod memory;
 mod round;
 mod rows;
 pub mod trellis;
@@ -12,8 +13,9 @@ pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::cost::{Feature, Weights};
+use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Place, Settled};
+use self::memory::Memory;
 use self::round::Round;
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path, Shelf};
@@ -37,12 +39,38 @@ pub struct Plan {
     pub cost: PlanCost,
 }
 
+/// The best path found for one individual.
+#[derive(Clone, Debug)]
+struct Found {
+    /// Its cost counts no repetition.
+    path: Path,
+    /// What its repeats cost, turns.
+    repetition: u32,
+    /// What no path costs less than, turns.
+    least: u32,
+}
+
+impl Found {
+    fn cost(&self) -> u32 {
+        self.path.cost + self.repetition
+    }
+
+    /// Becomes another where that costs less.
+    fn keep_cheaper(&mut self, other: &Found) {
+        if other.cost() < self.cost() {
+            self.path = other.path.clone();
+            self.repetition = other.repetition;
+        }
+    }
+}
+
 /// Everything that plans are computed from.
 pub struct Planner<'a> {
     trellis: Trellis,
     weights: Weights,
     features: Vec<Feature>,
     crowd: Crowd,
+    memory: Memory,
     /// The states that look like each state.
     alike: Vec<[u32; 2]>,
     /// `[t][id]`: where each boid is.
@@ -76,6 +104,7 @@ impl<'a> Planner<'a> {
             alike: crowd.alike(&trellis),
             places: (0..n_frames).map(place).collect(),
             crowd,
+            memory: Memory::new(params.matching.w_p, fps),
             dwell: params
                 .dwell_frames
                 .map_or(library.clip_frames, |frames| frames as usize)
@@ -102,7 +131,7 @@ impl<'a> Planner<'a> {
         );
         let (paths, bounds) = (paths?, bounds?);
         Ok((paths.par_iter().enumerate())
-            .map(|(id, path)| self.costed(path, &wanted[id], bounds[id]))
+            .map(|(id, found)| self.costed(found, &wanted[id], bounds[id]))
             .collect())
     }
 
@@ -112,7 +141,7 @@ impl<'a> Planner<'a> {
         wanted: &[Vec<Feature>],
         settled: &mut Settled,
         progress: &dyn Progress,
-    ) -> Result<Vec<Path>, Error> {
+    ) -> Result<Vec<Found>, Error> {
         let mut paths = Vec::with_capacity(wanted.len());
         while paths.len() < wanted.len() {
             if progress.cancelled() {
@@ -123,8 +152,8 @@ impl<'a> Planner<'a> {
             let alike = |id: &usize| self.crowd.n_watched(*id) == n_watched;
             let end = first + (first..wanted.len()).take_while(alike).count();
             let round = self.round(wanted, first, end).paths(settled)?;
-            for path in &round {
-                settled.push(&path.states);
+            for found in &round {
+                settled.push(&found.path.states);
             }
             paths.extend(round);
             progress.report("planning", paths.len() as f64 / wanted.len() as f64);
@@ -153,7 +182,8 @@ impl<'a> Planner<'a> {
 
     /// The plan with its cost in parts, summed anew from the states; what is left of the path's cost is
     /// the crowd's.
-    fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
+    fn costed(&self, found: &Found, wanted: &[Feature], lower_bound: u32) -> Plan {
+        let path = &found.path;
         let (mut heading, mut speed, mut transition, mut alone) = (0, 0, 0, 0);
         for (t, &state) in path.states.iter().enumerate() {
             let feature = self.features[state as usize];
@@ -173,15 +203,49 @@ impl<'a> Planner<'a> {
                 .filter_map(|&state| self.trellis.shown(state as usize))
                 .collect(),
             cost: PlanCost {
-                total: rad(path.cost),
+                total: rad(found.cost()),
                 heading: rad(heading),
                 speed: rad(speed),
                 transition: rad(transition),
                 crowd: rad(path.cost - alone - transition),
+                repetition: rad(found.repetition),
                 lower_bound: rad(lower_bound),
-                exact: true,
+                gap: rad(found.cost() - found.least),
+                exact: found.cost() == found.least,
             },
         }
+    }
+
+    /// A path that is the cheapest but for its repeats.
+    fn found(&self, path: Path) -> Found {
+        Found {
+            repetition: self.memory.cost_of(&path.states),
+            least: path.cost,
+            path,
+        }
+    }
+
+    /// What a path costs among those settled, its repeats aside, turns.
+    fn cost_among(&self, id: usize, wanted: &[Feature], settled: &Settled, states: &[u32]) -> u32 {
+        let n_watched = self.crowd.n_watched(id);
+        let mut cost = 0;
+        for (t, &state) in states.iter().enumerate() {
+            let places = &self.places[t];
+            let others = settled.at(t)[..n_watched].iter().zip(places);
+            let near = others.filter(|(other, _)| {
+                let [first, end] = self.alike[**other as usize];
+                (first..end).contains(&state)
+            });
+            let crowd: u32 = near
+                .map(|(_, &place)| u32::from(self.crowd.cost_at(places[id], place)))
+                .sum();
+            let alone = (self.weights).total(wanted[t], self.features[state as usize]);
+            cost += (alone + crowd).min(CEILING - 1);
+            if t > 0 && states[t - 1] + 1 != state {
+                cost += self.jump_cost(states[t - 1], state);
+            }
+        }
+        cost
     }
 
     fn jump_cost(&self, from: u32, to: u32) -> u32 {

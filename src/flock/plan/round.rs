@@ -6,9 +6,9 @@ use rayon::prelude::*;
 
 use super::cost::Feature;
 use super::crowd::Settled;
+use super::memory::N_REPLANS;
 use super::rows::{Alone, InCrowd};
-use super::viterbi::Path;
-use super::{LANES, Planner};
+use super::{Found, LANES, Planner};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
@@ -22,8 +22,8 @@ pub(super) struct Round<'a> {
 }
 
 impl Round<'_> {
-    /// The cheapest path of each among those settled.
-    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Path>, Error> {
+    /// The cheapest path of each among those settled, or the best found where the cheapest repeats.
+    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Found>, Error> {
         match self.wanted.len() {
             1 => Ok(self.in_crowd([0], settled)?.into()),
             _ => self.batches(|first| {
@@ -71,11 +71,33 @@ impl Round<'_> {
         &self,
         idx: [usize; N],
         settled: &Settled,
-    ) -> Result<[Path; N], Error> {
+    ) -> Result<[Found; N], Error> {
+        let (planner, memory) = (self.planner, self.planner.memory);
         let ids = idx.map(|idx| self.first + idx);
         let wanted = idx.map(|idx| &self.wanted[idx][..]);
-        let rows = InCrowd::new(self.planner, settled, ids, wanted);
-        let paths = self.planner.film().cheapest_paths(&rows);
-        paths.ok_or(Error::NoTransitions)
+        let rows = InCrowd::new(planner, settled, ids, wanted);
+        let film = planner.film();
+        let paths = film.cheapest_paths(&rows).ok_or(Error::NoTransitions)?;
+        let mut paths = paths.map(|path| planner.found(path));
+        let mut found = paths.clone();
+        let mut raised = [(); N].map(|()| memory.nothing_raised(planner.places.len()));
+        for _ in 0..N_REPLANS {
+            if paths.iter().all(|found| found.repetition == 0) {
+                break;
+            }
+            for (raised, found) in raised.iter_mut().zip(&paths) {
+                memory.raise(raised, &found.path.states);
+            }
+            let dearer = rows.clone().raised(raised.each_ref());
+            let next = film.cheapest_paths(&dearer).ok_or(Error::NoTransitions)?;
+            paths = next.map(|path| planner.found(path));
+            for lane in 0..N {
+                let states = &paths[lane].path.states;
+                let cost = planner.cost_among(ids[lane], wanted[lane], settled, states);
+                paths[lane].path.cost = cost;
+                found[lane].keep_cheaper(&paths[lane]);
+            }
+        }
+        Ok(found)
     }
 }

@@ -82,7 +82,7 @@ fn the_cost_recomputed_from_the_file_and_the_library_is_the_one_told() {
             let cost = individual.cost;
             let told = (cost.total * Turns::PER_RAD).round() as u32;
             assert_eq!(cost_from_outside(&library, &flock, id), told, "{name} {id}");
-            let parts = cost.heading + cost.speed + cost.transition + cost.crowd;
+            let parts = cost.heading + cost.speed + cost.transition + cost.crowd + cost.repetition;
             assert!((parts - cost.total).abs() < 1e-5);
             assert!(cost.lower_bound <= cost.total);
         }
@@ -116,6 +116,79 @@ fn the_plans_of_a_flock_hold_their_certificates() {
         assert_eq!(checked, Ok(()), "individual {id}");
         settled.push(&path.states);
     }
+}
+
+/// The least cost of all paths with their repetition, turns, by trying them all: each is a state shown at frame 0
+/// that goes on or jumps.
+fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u32>) -> u32 {
+    if path.len() == wanted.len() {
+        let settled = Settled::new(wanted.len());
+        let repetition = planner.memory.cost_of(path);
+        return planner.cost_among(0, wanted, &settled, path) + repetition;
+    }
+    let trellis = &planner.trellis;
+    let states = 0..trellis.n_states() as u32;
+    let shown = states.filter(|&state| trellis.shown(state as usize).is_some());
+    let since_jump = (path.iter().rev().zip(path.iter().rev().skip(1)))
+        .position(|(&now, &before)| now != before + 1)
+        .map_or(usize::MAX, |k| k + 1);
+    let next: Vec<u32> = match path.last() {
+        None => shown.collect(),
+        Some(&last) => {
+            let jumps = shown.filter(|&state| {
+                let k = trellis.targets().binary_search(&state);
+                since_jump >= planner.dwell
+                    && k.is_ok_and(|k| trellis.sources(k).iter().any(|s| s.0 == last))
+            });
+            let on = trellis.continues(last as usize, 1).then_some(last + 1);
+            jumps.chain(on).collect()
+        }
+    };
+    let least = next.into_iter().map(|state| {
+        path.push(state);
+        let least = least_by_brute_force(planner, wanted, path);
+        path.pop();
+        least
+    });
+    least.min().unwrap_or(u32::MAX)
+}
+
+#[test]
+fn a_plan_that_repeats_lies_between_its_bound_and_the_cheapest_that_knew_of_no_repeats() {
+    let library = synthetic::few_looks();
+    let mut params = Params {
+        count: 1,
+        frames: 32,
+        ..Params::default()
+    };
+    let (mut n_better, mut n_best) = (0, 0);
+    for seed in 0..12 {
+        params.seed = seed;
+        params.matching.w_p = 0.0;
+        let unaware = plan_flock(&library, &params, &Silent).unwrap();
+        params.matching.w_p = 0.15;
+        let aware = plan_flock(&library, &params, &Silent).unwrap();
+        let boids: Vec<BoidTrack> = aware.individuals.iter().map(|i| i.boid.clone()).collect();
+        let motion = motion_of(&library, &Lens::of(&library, &aware.params));
+        let planner = Planner::new(&library, &motion, &boids, &aware.params);
+        let wanted = planner.weights.wanted(&boids[0], planner.fps);
+        let least = least_by_brute_force(&planner, &wanted, &mut Vec::new());
+        let turns = |rad: f64| (rad * Turns::PER_RAD).round() as u32;
+        let (cost, before) = (aware.individuals[0].cost, unaware.individuals[0].cost);
+        let repeats = (unaware.stats.repeats_per_100_frames * 0.32).round() as u32;
+        let unaware_cost = turns(before.total) + repeats * planner.memory.cost;
+        assert!(turns(cost.total) <= unaware_cost, "{cost:?} {before:?}");
+        assert!(least <= turns(cost.total), "{least} {cost:?}");
+        assert_eq!(turns(cost.total - cost.gap), turns(before.total));
+        assert!(turns(before.total) <= least);
+        n_better += u32::from(turns(cost.total) < unaware_cost);
+        n_best += u32::from(turns(cost.total) == least);
+    }
+    assert!(
+        n_better >= 3,
+        "making plans anew finds better ones: {n_better}"
+    );
+    assert!(n_best >= 6, "and mostly the best: {n_best}");
 }
 
 #[test]
