@@ -13,6 +13,8 @@ pub struct Individual {
     pub mirrored: Vec<bool>,
     /// How far the sprite (mirrored first) is rotated, clockwise positive.
     pub rotation_rad: Vec<f64>,
+    /// Who shows the frame after its last, in a loop; that one's first frame is it.
+    pub continues_as: Option<u32>,
     /// The second sprites shown around jumps.
     pub fades: Vec<Fade>,
     /// Where the centroid is drawn.
@@ -82,6 +84,24 @@ pub struct PlanCost {
     pub gap: f64,
     /// The plan is the cheapest of all, not just of those tried: its gap is 0.
     pub exact: bool,
+}
+
+impl Fade {
+    /// Cuts off what comes from frame `n_frames` on, as that of an heir who begins there.
+    pub(super) fn split_off(&mut self, n_frames: usize) -> Option<Fade> {
+        let at = n_frames.saturating_sub(self.start as usize);
+        if at >= self.weight.len() {
+            return None;
+        }
+        Some(Fade {
+            start: 0,
+            source_frame: self.source_frame.split_off(at),
+            mirrored: self.mirrored,
+            rotation_rad: self.rotation_rad.split_off(at),
+            scale: self.scale.split_off(at),
+            weight: self.weight.split_off(at),
+        })
+    }
 }
 
 impl Individual {

@@ -79,6 +79,9 @@ struct IndividualFile {
     source_frame: Vec<u32>,
     mirrored: Vec<bool>,
     rotation_rad: Vec<f64>,
+    /// Absent in files of before.
+    #[serde(default)]
+    continues_as: Option<u32>,
     fade: Vec<FadeFile>,
     centroid_px: Vec<[f64; 2]>,
     heading_rad: Vec<f64>,
@@ -155,6 +158,7 @@ impl IndividualFile {
             source_frame: individual.source_frame,
             mirrored: individual.mirrored,
             rotation_rad: individual.rotation_rad,
+            continues_as: individual.continues_as,
             fade: individual.fades.into_iter().map(FadeFile::of).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
@@ -177,6 +181,7 @@ impl IndividualFile {
             source_frame: self.source_frame,
             mirrored: self.mirrored,
             rotation_rad: self.rotation_rad,
+            continues_as: self.continues_as,
             fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,

@@ -31,6 +31,9 @@ pub struct Args {
     /// Everything random follows from it.
     #[arg(long)]
     seed: Option<u64>,
+    /// The last frame plays into the first: a film that repeats without a seam.
+    #[arg(long = "loop")]
+    is_loop: bool,
     /// Where to start from: school, swarm, mill, scatter or papers.
     #[arg(long)]
     preset: Option<String>,
@@ -50,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
     /// Film this plan, a flock.json of the same library, instead of making one.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["count", "frames", "seed", "preset", "rules", "match_by", "matching"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "frames", "seed", "preset", "rules", "match_by", "matching"])]
     from: Option<PathBuf>,
 }
 
@@ -142,6 +145,7 @@ impl Args {
         let render = Value::Object(self.outputs.overrides());
         overrides.insert("render".into(), render);
         let given = [
+            ("loop", self.is_loop.then_some(Value::Bool(true))),
             ("preset", self.preset.clone().map(Value::from)),
             ("count", self.count.map(Value::from)),
             ("frames", self.frames.map(Value::from)),

@@ -119,6 +119,11 @@ impl<'a> Ledger<'a> {
             total += price;
             bill.before.push(total);
         }
+        if let (Some(jump), Some(before)) = (jumps_left.next(), bill.before.last_mut()) {
+            // What follows the last frame of a loop.
+            total += jump.cost;
+            *before = total;
+        }
         let transition = jumps.iter().map(|jump| jump.cost).sum();
         let said = &self.flock.individuals[id].cost;
         for (part, said, found) in [

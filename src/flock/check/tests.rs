@@ -90,7 +90,9 @@ fn a_plan_that_repeats_holds_with_what_its_repeats_cost_and_tells_its_gap() {
     assert_eq!(red(&library, &spoiled).code(), "wrong_cost");
     let mut spoiled = flock;
     spoiled.individuals[1].cost.exact = true;
-    assert_eq!(red(&library, &spoiled).code(), "not_cheapest");
+    assert_eq!(red(&library, &spoiled).code(), "wrong_exact");
+    spoiled.individuals[1].cost.gap = 0.0;
+    assert_eq!(red(&library, &spoiled).code(), "wrong_gap");
 }
 
 #[test]
@@ -261,4 +263,34 @@ fn files_that_do_not_belong_together_are_told_first() {
         spoiled(|flock| flock.params.matching.wx = 0.4),
         "wrong_cost"
     );
+}
+
+#[test]
+fn a_loop_holds_and_a_seam_that_is_no_step_is_named() {
+    let library = synthetic::library(View::Side);
+    let params = Params {
+        count: 4,
+        frames: 90,
+        is_loop: true,
+        ..Params::default()
+    };
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    let report = check(&library, &flock, &Silent).expect("what the planner makes holds");
+    assert_eq!((report.n_individuals, report.n_exact), (4, 4));
+    let mut spoiled = flock.clone();
+    let heirs: Vec<Option<u32>> = flock.individuals.iter().map(|i| i.continues_as).collect();
+    spoiled.individuals[0].continues_as = heirs[1];
+    spoiled.individuals[1].continues_as = heirs[0];
+    let code = red(&library, &spoiled).code();
+    assert!(
+        ["illegal_step", "wrong_cost", "dwell_too_short"].contains(&code),
+        "{code}"
+    );
+    spoiled.individuals[1].continues_as = heirs[1];
+    assert_eq!(red(&library, &spoiled), Violation::Heir { id: 1 });
+    spoiled.individuals[1].continues_as = None;
+    assert_eq!(red(&library, &spoiled), Violation::Heir { id: 1 });
+    let mut spoiled = flock;
+    spoiled.params.is_loop = false;
+    assert_eq!(red(&library, &spoiled), Violation::Heir { id: 0 });
 }

@@ -78,6 +78,14 @@ pub enum Violation {
         /// Frames there must be.
         dwell: usize,
     },
+    /// In a loop everybody goes on as somebody, no two as the same; without, nobody does.
+    #[error(
+        "individual {id}: continues_as does not say, as params.loop has it, whose first frame follows its last"
+    )]
+    Heir {
+        /// Whose.
+        id: usize,
+    },
     /// A cost that is no sum of integers.
     #[error("individual {id}: {part} is no whole number of 65536ths of a circle: {value} rad")]
     NotWhole {
@@ -178,6 +186,7 @@ impl Violation {
             Violation::Mirror { .. } => "mirror_not_allowed",
             Violation::IllegalStep { .. } => "illegal_step",
             Violation::Dwell { .. } => "dwell_too_short",
+            Violation::Heir { .. } => "wrong_heir",
             Violation::NotWhole { .. } => "cost_not_whole",
             Violation::Cost { .. } => "wrong_cost",
             Violation::Suboptimal { .. } => "not_cheapest",

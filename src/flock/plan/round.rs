@@ -8,6 +8,7 @@ use super::cost::Feature;
 use super::crowd::Settled;
 use super::memory::N_REPLANS;
 use super::rows::{Alone, InCrowd};
+use super::viterbi::{Film, Path};
 use super::{Found, LANES, Planner};
 use crate::flock::error::Error;
 use crate::progress::Progress;
@@ -63,7 +64,11 @@ impl Round<'_> {
 
     fn alone<const N: usize>(&self, idx: [usize; N]) -> Result<[u32; N], Error> {
         let (planner, wanted) = (self.planner, idx.map(|idx| &self.wanted[idx][..]));
-        let costs = planner.film().least_costs(&mut Alone { planner, wanted });
+        let open = Film {
+            n_frames: planner.places.len(),
+            ..planner.film()
+        };
+        let costs = open.least_costs(&mut Alone { planner, wanted });
         costs.ok_or(Error::NoTransitions)
     }
 
@@ -75,9 +80,19 @@ impl Round<'_> {
         let (planner, memory) = (self.planner, self.planner.memory);
         let ids = idx.map(|idx| self.first + idx);
         let wanted = idx.map(|idx| &self.wanted[idx][..]);
-        let rows = InCrowd::new(planner, settled, ids, wanted);
+        let mut rows = InCrowd::new(planner, settled, ids, wanted);
+        if !planner.ends.is_empty() {
+            rows = rows.between(ids.map(|id| planner.ends[id]));
+        }
         let film = planner.film();
         let paths = film.cheapest_paths(&rows).ok_or(Error::NoTransitions)?;
+        let is_closed = |(id, path): (&usize, &Path)| match planner.ends.get(*id) {
+            Some(ends) => ends.holds(&path.states),
+            None => true,
+        };
+        if !ids.iter().zip(&paths).all(is_closed) {
+            return Err(Error::LoopDoesNotClose(planner.places.len()));
+        }
         let mut paths = paths.map(|path| planner.found(path));
         let mut found = paths.clone();
         let mut raised = [(); N].map(|()| memory.nothing_raised(planner.places.len()));
@@ -86,16 +101,17 @@ impl Round<'_> {
                 break;
             }
             for (raised, found) in raised.iter_mut().zip(&paths) {
-                memory.raise(raised, &found.path.states);
+                memory.raise(raised, planner.film_of(&found.path));
             }
             let dearer = rows.clone().raised(raised.each_ref());
             let next = film.cheapest_paths(&dearer).ok_or(Error::NoTransitions)?;
             paths = next.map(|path| planner.found(path));
             for lane in 0..N {
-                let states = &paths[lane].path.states;
-                let cost = planner.cost_among(ids[lane], wanted[lane], settled, states);
-                paths[lane].path.cost = cost;
-                found[lane].keep_cheaper(&paths[lane]);
+                let path = &mut paths[lane].path;
+                if is_closed((&ids[lane], &*path)) {
+                    path.cost = planner.cost_among(ids[lane], wanted[lane], settled, path);
+                    found[lane].keep_cheaper(&paths[lane]);
+                }
             }
         }
         Ok(found)

@@ -2,6 +2,7 @@
 //! those whose plans are final.
 
 use super::Planner;
+use super::circle::Ends;
 use super::cost::{CEILING, Feature};
 use super::crowd::Settled;
 use super::memory::Raised;
@@ -37,6 +38,8 @@ pub(super) struct InCrowd<'a, const LANES: usize> {
     wanted: [&'a [Feature]; LANES],
     /// What is dearer for having been repeated.
     raised: [Option<&'a Raised>; LANES],
+    /// Where plans begin and what follows them, in a loop.
+    ends: Option<[Ends; LANES]>,
     /// What the crowd adds to each state; with several lanes, by how much that is more than
     /// what it adds to the state before.
     added: Vec<[u32; LANES]>,
@@ -58,6 +61,7 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
             ids,
             wanted,
             raised: [None; LANES],
+            ends: None,
             added: vec![[0; LANES]; planner.trellis.n_states() + 1],
             sum: [0; LANES],
         }
@@ -68,6 +72,36 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
         InCrowd {
             raised: raised.map(Some),
             ..self
+        }
+    }
+
+    /// The same for plans that play into one another.
+    pub(super) fn between(self, ends: [Ends; LANES]) -> InCrowd<'a, LANES> {
+        InCrowd {
+            ends: Some(ends),
+            ..self
+        }
+    }
+
+    #[inline(always)]
+    fn fill_film(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
+        if first == 0 {
+            self.gather(t);
+        }
+        let wanted: [Feature; LANES] = std::array::from_fn(|lane| self.wanted[lane][t]);
+        let features = &self.planner.features[first..first + out.len()];
+        let added = &self.added[first..first + out.len()];
+        for ((out, &feature), added) in out.iter_mut().zip(features).zip(added) {
+            for lane in 0..LANES {
+                let crowd = if LANES == 1 {
+                    added[lane]
+                } else {
+                    self.sum[lane] = self.sum[lane].wrapping_add(added[lane]);
+                    self.sum[lane]
+                };
+                let alone = self.planner.weights.total(wanted[lane], feature);
+                out[lane] = (alone + crowd).min(CEILING - 1);
+            }
         }
     }
 
@@ -122,23 +156,12 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
 impl<const LANES: usize> Rows<LANES> for InCrowd<'_, LANES> {
     #[inline(always)]
     fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
-        if first == 0 {
-            self.gather(t);
+        let n_frames = self.planner.places.len();
+        if t < n_frames {
+            self.fill_film(t, first, out);
         }
-        let wanted: [Feature; LANES] = std::array::from_fn(|lane| self.wanted[lane][t]);
-        let features = &self.planner.features[first..first + out.len()];
-        let added = &self.added[first..first + out.len()];
-        for ((out, &feature), added) in out.iter_mut().zip(features).zip(added) {
-            for lane in 0..LANES {
-                let crowd = if LANES == 1 {
-                    added[lane]
-                } else {
-                    self.sum[lane] = self.sum[lane].wrapping_add(added[lane]);
-                    self.sum[lane]
-                };
-                let alone = self.planner.weights.total(wanted[lane], feature);
-                out[lane] = (alone + crowd).min(CEILING - 1);
-            }
+        for (lane, ends) in self.ends.iter().flatten().enumerate() {
+            ends.close((t, n_frames, self.planner.dwell), first, out, lane);
         }
     }
 }
