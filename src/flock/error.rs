@@ -20,6 +20,11 @@ pub enum Error {
     /// The sentence says which parameter is out of which range.
     #[error("{0}")]
     InvalidParams(String),
+    /// No plan of so many frames ends where its heir begins.
+    #[error(
+        "no loop of {0} frames comes back to where it began with this footage; ask for another number of frames, best for more"
+    )]
+    LoopDoesNotClose(usize),
     /// Somebody cancelled.
     #[error("the flock was cancelled")]
     Cancelled,
@@ -31,7 +36,7 @@ impl Error {
         match self {
             Error::NoTransitions => Code::NoTransitions,
             Error::AnimalTooSmall => Code::AnimalTooSmall,
-            Error::InvalidParams(_) => Code::InvalidParams,
+            Error::InvalidParams(_) | Error::LoopDoesNotClose(_) => Code::InvalidParams,
             Error::Cancelled => Code::Cancelled,
         }
     }

@@ -13,6 +13,8 @@ pub struct Individual {
     pub mirrored: Vec<bool>,
     /// How far the sprite (mirrored first) is rotated, clockwise positive.
     pub rotation_rad: Vec<f64>,
+    /// Who shows the frame after its last, in a loop; that one's first frame is it.
+    pub continues_as: Option<u32>,
     /// The second sprites shown around jumps.
     pub fades: Vec<Fade>,
     /// Where the centroid is drawn.
@@ -64,7 +66,7 @@ pub struct Fade {
 /// The plan's cost, radians: sums of integers times 2 pi / 65536, to 6 decimals (ALGORITHMS.md 6).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PlanCost {
-    /// The sum of the four below.
+    /// The sum of the five below.
     pub total: f64,
     /// Headings and rotations.
     pub heading: f64,
@@ -74,10 +76,32 @@ pub struct PlanCost {
     pub transition: f64,
     /// Looking like a neighbor of smaller id.
     pub crowd: f64,
+    /// Frames shown again too soon.
+    pub repetition: f64,
     /// No plan costs less, crowd or not.
     pub lower_bound: f64,
-    /// The plan is the cheapest of all, not just of those tried.
+    /// Among those that it looks out for, no plan costs less than the total less this.
+    pub gap: f64,
+    /// The plan is the cheapest of all, not just of those tried: its gap is 0.
     pub exact: bool,
+}
+
+impl Fade {
+    /// Cuts off what comes from frame `n_frames` on, as that of an heir who begins there.
+    pub(super) fn split_off(&mut self, n_frames: usize) -> Option<Fade> {
+        let at = n_frames.saturating_sub(self.start as usize);
+        if at >= self.weight.len() {
+            return None;
+        }
+        Some(Fade {
+            start: 0,
+            source_frame: self.source_frame.split_off(at),
+            mirrored: self.mirrored,
+            rotation_rad: self.rotation_rad.split_off(at),
+            scale: self.scale.split_off(at),
+            weight: self.weight.split_off(at),
+        })
+    }
 }
 
 impl Individual {

@@ -4,6 +4,7 @@
 pub mod boids;
 pub mod check;
 pub mod composite;
+mod course;
 pub mod error;
 pub mod individual;
 pub mod lens;
@@ -12,6 +13,7 @@ pub mod params;
 pub mod placement;
 pub mod plan;
 pub mod quality;
+mod seam;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
@@ -21,20 +23,14 @@ pub use individual::{BoidTrack, Fade, Individual, PlanCost};
 pub use params::Params;
 pub use quality::Stats;
 
-use rayon::prelude::*;
-
 use self::boids::Boids;
 use self::boids::calibration::Calibration;
-use self::boids::measures::Order;
 use self::boids::tank::Tank;
-use self::boids::vector::{Vec3, unit};
-use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
 use self::params::MatchBy;
 use self::placement::Stage;
 use self::plan::{Plan, Planner};
-use crate::geometry::Turns;
 use crate::library::Library;
 use crate::progress::Progress;
 
@@ -93,8 +89,15 @@ pub fn plan_flock(
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
     let boids = Boids::new(params, &calibration, (&lens, &tank), library.poses.fps);
-    let course = simulate(boids, &lens, params.frames, progress)?;
-    let plans = Planner::new(library, &motion, &course.tracks, params).plan(progress)?;
+    let course = match params.is_loop {
+        true => course::simulate_loop(boids, &lens, (params.frames, library.poses.fps), progress)?,
+        false => course::simulate(boids, &lens, params.frames, progress)?,
+    };
+    let planner = Planner::new(library, &motion, &course.tracks, params);
+    let plans = match &course.heirs {
+        Some(heirs) => planner.plan_loop(heirs, progress)?,
+        None => planner.plan(progress)?,
+    };
     let stage = Stage {
         library,
         motion: &motion,
@@ -102,7 +105,7 @@ pub fn plan_flock(
         lens: &lens,
         tank: &tank,
     };
-    let individuals = place(&stage, course.tracks, plans);
+    let individuals = place(&stage, &course.tracks, &plans, course.heirs.as_deref());
     Ok(Flock {
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
@@ -136,92 +139,34 @@ fn told(params: &Params, library: &Library, lens: &Lens) -> Params {
     params
 }
 
-/// How a simulation went, as files hold it.
-struct Course {
-    /// By id.
-    tracks: Vec<BoidTrack>,
-    /// By frame.
-    orders: Vec<Order>,
-    /// By frame; empty without one.
-    predator_px: Vec<[f64; 3]>,
-}
-
-fn simulate(
-    mut boids: Boids,
-    lens: &Lens,
-    n_frames: u32,
-    progress: &dyn Progress,
-) -> Result<Course, Error> {
-    progress.report("simulating", 0.0);
-    let track = BoidTrack {
-        forward: (!lens.is_flat()).then(Vec::new),
-        ..BoidTrack::default()
+fn place(
+    stage: &Stage,
+    tracks: &[BoidTrack],
+    plans: &[Plan],
+    heirs: Option<&[u32]>,
+) -> Vec<Individual> {
+    let shown: Vec<_> = plans.iter().map(|plan| &plan.shown[..]).collect();
+    let placed = match heirs {
+        Some(heirs) => stage.place_loop(&shown, tracks, heirs),
+        None => stage.place(&shown, tracks),
     };
-    let mut course = Course {
-        tracks: vec![track; boids.positions.len()],
-        orders: Vec::with_capacity(n_frames as usize),
-        predator_px: Vec::new(),
-    };
-    for t in 0..n_frames {
-        if progress.cancelled() {
-            return Err(Error::Cancelled);
-        }
-        if t > 0 {
-            boids.advance();
-        }
-        for (id, track) in course.tracks.iter_mut().enumerate() {
-            record(track, lens, &boids, id);
-        }
-        let predator = boids.predator().map(|place| seen(place, lens, &boids));
-        course.predator_px.extend(predator);
-        course.orders.push(boids.order());
-        progress.report("simulating", f64::from(t + 1) / f64::from(n_frames));
-    }
-    Ok(course)
-}
-
-/// A place in the picture, and how far behind the front of the tank: pixels.
-fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
-    let [x, y] = lens.picture_px(place);
-    let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
-    [x, y, behind_px].map(|px| rounded(px, 2))
-}
-
-/// A boid's moment, as it is seen.
-fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
-    let (place, velocity) = (boids.positions[id], boids.velocities[id]);
-    track.position_px.push(seen(place, lens, boids));
-    if let Some(forward) = &mut track.forward {
-        forward.push(unit(velocity).map(|part| rounded(part, 5)));
-    }
-    let [vx, vy] = lens.picture_velocity(place, velocity);
-    let heading = Turns::from_rad(libm::atan2(vy, vx));
-    track.heading_rad.push(rounded(heading.to_rad(), 5));
-    track.speed_bl_per_s.push(rounded(vx.hypot(vy), 3));
-}
-
-fn place(stage: &Stage, tracks: Vec<BoidTrack>, plans: Vec<Plan>) -> Vec<Individual> {
     (0u32..)
-        .zip(tracks)
-        .zip(plans)
-        .collect::<Vec<_>>()
-        .into_par_iter()
-        .map(|((id, boid), plan)| {
-            let placed = stage.place(&plan.shown, &boid);
-            Individual {
-                id,
-                source_frame: plan.shown.iter().map(|shown| shown.0).collect(),
-                mirrored: plan.shown.iter().map(|shown| shown.1).collect(),
-                rotation_rad: placed.rotation_rad,
-                fades: placed.fades,
-                centroid_px: placed.centroid_px,
-                heading_rad: placed.heading_rad,
-                forward: placed.forward,
-                scale: placed.scale,
-                depth_m: placed.depth_m,
-                boid,
-                cost: plan.cost,
-            }
+        .zip(placed)
+        .zip(tracks.iter().zip(plans))
+        .map(|((id, placed), (boid, plan))| Individual {
+            id,
+            source_frame: plan.shown.iter().map(|shown| shown.0).collect(),
+            mirrored: plan.shown.iter().map(|shown| shown.1).collect(),
+            rotation_rad: placed.rotation_rad,
+            continues_as: heirs.map(|heirs| heirs[id as usize]),
+            fades: placed.fades,
+            centroid_px: placed.centroid_px,
+            heading_rad: placed.heading_rad,
+            forward: placed.forward,
+            scale: placed.scale,
+            depth_m: placed.depth_m,
+            boid: boid.clone(),
+            cost: plan.cost,
         })
         .collect()
 }

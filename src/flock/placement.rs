@@ -1,6 +1,8 @@
 //! Where and how each frame of a plan is shown: rotation within the budget, position along the shown
 //! heading on a leash to the boid, cross-fades at jumps (ALGORITHMS.md 8; O 5.2).
 
+use rayon::prelude::*;
+
 use super::boids::tank::Tank;
 use super::individual::{BoidTrack, Fade, rounded};
 use super::lens::Lens;
@@ -16,6 +18,9 @@ const ROTATION_S: f64 = 0.1;
 const LEASH_S: f64 = 0.5;
 /// The leash's length.
 const LEASH_BL: f64 = 0.5;
+
+/// A loop is gone round so many times before rotation and leash are as they were a round before.
+const N_ROUNDS: usize = 4;
 
 /// A sprite is drawn no smaller and no larger than this.
 const LEAST_SCALE: f64 = 0.2;
@@ -61,18 +66,97 @@ struct Way<'a> {
     depth_bl: &'a [f64],
 }
 
+/// How the frame before the first is shown, in a loop.
+#[derive(Clone, Copy)]
+struct Before {
+    state: (u32, bool),
+    heading_rad: f64,
+    centroid_px: [f64; 2],
+}
+
 /// Whether something else than the next frame is shown after `before`.
 pub fn is_jump(before: (u32, bool), after: (u32, bool)) -> bool {
     after != (before.0 + 1, before.1)
 }
 
 impl Stage<'_> {
-    /// Places one individual.
-    pub fn place(&self, shown: &[(u32, bool)], boid: &BoidTrack) -> Placed {
-        let heading_rad = self.headings(shown, boid);
-        let depth_bl: Vec<f64> = (boid.position_px.iter())
-            .map(|position| self.depth_bl(position[2]))
-            .collect();
+    /// Places all individuals, by id.
+    pub fn place(&self, shown: &[&[(u32, bool)]], boids: &[BoidTrack]) -> Vec<Placed> {
+        (shown.par_iter().zip(boids))
+            .map(|(shown, boid)| self.place_one(shown, boid, None))
+            .collect()
+    }
+
+    /// Places all individuals, by id, so that the last frame of each plays into the first of its heir.
+    pub fn place_loop(
+        &self,
+        shown: &[&[(u32, bool)]],
+        boids: &[BoidTrack],
+        heirs: &[u32],
+    ) -> Vec<Placed> {
+        let mut placed = self.place(shown, boids);
+        for _ in 0..N_ROUNDS {
+            let mut before = vec![None; shown.len()];
+            for (id, &heir) in heirs.iter().enumerate() {
+                let last = shown[id].len() - 1;
+                before[heir as usize] = Some(Before {
+                    state: shown[id][last],
+                    heading_rad: placed[id].heading_rad[last],
+                    centroid_px: placed[id].centroid_px[last],
+                });
+            }
+            placed = (shown.par_iter().zip(boids).zip(before))
+                .map(|((shown, boid), before)| self.place_one(shown, boid, before))
+                .collect();
+        }
+        let fades = self.fades_across(shown, boids, heirs, &placed);
+        for (placed, fades) in placed.iter_mut().zip(fades) {
+            placed.fades = fades;
+        }
+        placed
+    }
+
+    /// The fades of all individuals, those at the end going on in their heirs.
+    fn fades_across(
+        &self,
+        shown: &[&[(u32, bool)]],
+        boids: &[BoidTrack],
+        heirs: &[u32],
+        placed: &[Placed],
+    ) -> Vec<Vec<Fade>> {
+        let mut fades: Vec<Vec<Fade>> = vec![Vec::new(); shown.len()];
+        for (id, &heir) in heirs.iter().enumerate() {
+            let (heir, n_frames) = (heir as usize, shown[id].len());
+            let across = self.fades(
+                &Way {
+                    shown: &[shown[id], shown[heir]].concat(),
+                    heading_rad: &[id, heir].map(|id| &placed[id].heading_rad[..]).concat(),
+                    depth_bl: &[id, heir].map(|id| self.depths_bl(&boids[id])).concat(),
+                },
+                n_frames,
+            );
+            for mut fade in across {
+                let rest = fade.split_off(n_frames);
+                fades[heir].extend(rest);
+                if !fade.weight.is_empty() {
+                    fades[id].push(fade);
+                }
+            }
+        }
+        for fades in &mut fades {
+            fades.sort_by_key(|fade| fade.start);
+        }
+        fades
+    }
+
+    fn depths_bl(&self, boid: &BoidTrack) -> Vec<f64> {
+        let places = boid.position_px.iter();
+        places.map(|place| self.depth_bl(place[2])).collect()
+    }
+
+    fn place_one(&self, shown: &[(u32, bool)], boid: &BoidTrack, before: Option<Before>) -> Placed {
+        let heading_rad = self.headings(shown, boid, before);
+        let depth_bl = self.depths_bl(boid);
         let rotation_rad: Vec<f64> = shown
             .iter()
             .zip(&heading_rad)
@@ -86,18 +170,21 @@ impl Stage<'_> {
                     .collect()
             }),
             rotation_rad,
-            centroid_px: self.positions(&heading_rad, boid),
+            centroid_px: self.positions(&heading_rad, boid, before),
             scale: (shown.iter().zip(&depth_bl))
                 .map(|(state, &depth_bl)| self.scale(state.0, depth_bl))
                 .collect(),
             depth_m: (depth_bl.iter())
                 .map(|&bl| Some(rounded(self.lens.metres(bl)?, 5)))
                 .collect(),
-            fades: self.fades(&Way {
-                shown,
-                heading_rad: &heading_rad,
-                depth_bl: &depth_bl,
-            }),
+            fades: self.fades(
+                &Way {
+                    shown,
+                    heading_rad: &heading_rad,
+                    depth_bl: &depth_bl,
+                },
+                shown.len(),
+            ),
             heading_rad,
         }
     }
@@ -150,36 +237,55 @@ impl Stage<'_> {
 
     /// The headings shown. In top view the boid's own. In side view the frame's, rotated toward the
     /// boid's; the rotation follows slowly, and at a jump takes up what it can of the step.
-    fn headings(&self, shown: &[(u32, bool)], boid: &BoidTrack) -> Vec<f64> {
+    fn headings(
+        &self,
+        shown: &[(u32, bool)],
+        boid: &BoidTrack,
+        before: Option<Before>,
+    ) -> Vec<f64> {
         if self.library.poses.view == View::Top {
             return boid.heading_rad.clone();
         }
         let keep = libm::exp(-1.0 / (ROTATION_S * self.library.poses.fps));
-        let mut rotation = self.rotation(shown[0], boid.heading_rad[0]);
+        let mut rotation = match before {
+            Some(before) => wrap_rad(before.heading_rad - self.source_heading(before.state)),
+            None => self.rotation(shown[0], boid.heading_rad[0]),
+        };
+        let mut last = before.map(|before| (before.state, before.heading_rad));
         let mut headings: Vec<f64> = Vec::with_capacity(shown.len());
         for (t, &state) in shown.iter().enumerate() {
-            if t > 0 && is_jump(shown[t - 1], state) {
-                rotation = self.rotation(state, headings[t - 1]);
+            if let Some((before, heading)) = last
+                && is_jump(before, state)
+            {
+                rotation = self.rotation(state, heading);
             }
             let wanted = self.rotation(state, boid.heading_rad[t]);
             rotation = wanted + keep * (rotation - wanted);
-            headings.push(rounded(wrap_rad(self.source_heading(state) + rotation), 5));
+            let heading = rounded(wrap_rad(self.source_heading(state) + rotation), 5);
+            headings.push(heading);
+            last = Some((state, heading));
         }
         headings
     }
 
-    fn positions(&self, heading_rad: &[f64], boid: &BoidTrack) -> Vec<[f64; 2]> {
+    fn positions(
+        &self,
+        heading_rad: &[f64],
+        boid: &BoidTrack,
+        before: Option<Before>,
+    ) -> Vec<[f64; 2]> {
         let fps = self.library.poses.fps;
         let pull = match self.params.position {
             Position::Leash => 1.0 - libm::exp(-1.0 / (LEASH_S * fps)),
             Position::Boid => 1.0,
             Position::Papers => 0.0,
         };
-        let mut place = [boid.position_px[0][0], boid.position_px[0][1]];
+        let start = [boid.position_px[0][0], boid.position_px[0][1]];
+        let mut place = before.map_or(start, |before| before.centroid_px);
         let mut places = Vec::with_capacity(heading_rad.len());
         for (t, &heading) in heading_rad.iter().enumerate() {
             let goal = [boid.position_px[t][0], boid.position_px[t][1]];
-            if t > 0 {
+            if t > 0 || before.is_some() {
                 let step_px = boid.speed_bl_per_s[t] * self.lens.length_px / fps;
                 place[0] += step_px * libm::cos(heading);
                 place[1] += step_px * libm::sin(heading);
@@ -205,13 +311,15 @@ impl Stage<'_> {
         self.lens.picture_px(self.tank.on_the_way(from, to))
     }
 
-    fn fades(&self, way: &Way) -> Vec<Fade> {
+    /// The fades at the jumps up to frame `n_frames`, the one after the last.
+    fn fades(&self, way: &Way, n_frames: usize) -> Vec<Fade> {
         let shown = way.shown;
         let jumps: Vec<usize> = (1..shown.len())
             .filter(|&t| is_jump(shown[t - 1], shown[t]))
             .collect();
         let mut fades = Vec::new();
-        for (k, &t) in jumps.iter().enumerate() {
+        let within = jumps.iter().take_while(|&&t| t <= n_frames);
+        for (k, &t) in within.enumerate() {
             let before = if k > 0 { t - jumps[k - 1] } else { t };
             let after = jumps.get(k + 1).copied().unwrap_or(shown.len()) - t;
             let half = (self.params.fade_frames as usize / 2)

@@ -5,6 +5,7 @@ use super::boids::vector::angle_between;
 use super::individual::{Individual, rounded};
 use super::params::{MatchBy, Params};
 use super::placement::is_jump;
+use super::plan::memory::Memory;
 use crate::geometry::wrap_rad;
 use crate::library::Library;
 
@@ -24,6 +25,8 @@ pub struct Stats {
     pub heading_error_p90_rad: f64,
     /// Jumps in 100 frames of one individual.
     pub jumps_per_100_frames: f64,
+    /// Frames in 100 that show what the same individual showed less than 3 s before.
+    pub repeats_per_100_frames: f64,
     /// 95th percentile of the distance from individual to boid, body lengths.
     pub path_deviation_p95_bl: f64,
     /// Median angle between the way moved and the shown heading, radians.
@@ -65,6 +68,7 @@ pub fn measure(
         heading_error_median_rad: quantile(&headings, 0.5),
         heading_error_p90_rad: quantile(&headings, 0.9),
         jumps_per_100_frames: jumps_per_100_frames(individuals),
+        repeats_per_100_frames: repeats_per_100_frames(individuals, fps),
         path_deviation_p95_bl: quantile(&sorted(deviations), 0.95) / length_px,
         slip_median_rad: quantile(&sorted(slips.collect()), 0.5),
         clone_share: clone_share(individuals, CLONE_BL * length_px, CLONE_S * fps),
@@ -85,6 +89,7 @@ impl Stats {
             heading_error_median_rad: r(self.heading_error_median_rad),
             heading_error_p90_rad: r(self.heading_error_p90_rad),
             jumps_per_100_frames: r(self.jumps_per_100_frames),
+            repeats_per_100_frames: r(self.repeats_per_100_frames),
             path_deviation_p95_bl: r(self.path_deviation_p95_bl),
             slip_median_rad: r(self.slip_median_rad),
             clone_share: r(self.clone_share),
@@ -149,6 +154,18 @@ fn jumps_per_100_frames(individuals: &[Individual]) -> f64 {
     };
     let n_jumps: usize = individuals.iter().map(jumps).sum();
     100.0 * n_jumps as f64 / n_frames.max(1) as f64
+}
+
+fn repeats_per_100_frames(individuals: &[Individual], fps: f64) -> f64 {
+    let memory = Memory::new(1.0, fps);
+    let repeats = |individual: &Individual| {
+        let n_frames = individual.source_frame.len();
+        let states: Vec<(u32, bool)> = (0..n_frames).map(|t| shown(individual, t)).collect();
+        memory.repeats(&states).len()
+    };
+    let n_frames: usize = individuals.iter().map(|i| i.source_frame.len()).sum();
+    let n_repeats: usize = individuals.iter().map(repeats).sum();
+    100.0 * n_repeats as f64 / n_frames.max(1) as f64
 }
 
 fn clone_share(individuals: &[Individual], within_px: f64, within_frames: f64) -> f64 {

@@ -61,6 +61,29 @@ pub(crate) fn library(view: View) -> Library {
     }
 }
 
+/// The same from the side with 24 frames of two beats and some that only play on, so that a plan repeats.
+pub(crate) fn few_looks() -> Library {
+    let mut library = library(View::Side);
+    let jump = |from, to, cost, mirrored| Jump {
+        from,
+        to,
+        cost,
+        mirrored,
+    };
+    library.playback = Playback {
+        jumps: vec![
+            jump(209, 200, 400, false),
+            jump(214, 205, 300, true),
+            jump(219, 200, 900, false),
+            jump(219, 210, 500, false),
+            jump(223, 200, 700, true),
+        ],
+        component: (200..224).collect(),
+    };
+    library.clip_frames = 2;
+    library
+}
+
 /// Where it points: 0 = right, a quarter turn = away from the viewer (in top view: down).
 fn yaw_rad(frame: u32) -> f64 {
     let turn = |period: f64, phase: f64| libm::sin(TAU * f64::from(frame) / period + phase);

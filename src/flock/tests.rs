@@ -3,6 +3,7 @@
 use super::*;
 use crate::flock::params::TankExtent;
 use crate::flock::synthetic::{self, LENGTH_PX};
+use crate::geometry::wrap_rad;
 use crate::library::View;
 use crate::progress::Silent;
 
@@ -81,6 +82,90 @@ fn the_same_seed_gives_the_same_flock_and_another_another() {
     };
     assert_eq!(with_seed(1), with_seed(1));
     assert_ne!(with_seed(1), with_seed(2));
+}
+
+#[test]
+fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
+    for (view, name, n_frames) in [
+        (View::Side, "school", 150),
+        (View::Side, "swarm", 90),
+        (View::Top, "school", 200),
+        (View::Top, "scatter", 120),
+    ] {
+        let library = synthetic::library(view);
+        let params = Params {
+            frames: n_frames,
+            is_loop: true,
+            ..params(name)
+        };
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        let last = n_frames as usize - 1;
+        for one in &flock.individuals {
+            let heir = &flock.individuals[one.continues_as.expect("a loop") as usize];
+            let step = |of: fn(&Individual, &Individual, usize, usize) -> f64| {
+                let inside = [one, heir]
+                    .into_iter()
+                    .flat_map(|one| (0..last).map(move |t| of(one, one, t, t + 1)));
+                (inside.fold(0.0, f64::max), of(one, heir, last, 0))
+            };
+            let moved = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            let (inside, across) = step(|a, b, t, u| {
+                let (a, b) = (a.boid.position_px[t], b.boid.position_px[u]);
+                (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
+            });
+            assert!(
+                across <= inside + 0.05,
+                "{name} boid {} {across} {inside}",
+                one.id
+            );
+            let shown = step(|a, b, t, u| {
+                let (a, b) = (a.centroid_px[t], b.centroid_px[u]);
+                (a[0] - b[0]).hypot(a[1] - b[1])
+            });
+            assert!(shown.1 <= shown.0 + 0.05, "{name} {} {shown:?}", one.id);
+            assert!(moved(one.centroid_px[last], heir.centroid_px[0]) < 0.2 * LENGTH_PX);
+            let turn = step(|a, b, t, u| wrap_rad(a.heading_rad[t] - b.heading_rad[u]).abs());
+            assert!(turn.1 <= turn.0 + 0.002, "{name} {} {turn:?}", one.id);
+            let state = |one: &Individual, t: usize| (one.source_frame[t], one.mirrored[t]);
+            let (from, to) = (state(one, last), state(heir, 0));
+            let is_step = to == (from.0 + 1, from.1)
+                || (library.playback.jumps.iter())
+                    .any(|j| (j.from, j.to, j.mirrored) == (from.0, to.0, from.1 != to.1));
+            assert!(is_step, "{name} {}: {from:?} {to:?}", one.id);
+            assert!(one.is_complete(n_frames as usize));
+        }
+        assert!(
+            flock.stats.heading_error_median_rad < 0.2,
+            "{:?}",
+            flock.stats
+        );
+    }
+}
+
+#[test]
+fn a_loop_keeps_to_the_animals_speeds() {
+    let library = synthetic::library(View::Top);
+    let params = Params {
+        is_loop: true,
+        ..params("swarm")
+    };
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    let speeds = flock
+        .individuals
+        .iter()
+        .flat_map(|i| &i.boid.speed_bl_per_s);
+    let most = speeds.fold(0.0f64, |most, &speed| most.max(speed));
+    assert!(most < 1.25 * 2.0, "the fastest seen swims 2 BL/s: {most}");
+}
+
+#[test]
+fn a_loop_of_sums_of_speeds_is_refused() {
+    let params = Params {
+        is_loop: true,
+        ..params("papers")
+    };
+    let error = plan_flock(&synthetic::library(View::Side), &params, &Silent).expect_err("open");
+    assert!(error.to_string().contains("never comes back"), "{error}");
 }
 
 #[test]

@@ -79,6 +79,9 @@ struct IndividualFile {
     source_frame: Vec<u32>,
     mirrored: Vec<bool>,
     rotation_rad: Vec<f64>,
+    /// Absent in files of before.
+    #[serde(default)]
+    continues_as: Option<u32>,
     fade: Vec<FadeFile>,
     centroid_px: Vec<[f64; 2]>,
     heading_rad: Vec<f64>,
@@ -117,7 +120,13 @@ struct CostFile {
     speed: f64,
     transition: f64,
     crowd: f64,
+    /// Absent in files of before.
+    #[serde(default)]
+    repetition: f64,
     lower_bound: f64,
+    /// Absent in files of before.
+    #[serde(default)]
+    gap: f64,
     exact: bool,
 }
 
@@ -126,6 +135,9 @@ struct StatsFile {
     heading_error_median_rad: f64,
     heading_error_p90_rad: f64,
     jumps_per_100_frames: f64,
+    /// Absent in files of before; 0 then.
+    #[serde(default)]
+    repeats_per_100_frames: f64,
     path_deviation_p95_bl: f64,
     slip_median_rad: f64,
     clone_share: f64,
@@ -146,6 +158,7 @@ impl IndividualFile {
             source_frame: individual.source_frame,
             mirrored: individual.mirrored,
             rotation_rad: individual.rotation_rad,
+            continues_as: individual.continues_as,
             fade: individual.fades.into_iter().map(FadeFile::of).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
@@ -168,6 +181,7 @@ impl IndividualFile {
             source_frame: self.source_frame,
             mirrored: self.mirrored,
             rotation_rad: self.rotation_rad,
+            continues_as: self.continues_as,
             fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,
@@ -217,7 +231,9 @@ impl CostFile {
             speed: cost.speed,
             transition: cost.transition,
             crowd: cost.crowd,
+            repetition: cost.repetition,
             lower_bound: cost.lower_bound,
+            gap: cost.gap,
             exact: cost.exact,
         }
     }
@@ -229,7 +245,9 @@ impl CostFile {
             speed: self.speed,
             transition: self.transition,
             crowd: self.crowd,
+            repetition: self.repetition,
             lower_bound: self.lower_bound,
+            gap: self.gap,
             exact: self.exact,
         }
     }
@@ -241,6 +259,7 @@ impl StatsFile {
             heading_error_median_rad: stats.heading_error_median_rad,
             heading_error_p90_rad: stats.heading_error_p90_rad,
             jumps_per_100_frames: stats.jumps_per_100_frames,
+            repeats_per_100_frames: stats.repeats_per_100_frames,
             path_deviation_p95_bl: stats.path_deviation_p95_bl,
             slip_median_rad: stats.slip_median_rad,
             clone_share: stats.clone_share,
@@ -257,6 +276,7 @@ impl StatsFile {
             heading_error_median_rad: self.heading_error_median_rad,
             heading_error_p90_rad: self.heading_error_p90_rad,
             jumps_per_100_frames: self.jumps_per_100_frames,
+            repeats_per_100_frames: self.repeats_per_100_frames,
             path_deviation_p95_bl: self.path_deviation_p95_bl,
             slip_median_rad: self.slip_median_rad,
             clone_share: self.clone_share,

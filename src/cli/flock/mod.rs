@@ -31,6 +31,9 @@ pub struct Args {
     /// Everything random follows from it.
     #[arg(long)]
     seed: Option<u64>,
+    /// The last frame plays into the first: a film that repeats without a seam.
+    #[arg(long = "loop")]
+    is_loop: bool,
     /// Where to start from: school, swarm, mill, scatter or papers.
     #[arg(long)]
     preset: Option<String>,
@@ -40,6 +43,9 @@ pub struct Args {
     /// What frames and boids are matched by: heading (the default) or position.
     #[arg(long = "match", value_name = "BY")]
     match_by: Option<String>,
+    /// Weights of the plan to override, as JSON: '{"wx": 1.2, "w_p": 0.05}'.
+    #[arg(long, value_name = "JSON")]
+    matching: Option<String>,
     /// Write the plan, flock.json, here.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
@@ -47,7 +53,7 @@ pub struct Args {
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
     /// Film this plan, a flock.json of the same library, instead of making one.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["count", "frames", "seed", "preset", "rules", "match_by"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "frames", "seed", "preset", "rules", "match_by", "matching"])]
     from: Option<PathBuf>,
 }
 
@@ -119,16 +125,27 @@ impl Args {
     /// The preset with what was given besides.
     fn params(&self) -> Result<Params, Error> {
         let mut overrides = Map::new();
+        let json = |flag: &str, text: &String| {
+            serde_json::from_str(text)
+                .map_err(|cause| Error::Usage(format!("{flag} is not JSON: {cause}")))
+        };
         if let Some(text) = &self.rules {
-            let rules: Value = serde_json::from_str(text)
-                .map_err(|cause| Error::Usage(format!("--rules is not JSON: {cause}")))?;
-            overrides.insert("rules".into(), rules);
+            overrides.insert("rules".into(), json("--rules", text)?);
+        }
+        let mut matching = match &self.matching {
+            Some(text) => json("--matching", text)?,
+            None => json!({}),
+        };
+        if let (Some(by), Some(matching)) = (&self.match_by, matching.as_object_mut()) {
+            matching.insert("by".into(), by.as_str().into());
+        }
+        if matching != json!({}) {
+            overrides.insert("matching".into(), matching);
         }
         let render = Value::Object(self.outputs.overrides());
         overrides.insert("render".into(), render);
-        let by = |by: &String| json!({ "by": by });
         let given = [
-            ("matching", self.match_by.as_ref().map(by)),
+            ("loop", self.is_loop.then_some(Value::Bool(true))),
             ("preset", self.preset.clone().map(Value::from)),
             ("count", self.count.map(Value::from)),
             ("frames", self.frames.map(Value::from)),

@@ -24,7 +24,7 @@ use self::grid::{Grid, Neighbor};
 use self::habitat::{Habitat, Hunter};
 use self::rules::{Moment, Steering};
 use self::tank::Tank;
-use self::vector::{Vec3, add_scaled, norm, scaled, turned_at_most, unit};
+use self::vector::{Vec3, add_scaled, minus, norm, scaled, turned_at_most, unit};
 use super::lens::Lens;
 use super::params::Params;
 use crate::random;
@@ -37,6 +37,8 @@ const OVERLAP_BL: f64 = 0.5;
 const WARM_UP_S: f64 = 10.0;
 /// Time constant of the wandering turn rate.
 const WANDER_S: f64 = 1.0;
+/// Who is to meet a place closes in on it with this time constant.
+const MEETING_S: f64 = 0.6;
 /// In flight the greatest speed is so many times the animal's.
 const FLIGHT_PACE: f64 = 1.6;
 /// Boids of one unit of parallel work.
@@ -71,6 +73,16 @@ pub struct Boids<'a> {
     wander: Vec<[f64; 2]>,
     leads_for_s: Vec<f64>,
     hunter: Option<Hunter>,
+    meeting: Option<Meeting>,
+}
+
+/// Where everybody is to be a frame later and how fast, by id: places in body lengths and velocities.
+#[derive(Clone, Debug)]
+pub struct Meeting {
+    /// How much of each wish it is, 0..=1.
+    pub share: f64,
+    /// Place and velocity.
+    pub places: Vec<(Vec3, Vec3)>,
 }
 
 impl<'a> Boids<'a> {
@@ -120,6 +132,7 @@ impl<'a> Boids<'a> {
             wander: vec![[0.0; 2]; n],
             leads_for_s: vec![0.0; n],
             hunter: None,
+            meeting: None,
         };
         boids.start();
         boids
@@ -128,6 +141,24 @@ impl<'a> Boids<'a> {
     /// Where the predator is, if there is one.
     pub fn predator(&self) -> Option<Vec3> {
         Some(self.hunter?.position)
+    }
+
+    /// Lets the film begin so many frames later.
+    pub fn set_back(&mut self, n_frames: usize) {
+        self.time_s -= n_frames as f64 * f64::from(self.n_substeps) * self.step_s;
+    }
+
+    /// What they wish for from now on, besides their rules.
+    pub fn meet(&mut self, meeting: Meeting) {
+        self.meeting = Some(meeting);
+    }
+
+    /// Puts everybody into a moment.
+    pub fn show(&mut self, positions: Vec<Vec3>, velocities: Vec<Vec3>, hunter: Option<Vec3>) {
+        (self.positions, self.velocities) = (positions, velocities);
+        if let (Some(hunter), Some(position)) = (&mut self.hunter, hunter) {
+            hunter.position = position;
+        }
     }
 
     /// How they move as a whole at this moment.
@@ -242,6 +273,10 @@ impl<'a> Boids<'a> {
             noise: self.noise(id),
         });
         let wished = add_scaled(velocity, self.step_s, acceleration);
+        let wished = match &self.meeting {
+            Some(meeting) => meeting.wish(id, position, wished),
+            None => wished,
+        };
         let aside = match self.tank.is_flat() {
             true => [-velocity[1], velocity[0], 0.0],
             false => [-velocity[2], 0.0, velocity[0]],
@@ -355,6 +390,15 @@ impl<'a> Boids<'a> {
         }
         self.habitat.keep_out(&mut position, &mut velocity);
         (position, velocity)
+    }
+}
+
+impl Meeting {
+    /// The velocity wished for instead of `wished`.
+    fn wish(&self, id: usize, position: Vec3, wished: Vec3) -> Vec3 {
+        let (place, velocity) = self.places[id];
+        let there = add_scaled(velocity, 1.0 / MEETING_S, minus(place, position));
+        add_scaled(wished, self.share, minus(there, wished))
     }
 }
 

@@ -19,6 +19,9 @@ const ROUNDING_TURNS: f64 = 0.02;
 /// Nearer in the footage than this looks the same (ALGORITHMS.md 6, crowd).
 const LOOKALIKE_S: f64 = 0.3;
 
+/// Shown again sooner than this is a repeat (ALGORITHMS.md 6, repetition).
+const REPEAT_S: f64 = 3.0;
+
 /// What everything costs.
 pub(super) struct Ledger<'a> {
     flock: &'a Flock,
@@ -42,11 +45,13 @@ pub(super) struct Bill {
     lookalikes: Vec<Vec<Lookalike>>,
     /// What the plan has cost before each frame is shown, jumps to it included, and at the end.
     pub(super) before: Vec<u64>,
+    /// What its repeats cost, turns; no part of `before`.
+    pub(super) repetition: u64,
 }
 
 impl Bill {
     pub(super) fn total(&self) -> u64 {
-        self.before.last().copied().unwrap_or(0)
+        self.before.last().copied().unwrap_or(0) + self.repetition
     }
 
     /// Whether anyone is to be avoided at any time.
@@ -95,6 +100,7 @@ impl<'a> Ledger<'a> {
                 .wanted(&self.flock.individuals[id].boid, self.flock.fps),
             lookalikes: self.lookalikes(id),
             before: vec![0],
+            repetition: self.repetition(id),
         };
         let (mut heading, mut speed, mut crowd, mut total) = (0, 0, 0, 0);
         let mut jumps_left = jumps.iter().peekable();
@@ -113,6 +119,11 @@ impl<'a> Ledger<'a> {
             total += price;
             bill.before.push(total);
         }
+        if let (Some(jump), Some(before)) = (jumps_left.next(), bill.before.last_mut()) {
+            // What follows the last frame of a loop.
+            total += jump.cost;
+            *before = total;
+        }
         let transition = jumps.iter().map(|jump| jump.cost).sum();
         let said = &self.flock.individuals[id].cost;
         for (part, said, found) in [
@@ -120,7 +131,8 @@ impl<'a> Ledger<'a> {
             ("cost.speed", said.speed, speed),
             ("cost.transition", said.transition, transition),
             ("cost.crowd", said.crowd, crowd),
-            ("cost.total", said.total, total),
+            ("cost.repetition", said.repetition, bill.repetition),
+            ("cost.total", said.total, total + bill.repetition),
         ] {
             let said = whole(id, part, said)?;
             if said != found {
@@ -133,6 +145,20 @@ impl<'a> Ledger<'a> {
             }
         }
         Ok(bill)
+    }
+
+    /// Every frame that shows what was shown less than 3 s before costs `w_p`.
+    fn repetition(&self, id: usize) -> u64 {
+        let plan = &self.plans[id];
+        let span = (REPEAT_S * self.flock.fps).round() as usize;
+        let is_repeat = |&t: &usize| plan[t.saturating_sub(span - 1)..t].contains(&plan[t]);
+        let n_repeats = (0..plan.len()).filter(is_repeat).count() as u64;
+        n_repeats * (self.flock.params.matching.w_p * Turns::PER_RAD).round() as u64
+    }
+
+    /// By how much the file says that a plan may be cheaper.
+    pub(super) fn gap(&self, id: usize) -> Result<u64, Violation> {
+        whole(id, "cost.gap", self.flock.individuals[id].cost.gap)
     }
 
     /// What the file says no plan costs less than, crowd or not.

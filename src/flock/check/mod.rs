@@ -61,12 +61,16 @@ pub fn check(
         .map(|(id, individual)| steps::states(&graph, id, individual))
         .collect();
     let plans = plans?;
+    let heirs = steps::heirs(flock, &plans)?;
     let ledger = Ledger::new(library, flock, &graph, &plans);
     let mut report = Report::default();
     let ids: Vec<usize> = (0..flock.individuals.len()).collect();
     for batch in ids.chunks(BATCH) {
         progress.report("checking", batch[0] as f64 / ids.len() as f64);
-        let one = |&id: &usize| individual(&graph, &ledger, id, &plans[id]);
+        let one = |&id: &usize| {
+            let next = heirs.as_ref().map(|heirs| heirs[id]);
+            individual(&graph, &ledger, id, (&plans[id], next))
+        };
         let checked: Vec<Result<Report, Violation>> = batch.par_iter().map(one).collect();
         for one in checked {
             report.add(one?);
@@ -80,11 +84,11 @@ fn individual(
     graph: &Graph,
     ledger: &Ledger<'_>,
     id: usize,
-    states: &[usize],
+    (states, next): (&[usize], Option<usize>),
 ) -> Result<Report, Violation> {
-    let jumps = steps::jumps(graph, ledger.dwell, id, states)?;
+    let jumps = steps::jumps(graph, ledger.dwell, id, states, next)?;
     let bill = ledger.bill(id, &jumps)?;
-    let n_edges = optimum::check(graph, ledger, id, states, &bill)?;
+    let n_edges = optimum::check(graph, ledger, id, (states, next), &bill)?;
     Ok(Report {
         n_individuals: 1,
         n_frames: states.len(),

@@ -4,7 +4,8 @@
 //! (k stops at the dwell, from where jumps are free). It is filled in from the last frame to the first; then
 //! every edge is asked whether it offers less: if none does, W holds whoever filled it in, and no plan
 //! costs less than the least W(0, s). Along the plan, cost so far plus W never falls: where it first
-//! rises above that least, the plan left the cheapest way.
+//! rises above that least, the plan left the cheapest way. In a loop the first state is given, counts as
+//! just jumped to, and the first of the heir comes after the last frame.
 
 use super::cost::{Bill, Ledger};
 use super::graph::Graph;
@@ -22,9 +23,10 @@ pub(super) fn check(
     graph: &Graph,
     ledger: &Ledger<'_>,
     id: usize,
-    states: &[usize],
+    (states, next): (&[usize], Option<usize>),
     bill: &Bill,
 ) -> Result<u64, Violation> {
+    let ends = next.map(|next| (states[0], next));
     let mut search = Search {
         graph,
         dwell: ledger.dwell,
@@ -32,11 +34,12 @@ pub(super) fn check(
         n_edges: 0,
     };
     let n_frames = bill.before.len() - 1;
-    let since = since_jump(graph, ledger.dwell, states);
+    let since_start = if ends.is_some() { 1 } else { ledger.dwell };
+    let since = since_jump(graph, (since_start, ledger.dwell), states);
     // What the plan costs if from each frame on it goes the cheapest way.
     let mut at_best = vec![0; n_frames];
     let row = |t: usize| ledger.row(graph, bill, t, true);
-    let cheapest = search.cheapest(n_frames, row, |t, column| {
+    let cheapest = search.cheapest((n_frames, ends), row, |t, column| {
         at_best[t] = bill.before[t] + column[since[t] - 1][states[t]];
     })?;
     let left_at = at_best.iter().position(|&cost| cost > cheapest);
@@ -48,8 +51,24 @@ pub(super) fn check(
             cheapest,
         });
     }
-    let alone = match bill.has_crowd() {
-        true => search.cheapest(n_frames, |t| ledger.row(graph, bill, t, false), |_, _| {})?,
+    let gap = ledger.gap(id)?;
+    if ledger.is_exact(id) != (gap == 0) {
+        return Err(Violation::Exact { id, gap });
+    }
+    if bill.total() > cheapest + gap {
+        let found = bill.total() - cheapest;
+        return Err(Violation::Gap {
+            id,
+            said: gap,
+            found,
+        });
+    }
+    let alone = match bill.has_crowd() || ends.is_some() {
+        true => search.cheapest(
+            (n_frames, None),
+            |t| ledger.row(graph, bill, t, false),
+            |_, _| {},
+        )?,
         false => cheapest,
     };
     let said = ledger.lower_bound(id)?;
@@ -64,8 +83,8 @@ pub(super) fn check(
 }
 
 /// Frames since the last jump, 1 on its own frame; never above the dwell.
-fn since_jump(graph: &Graph, dwell: usize, states: &[usize]) -> Vec<usize> {
-    let mut since = vec![dwell; states.len()];
+fn since_jump(graph: &Graph, (since_start, dwell): (usize, usize), states: &[usize]) -> Vec<usize> {
+    let mut since = vec![since_start; states.len()];
     for t in 1..states.len() {
         since[t] = match graph.next[states[t - 1]] == Some(states[t]) {
             true => (since[t - 1] + 1).min(dwell),
@@ -84,21 +103,36 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// What the cheapest plan costs, every edge looked at; `on_column` is shown W from the last frame to
-    /// the first.
+    /// the first. `ends`: the state that it must begin with, and the one that comes after it.
     fn cheapest(
         &mut self,
-        n_frames: usize,
+        (n_frames, ends): (usize, Option<(usize, usize)>),
         row: impl Fn(usize) -> Vec<u64>,
         mut on_column: impl FnMut(usize, &Column),
     ) -> Result<u64, Violation> {
         let mut after: Column = vec![row(n_frames - 1); self.dwell];
-        on_column(n_frames - 1, &after);
-        for t in (0..n_frames - 1).rev() {
+        let mut n_open = n_frames;
+        match ends {
+            None => {
+                on_column(n_frames - 1, &after);
+                n_open -= 1;
+            }
+            Some((_, next)) => {
+                for after in &mut after {
+                    after.fill(NEVER);
+                    after[next] = 0;
+                }
+            }
+        }
+        for t in (0..n_open).rev() {
             let costs = row(t);
             let now = self.fill(&costs, &after);
             self.certify(t, &costs, &now, &after)?;
             on_column(t, &now);
             after = now;
+        }
+        if let Some((first, _)) = ends {
+            return Ok(after[0][first]);
         }
         let starts = after.last().into_iter().flatten();
         Ok(starts.copied().min().unwrap_or(NEVER))

@@ -53,16 +53,37 @@ pub(super) fn states(
     shown.enumerate().map(state).collect()
 }
 
-/// The jumps of a plan, if all its steps are allowed.
+/// The first state of whom each individual becomes, if the flock is a loop.
+pub(super) fn heirs(flock: &Flock, plans: &[Vec<usize>]) -> Result<Option<Vec<usize>>, Violation> {
+    let mut is_taken = vec![false; plans.len()];
+    let mut nexts = Vec::new();
+    for (id, individual) in flock.individuals.iter().enumerate() {
+        let heir = individual.continues_as.map(|heir| heir as usize);
+        match heir {
+            None if !flock.params.is_loop => continue,
+            Some(heir) if flock.params.is_loop && is_taken.get(heir) == Some(&false) => {
+                is_taken[heir] = true;
+                nexts.push(plans[heir][0]);
+            }
+            _ => return Err(Violation::Heir { id }),
+        }
+    }
+    Ok(flock.params.is_loop.then_some(nexts))
+}
+
+/// The jumps of a plan, if all its steps are allowed; in a loop `next` comes after the last frame, and
+/// the first counts as just jumped to.
 pub(super) fn jumps(
     graph: &Graph,
     dwell: usize,
     id: usize,
     states: &[usize],
+    next: Option<usize>,
 ) -> Result<Vec<Taken>, Violation> {
     let mut jumps: Vec<Taken> = Vec::new();
-    for t in 1..states.len() {
-        let (before, state) = (states[t - 1], states[t]);
+    let followed: Vec<usize> = states.iter().copied().chain(next).collect();
+    for t in 1..followed.len() {
+        let (before, state) = (followed[t - 1], followed[t]);
         if graph.next[before] == Some(state) {
             continue;
         }
@@ -76,7 +97,8 @@ pub(super) fn jumps(
                 to,
                 turned: from_side != side,
             })?;
-        let since = jumps.last().map_or(dwell, |jump| t - jump.t);
+        let from_start = if next.is_some() { t } else { dwell };
+        let since = jumps.last().map_or(from_start, |jump| t - jump.t);
         if since < dwell {
             return Err(Violation::Dwell {
                 id,

@@ -24,7 +24,7 @@ fn red(library: &Library, flock: &Flock) -> Violation {
 
 /// The file's costs changed to what the steps add up to, so that only the plan is to blame.
 fn with_honest_costs(library: &Library, mut flock: Flock, id: usize) -> Flock {
-    for _ in 0..5 {
+    for _ in 0..6 {
         let Err(Violation::Cost { part, found, .. }) = check(library, &flock, &Silent) else {
             break;
         };
@@ -35,6 +35,7 @@ fn with_honest_costs(library: &Library, mut flock: Flock, id: usize) -> Flock {
             "cost.speed" => cost.speed = rad,
             "cost.transition" => cost.transition = rad,
             "cost.crowd" => cost.crowd = rad,
+            "cost.repetition" => cost.repetition = rad,
             _ => cost.total = rad,
         }
     }
@@ -63,6 +64,35 @@ fn what_the_planner_makes_holds() {
         let least = 4 * 89 * jumps.count() as u64;
         assert!(report.n_edges > least, "every edge of every frame");
     }
+}
+
+#[test]
+fn a_plan_that_repeats_holds_with_what_its_repeats_cost_and_tells_its_gap() {
+    let library = synthetic::few_looks();
+    let mut params = Params {
+        count: 3,
+        frames: 90,
+        ..Params::default()
+    };
+    params.matching.w_p = 0.2;
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    let report = check(&library, &flock, &Silent).expect("what the planner makes holds");
+    assert_eq!(report.n_exact, 0, "so few frames cannot but repeat");
+    for individual in &flock.individuals {
+        let cost = individual.cost;
+        assert!(
+            cost.repetition > 0.0 && cost.gap > 0.0 && !cost.exact,
+            "{cost:?}"
+        );
+    }
+    let mut spoiled = flock.clone();
+    spoiled.individuals[1].cost.repetition = 0.0;
+    assert_eq!(red(&library, &spoiled).code(), "wrong_cost");
+    let mut spoiled = flock;
+    spoiled.individuals[1].cost.exact = true;
+    assert_eq!(red(&library, &spoiled).code(), "wrong_exact");
+    spoiled.individuals[1].cost.gap = 0.0;
+    assert_eq!(red(&library, &spoiled).code(), "wrong_gap");
 }
 
 #[test]
@@ -132,11 +162,12 @@ fn every_part_of_the_cost_is_recomputed() {
     let (library, flock) = planned(View::Side, "school");
     let turn = 1.0 / Turns::PER_RAD;
     type Part = fn(&mut crate::flock::PlanCost) -> &mut f64;
-    let spoil: [(&str, Part); 5] = [
+    let spoil: [(&str, Part); 6] = [
         ("cost.heading", |cost| &mut cost.heading),
         ("cost.speed", |cost| &mut cost.speed),
         ("cost.transition", |cost| &mut cost.transition),
         ("cost.crowd", |cost| &mut cost.crowd),
+        ("cost.repetition", |cost| &mut cost.repetition),
         ("cost.total", |cost| &mut cost.total),
     ];
     for (name, of) in spoil {
@@ -160,8 +191,16 @@ fn a_plan_that_could_be_cheaper_is_told_where_it_goes_wrong() {
     let violation = red(&library, &flock);
     let told = matches!(violation, Violation::Suboptimal { id: 3, t: 0, cost, cheapest } if cost > cheapest);
     assert!(told, "{violation}");
-    // Who does not claim to be the cheapest may cost more.
+    // Who does not claim to be the cheapest may cost more, and says how much.
+    let Violation::Suboptimal { cost, cheapest, .. } = violation else {
+        return;
+    };
     flock.individuals[3].cost.exact = false;
+    assert_eq!(red(&library, &flock).code(), "wrong_exact");
+    let gap = (cost - cheapest) as f64 / Turns::PER_RAD;
+    flock.individuals[3].cost.gap = rounded(gap - 1.0 / Turns::PER_RAD, 6);
+    assert_eq!(red(&library, &flock).code(), "wrong_gap");
+    flock.individuals[3].cost.gap = rounded(gap, 6);
     assert_eq!(
         check(&library, &flock, &Silent).map(|report| report.n_exact),
         Ok(3)
@@ -224,4 +263,34 @@ fn files_that_do_not_belong_together_are_told_first() {
         spoiled(|flock| flock.params.matching.wx = 0.4),
         "wrong_cost"
     );
+}
+
+#[test]
+fn a_loop_holds_and_a_seam_that_is_no_step_is_named() {
+    let library = synthetic::library(View::Side);
+    let params = Params {
+        count: 4,
+        frames: 90,
+        is_loop: true,
+        ..Params::default()
+    };
+    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+    let report = check(&library, &flock, &Silent).expect("what the planner makes holds");
+    assert_eq!((report.n_individuals, report.n_exact), (4, 4));
+    let mut spoiled = flock.clone();
+    let heirs: Vec<Option<u32>> = flock.individuals.iter().map(|i| i.continues_as).collect();
+    spoiled.individuals[0].continues_as = heirs[1];
+    spoiled.individuals[1].continues_as = heirs[0];
+    let code = red(&library, &spoiled).code();
+    assert!(
+        ["illegal_step", "wrong_cost", "dwell_too_short"].contains(&code),
+        "{code}"
+    );
+    spoiled.individuals[1].continues_as = heirs[1];
+    assert_eq!(red(&library, &spoiled), Violation::Heir { id: 1 });
+    spoiled.individuals[1].continues_as = None;
+    assert_eq!(red(&library, &spoiled), Violation::Heir { id: 1 });
+    let mut spoiled = flock;
+    spoiled.params.is_loop = false;
+    assert_eq!(red(&library, &spoiled), Violation::Heir { id: 0 });
 }

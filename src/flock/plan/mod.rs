@@ -2,9 +2,11 @@
 //! exactly (O 5.1; ALGORITHMS.md 6).
 
 pub mod certificate;
+pub mod circle;
 pub mod cost;
 pub mod crowd;
 pub mod landings;
+pub mod memory;
 mod round;
 mod rows;
 pub mod trellis;
@@ -12,8 +14,10 @@ pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::cost::{Feature, Weights};
+use self::circle::Ends;
+use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Place, Settled};
+use self::memory::Memory;
 use self::round::Round;
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path, Shelf};
@@ -37,12 +41,38 @@ pub struct Plan {
     pub cost: PlanCost,
 }
 
+/// The best path found for one individual.
+#[derive(Clone, Debug)]
+struct Found {
+    /// Its cost counts no repetition; in a loop its last state is the first of whom it becomes.
+    path: Path,
+    /// What its repeats cost, turns.
+    repetition: u32,
+    /// What no path costs less than, turns.
+    least: u32,
+}
+
+impl Found {
+    fn cost(&self) -> u32 {
+        self.path.cost + self.repetition
+    }
+
+    /// Becomes another where that costs less.
+    fn keep_cheaper(&mut self, other: &Found) {
+        if other.cost() < self.cost() {
+            self.path = other.path.clone();
+            self.repetition = other.repetition;
+        }
+    }
+}
+
 /// Everything that plans are computed from.
 pub struct Planner<'a> {
     trellis: Trellis,
     weights: Weights,
     features: Vec<Feature>,
     crowd: Crowd,
+    memory: Memory,
     /// The states that look like each state.
     alike: Vec<[u32; 2]>,
     /// `[t][id]`: where each boid is.
@@ -51,6 +81,8 @@ pub struct Planner<'a> {
     fps: f64,
     shelf: Shelf,
     boids: &'a [BoidTrack],
+    /// Of each individual, in a loop.
+    ends: Vec<Ends>,
 }
 
 impl<'a> Planner<'a> {
@@ -76,6 +108,7 @@ impl<'a> Planner<'a> {
             alike: crowd.alike(&trellis),
             places: (0..n_frames).map(place).collect(),
             crowd,
+            memory: Memory::new(params.matching.w_p, fps),
             dwell: params
                 .dwell_frames
                 .map_or(library.clip_frames, |frames| frames as usize)
@@ -85,16 +118,83 @@ impl<'a> Planner<'a> {
             fps,
             shelf: Shelf::default(),
             boids,
+            ends: Vec::new(),
         }
+    }
+
+    /// The plans of all boids, by id, the last frame of each played into the first of the heir it has.
+    pub fn plan_loop(mut self, heirs: &[u32], progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
+        if self.places.len() <= self.dwell {
+            return Err(Error::LoopDoesNotClose(self.places.len()));
+        }
+        let wanted = self.wanted();
+        let mut settled = Settled::new(self.places.len());
+        let open = self.paths(&wanted, &mut settled, progress)?;
+        let firsts = self.firsts(&open, &wanted, heirs)?;
+        let next = heirs.iter().map(|&heir| firsts[heir as usize]);
+        self.ends = (firsts.iter().zip(next))
+            .map(|(&first, next)| Ends { first, next })
+            .collect();
+        self.plan(progress)
+    }
+
+    /// The states that a loop's plans begin with. Some footage comes back to where it was after whole
+    /// beats only: what an heir begins with therefore follows from the plan before it.
+    fn firsts(
+        &self,
+        open: &[Found],
+        wanted: &[Vec<Feature>],
+        heirs: &[u32],
+    ) -> Result<Vec<u32>, Error> {
+        let mut firsts = vec![None; heirs.len()];
+        for (leader, found) in open.iter().enumerate() {
+            let mut id = leader;
+            let mut first = circle::first_of(&self.trellis, self.dwell, &found.path.states);
+            while firsts[id].is_none() {
+                let state = first.ok_or(Error::NoTransitions)?;
+                firsts[id] = Some(state);
+                let heir = heirs[id] as usize;
+                first = self.first_after(state, &wanted[id], &wanted[heir]);
+                id = heir;
+            }
+        }
+        firsts
+            .into_iter()
+            .collect::<Option<_>>()
+            .ok_or(Error::NoTransitions)
+    }
+
+    /// What comes best after a plan that begins with `first`.
+    fn first_after(&self, first: u32, wanted: &[Feature], heir: &[Feature]) -> Option<u32> {
+        let (n_frames, dwell) = (wanted.len(), self.dwell);
+        let wanted = [wanted, &heir[..dwell]].concat();
+        let ends = Ends { first, next: 0 };
+        let rows = |t: usize, start: usize, out: &mut [[u32; 1]]| {
+            let features = &self.features[start..start + out.len()];
+            for (out, &feature) in out.iter_mut().zip(features) {
+                *out = [self.weights.total(wanted[t], feature)];
+            }
+            ends.close((t, usize::MAX, dwell), start, out, 0);
+        };
+        let film = Film {
+            n_frames: n_frames + dwell,
+            ..self.film()
+        };
+        let [path] = film.cheapest_paths(&rows)?;
+        circle::first_of(&self.trellis, dwell, &path.states[n_frames..])
+    }
+
+    fn wanted(&self) -> Vec<Vec<Feature>> {
+        (self.boids.par_iter())
+            .map(|boid| self.weights.wanted(boid, self.fps))
+            .collect()
     }
 
     /// The plans of all boids, by id, each the cheapest among those that it looks out for; meanwhile
     /// what each would cost alone.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         progress.report("planning", 0.0);
-        let wanted: Vec<Vec<Feature>> = (self.boids.par_iter())
-            .map(|boid| self.weights.wanted(boid, self.fps))
-            .collect();
+        let wanted = self.wanted();
         let mut settled = Settled::new(self.places.len());
         let (paths, bounds) = rayon::join(
             || self.paths(&wanted, &mut settled, progress),
@@ -102,7 +202,7 @@ impl<'a> Planner<'a> {
         );
         let (paths, bounds) = (paths?, bounds?);
         Ok((paths.par_iter().enumerate())
-            .map(|(id, path)| self.costed(path, &wanted[id], bounds[id]))
+            .map(|(id, found)| self.costed(found, &wanted[id], bounds[id]))
             .collect())
     }
 
@@ -112,7 +212,7 @@ impl<'a> Planner<'a> {
         wanted: &[Vec<Feature>],
         settled: &mut Settled,
         progress: &dyn Progress,
-    ) -> Result<Vec<Path>, Error> {
+    ) -> Result<Vec<Found>, Error> {
         let mut paths = Vec::with_capacity(wanted.len());
         while paths.len() < wanted.len() {
             if progress.cancelled() {
@@ -123,8 +223,8 @@ impl<'a> Planner<'a> {
             let alike = |id: &usize| self.crowd.n_watched(*id) == n_watched;
             let end = first + (first..wanted.len()).take_while(alike).count();
             let round = self.round(wanted, first, end).paths(settled)?;
-            for path in &round {
-                settled.push(&path.states);
+            for found in &round {
+                settled.push(self.film_of(&found.path));
             }
             paths.extend(round);
             progress.report("planning", paths.len() as f64 / wanted.len() as f64);
@@ -144,7 +244,7 @@ impl<'a> Planner<'a> {
     fn film(&self) -> Film<'_> {
         Film {
             trellis: &self.trellis,
-            n_frames: self.places.len(),
+            n_frames: self.places.len() + usize::from(!self.ends.is_empty()),
             dwell: self.dwell,
             cpu: Level::detect(),
             shelf: &self.shelf,
@@ -153,35 +253,77 @@ impl<'a> Planner<'a> {
 
     /// The plan with its cost in parts, summed anew from the states; what is left of the path's cost is
     /// the crowd's.
-    fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
-        let (mut heading, mut speed, mut transition, mut alone) = (0, 0, 0, 0);
-        for (t, &state) in path.states.iter().enumerate() {
+    fn costed(&self, found: &Found, wanted: &[Feature], lower_bound: u32) -> Plan {
+        let path = &found.path;
+        let (mut heading, mut speed, mut alone) = (0, 0, 0);
+        let states = self.film_of(path);
+        for (&wanted, &state) in wanted.iter().zip(states) {
             let feature = self.features[state as usize];
-            let [h, s] = self.weights.of_state(wanted[t], feature);
+            let [h, s] = self.weights.of_state(wanted, feature);
             heading += h;
             speed += s;
-            alone += self.weights.total(wanted[t], feature);
-            if t > 0 && path.states[t - 1] + 1 != state {
-                transition += self.jump_cost(path.states[t - 1], state);
-            }
+            alone += self.weights.total(wanted, feature);
         }
+        let transition = self.transition_cost(path);
         let rad = |turns: u32| rounded(f64::from(turns) / Turns::PER_RAD, 6);
         Plan {
-            shown: path
-                .states
+            shown: states
                 .iter()
                 .filter_map(|&state| self.trellis.shown(state as usize))
                 .collect(),
             cost: PlanCost {
-                total: rad(path.cost),
+                total: rad(found.cost()),
                 heading: rad(heading),
                 speed: rad(speed),
                 transition: rad(transition),
                 crowd: rad(path.cost - alone - transition),
+                repetition: rad(found.repetition),
                 lower_bound: rad(lower_bound),
-                exact: true,
+                gap: rad(found.cost() - found.least),
+                exact: found.cost() == found.least,
             },
         }
+    }
+
+    /// A path that is the cheapest but for its repeats.
+    fn found(&self, path: Path) -> Found {
+        Found {
+            repetition: self.memory.cost_of(self.film_of(&path)),
+            least: path.cost,
+            path,
+        }
+    }
+
+    /// What a path costs among those settled, its repeats aside, turns.
+    fn cost_among(&self, id: usize, wanted: &[Feature], settled: &Settled, path: &Path) -> u32 {
+        let n_watched = self.crowd.n_watched(id);
+        let mut cost = self.transition_cost(path);
+        for (t, &state) in self.film_of(path).iter().enumerate() {
+            let places = &self.places[t];
+            let others = settled.at(t)[..n_watched].iter().zip(places);
+            let near = others.filter(|(other, _)| {
+                let [first, end] = self.alike[**other as usize];
+                (first..end).contains(&state)
+            });
+            let crowd: u32 = near
+                .map(|(_, &place)| u32::from(self.crowd.cost_at(places[id], place)))
+                .sum();
+            let alone = (self.weights).total(wanted[t], self.features[state as usize]);
+            cost += (alone + crowd).min(CEILING - 1);
+        }
+        cost
+    }
+
+    /// What a path shows in the film.
+    fn film_of<'b>(&self, path: &'b Path) -> &'b [u32] {
+        &path.states[..self.places.len()]
+    }
+
+    /// What a path's jumps cost, turns, with that after the last frame of a loop.
+    fn transition_cost(&self, path: &Path) -> u32 {
+        let steps = path.states.windows(2);
+        let jumps = steps.filter(|step| step[1] != step[0] + 1);
+        jumps.map(|step| self.jump_cost(step[0], step[1])).sum()
     }
 
     fn jump_cost(&self, from: u32, to: u32) -> u32 {

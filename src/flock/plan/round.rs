@@ -6,9 +6,10 @@ use rayon::prelude::*;
 
 use super::cost::Feature;
 use super::crowd::Settled;
+use super::memory::N_REPLANS;
 use super::rows::{Alone, InCrowd};
-use super::viterbi::Path;
-use super::{LANES, Planner};
+use super::viterbi::{Film, Path};
+use super::{Found, LANES, Planner};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
@@ -22,8 +23,8 @@ pub(super) struct Round<'a> {
 }
 
 impl Round<'_> {
-    /// The cheapest path of each among those settled.
-    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Path>, Error> {
+    /// The cheapest path of each among those settled, or the best found where the cheapest repeats.
+    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Found>, Error> {
         match self.wanted.len() {
             1 => Ok(self.in_crowd([0], settled)?.into()),
             _ => self.batches(|first| {
@@ -63,7 +64,11 @@ impl Round<'_> {
 
     fn alone<const N: usize>(&self, idx: [usize; N]) -> Result<[u32; N], Error> {
         let (planner, wanted) = (self.planner, idx.map(|idx| &self.wanted[idx][..]));
-        let costs = planner.film().least_costs(&mut Alone { planner, wanted });
+        let open = Film {
+            n_frames: planner.places.len(),
+            ..planner.film()
+        };
+        let costs = open.least_costs(&mut Alone { planner, wanted });
         costs.ok_or(Error::NoTransitions)
     }
 
@@ -71,11 +76,44 @@ impl Round<'_> {
         &self,
         idx: [usize; N],
         settled: &Settled,
-    ) -> Result<[Path; N], Error> {
+    ) -> Result<[Found; N], Error> {
+        let (planner, memory) = (self.planner, self.planner.memory);
         let ids = idx.map(|idx| self.first + idx);
         let wanted = idx.map(|idx| &self.wanted[idx][..]);
-        let rows = InCrowd::new(self.planner, settled, ids, wanted);
-        let paths = self.planner.film().cheapest_paths(&rows);
-        paths.ok_or(Error::NoTransitions)
+        let mut rows = InCrowd::new(planner, settled, ids, wanted);
+        if !planner.ends.is_empty() {
+            rows = rows.between(ids.map(|id| planner.ends[id]));
+        }
+        let film = planner.film();
+        let paths = film.cheapest_paths(&rows).ok_or(Error::NoTransitions)?;
+        let is_closed = |(id, path): (&usize, &Path)| match planner.ends.get(*id) {
+            Some(ends) => ends.holds(&path.states),
+            None => true,
+        };
+        if !ids.iter().zip(&paths).all(is_closed) {
+            return Err(Error::LoopDoesNotClose(planner.places.len()));
+        }
+        let mut paths = paths.map(|path| planner.found(path));
+        let mut found = paths.clone();
+        let mut raised = [(); N].map(|()| memory.nothing_raised(planner.places.len()));
+        for _ in 0..N_REPLANS {
+            if paths.iter().all(|found| found.repetition == 0) {
+                break;
+            }
+            for (raised, found) in raised.iter_mut().zip(&paths) {
+                memory.raise(raised, planner.film_of(&found.path));
+            }
+            let dearer = rows.clone().raised(raised.each_ref());
+            let next = film.cheapest_paths(&dearer).ok_or(Error::NoTransitions)?;
+            paths = next.map(|path| planner.found(path));
+            for lane in 0..N {
+                let path = &mut paths[lane].path;
+                if is_closed((&ids[lane], &*path)) {
+                    path.cost = planner.cost_among(ids[lane], wanted[lane], settled, path);
+                    found[lane].keep_cheaper(&paths[lane]);
+                }
+            }
+        }
+        Ok(found)
     }
 }

@@ -2,8 +2,10 @@
 //! those whose plans are final.
 
 use super::Planner;
+use super::circle::Ends;
 use super::cost::{CEILING, Feature};
 use super::crowd::Settled;
+use super::memory::Raised;
 use super::viterbi::Rows;
 
 /// Heading, rotation and speed alone.
@@ -34,6 +36,10 @@ pub(super) struct InCrowd<'a, const LANES: usize> {
     n_watched: usize,
     ids: [usize; LANES],
     wanted: [&'a [Feature]; LANES],
+    /// What is dearer for having been repeated.
+    raised: [Option<&'a Raised>; LANES],
+    /// Where plans begin and what follows them, in a loop.
+    ends: Option<[Ends; LANES]>,
     /// What the crowd adds to each state; with several lanes, by how much that is more than
     /// what it adds to the state before.
     added: Vec<[u32; LANES]>,
@@ -54,8 +60,48 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
             n_watched: planner.crowd.n_watched(ids[0]),
             ids,
             wanted,
+            raised: [None; LANES],
+            ends: None,
             added: vec![[0; LANES]; planner.trellis.n_states() + 1],
             sum: [0; LANES],
+        }
+    }
+
+    /// The same with what each has repeated made dearer.
+    pub(super) fn raised(self, raised: [&'a Raised; LANES]) -> InCrowd<'a, LANES> {
+        InCrowd {
+            raised: raised.map(Some),
+            ..self
+        }
+    }
+
+    /// The same for plans that play into one another.
+    pub(super) fn between(self, ends: [Ends; LANES]) -> InCrowd<'a, LANES> {
+        InCrowd {
+            ends: Some(ends),
+            ..self
+        }
+    }
+
+    #[inline(always)]
+    fn fill_film(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
+        if first == 0 {
+            self.gather(t);
+        }
+        let wanted: [Feature; LANES] = std::array::from_fn(|lane| self.wanted[lane][t]);
+        let features = &self.planner.features[first..first + out.len()];
+        let added = &self.added[first..first + out.len()];
+        for ((out, &feature), added) in out.iter_mut().zip(features).zip(added) {
+            for lane in 0..LANES {
+                let crowd = if LANES == 1 {
+                    added[lane]
+                } else {
+                    self.sum[lane] = self.sum[lane].wrapping_add(added[lane]);
+                    self.sum[lane]
+                };
+                let alone = self.planner.weights.total(wanted[lane], feature);
+                out[lane] = (alone + crowd).min(CEILING - 1);
+            }
         }
     }
 
@@ -76,18 +122,33 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
                 continue;
             }
             let [low, high] = planner.alike[state as usize];
-            let (first, end) = (low as usize, high as usize);
-            if LANES == 1 {
-                for added in &mut self.added[first..end] {
-                    added[0] += costs[0];
-                }
-            } else {
-                for lane in 0..LANES {
-                    let (up, down) = (self.added[first][lane], self.added[end][lane]);
-                    self.added[first][lane] = up.wrapping_add(costs[lane]);
-                    self.added[end][lane] = down.wrapping_sub(costs[lane]);
-                }
+            self.add(low as usize..high as usize, costs);
+        }
+        for lane in 0..LANES {
+            let Some(raised) = self.raised[lane] else {
+                continue;
+            };
+            let mut costs = [0; LANES];
+            costs[lane] = raised.cost;
+            for &state in raised.at(t) {
+                self.add(state as usize..state as usize + 1, costs);
             }
+        }
+    }
+
+    /// Adds to the cost of some states in a row.
+    #[inline(always)]
+    fn add(&mut self, states: std::ops::Range<usize>, costs: [u32; LANES]) {
+        if LANES == 1 {
+            for added in &mut self.added[states] {
+                added[0] += costs[0];
+            }
+            return;
+        }
+        for lane in 0..LANES {
+            let (up, down) = (self.added[states.start][lane], self.added[states.end][lane]);
+            self.added[states.start][lane] = up.wrapping_add(costs[lane]);
+            self.added[states.end][lane] = down.wrapping_sub(costs[lane]);
         }
     }
 }
@@ -95,23 +156,12 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
 impl<const LANES: usize> Rows<LANES> for InCrowd<'_, LANES> {
     #[inline(always)]
     fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
-        if first == 0 {
-            self.gather(t);
+        let n_frames = self.planner.places.len();
+        if t < n_frames {
+            self.fill_film(t, first, out);
         }
-        let wanted: [Feature; LANES] = std::array::from_fn(|lane| self.wanted[lane][t]);
-        let features = &self.planner.features[first..first + out.len()];
-        let added = &self.added[first..first + out.len()];
-        for ((out, &feature), added) in out.iter_mut().zip(features).zip(added) {
-            for lane in 0..LANES {
-                let crowd = if LANES == 1 {
-                    added[lane]
-                } else {
-                    self.sum[lane] = self.sum[lane].wrapping_add(added[lane]);
-                    self.sum[lane]
-                };
-                let alone = self.planner.weights.total(wanted[lane], feature);
-                out[lane] = (alone + crowd).min(CEILING - 1);
-            }
+        for (lane, ends) in self.ends.iter().flatten().enumerate() {
+            ends.close((t, n_frames, self.planner.dwell), first, out, lane);
         }
     }
 }

@@ -82,7 +82,7 @@ fn the_cost_recomputed_from_the_file_and_the_library_is_the_one_told() {
             let cost = individual.cost;
             let told = (cost.total * Turns::PER_RAD).round() as u32;
             assert_eq!(cost_from_outside(&library, &flock, id), told, "{name} {id}");
-            let parts = cost.heading + cost.speed + cost.transition + cost.crowd;
+            let parts = cost.heading + cost.speed + cost.transition + cost.crowd + cost.repetition;
             assert!((parts - cost.total).abs() < 1e-5);
             assert!(cost.lower_bound <= cost.total);
         }
@@ -115,6 +115,128 @@ fn the_plans_of_a_flock_hold_their_certificates() {
             certificate::check(&planner.trellis, planner.dwell, &cost_at, &columns, &path);
         assert_eq!(checked, Ok(()), "individual {id}");
         settled.push(&path.states);
+    }
+}
+
+/// The least cost of all paths with their repetition, turns, by trying them all: each is a state shown at frame 0
+/// that goes on or jumps.
+fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u32>) -> u32 {
+    let ends = planner.ends.first();
+    if path.len() == wanted.len() + planner.ends.len() {
+        if ends.is_some_and(|ends| path.last() != Some(&ends.next)) {
+            return u32::MAX;
+        }
+        let settled = Settled::new(wanted.len());
+        let repetition = planner.memory.cost_of(&path[..wanted.len()]);
+        let path = viterbi::Path {
+            states: path.clone(),
+            cost: 0,
+        };
+        return planner.cost_among(0, wanted, &settled, &path) + repetition;
+    }
+    let trellis = &planner.trellis;
+    let states = 0..trellis.n_states() as u32;
+    let shown = states.filter(|&state| trellis.shown(state as usize).is_some());
+    let since_jump = (path.iter().rev().zip(path.iter().rev().skip(1)))
+        .position(|(&now, &before)| now != before + 1)
+        .map_or(usize::MAX, |k| k + 1);
+    let since_jump = match ends {
+        Some(_) => since_jump.min(path.len()),
+        None => since_jump,
+    };
+    let next: Vec<u32> = match path.last() {
+        None => ends.map_or_else(|| shown.collect(), |ends| vec![ends.first]),
+        Some(&last) => {
+            let jumps = shown.filter(|&state| {
+                let k = trellis.targets().binary_search(&state);
+                since_jump >= planner.dwell
+                    && k.is_ok_and(|k| trellis.sources(k).iter().any(|s| s.0 == last))
+            });
+            let on = trellis.continues(last as usize, 1).then_some(last + 1);
+            jumps.chain(on).collect()
+        }
+    };
+    let least = next.into_iter().map(|state| {
+        path.push(state);
+        let least = least_by_brute_force(planner, wanted, path);
+        path.pop();
+        least
+    });
+    least.min().unwrap_or(u32::MAX)
+}
+
+#[test]
+fn a_plan_that_repeats_lies_between_its_bound_and_the_cheapest_that_knew_of_no_repeats() {
+    let library = synthetic::few_looks();
+    let mut params = Params {
+        count: 1,
+        frames: 32,
+        ..Params::default()
+    };
+    let (mut n_better, mut n_best) = (0, 0);
+    for seed in 0..12 {
+        params.seed = seed;
+        params.matching.w_p = 0.0;
+        let unaware = plan_flock(&library, &params, &Silent).unwrap();
+        params.matching.w_p = 0.15;
+        let aware = plan_flock(&library, &params, &Silent).unwrap();
+        let boids: Vec<BoidTrack> = aware.individuals.iter().map(|i| i.boid.clone()).collect();
+        let motion = motion_of(&library, &Lens::of(&library, &aware.params));
+        let planner = Planner::new(&library, &motion, &boids, &aware.params);
+        let wanted = planner.weights.wanted(&boids[0], planner.fps);
+        let least = least_by_brute_force(&planner, &wanted, &mut Vec::new());
+        let turns = |rad: f64| (rad * Turns::PER_RAD).round() as u32;
+        let (cost, before) = (aware.individuals[0].cost, unaware.individuals[0].cost);
+        let repeats = (unaware.stats.repeats_per_100_frames * 0.32).round() as u32;
+        let unaware_cost = turns(before.total) + repeats * planner.memory.cost;
+        assert!(turns(cost.total) <= unaware_cost, "{cost:?} {before:?}");
+        assert!(least <= turns(cost.total), "{least} {cost:?}");
+        assert_eq!(turns(cost.total - cost.gap), turns(before.total));
+        assert!(turns(before.total) <= least);
+        n_better += u32::from(turns(cost.total) < unaware_cost);
+        n_best += u32::from(turns(cost.total) == least);
+    }
+    assert!(
+        n_better >= 3,
+        "making plans anew finds better ones: {n_better}"
+    );
+    assert!(n_best >= 2, "and now and then the best: {n_best}");
+}
+
+#[test]
+fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
+    let library = synthetic::few_looks();
+    for seed in 0..12 {
+        let params = Params {
+            count: 1,
+            // Its frames come back after whole beats of ten only.
+            frames: 30 + 10 * (seed as u32 % 2),
+            seed,
+            is_loop: true,
+            dwell_frames: Some(1 + seed as u32 % 4),
+            ..Params::default()
+        };
+        let flock = plan_flock(&library, &params, &Silent).unwrap();
+        let one = &flock.individuals[0];
+        let boids = [one.boid.clone()];
+        let motion = motion_of(&library, &Lens::of(&library, &flock.params));
+        let mut planner = Planner::new(&library, &motion, &boids, &flock.params);
+        let wanted = [planner.weights.wanted(&boids[0], planner.fps)];
+        let own = (one.source_frame[0], one.mirrored[0]);
+        // Nothing plays on into the first frame of all: to it one jumps.
+        for (frame, side) in [own, (200, false)] {
+            let first = planner.trellis.state(frame, side);
+            let first = first.expect("a frame of the component");
+            planner.ends = vec![Ends { first, next: first }];
+            let mut settled = Settled::new(wanted[0].len());
+            let found = planner.paths(&wanted, &mut settled, &Silent).unwrap();
+            let least = least_by_brute_force(&planner, &wanted[0], &mut Vec::new());
+            assert_eq!(found[0].cost(), least, "seed {seed}");
+            if (frame, side) == own {
+                let told = (one.cost.total * Turns::PER_RAD).round() as u32;
+                assert_eq!(told, least, "seed {seed}");
+            }
+        }
     }
 }
 

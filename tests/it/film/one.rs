@@ -62,6 +62,7 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
         source_frame: (first as u32..(first + n_frames) as u32).collect(),
         mirrored: vec![false; n_frames],
         rotation_rad: vec![0.0; n_frames],
+        continues_as: None,
         fades: Vec::new(),
         centroid_px: poses.iter().map(|pose| pose.centroid_px.unwrap()).collect(),
         heading_rad: poses

@@ -1,0 +1,142 @@
+//! How a simulation goes, frame by frame, as files hold it (ALGORITHMS.md 7): straight through, or so that
+//! its end plays into its beginning.
+
+use super::boids::Boids;
+use super::boids::measures::Order;
+use super::boids::vector::{Vec3, unit};
+use super::error::Error;
+use super::individual::{BoidTrack, rounded};
+use super::lens::Lens;
+use super::seam::{self, Moment};
+use crate::geometry::Turns;
+use crate::progress::Progress;
+
+/// A simulation from its first frame to its last.
+#[derive(Clone, Debug)]
+pub(super) struct Course {
+    /// By id.
+    pub(super) tracks: Vec<BoidTrack>,
+    /// By frame.
+    pub(super) orders: Vec<Order>,
+    /// By frame; empty without one.
+    pub(super) predator_px: Vec<[f64; 3]>,
+    /// As whom each goes on after the last frame; none, where the film ends there.
+    pub(super) heirs: Option<Vec<u32>>,
+}
+
+/// Simulates `n_frames`.
+pub(super) fn simulate(
+    mut boids: Boids,
+    lens: &Lens,
+    n_frames: u32,
+    progress: &dyn Progress,
+) -> Result<Course, Error> {
+    let mut course = Course::new(&boids, lens);
+    let mut step = steps(n_frames as usize, progress);
+    for t in 0..n_frames {
+        step()?;
+        if t > 0 {
+            boids.advance();
+        }
+        course.record(&boids, lens);
+    }
+    Ok(course)
+}
+
+/// Simulates `n_frames` of which the last plays into the first.
+pub(super) fn simulate_loop(
+    mut boids: Boids,
+    lens: &Lens,
+    (n_frames, fps): (u32, f64),
+    progress: &dyn Progress,
+) -> Result<Course, Error> {
+    let n_lead = seam::n_meeting_frames(n_frames, fps);
+    let n_frames = n_frames as usize;
+    let mut step = steps(n_frames + n_lead, progress);
+    boids.set_back(n_lead);
+    let mut lead = Vec::with_capacity(n_lead);
+    for _ in 0..n_lead {
+        step()?;
+        lead.push(Moment::of(&boids));
+        boids.advance();
+    }
+    let mut heirs = Vec::new();
+    let mut moments = Vec::with_capacity(n_frames);
+    for t in 0..n_frames {
+        step()?;
+        moments.push(Moment::of(&boids));
+        let left = n_frames - t;
+        if left == n_lead {
+            heirs = seam::heirs(&moments[t], &lead);
+        }
+        if left <= n_lead {
+            boids.meet(seam::meeting(&lead, &heirs, left));
+        }
+        boids.advance();
+    }
+    seam::close(&mut moments, &lead, &heirs, fps);
+    let mut course = Course::new(&boids, lens);
+    for moment in moments {
+        boids.show(moment.positions, moment.velocities, moment.hunter);
+        course.record(&boids, lens);
+    }
+    course.heirs = Some(heirs);
+    Ok(course)
+}
+
+/// To be called before each of so many frames.
+fn steps(n_frames: usize, progress: &dyn Progress) -> impl FnMut() -> Result<(), Error> {
+    let mut gone = 0;
+    move || {
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        progress.report("simulating", gone as f64 / n_frames as f64);
+        gone += 1;
+        Ok(())
+    }
+}
+
+impl Course {
+    fn new(boids: &Boids, lens: &Lens) -> Course {
+        let track = BoidTrack {
+            forward: (!lens.is_flat()).then(Vec::new),
+            ..BoidTrack::default()
+        };
+        Course {
+            tracks: vec![track; boids.positions.len()],
+            orders: Vec::new(),
+            predator_px: Vec::new(),
+            heirs: None,
+        }
+    }
+
+    fn record(&mut self, boids: &Boids, lens: &Lens) {
+        for (id, track) in self.tracks.iter_mut().enumerate() {
+            record(track, lens, boids, id);
+        }
+        let predator = boids.predator().map(|place| seen(place, lens, boids));
+        self.predator_px.extend(predator);
+        self.orders.push(boids.order());
+    }
+}
+
+/// A place in the picture, and how far behind the front of the tank: pixels.
+fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
+    let [x, y] = lens.picture_px(place);
+    let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
+    [x, y, behind_px].map(|px| rounded(px, 2))
+}
+
+/// A boid's moment, as it is seen.
+fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
+    let (place, velocity) = (boids.positions[id], boids.velocities[id]);
+    track.position_px.push(seen(place, lens, boids));
+    if let Some(forward) = &mut track.forward {
+        forward.push(unit(velocity).map(|part| rounded(part, 5)));
+    }
+    let [vx, vy] = lens.picture_velocity(place, velocity);
+    let heading = Turns::from_rad(libm::atan2(vy, vx));
+    track.heading_rad.push(rounded(heading.to_rad(), 5));
+    track.speed_bl_per_s.push(rounded(vx.hypot(vy), 3));
+}

@@ -1,0 +1,196 @@
+//! A flock that repeats without a seam: the last frame plays into the first (ALGORITHMS.md 7, loop).
+//!
+//! Some seconds before the first frame are simulated as well. Before the end each individual is told
+//! whom it becomes, by the least distance, for individuals are interchangeable; from there on its wish
+//! turns by and by into meeting that one's moments before the first frame, as they pass. Its speed, its
+//! turns and the tank limit it as ever. What is still missing then is blended away, so that the frame
+//! after the last is the first.
+
+use super::boids::vector::{Vec3, add_scaled, dot, minus};
+use super::boids::{Boids, Meeting};
+
+/// How long meeting may take; at most half of the film.
+const MEETING_S: f64 = 8.0;
+/// A difference of velocity counts as much as what it amounts to in this time.
+const AHEAD_S: f64 = 1.0;
+/// At most so many times all pairs are looked at for swaps.
+const N_PASSES: usize = 20;
+
+/// Where everybody is and how fast.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Moment {
+    /// Body lengths.
+    pub(super) positions: Vec<Vec3>,
+    /// Body lengths a second.
+    pub(super) velocities: Vec<Vec3>,
+    /// The predator's place.
+    pub(super) hunter: Option<Vec3>,
+}
+
+/// How many frames before the first, and before the end, are needed for a film of `n_frames`.
+pub(super) fn n_meeting_frames(n_frames: u32, fps: f64) -> usize {
+    ((MEETING_S * fps).round() as usize).min(n_frames as usize / 2)
+}
+
+/// Whom each individual becomes. `end`: where they are when meeting begins; `lead`: the moments before
+/// the first frame. Each is somebody else's heir, or its own.
+pub(super) fn heirs(end: &Moment, lead: &[Moment]) -> Vec<u32> {
+    let Some(first) = lead.first() else {
+        return (0..end.positions.len() as u32).collect();
+    };
+    least_pairs(end.positions.len(), |from, to| {
+        let way = minus(first.positions[to], end.positions[from]);
+        let change = minus(first.velocities[to], end.velocities[from]);
+        dot(way, way) + AHEAD_S * AHEAD_S * dot(change, change)
+    })
+}
+
+/// One target for each of `n`, the sum of squares such that no swap of two lowers it. Ties go to the
+/// smaller ids.
+fn least_pairs(n: usize, square: impl Fn(usize, usize) -> f64) -> Vec<u32> {
+    let mut pairs: Vec<(f64, u32, u32)> = (0..n as u32)
+        .flat_map(|from| (0..n as u32).map(move |to| (from, to)))
+        .map(|(from, to)| (square(from as usize, to as usize), from, to))
+        .collect();
+    pairs.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut heirs = vec![u32::MAX; n];
+    let mut is_taken = vec![false; n];
+    for (_, from, to) in pairs {
+        if heirs[from as usize] == u32::MAX && !is_taken[to as usize] {
+            heirs[from as usize] = to;
+            is_taken[to as usize] = true;
+        }
+    }
+    for _ in 0..N_PASSES {
+        let mut is_done = true;
+        for a in 0..n {
+            for b in a + 1..n {
+                let (to_a, to_b) = (heirs[a] as usize, heirs[b] as usize);
+                if square(a, to_b) + square(b, to_a) < square(a, to_a) + square(b, to_b) {
+                    heirs.swap(a, b);
+                    is_done = false;
+                }
+            }
+        }
+        if is_done {
+            break;
+        }
+    }
+    heirs
+}
+
+/// Whom everybody is to meet, `left` frames before the film's end: the first frame comes after the last of
+/// `lead`.
+pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> Meeting {
+    let moment = &lead[lead.len() - left];
+    let n_frames = lead.len() as f64;
+    Meeting {
+        // All of the wish from the middle on.
+        share: smooth(2.0 * (n_frames - left as f64) / n_frames),
+        places: (heirs.iter())
+            .map(|&heir| {
+                let heir = heir as usize;
+                (moment.positions[heir], moment.velocities[heir])
+            })
+            .collect(),
+    }
+}
+
+/// Blends the last moments of a film into those before its first.
+pub(super) fn close(moments: &mut [Moment], lead: &[Moment], heirs: &[u32], fps: f64) {
+    let first = moments.len() - lead.len();
+    let half = lead.len() as f64 / 2.0;
+    for (k, (now, before)) in moments[first..].iter_mut().zip(lead).enumerate() {
+        let gone = (k as f64 - half) / half;
+        let (share, slope) = (smooth(gone), slope(gone) * fps / half);
+        for (id, &heir) in heirs.iter().enumerate() {
+            let heir = heir as usize;
+            let missing = minus(before.positions[heir], now.positions[id]);
+            let change = minus(before.velocities[heir], now.velocities[id]);
+            now.positions[id] = add_scaled(now.positions[id], share, missing);
+            let velocity = add_scaled(now.velocities[id], share, change);
+            now.velocities[id] = add_scaled(velocity, slope, missing);
+        }
+        if let (Some(hunter), Some(before)) = (&mut now.hunter, before.hunter) {
+            *hunter = add_scaled(*hunter, share, minus(before, *hunter));
+        }
+    }
+}
+
+impl Moment {
+    /// The boids' present one.
+    pub(super) fn of(boids: &Boids) -> Moment {
+        Moment {
+            positions: boids.positions.clone(),
+            velocities: boids.velocities.clone(),
+            hunter: boids.predator(),
+        }
+    }
+}
+
+/// From 0 to 1 with no speed nor acceleration at either end; constant outside.
+fn smooth(share: f64) -> f64 {
+    let s = share.clamp(0.0, 1.0);
+    s * s * s * (10.0 - s * (15.0 - 6.0 * s))
+}
+
+/// Its derivative.
+fn slope(share: f64) -> f64 {
+    let s = share.clamp(0.0, 1.0);
+    30.0 * s * s * (1.0 - s) * (1.0 - s)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn moment(positions: Vec<Vec3>) -> Moment {
+        Moment {
+            velocities: vec![[1.0, 0.0, 0.0]; positions.len()],
+            positions,
+            hunter: None,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn everybody_has_one_heir_and_no_two_would_rather_swap(
+            from in prop::collection::vec(prop::array::uniform3(-9.0..9.0), 1..9),
+            seed in prop::collection::vec(prop::array::uniform3(-9.0..9.0), 9),
+        ) {
+            let (end, lead) = (moment(from.clone()), [moment(seed[..from.len()].to_vec())]);
+            let heirs = heirs(&end, &lead);
+            let mut sorted = heirs.clone();
+            sorted.sort_unstable();
+            prop_assert_eq!(sorted, (0..from.len() as u32).collect::<Vec<_>>());
+            let square = |a: usize, b: u32| {
+                let way = minus(seed[b as usize], from[a]);
+                dot(way, way)
+            };
+            for a in 0..from.len() {
+                for b in 0..a {
+                    let kept = square(a, heirs[a]) + square(b, heirs[b]);
+                    prop_assert!(kept <= square(a, heirs[b]) + square(b, heirs[a]) + 1e-9);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_missing_is_blended_away_before_the_first_frame_comes_again() {
+        let at = |x: f64| moment(vec![[x, 0.0, 0.0]]);
+        let lead: Vec<Moment> = (0..60).map(|k| at(k as f64 / 30.0 - 2.0)).collect();
+        let mut film: Vec<Moment> = (0..90).map(|t| at(t as f64 / 30.0 - 2.6)).collect();
+        close(&mut film, &lead, &[0], 30.0);
+        let x = |t: usize| film[t].positions[0][0];
+        assert!(x(89).abs() < 0.04, "a frame before 0: {}", x(89));
+        for t in 1..90 {
+            let step = 30.0 * (x(t) - x(t - 1));
+            assert!((0.2..1.1).contains(&step), "{t}: {step}");
+            let told = film[t].velocities[0][0];
+            assert!((told - step).abs() < 0.1, "{t}: {told} {step}");
+        }
+    }
+}
