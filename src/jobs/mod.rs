@@ -71,10 +71,6 @@ impl Context {
 
 /// A job with its input, decoded.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is one of it while it runs"
-)]
 pub enum Job {
     /// Footage to library.
     Analysis(analysis::Input),

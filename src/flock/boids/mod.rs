@@ -11,6 +11,8 @@ pub mod grid;
 pub mod habitat;
 pub mod leadership;
 pub mod measures;
+mod meeting;
+mod overlap;
 pub mod params;
 pub mod rules;
 pub mod tank;
@@ -22,9 +24,10 @@ use rayon::prelude::*;
 use self::calibration::Calibration;
 use self::grid::{Grid, Neighbor};
 use self::habitat::{Habitat, Hunter};
+pub use self::meeting::Meeting;
 use self::rules::{Moment, Steering};
 use self::tank::Tank;
-use self::vector::{Vec3, add_scaled, minus, norm, scaled, turned_at_most, unit};
+use self::vector::{Vec3, add_scaled, norm, scaled, turned_at_most, unit};
 use super::lens::Lens;
 use super::params::Params;
 use crate::random;
@@ -37,8 +40,6 @@ const OVERLAP_BL: f64 = 0.5;
 const WARM_UP_S: f64 = 10.0;
 /// Time constant of the wandering turn rate.
 const WANDER_S: f64 = 1.0;
-/// Who is to meet a place closes in on it with this time constant.
-const MEETING_S: f64 = 0.6;
 /// In flight the greatest speed is so many times the animal's.
 const FLIGHT_PACE: f64 = 1.6;
 /// Boids of one unit of parallel work.
@@ -74,15 +75,6 @@ pub struct Boids<'a> {
     leads_for_s: Vec<f64>,
     hunter: Option<Hunter>,
     meeting: Option<Meeting>,
-}
-
-/// Where everybody is to be a frame later and how fast, by id: places in body lengths and velocities.
-#[derive(Clone, Debug)]
-pub struct Meeting {
-    /// How much of each wish it is, 0..=1.
-    pub share: f64,
-    /// Place and velocity.
-    pub places: Vec<(Vec3, Vec3)>,
 }
 
 impl<'a> Boids<'a> {
@@ -347,58 +339,6 @@ impl<'a> Boids<'a> {
         let scale = (self.params.rules.cohesion_bl, self.step_s);
         leadership::taken(self.params.seed, key, self.velocities[id], neighbors, scale)
             .unwrap_or(0.0)
-    }
-
-    /// One relaxation: each pair that overlaps moves apart by half of what is missing.
-    fn push_apart(&mut self) {
-        let grid = Grid::new(&self.positions, self.overlap_bl);
-        let moved: Vec<(u32, Vec3, Vec3)> = grid
-            .by_cell()
-            .par_chunks(CHUNK)
-            .flat_map_iter(|chunk| {
-                let mut neighbors = Vec::new();
-                let mut moved = Vec::new();
-                for &id in chunk {
-                    let position = self.positions[id as usize];
-                    grid.nearest(id, position, self.overlap_bl, 16, &mut neighbors);
-                    if !neighbors.is_empty() {
-                        let (position, velocity) = self.apart(id, &neighbors);
-                        moved.push((id, position, velocity));
-                    }
-                }
-                moved
-            })
-            .collect();
-        for (id, position, velocity) in moved {
-            self.positions[id as usize] = position;
-            self.velocities[id as usize] = velocity;
-        }
-    }
-
-    /// Where one goes that others are too near to.
-    fn apart(&self, id: u32, neighbors: &[Neighbor]) -> (Vec3, Vec3) {
-        let mut position = self.positions[id as usize];
-        let mut velocity = self.velocities[id as usize];
-        for neighbor in neighbors {
-            let distance = neighbor.square_bl2.sqrt();
-            let away = match distance > 1e-9 {
-                true => scaled(-1.0 / distance, neighbor.offset),
-                // In one place: apart along x, by id.
-                false => [if id < neighbor.id { -1.0 } else { 1.0 }, 0.0, 0.0],
-            };
-            position = add_scaled(position, 0.5 * (self.overlap_bl - distance), away);
-        }
-        self.habitat.keep_out(&mut position, &mut velocity);
-        (position, velocity)
-    }
-}
-
-impl Meeting {
-    /// The velocity wished for instead of `wished`.
-    fn wish(&self, id: usize, position: Vec3, wished: Vec3) -> Vec3 {
-        let (place, velocity) = self.places[id];
-        let there = add_scaled(velocity, 1.0 / MEETING_S, minus(place, position));
-        add_scaled(wished, self.share, minus(there, wished))
     }
 }
 

@@ -1,0 +1,213 @@
+//! Where the flock may go: half-spaces, seen in the picture as lines, and in side view a depth
+//! (ALGORITHMS.md 7). All in body lengths. Inside the tank always.
+
+mod site;
+
+use super::vector::{Vec3, add_scaled, dot, minus, scaled};
+
+/// The side of the square that a boid needs to keep the usual distances.
+const ROOM_BL: f64 = 1.2;
+/// Points a side by which the tank's section is measured.
+const N_SAMPLES: usize = 48;
+
+/// A convex tank.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tank {
+    walls: Vec<Wall>,
+    /// The box around it: least and greatest corner.
+    pub corners: [Vec3; 2],
+    /// A place well inside.
+    pub middle: Vec3,
+    /// How far it reaches from there, about: half its width, height and depth.
+    pub reach_bl: Vec3,
+    section_bl2: f64,
+}
+
+/// Inside is where `outward . p <= offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// Unit vector out of the tank.
+    pub outward: Vec3,
+    /// Distance from the origin along it.
+    pub offset_bl: f64,
+}
+
+impl Tank {
+    /// A box; flat when it has no depth.
+    pub fn new(least: Vec3, greatest: Vec3) -> Tank {
+        Tank::within([least, greatest], Vec::new())
+    }
+
+    /// A box, cut by further walls; there must be something left.
+    fn within(corners: [Vec3; 2], mut walls: Vec<Wall>) -> Tank {
+        for (axis, (least, greatest)) in corners[0].into_iter().zip(corners[1]).enumerate() {
+            for (sign, offset_bl) in [(1.0, greatest), (-1.0, -least)] {
+                let mut outward = [0.0; 3];
+                outward[axis] = sign;
+                walls.push(Wall { outward, offset_bl });
+            }
+        }
+        let mut tank = Tank {
+            walls,
+            corners,
+            middle: [0.0; 3],
+            reach_bl: [0.0; 3],
+            section_bl2: 0.0,
+        };
+        tank.measure();
+        tank
+    }
+
+    /// The middle of the places inside at half its depth, how far they reach, and their area.
+    fn measure(&mut self) {
+        let [least, greatest] = self.corners;
+        let depth = 0.5 * (least[2] + greatest[2]);
+        let at = |axis: usize, k: usize| {
+            let share = (k as f64 + 0.5) / N_SAMPLES as f64;
+            least[axis] + share * (greatest[axis] - least[axis])
+        };
+        let (mut sum, mut squares, mut n) = ([0.0; 3], [0.0; 3], 0.0);
+        for k in 0..N_SAMPLES * N_SAMPLES {
+            let place = [at(0, k % N_SAMPLES), at(1, k / N_SAMPLES), depth];
+            if self.holds(place) {
+                sum = add_scaled(sum, 1.0, place);
+                squares = add_scaled(squares, 1.0, place.map(|x| x * x));
+                n += 1.0;
+            }
+        }
+        let area = (greatest[0] - least[0]) * (greatest[1] - least[1]);
+        self.section_bl2 = area * n / (N_SAMPLES * N_SAMPLES) as f64;
+        self.middle = match n > 0.0 {
+            true => scaled(1.0 / n, sum),
+            false => [at(0, N_SAMPLES / 2), at(1, N_SAMPLES / 2), depth],
+        };
+        // The half of a span is the root of three times its variance.
+        let half = |axis: usize| {
+            let variance = squares[axis] / f64::max(n, 1.0) - self.middle[axis] * self.middle[axis];
+            (3.0 * variance.max(0.0)).sqrt()
+        };
+        self.reach_bl = [half(0), half(1), 0.5 * (greatest[2] - least[2])];
+    }
+
+    /// Whether it has no depth: everything happens in the picture's plane.
+    pub fn is_flat(&self) -> bool {
+        self.corners[1][2] <= self.corners[0][2]
+    }
+
+    /// The axis about which boids turn: out of the picture when flat, the vertical otherwise.
+    pub fn up(&self) -> Vec3 {
+        match self.is_flat() {
+            true => [0.0, 0.0, 1.0],
+            false => [0.0, 1.0, 0.0],
+        }
+    }
+
+    /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where
+    /// each has less than a square of `ROOM_BL` in the picture.
+    pub fn closeness(&self, n: usize) -> f64 {
+        ((self.section_bl2 / n as f64).sqrt() / ROOM_BL).clamp(0.05, 1.0)
+    }
+
+    /// Inward pushes for whoever would pass a wall within `horizon_s`, growing to 1 at the wall.
+    pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
+        let mut push = [0.0; 3];
+        for wall in self.upright_walls() {
+            let room = wall.offset_bl - dot(wall.outward, position);
+            let approach = dot(wall.outward, velocity) * horizon_s;
+            if approach > room.max(0.0) {
+                let strength = (approach - room.max(0.0)) / approach;
+                for (push, outward) in push.iter_mut().zip(wall.outward) {
+                    *push -= strength * outward;
+                }
+            }
+        }
+        push
+    }
+
+    /// Puts a position inside and reflects the part of the velocity that leads out: who only lost it
+    /// would be caught in corners, never getting round. True when a wall was met.
+    pub fn keep_inside(&self, position: &mut Vec3, velocity: &mut Vec3) -> bool {
+        let mut met = false;
+        // A few rounds settle most corners.
+        for _ in 0..3 {
+            for wall in &self.walls {
+                let beyond = dot(wall.outward, *position) - wall.offset_bl;
+                if beyond > 0.0 {
+                    let outward_speed = dot(wall.outward, *velocity).max(0.0);
+                    *position = add_scaled(*position, -beyond, wall.outward);
+                    *velocity = add_scaled(*velocity, -2.0 * outward_speed, wall.outward);
+                    met = true;
+                }
+            }
+        }
+        if met {
+            *position = self.on_the_way(self.middle, *position);
+        }
+        met
+    }
+
+    /// As far on the way from a place inside to another as the tank goes: it is convex.
+    pub fn on_the_way(&self, from: Vec3, to: Vec3) -> Vec3 {
+        let way = minus(to, from);
+        let share = self.walls.iter().fold(1.0f64, |share, wall| {
+            let along = dot(wall.outward, way);
+            let room = (wall.offset_bl - dot(wall.outward, from)).max(0.0);
+            if along > room {
+                share.min(room / along)
+            } else {
+                share
+            }
+        });
+        match share < 1.0 {
+            true => add_scaled(from, share, way),
+            false => to,
+        }
+    }
+
+    /// Whether a position lies inside, to rounding.
+    pub fn holds(&self, position: Vec3) -> bool {
+        let beyond = |wall: &Wall| dot(wall.outward, position) - wall.offset_bl;
+        self.walls.iter().all(|wall| beyond(wall) < 1e-9)
+    }
+
+    /// The walls that steer: a flat tank has no front and back.
+    fn upright_walls(&self) -> impl Iterator<Item = &Wall> {
+        let flat = self.is_flat();
+        self.walls
+            .iter()
+            .filter(move |wall| !flat || wall.outward[2] == 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn only_who_heads_for_a_wall_is_pushed_and_inward() {
+        let tank = Tank::new([0.0; 3], [6.0, 4.0, 2.0]);
+        assert_eq!(tank.push([3.0, 2.0, 1.0], [0.5, 0.0, 0.0], 1.0), [0.0; 3]);
+        let push = tank.push([5.8, 2.0, 1.0], [0.5, 0.0, 0.0], 1.0);
+        assert!(
+            push[0] < 0.0 && push[1] == 0.0 && push[2] == 0.0,
+            "{push:?}"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn whoever_leaves_is_put_back_and_leads_out_no_more(
+            p in prop::array::uniform3(-9.0..9.0f64), v in prop::array::uniform3(-3.0..3.0f64)
+        ) {
+            let tank = Tank::new([0.0; 3], [6.0, 4.0, 0.0]);
+            let (mut position, mut velocity) = (p, v);
+            let met = tank.keep_inside(&mut position, &mut velocity);
+            prop_assert!(tank.holds(position));
+            prop_assert_eq!(met, !tank.holds(p));
+            if p[0] > 6.0 {
+                prop_assert!(velocity[0] <= 0.0);
+            }
+        }
+    }
+}

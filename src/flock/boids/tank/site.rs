@@ -1,0 +1,222 @@
+//! The tank of a library: where the animal was seen, and where it is wholly in the picture (ALGORITHMS.md 7).
+
+use super::{Tank, Wall};
+use crate::flock::boids::vector::norm;
+use crate::flock::lens::Lens;
+use crate::flock::motion::FrameMotion;
+use crate::flock::params::{Params, TankExtent};
+use crate::library::{Library, Pose, View};
+
+/// Directions in which the seen area is bounded.
+const N_SIDES: usize = 16;
+/// A flock without room gets it farther out until the tank is this share of the picture. From above, what
+/// bounds the animal is mostly a wall; from the side, mostly its whim.
+const MOST_OF_ARENA: f64 = 0.35;
+const MOST_OF_TANK: f64 = 0.7;
+/// By so much at a time.
+const FARTHER_BL: f64 = 0.25;
+/// Between a body and a wall.
+const CLEARANCE_BL: f64 = 0.05;
+/// How deep a tank is whose depth is not asked for: as deep as the animal was seen to be, within these.
+const DEPTHS_BL: [f64; 2] = [1.0, 6.0];
+/// Share of the frames, and of the bodies, that what was seen leaves out at either end.
+const OUTLIERS: f64 = 0.01;
+
+impl Tank {
+    /// The tank of a library: where the animal was seen, as deep as it was seen to be. Where a flock has no room
+    /// there, it reaches farther, but not beyond where the animal is wholly in the picture.
+    pub fn of(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> Tank {
+        let [w, h] = library.poses.image_size_px.map(f64::from);
+        let site = Site {
+            lens,
+            body: Body::of(library, lens.length_px),
+            size_px: [w, h],
+            depths_bl: depths(library, lens, motion, params),
+        };
+        let seen = match params.tank {
+            TankExtent::Seen => seen_lines(library),
+            TankExtent::Picture => Vec::new(),
+        };
+        if seen.is_empty() {
+            return site.tank(&[]);
+        }
+        let most = match library.poses.view {
+            View::Top => MOST_OF_ARENA,
+            View::Side => MOST_OF_TANK,
+        };
+        let mut farther_px = 0.0;
+        loop {
+            let lines: Vec<Line> = seen.iter().map(|&(u, px)| (u, px + farther_px)).collect();
+            let tank = site.tank(&lines);
+            let has_room = tank.closeness(params.count as usize) >= 1.0;
+            if has_room || area(&lines) >= most * w * h || farther_px > w + h {
+                return tank;
+            }
+            farther_px += FARTHER_BL * lens.length_px;
+        }
+    }
+}
+
+/// A unit vector in the picture and how far it may be gone along it from the picture's corner, pixels.
+type Line = ([f64; 2], f64);
+
+/// What tanks of one library have in common.
+struct Site<'a> {
+    lens: &'a Lens,
+    body: Body,
+    size_px: [f64; 2],
+    depths_bl: [f64; 2],
+}
+
+impl Site<'_> {
+    /// The tank in which bodies stay within the picture and these lines.
+    fn tank(&self, lines: &[Line]) -> Tank {
+        let [w, h] = self.size_px;
+        let picture = [
+            ([1.0, 0.0], w),
+            ([0.0, 1.0], h),
+            ([-1.0, 0.0], 0.0),
+            ([0.0, -1.0], 0.0),
+        ];
+        let walls = self.walls(&picture).chain(self.walls(lines)).collect();
+        let places = self
+            .depths_bl
+            .map(|z| [[0.0, 0.0], [w, h]].map(|px| self.lens.place_bl(px, z)));
+        let extreme = |axis: usize, of: fn(f64, f64) -> f64| {
+            places
+                .iter()
+                .flatten()
+                .map(|p| p[axis])
+                .reduce(of)
+                .unwrap_or(0.0)
+        };
+        let corners = [f64::min, f64::max].map(|of| std::array::from_fn(|axis| extreme(axis, of)));
+        Tank::within(corners, walls)
+    }
+
+    /// A body's margin within lines, each of which has its opposite half the way round; never more than
+    /// a third of the way between them.
+    fn walls(&self, lines: &[Line]) -> impl Iterator<Item = Wall> {
+        let px_per_bl = self.lens.px_per_bl(self.depths_bl[0]);
+        (0..lines.len()).map(move |k| {
+            let (outward, offset_px) = lines[k];
+            let opposite_px = lines[(k + lines.len() / 2) % lines.len()].1;
+            let across_bl = (offset_px + opposite_px) / px_per_bl;
+            let margin_bl = self.body.margin_bl(outward).min(across_bl / 3.0);
+            self.lens.wall(outward, offset_px, margin_bl)
+        })
+    }
+}
+
+/// How far a body reaches from its centroid.
+struct Body {
+    view: View,
+    half_height_bl: f64,
+}
+
+impl Body {
+    fn of(library: &Library, length_px: f64) -> Body {
+        let heights = library
+            .poses
+            .frames
+            .iter()
+            .filter_map(|pose| pose.height_px);
+        let median_px = quantile(heights.collect(), 0.5).unwrap_or(length_px);
+        Body {
+            view: library.poses.view,
+            half_height_bl: 0.5 * (median_px / length_px).min(1.0),
+        }
+    }
+
+    /// What it needs between its centroid and a wall: in top view it may point to any, in side view it is level.
+    fn margin_bl(&self, outward: [f64; 2]) -> f64 {
+        let reach = match self.view {
+            View::Top => 0.5,
+            View::Side => norm([0.5 * outward[0], self.half_height_bl * outward[1], 0.0]),
+        };
+        reach + CLEARANCE_BL
+    }
+}
+
+/// The nearest and the farthest place, from the camera; nowhere when the lens is flat.
+fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> [f64; 2] {
+    if lens.is_flat() {
+        return [0.0; 2];
+    }
+    let seen = || {
+        let shown = library.playback.component.iter();
+        shown
+            .map(|&frame| motion[frame as usize].depth_bl)
+            .collect()
+    };
+    let at = |share: f64| quantile(seen(), share).unwrap_or(0.0);
+    let (near, far) = (at(OUTLIERS), at(1.0 - OUTLIERS));
+    let depth = params
+        .depth_bl
+        .unwrap_or((far - near).clamp(DEPTHS_BL[0], DEPTHS_BL[1]));
+    // Never so near that a body fills the picture.
+    let least = lens.depth_at_bl(1.5 * lens.length_px);
+    let nearest = (0.5 * (near + far - depth)).max(least);
+    [nearest, nearest + depth]
+}
+
+/// The outer polygon of the bodies seen; empty when there are none.
+fn seen_lines(library: &Library) -> Vec<Line> {
+    (0..N_SIDES)
+        .filter_map(|k| {
+            let angle = std::f64::consts::TAU * k as f64 / N_SIDES as f64;
+            let outward = [libm::cos(angle), libm::sin(angle)];
+            let bodies = library
+                .poses
+                .frames
+                .iter()
+                .filter_map(|pose| reach_px(pose, outward));
+            Some((outward, quantile(bodies.collect(), 1.0 - OUTLIERS)?))
+        })
+        .collect()
+}
+
+/// How far a body reaches in a direction: an ellipse of its length and height.
+fn reach_px(pose: &Pose, outward: [f64; 2]) -> Option<f64> {
+    let [x, y] = pose.centroid_px?;
+    let axis = pose.heading_rad?;
+    let (cos, sin) = (libm::cos(axis), libm::sin(axis));
+    let along = 0.5 * pose.length_px? * (outward[0] * cos + outward[1] * sin);
+    let across = 0.5 * pose.height_px? * (outward[1] * cos - outward[0] * sin);
+    Some(outward[0] * x + outward[1] * y + along.hypot(across))
+}
+
+/// The area within lines of rising angle, by their corners.
+fn area(lines: &[Line]) -> f64 {
+    let corner = |k: usize| {
+        let (a, b) = (&lines[k], &lines[(k + 1) % lines.len()]);
+        let cross = a.0[0] * b.0[1] - a.0[1] * b.0[0];
+        [
+            (a.1 * b.0[1] - b.1 * a.0[1]) / cross,
+            (b.1 * a.0[0] - a.1 * b.0[0]) / cross,
+        ]
+    };
+    (0..lines.len())
+        .map(|k| {
+            let (p, q) = (corner(k), corner((k + 1) % lines.len()));
+            0.5 * (p[0] * q[1] - q[0] * p[1])
+        })
+        .sum()
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let rank = values.len().saturating_sub(1) as f64 * share;
+    values.get(rank.round() as usize).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_of_walls_has_the_area_of_a_square() {
+        let lines = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]].map(|u| (u, 2.0));
+        assert!((area(&lines) - 16.0).abs() < 1e-12);
+    }
+}
