@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """How good flocks are: the measures of ALGORITHMS.md 9 on libraries that `flockreel analyze` made.
 
-    bench/flocks.py PROGRAM LIBRARY_DIR... [--count 20] [--frames 400] [--seed 1] [--preset school] [--match heading]
+    bench/flocks.py PROGRAM LIBRARY_DIR... [--count 20] [--frames 400] [--seed 1] [--preset school] [--match BY]
 
-For each library plans a flock, and prints what flock.json's stats say with their bars (* = missed), how many frames
+For each library plans a flock, and prints what flock.json's stats say with their bars (* = missed), how far headings
+shown in the picture are from the boids' (with a camera the stats tell directions in space), how many frames
 the component has, and how visible the cuts are: for each jump that the flock plays, the step across it between
 the sprites as exported (RGB times alpha, and alpha; ALGORITHMS.md 5), over the median step between consecutive
 sprites, hard as if nothing were faded. Needs numpy and cv2.
@@ -22,6 +23,8 @@ import numpy as np
 BARS = [
     ("heading_error_median_deg", 1.0),
     ("heading_error_p90_deg", 6.0),
+    ("picture_median_deg", 1.0),
+    ("picture_p90_deg", 6.0),
     ("jumps_per_100_frames", 4.0),
     ("clone_share", 0.005),
     ("cut_median", 1.3),
@@ -33,7 +36,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
     parser.add_argument("libraries", nargs="+", type=pathlib.Path)
-    for name, default in [("count", "20"), ("frames", "400"), ("seed", "1"), ("preset", "school"), ("match", "heading")]:
+    for name, default in [("count", "20"), ("frames", "400"), ("seed", "1"), ("preset", "school"), ("match", None)]:
         parser.add_argument(f"--{name}", default=default)
     args = parser.parse_args()
     for library in args.libraries:
@@ -49,7 +52,7 @@ def main():
 
 def measure(args, library, folder):
     plan = folder / "flock.json"
-    words = [args.program, "flock", library, "-o", folder / "x.mp4", "--plan", plan] + (["--match", args.match] if args.match != "heading" else [])
+    words = [args.program, "flock", library, "-o", folder / "x.mp4", "--plan", plan] + (["--match", args.match] if args.match else [])
     for name in ("count", "frames", "seed", *(["preset"] if args.preset != "school" else [])):
         words += [f"--{name}", getattr(args, name)]
     done = subprocess.run(words, capture_output=True, text=True)
@@ -63,8 +66,12 @@ def measure(args, library, folder):
     median, p99, cuts = cut_steps(folder / "sprites", flock, poses)
     stats, costs = flock["stats"], [one["cost"] for one in flock["individuals"]]
     total, bound = (sum(cost[key] for cost in costs) for key in ("total", "lower_bound"))
+    gaps = np.concatenate([np.subtract(one["heading_rad"], one["boid"]["heading_rad"]) for one in flock["individuals"]])
+    gaps = np.degrees(np.abs((gaps + np.pi) % (2 * np.pi) - np.pi))
     return {
         **stats,
+        "picture_median_deg": float(np.median(gaps)),
+        "picture_p90_deg": float(np.percentile(gaps, 90)),
         "heading_error_median_deg": np.degrees(stats["heading_error_median_rad"]),
         "heading_error_p90_deg": np.degrees(stats["heading_error_p90_rad"]),
         "component": len(known["component"]),

@@ -11,7 +11,7 @@ use super::params::Params;
 use crate::geometry::Camera;
 use crate::library::{Library, View};
 
-/// Focal length of a usual camera, widths of its picture: what a phone's main camera has.
+/// Focal length of a camera that nothing is known of, widths of its picture: it sees 53 degrees across.
 const USUAL_FOCAL_WIDTHS: f64 = 1.0;
 /// A silhouette's height is taken as the median over this much time: fins open and close.
 const HEIGHT_SPAN_S: f64 = 0.5;

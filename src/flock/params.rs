@@ -75,7 +75,7 @@ pub struct Matching {
     /// Cost of looking like a neighbor, radians for each at no distance.
     pub w_c: f64,
     /// Cost of each frame that an individual shows again within 3 s, radians; 0 = no matter, and every plan is the
-    /// cheapest. 0.05 takes an eighth to two thirds of the repeats away and makes headings no worse than 0.01 rad.
+    /// cheapest.
     pub w_p: f64,
 }
 
