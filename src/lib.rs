@@ -10,6 +10,7 @@ pub mod footage; // what the algorithms ask of a video
 pub mod geometry; // angles, rectangles, the pinhole camera
 pub mod ids; // identifiers of stored things
 pub mod library; // the value in the middle: poses, sprites, transitions, patches
+pub mod order; // medians and percentiles
 pub mod progress; // how far a computation is, and whether to go on
 pub mod random; // counter-based random numbers
 pub mod raster; // frames, images, masks, components, resampling, blending

@@ -23,7 +23,6 @@ pub mod tracking;
 // What it did.
 pub mod direction;
 pub mod midline;
-pub mod order;
 pub mod pose;
 
 // Which moments look alike.

@@ -7,6 +7,7 @@ use super::tracking::{Track, Tracked};
 use crate::cpu::Level;
 use crate::geometry::Rect;
 use crate::library::{Poses, Sprites, View};
+use crate::order::median;
 use crate::raster::RgbaImage;
 use crate::raster::canvas::straight;
 use crate::raster::resample::{Placement, Premultiplied, Resampled, Room};
@@ -51,12 +52,6 @@ pub fn scales(poses: &Poses) -> Vec<f64> {
         (scale * 1e5).round() / 1e5
     };
     farness.iter().map(scale).collect()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 /// The sprites of a track, of the size filmed or of `scales`. The box holds the largest extent from the centroid over the frames in

@@ -16,13 +16,13 @@ use rayon::prelude::*;
 
 use super::background::Plate;
 use super::light::{self, Gain};
-use super::order;
 use super::params::Search;
 use super::read_ahead::Batches;
 use super::sighting::{Choice, Scene, Sighting};
 use super::silhouette::{self, parting};
 use super::{Error, LEAST_FRAMES, Params};
 use crate::geometry::Rect;
+use crate::order;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, RgbaImage};

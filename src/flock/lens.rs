@@ -10,6 +10,7 @@ use super::individual::rounded;
 use super::params::Params;
 use crate::geometry::Camera;
 use crate::library::{Library, View};
+use crate::order::median;
 
 /// Focal length of a camera that nothing is known of, widths of its picture: it sees 53 degrees across.
 const USUAL_FOCAL_WIDTHS: f64 = 1.0;
@@ -175,20 +176,14 @@ pub fn depths_bl(library: &Library, lens: &Lens) -> Vec<f64> {
         return frames.iter().map(depth).collect();
     }
     let heights: Vec<Option<f64>> = frames.iter().map(|pose| pose.height_px).collect();
-    let mut all: Vec<f64> = heights.iter().flatten().copied().collect();
-    let usual_px = median(&mut all).unwrap_or(1.0);
+    let usual_px = median(heights.iter().flatten().copied()).unwrap_or(1.0);
     let reach = (HEIGHT_SPAN_S * library.poses.fps / 2.0).round() as usize;
     let depth = |frame: usize| {
         let around = frame.saturating_sub(reach)..(frame + reach + 1).min(frames.len());
-        let mut near: Vec<f64> = heights[around].iter().flatten().copied().collect();
-        median(&mut near).map_or(0.0, |px| lens.depth_at_bl(lens.length_px * px / usual_px))
+        let near = heights[around].iter().flatten().copied();
+        median(near).map_or(0.0, |px| lens.depth_at_bl(lens.length_px * px / usual_px))
     };
     (0..frames.len()).map(depth).collect()
-}
-
-fn median(values: &mut [f64]) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! What a person may set about a flock. Every default is the value of ALGORITHMS.md 6 to 8;
+//! What a person may set about a flock. Defaults are those of ALGORITHMS.md 6 and 8, and of
+//! `boids/params.rs`;
 //! `papers` is O's plain objective.
 
 use serde::{Deserialize, Serialize};

@@ -8,6 +8,7 @@ use super::placement::is_jump;
 use super::plan::memory::Memory;
 use crate::geometry::wrap_rad;
 use crate::library::Library;
+use crate::order::percentile;
 
 /// Two neighbors this near that show frames this near in the footage are clones.
 const CLONE_BL: f64 = 4.0;
@@ -59,18 +60,18 @@ pub fn measure(
         Some(MatchBy::Direction) => direction_errors(one),
         _ => heading_errors(one),
     };
-    let headings = sorted(individuals.iter().flat_map(errors).collect());
+    let headings: Vec<f64> = individuals.iter().flat_map(errors).collect();
     let deviations = individuals.iter().flat_map(deviations_px).collect();
     let least_step_px = MOVING_BL_PER_S * length_px / fps;
     let slips = individuals.iter().flat_map(|i| slips(i, least_step_px));
     let mean = |of: fn(&Order) -> f64| orders.iter().map(of).sum::<f64>() / orders.len() as f64;
     let stats = Stats {
-        heading_error_median_rad: quantile(&headings, 0.5),
-        heading_error_p90_rad: quantile(&headings, 0.9),
+        heading_error_median_rad: quantile(headings.clone(), 0.5),
+        heading_error_p90_rad: quantile(headings, 0.9),
         jumps_per_100_frames: jumps_per_100_frames(individuals),
         repeats_per_100_frames: repeats_per_100_frames(individuals, fps),
-        path_deviation_p95_bl: quantile(&sorted(deviations), 0.95) / length_px,
-        slip_median_rad: quantile(&sorted(slips.collect()), 0.5),
+        path_deviation_p95_bl: quantile(deviations, 0.95) / length_px,
+        slip_median_rad: quantile(slips.collect(), 0.5),
         clone_share: clone_share(individuals, CLONE_BL * length_px, CLONE_S * fps),
         distinct_looks: distinct_looks(&library.playback.component, CLONE_S * fps)
             * if params.mirror { 2 } else { 1 },
@@ -210,17 +211,9 @@ fn variety(individuals: &[Individual], library: &Library) -> f64 {
     n_used as f64 / library.playback.component.len().max(1) as f64
 }
 
-fn sorted(mut values: Vec<f64>) -> Vec<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values
-}
-
 /// 0 of nothing.
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    match sorted.len() {
-        0 => 0.0,
-        n => sorted[((n - 1) as f64 * share).round() as usize],
-    }
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    percentile(&mut values, share).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -20,8 +20,8 @@ mod sphere;
 
 use crate::geometry::Camera;
 use crate::library::Animal;
+use crate::order::percentile;
 
-use super::order::percentile;
 use energy::{Energy, State};
 use shape::Shape;
 

@@ -8,8 +8,8 @@
 use super::body::{Axes, form};
 use super::energy::{BEND_RATE, State, moment_noise};
 use super::{Outline, View, Views};
-use crate::analysis::order::{median, percentile};
 use crate::library::Animal;
+use crate::order::{median, percentile};
 
 /// The body's constants, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]

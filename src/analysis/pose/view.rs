@@ -2,10 +2,10 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
-use crate::analysis::order::{median, percentile};
 use crate::analysis::sighting::Sighting;
 use crate::analysis::tracking::Tracked;
 use crate::library::View;
+use crate::order::{median, percentile};
 
 /// From the side an animal has a back and a belly (the skew across its length keeps its sign), and stays
 /// as tall when it turns. From above it has a left and a right, bends, and lies at any angle.

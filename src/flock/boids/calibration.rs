@@ -3,6 +3,7 @@
 
 use crate::flock::motion::FrameMotion;
 use crate::library::{Library, View};
+use crate::order::percentile;
 
 /// The limits of a boid, in body lengths and seconds.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,23 +35,25 @@ impl Calibration {
     /// but through the vertical.
     pub fn of(library: &Library, motion: &[FrameMotion], flat: bool) -> Calibration {
         let shown = || (library.playback.component.iter()).map(|&frame| &motion[frame as usize]);
-        let paces = sorted(shown().filter_map(|m| m.pace_bl_per_s));
+        let mut paces: Vec<f64> = shown().filter_map(|m| m.pace_bl_per_s).collect();
         let [slow, cruise, fast] = [(SLOWEST, 0.5), (0.5, 1.0), (FASTEST, 1.5)]
-            .map(|(share, usual)| quantile(&paces, share).unwrap_or(usual));
+            .map(|(share, usual)| percentile(&mut paces, share).unwrap_or(usual));
         // An animal that mostly sits still would make a flock of statues: a quarter of its best.
         let cruise = cruise.max(0.25 * fast).max(0.05);
-        let swings = sorted(shown().filter_map(|m| m.swing_rad_per_s));
-        let turn_rad_per_s = quantile(&swings, FASTEST).map_or(2.0, |rate| rate.clamp(0.5, 6.0));
+        let mut swings: Vec<f64> = shown().filter_map(|m| m.swing_rad_per_s).collect();
+        let turn_rad_per_s =
+            percentile(&mut swings, FASTEST).map_or(2.0, |rate| rate.clamp(0.5, 6.0));
         Calibration {
             cruise_bl_per_s: cruise,
             speed_limits_bl_per_s: [slow.max(0.25 * cruise).min(cruise), fast.max(cruise)],
             turn_rad_per_s,
             wander_rad_per_s: root_mean_square(&swings, turn_rad_per_s),
             slopes: (library.poses.view == View::Side && !flat).then(|| {
-                let pitches = sorted(shown().map(|m| libm::asin(m.forward[1].clamp(-1.0, 1.0))));
+                let pitches = shown().map(|m| libm::asin(m.forward[1].clamp(-1.0, 1.0)));
+                let mut pitches: Vec<f64> = pitches.collect();
                 [
-                    slope(quantile(&pitches, 1.0 - STEEPEST).map(|up| -up)),
-                    slope(quantile(&pitches, STEEPEST)),
+                    slope(percentile(&mut pitches, 1.0 - STEEPEST).map(|up| -up)),
+                    slope(percentile(&mut pitches, STEEPEST)),
                 ]
             }),
         }
@@ -74,18 +77,6 @@ fn slope(pitch_rad: Option<f64>) -> f64 {
             .unwrap_or(0.0)
             .clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD),
     )
-}
-
-fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_unstable_by(f64::total_cmp);
-    values
-}
-
-fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
-    sorted
-        .get((sorted.len().saturating_sub(1) as f64 * share).round() as usize)
-        .copied()
 }
 
 /// Of values up to `most`: what was measured beyond is noise.

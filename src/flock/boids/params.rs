@@ -1,5 +1,6 @@
-//! What a person may set about boids: how they steer, and what else is in the tank. Every default is the value of
-//! ALGORITHMS.md 7.
+//! What a person may set about boids: how they steer, and what else is in the tank. Defaults are those of
+//! ALGORITHMS.md 7, but for a stronger alignment, without which a school forms slowly, and a
+//! weaker wander.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,7 +1,7 @@
 //! Who may import whom: the table, and the reader that finds what a file imports.
 
 pub(super) const VALUES: &[&str] = &[
-    "geometry", "raster", "random", "cpu", "progress", "code", "ids", "scratch",
+    "geometry", "raster", "random", "cpu", "progress", "code", "ids", "scratch", "order",
 ];
 pub(super) const MIDDLE: &[&str] = &["library", "footage"];
 pub(super) const ALGORITHMS: &[&str] = &["analysis", "flock", "fish"];

@@ -6,6 +6,7 @@ use crate::flock::lens::Lens;
 use crate::flock::motion::FrameMotion;
 use crate::flock::params::{Params, TankExtent};
 use crate::library::{Library, Pose, View};
+use crate::order::{median, percentile};
 
 /// Directions in which the seen area is bounded.
 const N_SIDES: usize = 16;
@@ -121,7 +122,7 @@ impl Body {
             .frames
             .iter()
             .filter_map(|pose| pose.height_px);
-        let median_px = quantile(heights.collect(), 0.5).unwrap_or(length_px);
+        let median_px = median(heights).unwrap_or(length_px);
         Body {
             view: library.poses.view,
             half_height_bl: 0.5 * (median_px / length_px).min(1.0),
@@ -147,9 +148,9 @@ fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Param
         let shown = library.playback.component.iter();
         shown
             .map(|&frame| motion[frame as usize].depth_bl)
-            .collect()
+            .collect::<Vec<f64>>()
     };
-    let at = |share: f64| quantile(seen(), share).unwrap_or(0.0);
+    let at = |share: f64| percentile(&mut seen(), share).unwrap_or(0.0);
     let (near, far) = (at(OUTLIERS), at(1.0 - OUTLIERS));
     let depth = params
         .depth_bl
@@ -171,7 +172,10 @@ fn seen_lines(library: &Library) -> Vec<Line> {
                 .frames
                 .iter()
                 .filter_map(|pose| reach_px(pose, outward));
-            Some((outward, quantile(bodies.collect(), 1.0 - OUTLIERS)?))
+            Some((
+                outward,
+                percentile(&mut bodies.collect::<Vec<f64>>(), 1.0 - OUTLIERS)?,
+            ))
         })
         .collect()
 }
@@ -202,12 +206,6 @@ fn area(lines: &[Line]) -> f64 {
             0.5 * (p[0] * q[1] - q[0] * p[1])
         })
         .sum()
-}
-
-fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    let rank = values.len().saturating_sub(1) as f64 * share;
-    values.get(rank.round() as usize).copied()
 }
 
 #[cfg(test)]
