@@ -16,9 +16,19 @@ pub struct Calibration {
     pub turn_rad_per_s: f64,
     /// Root mean square of the turn rate.
     pub wander_rad_per_s: f64,
-    /// In side view: greatest slope upward and downward, vertical to level speed. `None` where
-    /// every direction can be shown.
-    pub slopes: Option<[f64; 2]>,
+    /// In side view with depth. `None` where every direction can be shown.
+    pub slopes: Option<Slopes>,
+}
+
+/// How steeply the animal swims: vertical to level speed, positive downward.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slopes {
+    /// Greatest slope upward (positive) and downward.
+    pub limits: [f64; 2],
+    /// The median.
+    pub usual: f64,
+    /// Standard deviation, from the middle two thirds.
+    pub spread: f64,
 }
 
 /// Share of the frames that the steepest directions, and the fastest turns, may leave out.
@@ -50,11 +60,7 @@ impl Calibration {
             wander_rad_per_s: root_mean_square(&swings, turn_rad_per_s),
             slopes: (library.poses.view == View::Side && !flat).then(|| {
                 let pitches = shown().map(|m| libm::asin(m.forward[1].clamp(-1.0, 1.0)));
-                let mut pitches: Vec<f64> = pitches.collect();
-                [
-                    slope(percentile(&mut pitches, 1.0 - STEEPEST).map(|up| -up)),
-                    slope(percentile(&mut pitches, STEEPEST)),
-                ]
+                Slopes::of(pitches.collect())
             }),
         }
     }
@@ -71,12 +77,19 @@ impl Calibration {
     }
 }
 
-fn slope(pitch_rad: Option<f64>) -> f64 {
-    libm::tan(
-        pitch_rad
-            .unwrap_or(0.0)
-            .clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD),
-    )
+impl Slopes {
+    /// Of an animal seen at these pitches.
+    fn of(mut pitches: Vec<f64>) -> Slopes {
+        let mut at = |share| percentile(&mut pitches, share).unwrap_or(0.0);
+        let limits = [-at(1.0 - STEEPEST), at(STEEPEST)]
+            .map(|pitch_rad| libm::tan(pitch_rad.clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD)));
+        let [low, usual, high] = [0.1587, 0.5, 0.8413].map(|share| libm::tan(at(share)));
+        Slopes {
+            limits,
+            usual,
+            spread: 0.5 * (high - low),
+        }
+    }
 }
 
 /// Of values up to `most`: what was measured beyond is noise.

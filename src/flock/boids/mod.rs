@@ -260,7 +260,7 @@ impl<'a> Boids<'a> {
             position,
             velocity,
             neighbors,
-            wander_rad_per_s: wander,
+            wander,
             leads: leads_for_s > 0.0,
             noise: self.noise(id),
         });
@@ -289,7 +289,7 @@ impl<'a> Boids<'a> {
     /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
     /// stands.
     fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
-        if let Some([up, down]) = self.calibration.slopes {
+        if let Some([up, down]) = self.calibration.slopes.map(|slopes| slopes.limits) {
             let level = velocity[0].hypot(velocity[2]);
             velocity[1] = velocity[1].clamp(-up * level, down * level);
         }
@@ -318,15 +318,16 @@ impl<'a> Boids<'a> {
         })
     }
 
-    /// Ornstein-Uhlenbeck turn rates; at weight 1 the level one is as varied as the animal's own.
+    /// Ornstein-Uhlenbeck: a level turn rate, at weight 1 as varied as the animal's own, and a standard normal
+    /// number, which is how far its slope is to be off the usual one.
     fn next_wander(&self, id: usize) -> [f64; 2] {
         let keep = libm::exp(-self.step_s / WANDER_S);
         let spread = self.params.rules.wander * self.calibration.wander_rad_per_s;
-        let fresh = spread * (1.0 - keep * keep).sqrt();
+        let fresh = (1.0 - keep * keep).sqrt();
         std::array::from_fn(|k| {
             let key = [draw::WANDER, id as u64, self.step_idx, k as u64];
-            let share = [1.0, 0.3][k];
-            keep * self.wander[id][k] + share * fresh * random::normal(self.params.seed, &key)
+            let fresh = [spread, 1.0][k] * fresh * random::normal(self.params.seed, &key);
+            keep * self.wander[id][k] + fresh
         })
     }
 

@@ -19,6 +19,8 @@ const WALL_HORIZON_S: f64 = 1.0;
 const WITHOUT_DELAY: f64 = 20.0;
 /// Whoever circles does so at this share of the way from the middle to the walls.
 const RING: f64 = 0.65;
+/// Time constant of coming back to a slope that the animal has.
+const LEVEL_S: f64 = 0.5;
 /// Weight of swimming across the picture rather than into it.
 const BROADSIDE: f64 = 0.3;
 
@@ -30,8 +32,9 @@ pub struct Moment<'a> {
     pub velocity: Vec3,
     /// Nearest first; all that its rules may need.
     pub neighbors: &'a [Neighbor],
-    /// The wandering turn rates: in the plane of swimming, and up or down.
-    pub wander_rad_per_s: [f64; 2],
+    /// The wandering turn rate in the plane of swimming, and how many standard deviations the wished slope is off
+    /// the usual one.
+    pub wander: [f64; 2],
     /// It leads: alignment and cohesion are off.
     pub leads: bool,
     /// What its course is wrong by, with zones.
@@ -209,15 +212,19 @@ impl Steering<'_> {
         [side * into.abs(), 0.0, -into]
     }
 
-    /// The wandering turn, as the acceleration that makes it.
+    /// The wandering turn, as the acceleration that makes it, and the way back to the slopes that the animal has:
+    /// left to the rules alone, boids swim as steeply as they may, and who is both steep and seen nearly end-on
+    /// heads in the picture where the animal never did.
     fn wander(&self, moment: &Moment) -> Vec3 {
         let up = self.tank.up();
         let sideways = cross(up, moment.velocity);
-        let turn = scaled(moment.wander_rad_per_s[0], sideways);
-        if self.tank.is_flat() {
+        let turn = scaled(moment.wander[0], sideways);
+        let Some(slopes) = &self.calibration.slopes else {
             return turn;
-        }
-        add_scaled(turn, moment.wander_rad_per_s[1] * norm(moment.velocity), up)
+        };
+        let [x, y, z] = moment.velocity;
+        let wished = slopes.usual + slopes.spread * moment.wander[1];
+        add_scaled(turn, (wished * x.hypot(z) - y) / LEVEL_S, up)
     }
 
     /// Back to cruising speed; leaders are faster.

@@ -85,7 +85,7 @@ fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
     let library = synthetic::library(View::Side);
     let params = preset("swarm");
     let calibration = calibrated(&library, &params);
-    let [up, down] = calibration.slopes.expect("side view has a reach");
+    let [up, down] = calibration.slopes.expect("side view has a reach").limits;
     let (_, velocities, _) = swim(View::Side, &params, 300);
     for v in velocities.iter().flatten() {
         let level = v[0].hypot(v[2]);
