@@ -7,7 +7,8 @@ For each library plans a flock, and prints what flock.json's stats say with thei
 shown in the picture are from the boids' (with a camera the stats tell directions in space), how many frames
 the component has, and how visible the cuts are: for each jump that the flock plays, the step across it between
 the sprites as exported (RGB times alpha, and alpha; ALGORITHMS.md 5), over the median step between consecutive
-sprites, hard as if nothing were faded. Needs numpy and cv2.
+sprites, hard as if nothing were faded; and `faded`, the largest step between frames around a jump with the fades as
+they are drawn (`natural_window`: the same around frames without a jump). Needs numpy and cv2.
 """
 import argparse
 import json
@@ -29,7 +30,12 @@ BARS = [
     ("clone_share", 0.005),
     ("cut_median", 1.3),
     ("cut_above_natural_p99", 0.0),
+    ("faded_median", 1.3),
+    ("faded_above_natural_p99", 0.0),
 ]
+
+# Frames either side of a jump that a fade may change, and one more.
+AROUND = 3
 
 
 def main():
@@ -47,7 +53,7 @@ def main():
             continue
         words = [f"{name} {figures[name]:.4g}{'*' if figures[name] > bar else ''}" for name, bar in BARS]
         print(f"{library.name:28} component {figures['component']} of {figures['n_frames']} frames, {', '.join(words)}, "
-              f"variety {figures['variety']:.2f}, bound gap {figures['gap']:.3f}", flush=True)
+              f"natural_window {figures['natural_window']:.3f}, variety {figures['variety']:.2f}, bound gap {figures['gap']:.3f}", flush=True)
 
 
 def measure(args, library, folder):
@@ -63,7 +69,7 @@ def measure(args, library, folder):
     poses = json.loads((library / "poses.json").read_text())
     n_frames = len(poses["frames"])
     subprocess.run([args.program, "sprites", library, "-o", folder / "sprites"], check=True, capture_output=True)
-    median, p99, cuts = cut_steps(folder / "sprites", flock, poses)
+    median, p99, cuts, faded, windows = cut_steps(folder / "sprites", flock, poses)
     stats, costs = flock["stats"], [one["cost"] for one in flock["individuals"]]
     total, bound = (sum(cost[key] for cost in costs) for key in ("total", "lower_bound"))
     gaps = np.concatenate([np.subtract(one["heading_rad"], one["boid"]["heading_rad"]) for one in flock["individuals"]])
@@ -78,12 +84,16 @@ def measure(args, library, folder):
         "n_frames": n_frames,
         "cut_median": float(np.median(cuts)) / median if cuts else 0.0,
         "cut_above_natural_p99": float(np.mean([cut > p99 for cut in cuts])) if cuts else 0.0,
+        "faded_median": float(np.median(faded)) / median if faded else 0.0,
+        "faded_above_natural_p99": float(np.mean([step > p99 for step in faded])) if faded else 0.0,
+        "natural_window": float(np.median(windows)) / median,
         "gap": (total - bound) / max(total, 1e-9),
     }
 
 
 def cut_steps(folder, flock, poses):
-    """The median and the 99th percentile of natural steps, and the step of each cut played.
+    """The median and the 99th percentile of natural steps, the step of each cut played, the largest step around
+    each with its fades, and the largest step of as many consecutive frames of the footage.
 
     In top view sprites are turned to heading 0 first, and mirrored top to bottom.
     """
@@ -91,19 +101,38 @@ def cut_steps(folder, flock, poses):
     headings = [(frame["heading_rad"] or 0.0) if top else 0.0 for frame in poses["frames"]]
     sprites = [compared(folder / f"{frame:06}.png", heading) for frame, heading in enumerate(headings)]
     mirrored = (lambda sprite: sprite[::-1]) if top else (lambda sprite: sprite[:, ::-1])
-    step = lambda a, b: int(np.abs(a - b).sum())
+    step = lambda a, b: float(np.abs(a - b).sum())
     natural = [step(a, b) for a, b in zip(sprites, sprites[1:]) if a is not None and b is not None]
-    cuts, known = [], {}
+    span = 2 * AROUND - 1
+    windows = [max(natural[k : k + span]) for k in range(0, len(natural) - span, span)]
+    cuts, faded, known = [], [], {}
     for one in flock["individuals"]:
         shown = list(zip(one["source_frame"], one["mirrored"]))
-        for (a, side), (b, other) in zip(shown, shown[1:]):
+        fades = {}
+        for fade in one["fade"]:
+            for k, frame in enumerate(fade["source_frame"]):
+                fades[fade["start"] + k] = (frame, fade["mirrored"], fade["weight"][k])
+        for t, ((a, side), (b, other)) in enumerate(zip(shown, shown[1:]), start=1):
             if (b, other) == (a + 1, side) or sprites[a] is None or sprites[b] is None:
                 continue
             key = (a, b, side != other)
             if key not in known:
                 known[key] = step(sprites[a], mirrored(sprites[b]) if key[2] else sprites[b])
             cuts.append(known[key])
-    return float(np.median(natural)), float(np.percentile(natural, 99)), cuts
+            if AROUND <= t <= len(shown) - AROUND:
+                drawn = [blended(sprites, shown[u], fades.get(u), mirrored) for u in range(t - AROUND, t + AROUND)]
+                if all(picture is not None for picture in drawn):
+                    faded.append(max(step(a, b) for a, b in zip(drawn, drawn[1:])))
+    return float(np.median(natural)), float(np.percentile(natural, 99)), cuts, faded, windows
+
+
+def blended(sprites, shown, fade, mirrored):
+    """What a frame of an individual shows, with what fades into it; None where a sprite is missing."""
+    look = lambda frame, is_mirrored: mirrored(sprites[frame]) if is_mirrored else sprites[frame]
+    if sprites[shown[0]] is None or (fade and sprites[fade[0]] is None):
+        return None
+    picture = look(*shown)
+    return picture if fade is None else (1 - fade[2]) * picture + fade[2] * look(*fade[:2])
 
 
 def compared(path, turned_rad):

@@ -84,7 +84,7 @@ pub fn plan_flock(
         return Err(Error::NoTransitions);
     }
     let lens = Lens::of(library, params);
-    let params = &told(params, library, &lens);
+    let params = &told(params, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
@@ -123,19 +123,12 @@ pub fn plan_flock(
     })
 }
 
-/// The parameters with what they leave open.
-fn told(params: &Params, library: &Library, lens: &Lens) -> Params {
+/// The parameters as they can be met: without depth, directions are headings.
+fn told(params: &Params, lens: &Lens) -> Params {
     let mut params = params.clone();
-    let is_known = library
-        .poses
-        .frames
-        .iter()
-        .any(|pose| pose.forward.is_some());
-    params.matching.by = Some(match params.matching.by {
-        None if is_known && !lens.is_flat() => MatchBy::Direction,
-        Some(MatchBy::Direction) if lens.is_flat() => MatchBy::Heading,
-        by => by.unwrap_or(MatchBy::Heading),
-    });
+    if lens.is_flat() && params.matching.by == MatchBy::Direction {
+        params.matching.by = MatchBy::Heading;
+    }
     params
 }
 

@@ -57,9 +57,8 @@ pub struct Params {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Matching {
-    /// What is matched; null = directions in space where the library knows them and the tank has depth, headings
-    /// otherwise. A flock says which it was.
-    pub by: Option<MatchBy>,
+    /// What is matched.
+    pub by: MatchBy,
     /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
     pub w_h: f64,
     /// Share of a difference along the line of sight that counts when directions are matched, 0..=1: 1 = the whole
@@ -84,10 +83,11 @@ pub struct Matching {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatchBy {
-    /// O: where the animal points in the picture, and how fast it is.
+    /// O: where the animal points in the picture, and how fast it is. A wrong heading is seen at once.
     Heading,
-    /// The same, but where it points in space. Only where the tank has depth. What stays wrong is the chord
-    /// between two unit vectors; without a camera, away from the viewer and toward are one.
+    /// The same, but where it points in space: half the error of that, for twice the error of headings. Without depth
+    /// headings are matched. What stays wrong is the chord between two unit vectors; without a camera, away
+    /// from the viewer and toward are one.
     Direction,
     /// Colqui et al. 2008: how the animal moved in the picture against how the boid moves, frame by
     /// frame. `w_h` is then the cost of a body length a second each way; `w_r`, `rho_deg` and `w_v` play
@@ -130,7 +130,7 @@ pub enum TankExtent {
 impl Default for Matching {
     fn default() -> Matching {
         Matching {
-            by: None,
+            by: MatchBy::Heading,
             w_h: 1.0,
             w_d: 0.3,
             w_r: 0.1,
@@ -216,7 +216,7 @@ impl Params {
     pub fn papers() -> Params {
         Params {
             matching: Matching {
-                by: Some(MatchBy::Heading),
+                by: MatchBy::Heading,
                 w_h: 1.0,
                 w_d: 1.0,
                 w_r: 0.0,

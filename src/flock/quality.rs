@@ -57,7 +57,7 @@ pub fn measure(
 ) -> Stats {
     let fps = library.poses.fps;
     let errors = |one| match params.matching.by {
-        Some(MatchBy::Direction) => direction_errors(one),
+        MatchBy::Direction => direction_errors(one),
         _ => heading_errors(one),
     };
     let headings: Vec<f64> = individuals.iter().flat_map(errors).collect();

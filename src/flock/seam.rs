@@ -85,8 +85,8 @@ pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> Meeting {
     let moment = &lead[lead.len() - left];
     let n_frames = lead.len() as f64;
     Meeting {
-        // All of the wish from the middle on.
-        share: smooth(2.0 * (n_frames - left as f64) / n_frames),
+        // All of the wish from a third on.
+        share: smooth(3.0 * (n_frames - left as f64) / n_frames),
         places: (heirs.iter())
             .map(|&heir| {
                 let heir = heir as usize;
@@ -99,10 +99,10 @@ pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> Meeting {
 /// Blends the last moments of a film into those before its first.
 pub(super) fn close(moments: &mut [Moment], lead: &[Moment], heirs: &[u32], fps: f64) {
     let first = moments.len() - lead.len();
-    let half = lead.len() as f64 / 2.0;
+    let n_frames = lead.len() as f64;
     for (k, (now, before)) in moments[first..].iter_mut().zip(lead).enumerate() {
-        let gone = (k as f64 - half) / half;
-        let (share, slope) = (smooth(gone), slope(gone) * fps / half);
+        let gone = k as f64 / n_frames;
+        let (share, slope) = (smooth(gone), slope(gone) * fps / n_frames);
         for (id, &heir) in heirs.iter().enumerate() {
             let heir = heir as usize;
             let missing = minus(before.positions[heir], now.positions[id]);

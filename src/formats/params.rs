@@ -124,7 +124,7 @@ mod tests {
         }
         let json = r#"{"matching": {"by": "position"}}"#;
         let params: flock::Params = read(serde_json::from_str(json).unwrap()).unwrap();
-        assert_eq!(params.matching.by, Some(flock::params::MatchBy::Position));
+        assert_eq!(params.matching.by, flock::params::MatchBy::Position);
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub struct Args {
     /// Rules to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.
     #[arg(long, value_name = "JSON")]
     rules: Option<String>,
-    /// What frames and boids are matched by: heading (the default) or position.
+    /// What frames and boids are matched by: heading (the default), direction (in space) or position.
     #[arg(long = "match", value_name = "BY")]
     match_by: Option<String>,
     /// Weights of the plan to override, as JSON: '{"wx": 1.2, "w_p": 0.05}'.

@@ -281,8 +281,11 @@ impl<'a> Boids<'a> {
             leads_for_s,
         };
         next.position = add_scaled(position, self.step_s, next.velocity);
+        let along = next.velocity;
         self.habitat
             .keep_out(&mut next.position, &mut next.velocity);
+        // A slanting wall reflects more steeply than the animal swims.
+        next.velocity = self.within_limits(next.velocity, position, along);
         next
     }
 

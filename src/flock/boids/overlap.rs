@@ -47,6 +47,7 @@ impl Boids<'_> {
             position = add_scaled(position, 0.5 * (self.overlap_bl - distance), away);
         }
         self.habitat.keep_out(&mut position, &mut velocity);
-        (position, velocity)
+        let along = self.velocities[id as usize];
+        (position, self.within_limits(velocity, position, along))
     }
 }

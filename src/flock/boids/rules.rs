@@ -15,14 +15,16 @@ use crate::flock::params::{Params, Rules, Separation, Zones};
 /// A wall is steered from when the path over this time meets it.
 const WALL_HORIZON_S: f64 = 1.0;
 
+/// The share of a wall's braking that becomes a turn alone.
+const BRAKED: f64 = 0.7;
 /// So strong a wish is granted as far as the turn rate allows.
 const WITHOUT_DELAY: f64 = 20.0;
 /// Whoever circles does so at this share of the way from the middle to the walls.
 const RING: f64 = 0.65;
 /// Time constant of coming back to a slope that the animal has.
-const LEVEL_S: f64 = 0.5;
+const LEVEL_S: f64 = 0.25;
 /// Weight of swimming across the picture rather than into it.
-const BROADSIDE: f64 = 0.3;
+const BROADSIDE: f64 = 1.0;
 
 /// One boid's moment.
 pub struct Moment<'a> {
@@ -72,6 +74,7 @@ impl Steering<'_> {
             1.0,
             self.habitat.push(position, velocity, WALL_HORIZON_S),
         );
+        let walls = self.aside(walls, moment);
         let flight = self.habitat.flee(position, self.hunter).unwrap_or_default();
         let walls = add_scaled(flight, self.params.rules.walls, walls);
         let goals = self.habitat.toward_goals(
@@ -102,6 +105,28 @@ impl Steering<'_> {
             ],
             most,
         )
+    }
+
+    /// A push as a turn: who is only slowed down by a wall dawdles before it. What of the push would brake leads to
+    /// the side instead that the rest of it points to, or, head-on, to the one where the neighbors turn and where
+    /// the tank's middle lies, or its circle leads.
+    fn aside(&self, push: Vec3, moment: &Moment) -> Vec3 {
+        let ahead = unit(moment.velocity);
+        let brake = -dot(push, ahead);
+        if brake <= 0.0 {
+            return push;
+        }
+        let side = unit(cross(self.tank.up(), ahead));
+        let velocities = (moment.neighbors.iter()).map(|n| self.velocities[n.id as usize]);
+        let turned: f64 = velocities.map(|velocity| dot(unit(velocity), side)).sum();
+        let turned = turned / moment.neighbors.len().max(1) as f64;
+        let home = match self.params.rules.circling > 0.0 {
+            true => self.circling(moment),
+            false => minus(self.tank.middle, moment.position),
+        };
+        let chosen = dot(push, side) / brake + turned + dot(unit(home), side);
+        let turn = scaled(brake.copysign(chosen), side);
+        add_scaled(add_scaled(push, BRAKED * brake, ahead), 1.0, turn)
     }
 
     /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
@@ -206,8 +231,11 @@ impl Steering<'_> {
         let others: f64 = seen.iter().map(|n| self.velocities[n.id as usize][0]).sum();
         let cruise = self.calibration.cruise_bl_per_s;
         let follow = 2.0 * self.params.rules.alignment.min(1.0) / seen.len().max(1) as f64;
-        let side = moment.velocity[0] + follow * others;
-        let side = (side / cruise).clamp(-1.0, 1.0);
+        let side = ((moment.velocity[0] + follow * others) / cruise).clamp(-1.0, 1.0);
+        // Not onto a wall: its push leads back.
+        let across = [cruise.copysign(side), 0.0, 0.0];
+        let wall = self.tank.push(moment.position, across, WALL_HORIZON_S)[0];
+        let side = (side + 2.0 * wall).clamp(-1.0, 1.0);
         let into = moment.velocity[2] / cruise;
         [side * into.abs(), 0.0, -into]
     }

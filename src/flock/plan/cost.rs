@@ -57,7 +57,7 @@ impl Weights {
     pub fn new(matching: &Matching, library: &Library) -> Weights {
         let fixed = |w: f64| (w * 256.0).round() as u32;
         let view = library.poses.view;
-        let by = matching.by.unwrap_or(MatchBy::Heading);
+        let by = matching.by;
         let cruise = library.stats.speed_bl_per_s.map_or(1.0, |speeds| speeds[1]);
         Weights {
             heading: fixed(matching.w_h),

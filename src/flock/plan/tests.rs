@@ -14,16 +14,16 @@ use crate::progress::Silent;
 fn flock(view: View, name: &str) -> (Library, Flock) {
     let library = synthetic::library(view);
     let (preset, by) = match name {
-        "heading" => ("school", Some(MatchBy::Heading)),
-        "position" => ("school", Some(MatchBy::Position)),
-        name => (name, None),
+        "direction" => ("school", MatchBy::Direction),
+        "position" => ("school", MatchBy::Position),
+        name => (name, MatchBy::Heading),
     };
     let mut params = Params {
         count: 10,
         frames: 120,
         ..Params::preset(preset).expect("a known preset")
     };
-    params.matching.by = by.or(params.matching.by);
+    params.matching.by = by;
     let flock = plan_flock(&library, &params, &Silent).expect("a good library");
     (library, flock)
 }
@@ -279,7 +279,7 @@ fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
         });
         gaps.sum::<f64>()
     };
-    let (by_place, by_heading) = (gap("position"), gap("heading"));
+    let (by_place, by_heading) = (gap("position"), gap("school"));
     assert!(by_place < by_heading, "{by_place} {by_heading}");
 }
 
