@@ -10,6 +10,7 @@ use super::background::Plate;
 use super::light::Gain;
 use super::silhouette::{self, Difference, shadow};
 use crate::geometry::Rect;
+use crate::order::percentile;
 use crate::raster::{Frame, Mask, RgbaImage};
 
 /// The animal cut out of one frame.
@@ -81,8 +82,13 @@ fn moved(mask: &Mask, rect: Rect) -> Mask {
 /// mostly differs by, look like the plate, only darker, and hang together with the outside. They
 /// get a fraction of alpha like the outline, so that a shadow on the floor stays a shadow.
 fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate) -> Mask {
-    const FAINT: f64 = 0.35;
-    let faint = FAINT * contrast(difference, mask);
+    /// Of what the starkest quarter of the animal differs by: a mean would sink with the shadow itself.
+    const FAINT: f64 = 0.3;
+    let mut levels: Vec<f64> = (difference.levels.iter().zip(&mask.bits))
+        .filter(|&(_, &bit)| bit == 1)
+        .map(|(&level, _)| f64::from(level))
+        .collect();
+    let faint = FAINT * percentile(&mut levels, 0.75).unwrap_or(0.0);
     let mut solid = mask.clone();
     let width = mask.width();
     for k in 0..solid.bits.len() {
