@@ -1,0 +1,206 @@
+//! The nearest neighbors of a boid (ALGORITHMS.md 7): whoever is within a guessed radius, and only if those are too
+//! few within a greater one. The guess decides how long it takes and never what is found.
+//!
+//! Neighbors come nearest first, equal distances by id: an order that does not depend on the grid.
+
+use super::grid::Grid;
+use super::vector::{Vec3, dot, minus};
+
+/// So many are put in order by counting who is nearer, which knows no branch; more are sorted.
+const MOST_COUNTED: usize = 48;
+/// By how much a guess that was too small grows.
+const GROWTH: f64 = 1.25;
+/// Numbers compared at a time.
+const LANES: usize = 4;
+
+/// A boid near another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbor {
+    /// Its number.
+    pub id: u32,
+    /// From the one who looks to it, body lengths.
+    pub offset: Vec3,
+    /// |offset|^2.
+    pub square_bl2: f64,
+    /// Its velocity, body lengths a second.
+    pub velocity: Vec3,
+}
+
+/// A search, with its memory.
+#[derive(Clone, Debug, Default)]
+pub struct Search {
+    /// Squared distances of whoever is within the radius, and where they stand.
+    squares_bl2: Vec<f64>,
+    slots: Vec<u32>,
+    order: Vec<u32>,
+    found: Vec<Neighbor>,
+}
+
+impl Search {
+    /// The `limit` nearest others within `reach_bl` of whoever stands at `slot`, nearest first. `guess_bl`: within
+    /// it there are about so many, or a little more.
+    pub fn nearest(
+        &mut self,
+        grid: &Grid,
+        slot: usize,
+        (limit, reach_bl): (usize, f64),
+        guess_bl: f64,
+    ) -> &[Neighbor] {
+        let place = grid.position(slot);
+        let mut radius_bl = guess_bl.min(reach_bl);
+        let n = loop {
+            let n = match grid.is_flat() {
+                true => self.gather::<true>(grid, slot, place, radius_bl),
+                false => self.gather::<false>(grid, slot, place, radius_bl),
+            };
+            if n >= limit || radius_bl >= reach_bl {
+                break n;
+            }
+            radius_bl = (GROWTH * radius_bl).min(reach_bl);
+        };
+        self.put_in_order(grid, n);
+        self.found.clear();
+        self.found
+            .extend(self.order[..n.min(limit)].iter().map(|&at| {
+                let slot = self.slots[at as usize] as usize;
+                Neighbor {
+                    id: grid.by_cell()[slot],
+                    offset: minus(grid.position(slot), place),
+                    square_bl2: self.squares_bl2[at as usize],
+                    velocity: grid.velocity(slot),
+                }
+            }));
+        &self.found
+    }
+
+    /// All others nearer than `radius_bl`: how many.
+    fn gather<const FLAT: bool>(
+        &mut self,
+        grid: &Grid,
+        slot: usize,
+        place: Vec3,
+        radius_bl: f64,
+    ) -> usize {
+        let most_bl2 = radius_bl * radius_bl;
+        let mut n = 0;
+        grid.rows(place, radius_bl, |from, to| {
+            if self.slots.len() < n + to - from + LANES {
+                self.slots.resize(2 * (n + to - from + LANES), 0);
+                self.squares_bl2.resize(self.slots.len(), 0.0);
+            }
+            let [x, y, z] = [0, 1, 2].map(|axis| &grid.along(axis)[from..to]);
+            let squares = &mut self.squares_bl2[n..n + to - from];
+            let slots = &mut self.slots[n..n + to - from];
+            let mut k = 0;
+            for at in 0..to - from {
+                let offset = [
+                    x[at] - place[0],
+                    y[at] - place[1],
+                    if FLAT { 0.0 } else { z[at] - place[2] },
+                ];
+                let square_bl2 = dot(offset, offset);
+                // Written in any case, kept when near: nothing to be guessed wrong.
+                squares[k] = square_bl2;
+                slots[k] = (from + at) as u32;
+                k += usize::from((square_bl2 < most_bl2) & (from + at != slot));
+            }
+            n += k;
+        });
+        n
+    }
+
+    /// `order`: the first `n` gathered by distance, equal ones by id.
+    fn put_in_order(&mut self, grid: &Grid, n: usize) {
+        self.order.clear();
+        if n <= MOST_COUNTED && self.count_nearer(n) {
+            return;
+        }
+        self.order.clear();
+        self.order.extend(0..n as u32);
+        let (squares, slots, ids) = (&self.squares_bl2, &self.slots, grid.by_cell());
+        self.order.sort_unstable_by(|&a, &b| {
+            let id = |at: u32| ids[slots[at as usize] as usize];
+            let [near, far] = [a, b].map(|at| squares[at as usize]);
+            near.total_cmp(&far).then_with(|| id(a).cmp(&id(b)))
+        });
+    }
+
+    /// Each one's place is the number of those nearer; false when some are equally far.
+    fn count_nearer(&mut self, n: usize) -> bool {
+        const NOBODY: u32 = u32::MAX;
+        let n_padded = n.next_multiple_of(LANES);
+        if self.squares_bl2.len() < n_padded {
+            return n == 0;
+        }
+        self.squares_bl2[n..n_padded].fill(f64::INFINITY);
+        self.order.resize(n, NOBODY);
+        let (chunks, _) = self.squares_bl2[..n_padded].as_chunks::<LANES>();
+        for (at, &square) in (0..).zip(&self.squares_bl2[..n]) {
+            let mut nearer = [0u64; LANES];
+            for chunk in chunks {
+                for lane in 0..LANES {
+                    nearer[lane] += u64::from(chunk[lane] < square);
+                }
+            }
+            self.order[nearer.iter().sum::<u64>() as usize] = at;
+        }
+        self.order.iter().all(|&at| at != NOBODY)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn all_by_brute_force(
+        positions: &[Vec3],
+        id: u32,
+        (limit, reach): (usize, f64),
+    ) -> Vec<Neighbor> {
+        let mut all: Vec<Neighbor> = (0u32..)
+            .zip(positions)
+            .map(|(other, &p)| {
+                let offset = minus(p, positions[id as usize]);
+                Neighbor {
+                    id: other,
+                    offset,
+                    square_bl2: dot(offset, offset),
+                    velocity: p.map(|x| 2.0 * x),
+                }
+            })
+            .filter(|n| n.id != id && n.square_bl2 < reach * reach)
+            .collect();
+        all.sort_by(|a, b| {
+            (a.square_bl2, a.id)
+                .partial_cmp(&(b.square_bl2, b.id))
+                .unwrap()
+        });
+        all.truncate(limit);
+        all
+    }
+
+    proptest! {
+        #[test]
+        fn the_grid_finds_what_comparing_all_pairs_finds_whatever_was_guessed(
+            positions in prop::collection::vec((0.0..30.0f64, 0.0..12.0f64, 0.0..5.0f64), 1..160),
+            reach in 0.3..12.0f64, limit in 1usize..60, guess in 0.1..12.0f64,
+            flat in any::<bool>(), whole in any::<bool>()
+        ) {
+            // Whole numbers are often equally far.
+            let at = |x: f64| if whole { x.floor() } else { x };
+            let positions: Vec<Vec3> = positions
+                .iter()
+                .map(|&(x, y, z)| [at(x), at(y), if flat { 0.0 } else { at(z) }])
+                .collect();
+            let velocities: Vec<Vec3> = positions.iter().map(|p| p.map(|x| 2.0 * x)).collect();
+            let mut grid = Grid::default();
+            grid.sort(&positions, &velocities, reach);
+            let mut search = Search::default();
+            for (id, &slot) in (0..).zip(grid.slots()) {
+                let found = search.nearest(&grid, slot as usize, (limit, reach), guess);
+                prop_assert_eq!(found, all_by_brute_force(&positions, id, (limit, reach)));
+            }
+        }
+    }
+}
