@@ -9,6 +9,9 @@ const FINEST: f64 = 6.0;
 /// Cells to a boid, at most.
 const CELLS_PER_BOID: f64 = 1.0;
 
+/// So many positions can be looked at from any slot on.
+pub const BLOCK: usize = 4;
+
 /// Boids sorted by cell.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
@@ -25,6 +28,37 @@ pub struct Grid {
     velocities: Vec<Vec3>,
 }
 
+/// Rows of cells beside one another.
+pub struct Rows<'a> {
+    grid: &'a Grid,
+    from: [usize; 3],
+    to: [usize; 3],
+    /// y and z of the next one.
+    next: [usize; 2],
+}
+
+impl Iterator for Rows<'_> {
+    type Item = (usize, usize);
+
+    /// The first slot of a row and one past its last.
+    #[inline(always)]
+    fn next(&mut self) -> Option<(usize, usize)> {
+        let [y, z] = self.next;
+        if z > self.to[2] {
+            return None;
+        }
+        self.next = if y < self.to[1] {
+            [y + 1, z]
+        } else {
+            [self.from[1], z + 1]
+        };
+        let (start, end) = ([self.from[0], y, z], [self.to[0], y, z]);
+        let (start, end) = (self.grid.index(start), self.grid.index(end));
+        let first = &self.grid.first;
+        Some((first[start] as usize, first[end + 1] as usize))
+    }
+}
+
 impl Grid {
     /// Sorts boids into cells for rules that reach so far; what was sorted before is forgotten.
     pub fn sort(&mut self, positions: &[Vec3], velocities: &[Vec3], reach_bl: f64) {
@@ -34,15 +68,21 @@ impl Grid {
         for (id, &slot) in (0..).zip(&self.slots) {
             self.ids[slot as usize] = id;
         }
-        for (axis, sorted) in self.axes.iter_mut().enumerate() {
-            sorted.clear();
-            sorted.extend(self.ids.iter().map(|&id| positions[id as usize][axis]));
+        for axis in &mut self.axes {
+            axis.clear();
+            axis.resize(positions.len() + BLOCK, f64::INFINITY);
         }
-        self.velocities.clear();
-        (self.velocities).extend(self.ids.iter().map(|&id| velocities[id as usize]));
+        self.velocities.resize(positions.len(), [0.0; 3]);
+        let [x, y, z] = &mut self.axes;
+        let sorted = (x.iter_mut().zip(y).zip(z)).zip(&mut self.velocities);
+        for ((((x, y), z), velocity), &id) in sorted.zip(&self.ids) {
+            [*x, *y, *z] = positions[id as usize];
+            *velocity = velocities[id as usize];
+        }
     }
 
     /// The boids in the order of their cells: who follows whom here is near it.
+    #[inline(always)]
     pub fn by_cell(&self) -> &[u32] {
         &self.ids
     }
@@ -53,37 +93,42 @@ impl Grid {
     }
 
     /// The position of whoever stands at `slot`.
+    #[inline(always)]
     pub fn position(&self, slot: usize) -> Vec3 {
-        [0, 1, 2].map(|axis| self.axes[axis][slot])
+        [self.axes[0][slot], self.axes[1][slot], self.axes[2][slot]]
     }
 
     /// The velocity of whoever stands at `slot`.
+    #[inline(always)]
     pub fn velocity(&self, slot: usize) -> Vec3 {
         self.velocities[slot]
     }
 
-    /// All positions along an axis, in the order of cells.
+    /// All positions along an axis, in the order of cells, and `BLOCK` infinite ones.
+    #[inline(always)]
     pub fn along(&self, axis: usize) -> &[f64] {
         &self.axes[axis]
     }
 
     /// Whether all are in one plane across the third axis.
+    #[inline(always)]
     pub fn is_flat(&self) -> bool {
         self.cells_per_bl[2] == 0.0
     }
 
-    /// Calls `visit` with the first slot and one past the last of every row of cells that holds whoever may be
-    /// within `radius_bl` of a place, and more.
-    pub fn rows(&self, place: Vec3, radius_bl: f64, mut visit: impl FnMut(usize, usize)) {
+    /// The slots of every row of cells that holds whoever may be within `radius_bl` of a place, and more.
+    #[inline(always)]
+    pub fn rows(&self, place: Vec3, radius_bl: f64) -> Rows<'_> {
         // Nobody is lost by rounding.
-        let radius_bl = radius_bl * (1.0 + 1e-9) + 1e-9;
-        let from = self.cell_of(place.map(|at| at - radius_bl));
-        let to = self.cell_of(place.map(|at| at + radius_bl));
-        for z in from[2]..=to[2] {
-            for y in from[1]..=to[1] {
-                let (start, end) = (self.index([from[0], y, z]), self.index([to[0], y, z]));
-                visit(self.first[start] as usize, self.first[end + 1] as usize);
-            }
+        let out = radius_bl * (1.0 + 1e-9) + 1e-9;
+        let from = self.cell_of([place[0] - out, place[1] - out, place[2] - out]);
+        let to = self.cell_of([place[0] + out, place[1] + out, place[2] + out]);
+        let next = [from[1], from[2]];
+        Rows {
+            grid: self,
+            from,
+            to,
+            next,
         }
     }
 
@@ -134,13 +179,17 @@ impl Grid {
         self.slots = slots;
     }
 
+    #[inline(always)]
     fn cell_of(&self, position: Vec3) -> [usize; 3] {
-        std::array::from_fn(|axis| {
-            let cell = (position[axis] - self.least[axis]) * self.cells_per_bl[axis];
-            (cell.max(0.0) as usize).min(self.n_cells[axis] - 1)
-        })
+        let mut cell = [0; 3];
+        for axis in 0..3 {
+            let at = (position[axis] - self.least[axis]) * self.cells_per_bl[axis];
+            cell[axis] = (at.max(0.0) as usize).min(self.n_cells[axis] - 1);
+        }
+        cell
     }
 
+    #[inline(always)]
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.n_cells[1] + y) * self.n_cells[0] + x
     }

@@ -3,15 +3,13 @@
 //!
 //! Neighbors come nearest first, equal distances by id: an order that does not depend on the grid.
 
-use super::grid::Grid;
+use super::grid::{BLOCK, Grid};
 use super::vector::{Vec3, dot, minus};
 
 /// So many are put in order by counting who is nearer, which knows no branch; more are sorted.
 const MOST_COUNTED: usize = 48;
 /// By how much a guess that was too small grows.
 const GROWTH: f64 = 1.25;
-/// Numbers compared at a time.
-const LANES: usize = 4;
 
 /// A boid near another.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +37,7 @@ pub struct Search {
 impl Search {
     /// The `limit` nearest others within `reach_bl` of whoever stands at `slot`, nearest first. `guess_bl`: within
     /// it there are about so many, or a little more.
+    #[inline(always)]
     pub fn nearest(
         &mut self,
         grid: &Grid,
@@ -60,20 +59,21 @@ impl Search {
         };
         self.put_in_order(grid, n);
         self.found.clear();
-        self.found
-            .extend(self.order[..n.min(limit)].iter().map(|&at| {
-                let slot = self.slots[at as usize] as usize;
-                Neighbor {
-                    id: grid.by_cell()[slot],
-                    offset: minus(grid.position(slot), place),
-                    square_bl2: self.squares_bl2[at as usize],
-                    velocity: grid.velocity(slot),
-                }
-            }));
+        self.found.reserve(n.min(limit));
+        for &at in &self.order[..n.min(limit)] {
+            let slot = self.slots[at as usize] as usize;
+            self.found.push(Neighbor {
+                id: grid.by_cell()[slot],
+                offset: minus(grid.position(slot), place),
+                square_bl2: self.squares_bl2[at as usize],
+                velocity: grid.velocity(slot),
+            });
+        }
         &self.found
     }
 
     /// All others nearer than `radius_bl`: how many.
+    #[inline(always)]
     fn gather<const FLAT: bool>(
         &mut self,
         grid: &Grid,
@@ -83,33 +83,41 @@ impl Search {
     ) -> usize {
         let most_bl2 = radius_bl * radius_bl;
         let mut n = 0;
-        grid.rows(place, radius_bl, |from, to| {
-            if self.slots.len() < n + to - from + LANES {
-                self.slots.resize(2 * (n + to - from + LANES), 0);
+        for (from, to) in grid.rows(place, radius_bl) {
+            if self.slots.len() < n + to - from + BLOCK {
+                self.slots.resize(2 * (n + to - from + BLOCK), 0);
                 self.squares_bl2.resize(self.slots.len(), 0.0);
             }
-            let [x, y, z] = [0, 1, 2].map(|axis| &grid.along(axis)[from..to]);
-            let squares = &mut self.squares_bl2[n..n + to - from];
-            let slots = &mut self.slots[n..n + to - from];
-            let mut k = 0;
-            for at in 0..to - from {
-                let offset = [
-                    x[at] - place[0],
-                    y[at] - place[1],
-                    if FLAT { 0.0 } else { z[at] - place[2] },
-                ];
-                let square_bl2 = dot(offset, offset);
-                // Written in any case, kept when near: nothing to be guessed wrong.
-                squares[k] = square_bl2;
-                slots[k] = (from + at) as u32;
-                k += usize::from((square_bl2 < most_bl2) & (from + at != slot));
+            let (x, _) = grid.along(0)[from..].as_chunks::<BLOCK>();
+            let (y, _) = grid.along(1)[from..].as_chunks::<BLOCK>();
+            let (z, _) = grid.along(2)[from..].as_chunks::<BLOCK>();
+            let (mut k, mut at) = (n, from);
+            for ((x, y), z) in x.iter().zip(y).zip(z) {
+                if at >= to {
+                    break;
+                }
+                let mut squares = [0.0; BLOCK];
+                for lane in 0..BLOCK {
+                    let depth = if FLAT { 0.0 } else { z[lane] - place[2] };
+                    let offset = [x[lane] - place[0], y[lane] - place[1], depth];
+                    squares[lane] = dot(offset, offset);
+                }
+                let (kept, slots) = (&mut self.squares_bl2[..], &mut self.slots[..]);
+                for (lane, square_bl2) in squares.into_iter().enumerate() {
+                    // Written in any case, kept when near: nothing to be guessed wrong.
+                    (kept[k], slots[k]) = (square_bl2, (at + lane) as u32);
+                    let is_near = (square_bl2 < most_bl2) & (at + lane != slot);
+                    k += usize::from(is_near & (at + lane < to));
+                }
+                at += BLOCK;
             }
-            n += k;
-        });
+            n = k;
+        }
         n
     }
 
     /// `order`: the first `n` gathered by distance, equal ones by id.
+    #[inline(always)]
     fn put_in_order(&mut self, grid: &Grid, n: usize) {
         self.order.clear();
         if n <= MOST_COUNTED && self.count_nearer(n) {
@@ -126,23 +134,25 @@ impl Search {
     }
 
     /// Each one's place is the number of those nearer; false when some are equally far.
+    #[inline(always)]
     fn count_nearer(&mut self, n: usize) -> bool {
         const NOBODY: u32 = u32::MAX;
-        let n_padded = n.next_multiple_of(LANES);
+        let n_padded = n.next_multiple_of(BLOCK);
         if self.squares_bl2.len() < n_padded {
             return n == 0;
         }
         self.squares_bl2[n..n_padded].fill(f64::INFINITY);
         self.order.resize(n, NOBODY);
-        let (chunks, _) = self.squares_bl2[..n_padded].as_chunks::<LANES>();
+        let (chunks, _) = self.squares_bl2[..n_padded].as_chunks::<BLOCK>();
         for (at, &square) in (0..).zip(&self.squares_bl2[..n]) {
-            let mut nearer = [0u64; LANES];
+            let mut nearer = [0.0; BLOCK];
             for chunk in chunks {
-                for lane in 0..LANES {
-                    nearer[lane] += u64::from(chunk[lane] < square);
+                for lane in 0..BLOCK {
+                    nearer[lane] += if chunk[lane] < square { 1.0 } else { 0.0 };
                 }
             }
-            self.order[nearer.iter().sum::<u64>() as usize] = at;
+            let nearer = (nearer[0] + nearer[1]) + (nearer[2] + nearer[3]);
+            self.order[nearer as usize] = at;
         }
         self.order.iter().all(|&at| at != NOBODY)
     }

@@ -42,7 +42,7 @@ impl Boids<'_> {
         let place = room.next[slot].position;
         let most_bl2 = self.overlap_bl * self.overlap_bl;
         let mut near = Vec::new();
-        (room.grid).rows(place, self.overlap_bl + farthest_bl, |from, to| {
+        for (from, to) in (room.grid).rows(place, self.overlap_bl + farthest_bl) {
             for other in from..to {
                 let offset = minus(room.next[other].position, place);
                 let square_bl2 = dot(offset, offset);
@@ -50,7 +50,7 @@ impl Boids<'_> {
                     near.push((square_bl2, room.grid.by_cell()[other], offset));
                 }
             }
-        });
+        }
         near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.truncate(MOST);
         near

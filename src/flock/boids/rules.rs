@@ -75,6 +75,7 @@ struct Seen {
 
 impl Steering<'_> {
     /// The acceleration granted, at most the calibration's, BL/s^2.
+    #[inline(always)]
     pub fn acceleration(&self, moment: &Moment) -> Vec3 {
         let most = self.calibration.acceleration_bl_per_s2();
         let usual = self.calibration.usual_acceleration_bl_per_s2();
@@ -117,6 +118,7 @@ impl Steering<'_> {
     }
 
     /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
+    #[inline(always)]
     fn with_rules(&self, moment: &Moment) -> (Vec3, [Vec3; 4]) {
         let rules = &self.params.rules;
         let ahead = unit(moment.velocity);
@@ -148,6 +150,7 @@ impl Steering<'_> {
     }
 
     /// mean v_j - v_i, in cruising speeds.
+    #[inline(always)]
     fn alignment(&self, seen: &Seen, moment: &Moment) -> Vec3 {
         if seen.n_along == 0.0 {
             return [0.0; 3];
@@ -206,6 +209,7 @@ impl Steering<'_> {
     }
 
     /// The wandering turn, as the acceleration that makes it.
+    #[inline(always)]
     fn wander(&self, moment: &Moment) -> Vec3 {
         let up = self.tank.up();
         let sideways = cross(up, moment.velocity);
@@ -217,6 +221,7 @@ impl Steering<'_> {
     }
 
     /// Back to cruising speed; leaders are faster.
+    #[inline(always)]
     fn cruise(&self, moment: &Moment) -> Vec3 {
         let speed = norm(moment.velocity);
         let pace = if moment.leads { 1.4 } else { 1.0 };
@@ -227,22 +232,25 @@ impl Steering<'_> {
 
 impl Seen {
     /// Of neighbors, nearest first, who looks `ahead`, a unit vector.
+    #[inline(always)]
     fn of(neighbors: &[Neighbor], ahead: Vec3, cos_half_view: f64, rules: &Rules) -> Seen {
-        let [apart_bl2, along_bl2, toward_bl2] =
-            [rules.separation_bl, rules.alignment_bl, rules.cohesion_bl].map(|reach| reach * reach);
+        let apart_bl2 = rules.separation_bl * rules.separation_bl;
+        let along_bl2 = rules.alignment_bl * rules.alignment_bl;
+        let toward_bl2 = rules.cohesion_bl * rules.cohesion_bl;
         let mut seen = Seen::default();
         for neighbor in neighbors {
-            // Numbers instead of branches: who is seen and how near is not to be guessed.
+            // Nothing is added instead of nothing being done: who is seen is not to be guessed.
             let sees = is_seen(neighbor, ahead, cos_half_view);
-            let share = |is: bool| f64::from(u8::from(is & sees));
-            let along = share(neighbor.square_bl2 < along_bl2);
-            let toward = share(neighbor.square_bl2 < toward_bl2);
-            seen.n += share(true);
-            seen.along = add_scaled(seen.along, along, neighbor.velocity);
-            seen.n_along += along;
-            seen.toward = add_scaled(seen.toward, toward, neighbor.offset);
-            seen.n_toward += toward;
-            seen.across += share(true) * neighbor.velocity[0];
+            let along = sees & (neighbor.square_bl2 < along_bl2);
+            let toward = sees & (neighbor.square_bl2 < toward_bl2);
+            seen.n += only_if(sees, 1.0);
+            seen.n_along += only_if(along, 1.0);
+            seen.n_toward += only_if(toward, 1.0);
+            seen.across += only_if(sees, neighbor.velocity[0]);
+            for axis in 0..3 {
+                seen.along[axis] += only_if(along, neighbor.velocity[axis]);
+                seen.toward[axis] += only_if(toward, neighbor.offset[axis]);
+            }
         }
         let near = neighbors.iter().take_while(|n| n.square_bl2 < apart_bl2);
         for neighbor in near.filter(|n| is_seen(n, ahead, cos_half_view)) {
@@ -254,6 +262,7 @@ impl Seen {
     }
 
     /// mean p_j - p_i over those nearer than r_c, in r_c.
+    #[inline(always)]
     fn cohesion(&self, rules: &Rules) -> Vec3 {
         if self.n_toward == 0.0 {
             return self.toward;
@@ -262,11 +271,18 @@ impl Seen {
     }
 }
 
+#[inline(always)]
+fn only_if(is: bool, number: f64) -> f64 {
+    f64::from_bits(number.to_bits() & u64::from(is).wrapping_neg())
+}
+
+#[inline(always)]
 fn is_seen(neighbor: &Neighbor, ahead: Vec3, cos_half_view: f64) -> bool {
     dot(ahead, neighbor.offset) >= cos_half_view * neighbor.square_bl2.sqrt()
 }
 
 /// Requests in order, until the sum of their sizes reaches `most`; the last one is cut.
+#[inline(always)]
 fn granted(requests: &[Vec3], most: f64) -> Vec3 {
     let mut left = most;
     let mut sum = [0.0; 3];

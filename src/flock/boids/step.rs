@@ -8,6 +8,7 @@ use super::nearest::{Neighbor, Search};
 use super::rules::{Moment, Steering};
 use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, unit};
 use super::{Boids, CHUNK, draw, leadership};
+use crate::cpu::Level;
 use crate::random;
 
 /// Time constant of the wandering turn rate.
@@ -50,6 +51,7 @@ struct Pace<'a> {
     /// The share of a wandering turn rate that is kept, and the spread of what is added.
     wander: [f64; 2],
     reach_bl: f64,
+    cpu: Level,
 }
 
 impl Default for Inner {
@@ -77,13 +79,7 @@ impl Boids<'_> {
         next.resize(self.positions.len(), Next::default());
         let farthest_bl2 = (next.par_chunks_mut(CHUNK).enumerate())
             .map_init(Search::default, |search, (chunk, next)| {
-                let mut farthest_bl2 = 0.0f64;
-                for (slot, next) in (chunk * CHUNK..).zip(next) {
-                    *next = self.next(slot, grid, search, &pace);
-                    let way = minus(next.position, grid.position(slot));
-                    farthest_bl2 = farthest_bl2.max(dot(way, way));
-                }
-                farthest_bl2
+                self.go_on(chunk * CHUNK, next, (grid, search), &pace)
             })
             .reduce(|| 0.0, f64::max);
         self.push_apart(&mut room, farthest_bl2.sqrt());
@@ -120,21 +116,83 @@ impl Boids<'_> {
             cos_sin: (libm::cos(turn_rad), libm::sin(turn_rad)),
             wander: [keep, spread * (1.0 - keep * keep).sqrt()],
             reach_bl: rules.reach_bl(),
+            cpu: Level::detect(),
         }
     }
 
+    /// What they are after the step who stand at `first` and after it; the square of the longest way.
+    fn go_on(
+        &self,
+        first: usize,
+        next: &mut [Next],
+        near: (&Grid, &mut Search),
+        pace: &Pace,
+    ) -> f64 {
+        match pace.cpu {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+                #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                unsafe {
+                    self.go_on_avx2(first, next, near, pace)
+                }
+            }
+            _ => self.go_on_with(first, next, near, pace),
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn go_on_avx2(
+        &self,
+        first: usize,
+        next: &mut [Next],
+        near: (&Grid, &mut Search),
+        pace: &Pace,
+    ) -> f64 {
+        self.go_on_with(first, next, near, pace)
+    }
+
+    #[inline(always)]
+    fn go_on_with(
+        &self,
+        first: usize,
+        next: &mut [Next],
+        (grid, search): (&Grid, &mut Search),
+        pace: &Pace,
+    ) -> f64 {
+        let ids = &grid.by_cell()[first..];
+        for (next, &id) in next.iter_mut().zip(ids) {
+            // All at once: they lie far apart.
+            next.inner = self.inner[id as usize];
+        }
+        let mut farthest_bl2 = 0.0f64;
+        for (slot, next) in (first..).zip(next) {
+            *next = self.next(slot, &next.inner, (grid, search), pace);
+            let way = minus(next.position, grid.position(slot));
+            farthest_bl2 = farthest_bl2.max(dot(way, way));
+        }
+        farthest_bl2
+    }
+
     /// What whoever stands at `slot` is after the step.
-    fn next(&self, slot: usize, grid: &Grid, search: &mut Search, pace: &Pace) -> Next {
+    #[inline(always)]
+    fn next(
+        &self,
+        slot: usize,
+        before: &Inner,
+        (grid, search): (&Grid, &mut Search),
+        pace: &Pace,
+    ) -> Next {
         let id = grid.by_cell()[slot] as usize;
         let (position, velocity) = (grid.position(slot), grid.velocity(slot));
-        let before = &self.inner[id];
         let limit = self.params.rules.neighbors as usize;
         let guess_bl = FARTHER * before.sight_bl;
         let neighbors = search.nearest(grid, slot, (limit, pace.reach_bl), guess_bl);
         let last = neighbors.get(limit - 1);
         let inner = Inner {
-            wander: self.next_wander(id, pace),
-            leads_for_s: self.next_lead(id, neighbors),
+            wander: self.next_wander((id, before), pace),
+            leads_for_s: self.next_lead((id, before), velocity, neighbors),
             sight_bl: last.map_or(f64::INFINITY, |last| last.square_bl2.sqrt()),
         };
         let acceleration = pace.steering.acceleration(&Moment {
@@ -200,12 +258,12 @@ impl Boids<'_> {
 
     /// Ornstein-Uhlenbeck turn rates; at weight 1 the level one is as varied as the animal's own. In a flat tank
     /// there is no other.
-    fn next_wander(&self, id: usize, pace: &Pace) -> [f64; 2] {
+    fn next_wander(&self, (id, before): (usize, &Inner), pace: &Pace) -> [f64; 2] {
         let [keep, fresh] = pace.wander;
         let next = |k: usize, share: f64| {
             let key = [draw::WANDER, id as u64, self.step_idx, k as u64];
             let draw = random::normal(self.params.seed, &key);
-            keep * self.inner[id].wander[k] + share * fresh * draw
+            keep * before.wander[k] + share * fresh * draw
         };
         match self.tank.is_flat() {
             true => [next(0, 1.0), 0.0],
@@ -213,14 +271,18 @@ impl Boids<'_> {
         }
     }
 
-    fn next_lead(&self, id: usize, neighbors: &[Neighbor]) -> f64 {
-        let left = self.inner[id].leads_for_s - self.step_s;
+    fn next_lead(
+        &self,
+        (id, before): (usize, &Inner),
+        velocity: Vec3,
+        neighbors: &[Neighbor],
+    ) -> f64 {
+        let left = before.leads_for_s - self.step_s;
         if left > 0.0 || !self.params.leaders {
             return left.max(0.0);
         }
         let key = [draw::LEAD, id as u64, self.step_idx];
         let scale = (self.params.rules.cohesion_bl, self.step_s);
-        leadership::taken(self.params.seed, key, self.velocities[id], neighbors, scale)
-            .unwrap_or(0.0)
+        leadership::taken(self.params.seed, key, velocity, neighbors, scale).unwrap_or(0.0)
     }
 }
