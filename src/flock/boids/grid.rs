@@ -24,8 +24,20 @@ pub struct Grid {
     /// The cell of each boid, by id; then where it stands in cell order.
     slots: Vec<u32>,
     ids: Vec<u32>,
+    boids: Vec<Boid>,
+    /// Their positions once more, axis by axis.
     axes: [Vec<f64>; 3],
-    velocities: Vec<Vec3>,
+}
+
+/// A boid where its cell is.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Boid {
+    /// Body lengths.
+    pub position: Vec3,
+    /// Body lengths a second.
+    pub velocity: Vec3,
+    /// Its number.
+    pub id: u32,
 }
 
 /// Rows of cells beside one another.
@@ -72,12 +84,17 @@ impl Grid {
             axis.clear();
             axis.resize(positions.len() + BLOCK, f64::INFINITY);
         }
-        self.velocities.resize(positions.len(), [0.0; 3]);
+        self.boids.resize(positions.len(), Boid::default());
         let [x, y, z] = &mut self.axes;
-        let sorted = (x.iter_mut().zip(y).zip(z)).zip(&mut self.velocities);
-        for ((((x, y), z), velocity), &id) in sorted.zip(&self.ids) {
-            [*x, *y, *z] = positions[id as usize];
-            *velocity = velocities[id as usize];
+        let axes = x.iter_mut().zip(y).zip(z);
+        for ((((x, y), z), boid), &id) in axes.zip(&mut self.boids).zip(&self.ids) {
+            let (position, velocity) = (positions[id as usize], velocities[id as usize]);
+            [*x, *y, *z] = position;
+            *boid = Boid {
+                position,
+                velocity,
+                id,
+            };
         }
     }
 
@@ -92,16 +109,10 @@ impl Grid {
         &self.slots
     }
 
-    /// The position of whoever stands at `slot`.
+    /// Whoever stands at `slot`.
     #[inline(always)]
-    pub fn position(&self, slot: usize) -> Vec3 {
-        [self.axes[0][slot], self.axes[1][slot], self.axes[2][slot]]
-    }
-
-    /// The velocity of whoever stands at `slot`.
-    #[inline(always)]
-    pub fn velocity(&self, slot: usize) -> Vec3 {
-        self.velocities[slot]
+    pub fn at(&self, slot: usize) -> &Boid {
+        &self.boids[slot]
     }
 
     /// All positions along an axis, in the order of cells, and `BLOCK` infinite ones.

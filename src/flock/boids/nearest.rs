@@ -45,7 +45,7 @@ impl Search {
         (limit, reach_bl): (usize, f64),
         guess_bl: f64,
     ) -> &[Neighbor] {
-        let place = grid.position(slot);
+        let place = grid.at(slot).position;
         let mut radius_bl = guess_bl.min(reach_bl);
         let n = loop {
             let n = match grid.is_flat() {
@@ -59,14 +59,13 @@ impl Search {
         };
         self.put_in_order(grid, n);
         self.found.clear();
-        self.found.reserve(n.min(limit));
         for &at in &self.order[..n.min(limit)] {
-            let slot = self.slots[at as usize] as usize;
+            let other = grid.at(self.slots[at as usize] as usize);
             self.found.push(Neighbor {
-                id: grid.by_cell()[slot],
-                offset: minus(grid.position(slot), place),
+                id: other.id,
+                offset: minus(other.position, place),
                 square_bl2: self.squares_bl2[at as usize],
-                velocity: grid.velocity(slot),
+                velocity: other.velocity,
             });
         }
         &self.found
@@ -152,10 +151,17 @@ impl Search {
                 }
             }
             let nearer = (nearer[0] + nearer[1]) + (nearer[2] + nearer[3]);
-            self.order[nearer as usize] = at;
+            self.order[small_whole(nearer)] = at;
         }
         self.order.iter().all(|&at| at != NOBODY)
     }
+}
+
+/// What a small whole number is: the last bits of it and 2^52, where a conversion would first ask whether it is one.
+#[inline(always)]
+fn small_whole(number: f64) -> usize {
+    const SHIFT: f64 = (1u64 << 52) as f64;
+    (number + SHIFT).to_bits() as u32 as usize
 }
 
 #[cfg(test)]

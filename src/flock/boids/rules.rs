@@ -60,15 +60,15 @@ pub struct Steering<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     /// Who it sees.
-    n: f64,
+    n: u32,
     /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
     apart: Vec3,
     /// sum v_j over those nearer than r_a, and how many they are.
     along: Vec3,
-    n_along: f64,
+    n_along: u32,
     /// sum p_j - p_i over those nearer than r_c, and how many they are.
     toward: Vec3,
-    n_toward: f64,
+    n_toward: u32,
     /// sum of how fast they go across the picture.
     across: f64,
 }
@@ -152,10 +152,13 @@ impl Steering<'_> {
     /// mean v_j - v_i, in cruising speeds.
     #[inline(always)]
     fn alignment(&self, seen: &Seen, moment: &Moment) -> Vec3 {
-        if seen.n_along == 0.0 {
+        if seen.n_along == 0 {
             return [0.0; 3];
         }
-        let gap = minus(scaled(1.0 / seen.n_along, seen.along), moment.velocity);
+        let gap = minus(
+            scaled(1.0 / f64::from(seen.n_along), seen.along),
+            moment.velocity,
+        );
         scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
     }
 
@@ -201,7 +204,7 @@ impl Steering<'_> {
             return [0.0; 3];
         }
         let cruise = self.calibration.cruise_bl_per_s;
-        let follow = 2.0 * self.params.rules.alignment.min(1.0) / seen.n.max(1.0);
+        let follow = 2.0 * self.params.rules.alignment.min(1.0) / f64::from(seen.n.max(1));
         let side = moment.velocity[0] + follow * seen.across;
         let side = (side / cruise).clamp(-1.0, 1.0);
         let into = moment.velocity[2] / cruise;
@@ -243,9 +246,9 @@ impl Seen {
             let sees = is_seen(neighbor, ahead, cos_half_view);
             let along = sees & (neighbor.square_bl2 < along_bl2);
             let toward = sees & (neighbor.square_bl2 < toward_bl2);
-            seen.n += only_if(sees, 1.0);
-            seen.n_along += only_if(along, 1.0);
-            seen.n_toward += only_if(toward, 1.0);
+            seen.n += u32::from(sees);
+            seen.n_along += u32::from(along);
+            seen.n_toward += u32::from(toward);
             seen.across += only_if(sees, neighbor.velocity[0]);
             for axis in 0..3 {
                 seen.along[axis] += only_if(along, neighbor.velocity[axis]);
@@ -264,10 +267,13 @@ impl Seen {
     /// mean p_j - p_i over those nearer than r_c, in r_c.
     #[inline(always)]
     fn cohesion(&self, rules: &Rules) -> Vec3 {
-        if self.n_toward == 0.0 {
+        if self.n_toward == 0 {
             return self.toward;
         }
-        scaled(1.0 / (self.n_toward * rules.cohesion_bl), self.toward)
+        scaled(
+            1.0 / (f64::from(self.n_toward) * rules.cohesion_bl),
+            self.toward,
+        )
     }
 }
 

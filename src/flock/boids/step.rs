@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::grid::Grid;
+use super::grid::{Boid, Grid};
 use super::nearest::{Neighbor, Search};
 use super::rules::{Moment, Steering};
 use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, unit};
@@ -169,7 +169,7 @@ impl Boids<'_> {
         let mut farthest_bl2 = 0.0f64;
         for (slot, next) in (first..).zip(next) {
             *next = self.next(slot, &next.inner, (grid, search), pace);
-            let way = minus(next.position, grid.position(slot));
+            let way = minus(next.position, grid.at(slot).position);
             farthest_bl2 = farthest_bl2.max(dot(way, way));
         }
         farthest_bl2
@@ -184,8 +184,12 @@ impl Boids<'_> {
         (grid, search): (&Grid, &mut Search),
         pace: &Pace,
     ) -> Next {
-        let id = grid.by_cell()[slot] as usize;
-        let (position, velocity) = (grid.position(slot), grid.velocity(slot));
+        let &Boid {
+            position,
+            velocity,
+            id,
+        } = grid.at(slot);
+        let id = id as usize;
         let limit = self.params.rules.neighbors as usize;
         let guess_bl = FARTHER * before.sight_bl;
         let neighbors = search.nearest(grid, slot, (limit, pace.reach_bl), guess_bl);
