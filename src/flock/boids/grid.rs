@@ -7,7 +7,7 @@ use super::vector::Vec3;
 /// Cells to the reach of the farthest rule, where there are boids enough to fill them.
 const FINEST: f64 = 6.0;
 /// Cells to a boid, at most.
-const CELLS_PER_BOID: f64 = 1.0;
+const CELLS_PER_BOID: f64 = 0.6;
 
 /// So many positions can be looked at from any slot on.
 pub const BLOCK: usize = 4;
