@@ -4,8 +4,9 @@
     bench/boids.py [--count 100000] [--steps 10] [--engine PROGRAM]
 
 The loop does the same three rules on the same number of agents with the same 16 nearest neighbors within 6 body
-lengths, in the plane, without field of view, wander or overlap; it may use all cores where SciPy can. Mesa's model runs as
-it comes, with 1000 agents: more would take minutes a step. Prints a line of JSON and ends with 1 when
+lengths, as densely (1.5 square body lengths to an agent), in the plane, without field of view, wander or overlap; it may
+use all cores where SciPy can. Mesa's model runs with 1000 agents, as densely and seeing 16 others on average: more agents
+would take minutes a step, for it compares all with all. Prints a line of JSON and ends with 1 when
 flockreel makes less than 20 times the loop's agent-steps a second, or 1000 times Mesa's. Needs numpy and scipy; Mesa with
 networkx if it is to be compared.
 """
@@ -20,6 +21,7 @@ from scipy.spatial import cKDTree
 
 LEAST_OF_LOOP, LEAST_OF_MESA = 20, 1000
 STEP_S, CRUISE, TURN = 1 / 30, 1.0, 3.0
+ROOM_BL2, MESA_COUNT = 1.5, 1000  # square body lengths to an agent, as in benches/boids.rs
 
 
 def main():
@@ -45,7 +47,7 @@ def main():
 def loop_rate(count, steps):
     """Agent-steps a second of the loop."""
     draw = np.random.default_rng(1)
-    side = (1.5 * count) ** 0.5
+    side = (ROOM_BL2 * count) ** 0.5
     places, turns = draw.uniform(0, side, (count, 2)), draw.uniform(0, 2 * np.pi, count)
     velocities = CRUISE * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     start = time.perf_counter()
@@ -80,7 +82,9 @@ def mesa_rate():
         from mesa.examples.basic.boid_flockers.model import BoidFlockers
     except ImportError:
         return None
-    model, steps = BoidFlockers(), 5
+    side, vision = (ROOM_BL2 * MESA_COUNT) ** 0.5, (16 * ROOM_BL2 / np.pi) ** 0.5
+    model = BoidFlockers(population_size=MESA_COUNT, width=side, height=side, vision=vision, separation=1.0)
+    steps = 5
     start = time.perf_counter()
     for _ in range(steps):
         model.step()

@@ -2,17 +2,24 @@
 //! values in which they were cut out.
 
 use super::resample::{Quad, Resampled, scaled};
+use crate::cpu::Level;
 use crate::geometry::Rect;
 
 /// `weight` of `second` (0..=1) and the rest of `main`, in `main`: its box grows to hold both. `memory` is
-/// lent.
-pub fn mix(main: &mut Resampled, second: &Resampled, weight: f64, memory: &mut Vec<Quad>) {
+/// lent; this machine must have the instructions of `cpu`.
+pub fn mix(
+    main: &mut Resampled,
+    second: &Resampled,
+    weight: f64,
+    memory: &mut Vec<Quad>,
+    cpu: Level,
+) {
     let rect = main.rect.union(&second.rect);
     memory.clear();
     memory.resize(rect.area() as usize, [0; 4]);
     let share = (weight * 32767.0).round() as i16;
-    add(memory, rect, main, 32767 - share);
-    add(memory, rect, second, share);
+    add(memory, rect, (main, 32767 - share), cpu);
+    add(memory, rect, (second, share), cpu);
     main.rect = rect;
     std::mem::swap(&mut main.pixels, memory);
 }
@@ -32,18 +39,39 @@ pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
     }
 }
 
-fn add(pixels: &mut [Quad], rect: Rect, layer: &Resampled, weight: i16) {
+fn add(pixels: &mut [Quad], rect: Rect, (layer, weight): (&Resampled, i16), cpu: Level) {
     if layer.rect.is_empty() {
         return;
     }
     let rows = layer.pixels.chunks_exact(layer.rect.w as usize);
     for (row, y) in rows.zip(layer.rect.y..) {
         let at = (y - rect.y) as usize * rect.w as usize + (layer.rect.x - rect.x) as usize;
-        for (out, pixel) in pixels[at..at + row.len()].iter_mut().zip(row) {
-            for channel in 0..4 {
-                out[channel] += scaled(pixel[channel], weight);
+        let out = &mut pixels[at..at + row.len()];
+        match cpu {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+                #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                unsafe {
+                    add_row_avx2(out, row, weight);
+                }
             }
+            _ => add_row(out, row, weight),
         }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn add_row_avx2(out: &mut [Quad], row: &[Quad], weight: i16) {
+    add_row(out, row, weight);
+}
+
+#[inline(always)]
+fn add_row(out: &mut [Quad], row: &[Quad], weight: i16) {
+    let (out, row) = (out.as_flattened_mut(), row.as_flattened());
+    for (out, &value) in out.iter_mut().zip(row) {
+        *out += scaled(value, weight);
     }
 }
 
@@ -68,7 +96,7 @@ mod tests {
         };
         let mut main = layer(rect, [6400, 3201, 1603, 8192]);
         let before = main.clone();
-        mix(&mut main, &before, 0.25, &mut Vec::new());
+        mix(&mut main, &before, 0.25, &mut Vec::new(), Level::detect());
         assert_eq!(main.rect, before.rect);
         for (a, b) in main
             .pixels
@@ -107,10 +135,38 @@ mod tests {
         };
         let mut main = layer(at(0), [8000, 0, 0, 16384]);
         let second = layer(at(2), [0, 8000, 0, 16384]);
-        mix(&mut main, &second, 0.25, &mut Vec::new());
+        mix(&mut main, &second, 0.25, &mut Vec::new(), Level::Scalar);
         assert_eq!(
             main.pixels,
             [[6000, 0, 0, 12288], [0; 4], [0, 2000, 0, 4096]]
         );
+    }
+
+    #[test]
+    fn every_instruction_set_mixes_to_the_same_numbers() {
+        let rect = |x| Rect {
+            x,
+            y: 1,
+            w: 41,
+            h: 7,
+        };
+        let drawn = |x, seed| {
+            let mut drawn = layer(rect(x), [0; 4]);
+            for (k, value) in (0..).zip(drawn.pixels.as_flattened_mut()) {
+                *value = (crate::random::bits(seed, &[k]) % 16385) as i16;
+            }
+            drawn
+        };
+        let mixed = |weight, cpu| {
+            let mut main = drawn(3, 1);
+            mix(&mut main, &drawn(9, 2), weight, &mut Vec::new(), cpu);
+            (main.rect, main.pixels)
+        };
+        for (cpu, weight) in Level::available()
+            .into_iter()
+            .flat_map(|cpu| [0.0, 0.3, 0.5, 1.0].map(|weight| (cpu, weight)))
+        {
+            assert_eq!(mixed(weight, cpu), mixed(weight, Level::Scalar), "{cpu:?}");
+        }
     }
 }

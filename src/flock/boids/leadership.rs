@@ -1,7 +1,7 @@
 //! Who leads: a boid at the rim of its neighbors, with few of them ahead, may go its own way for a
 //! while, and the others follow by alignment (Hartman & Benes 2006; ALGORITHMS.md 7).
 
-use super::grid::Neighbor;
+use super::nearest::Neighbor;
 use super::vector::{Vec3, add_scaled, dot, norm, scaled};
 use crate::random;
 

@@ -12,22 +12,21 @@ pub mod habitat;
 pub mod leadership;
 pub mod measures;
 mod meeting;
+pub mod nearest;
 mod overlap;
 pub mod params;
 pub mod rules;
+mod step;
 pub mod tank;
 pub mod vector;
 pub mod zones;
 
-use rayon::prelude::*;
-
 use self::calibration::Calibration;
-use self::grid::{Grid, Neighbor};
 use self::habitat::{Habitat, Hunter};
 pub use self::meeting::Meeting;
-use self::rules::{Moment, Steering};
+use self::step::{Inner, Room};
 use self::tank::Tank;
-use self::vector::{Vec3, add_scaled, norm, scaled, turned_at_most, unit};
+use self::vector::{Vec3, scaled};
 use super::lens::Lens;
 use super::params::Params;
 use crate::random;
@@ -38,10 +37,6 @@ const LONGEST_STEP_BL: f64 = 0.2;
 const OVERLAP_BL: f64 = 0.5;
 /// How long they swim before the first frame, so that the flock has formed.
 const WARM_UP_S: f64 = 10.0;
-/// Time constant of the wandering turn rate.
-const WANDER_S: f64 = 1.0;
-/// In flight the greatest speed is so many times the animal's.
-const FLIGHT_PACE: f64 = 1.6;
 /// Boids of one unit of parallel work.
 const CHUNK: usize = 64;
 
@@ -71,8 +66,8 @@ pub struct Boids<'a> {
     pub positions: Vec<Vec3>,
     /// Velocities, body lengths a second.
     pub velocities: Vec<Vec3>,
-    wander: Vec<[f64; 2]>,
-    leads_for_s: Vec<f64>,
+    inner: Vec<Inner>,
+    room: Room,
     hunter: Option<Hunter>,
     meeting: Option<Meeting>,
 }
@@ -121,8 +116,8 @@ impl<'a> Boids<'a> {
             time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],
-            wander: vec![[0.0; 2]; n],
-            leads_for_s: vec![0.0; n],
+            inner: vec![Inner::default(); n],
+            room: Room::default(),
             hunter: None,
             meeting: None,
         };
@@ -193,165 +188,6 @@ impl<'a> Boids<'a> {
                 .keep_out(&mut self.positions[id], &mut self.velocities[id]);
         }
     }
-
-    fn step(&mut self) {
-        self.time_s += self.step_s;
-        if let Some(hunter) = &mut self.hunter {
-            let (time_s, step_s) = (self.time_s, self.step_s);
-            self.habitat
-                .advance(hunter, time_s, step_s, &self.positions, self.calibration);
-        }
-        let rules = &self.params.rules;
-        let reach = rules.reach_bl();
-        let grid = Grid::new(&self.positions, reach);
-        let half_view_rad = rules.view_deg.to_radians() / 2.0;
-        let steering = Steering {
-            params: &self.params,
-            calibration: self.calibration,
-            tank: self.tank,
-            habitat: &self.habitat,
-            time_s: self.time_s,
-            hunter: self.hunter.as_ref(),
-            cos_half_view: libm::cos(half_view_rad.min(std::f64::consts::PI)),
-            velocities: &self.velocities,
-        };
-        let cos_sin = {
-            let turn_rad = self.calibration.turn_rad_per_s * self.step_s;
-            (libm::cos(turn_rad), libm::sin(turn_rad))
-        };
-        // In the order of cells: whoever is looked at next has nearly the same neighbors.
-        let next: Vec<Next> = grid
-            .by_cell()
-            .par_chunks(CHUNK)
-            .flat_map_iter(|chunk| {
-                let mut neighbors = Vec::new();
-                let mut next = Vec::with_capacity(chunk.len());
-                for &id in chunk {
-                    let position = self.positions[id as usize];
-                    let limit = rules.neighbors as usize;
-                    grid.nearest(id, position, reach, limit, &mut neighbors);
-                    next.push(self.next(id as usize, &neighbors, &steering, cos_sin));
-                }
-                next
-            })
-            .collect();
-        for (&id, next) in grid.by_cell().iter().zip(next) {
-            let id = id as usize;
-            self.positions[id] = next.position;
-            self.velocities[id] = next.velocity;
-            self.wander[id] = next.wander;
-            self.leads_for_s[id] = next.leads_for_s;
-        }
-        self.push_apart();
-        self.step_idx += 1;
-    }
-
-    fn next(
-        &self,
-        id: usize,
-        neighbors: &[Neighbor],
-        steering: &Steering,
-        cos_sin: (f64, f64),
-    ) -> Next {
-        let (position, velocity) = (self.positions[id], self.velocities[id]);
-        let wander = self.next_wander(id);
-        let leads_for_s = self.next_lead(id, neighbors);
-        let acceleration = steering.acceleration(&Moment {
-            position,
-            velocity,
-            neighbors,
-            wander,
-            leads: leads_for_s > 0.0,
-            noise: self.noise(id),
-        });
-        let wished = add_scaled(velocity, self.step_s, acceleration);
-        let wished = match &self.meeting {
-            Some(meeting) => meeting.wish(id, position, wished),
-            None => wished,
-        };
-        let aside = match self.tank.is_flat() {
-            true => [-velocity[1], velocity[0], 0.0],
-            false => [-velocity[2], 0.0, velocity[0]],
-        };
-        let turned = turned_at_most(velocity, wished, cos_sin, aside);
-        let mut next = Next {
-            position,
-            velocity: self.within_limits(turned, position, velocity),
-            wander,
-            leads_for_s,
-        };
-        next.position = add_scaled(position, self.step_s, next.velocity);
-        let along = next.velocity;
-        self.habitat
-            .keep_out(&mut next.position, &mut next.velocity);
-        // A slanting wall reflects more steeply than the animal swims.
-        next.velocity = self.within_limits(next.velocity, position, along);
-        next
-    }
-
-    /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
-    /// stands.
-    fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
-        if let Some([up, down]) = self.calibration.slopes.map(|slopes| slopes.limits) {
-            let level = velocity[0].hypot(velocity[2]);
-            velocity[1] = velocity[1].clamp(-up * level, down * level);
-        }
-        let [least, most] = self.calibration.speed_limits_bl_per_s;
-        let flees = self.habitat.flee(position, self.hunter.as_ref()).is_some();
-        let most = if flees { FLIGHT_PACE * most } else { most };
-        let speed = norm(velocity);
-        let direction = if speed > 1e-9 {
-            unit(velocity)
-        } else {
-            unit(before)
-        };
-        scaled(speed.clamp(least, most), direction)
-    }
-
-    /// The error of a course with zones, in each direction.
-    fn noise(&self, id: usize) -> Vec3 {
-        let Some(zones) = &self.params.rules.zones else {
-            return [0.0; 3];
-        };
-        let n_axes = if self.tank.is_flat() { 2 } else { 3 };
-        std::array::from_fn(|axis| {
-            let key = [draw::NOISE, id as u64, self.step_idx, axis as u64];
-            let is_free = axis < n_axes;
-            f64::from(u8::from(is_free)) * zones.noise_rad * random::normal(self.params.seed, &key)
-        })
-    }
-
-    /// Ornstein-Uhlenbeck: a level turn rate, at weight 1 as varied as the animal's own, and a standard normal
-    /// number, which is how far its slope is to be off the usual one.
-    fn next_wander(&self, id: usize) -> [f64; 2] {
-        let keep = libm::exp(-self.step_s / WANDER_S);
-        let spread = self.params.rules.wander * self.calibration.wander_rad_per_s;
-        let fresh = (1.0 - keep * keep).sqrt();
-        std::array::from_fn(|k| {
-            let key = [draw::WANDER, id as u64, self.step_idx, k as u64];
-            let fresh = [spread, 1.0][k] * fresh * random::normal(self.params.seed, &key);
-            keep * self.wander[id][k] + fresh
-        })
-    }
-
-    fn next_lead(&self, id: usize, neighbors: &[Neighbor]) -> f64 {
-        let left = self.leads_for_s[id] - self.step_s;
-        if left > 0.0 || !self.params.leaders {
-            return left.max(0.0);
-        }
-        let key = [draw::LEAD, id as u64, self.step_idx];
-        let scale = (self.params.rules.cohesion_bl, self.step_s);
-        leadership::taken(self.params.seed, key, self.velocities[id], neighbors, scale)
-            .unwrap_or(0.0)
-    }
-}
-
-/// What a boid is after a step.
-struct Next {
-    position: Vec3,
-    velocity: Vec3,
-    wander: [f64; 2],
-    leads_for_s: f64,
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@
 //! serves a slow animal and a fast one, and their sum is cut to the greatest it was seen to make.
 
 use super::calibration::Calibration;
-use super::grid::Neighbor;
 use super::habitat::{Habitat, Hunter};
+use super::nearest::Neighbor;
 use super::tank::Tank;
 use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
 use super::zones;
@@ -59,12 +59,28 @@ pub struct Steering<'a> {
     pub hunter: Option<&'a Hunter>,
     /// cos of half the field of view.
     pub cos_half_view: f64,
-    /// The velocity of every boid.
-    pub velocities: &'a [Vec3],
+}
+
+/// What a boid sees of its neighbors.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Seen {
+    /// Who it sees.
+    n: u32,
+    /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
+    apart: Vec3,
+    /// sum v_j over those nearer than r_a, and how many they are.
+    along: Vec3,
+    n_along: u32,
+    /// sum p_j - p_i over those nearer than r_c, and how many they are.
+    toward: Vec3,
+    n_toward: u32,
+    /// sum of how fast they go across the picture.
+    across: f64,
 }
 
 impl Steering<'_> {
     /// The acceleration granted, at most the calibration's, BL/s^2.
+    #[inline(always)]
     pub fn acceleration(&self, moment: &Moment) -> Vec3 {
         let most = self.calibration.acceleration_bl_per_s2();
         let usual = self.calibration.usual_acceleration_bl_per_s2();
@@ -117,7 +133,7 @@ impl Steering<'_> {
             return push;
         }
         let side = unit(cross(self.tank.up(), ahead));
-        let velocities = (moment.neighbors.iter()).map(|n| self.velocities[n.id as usize]);
+        let velocities = (moment.neighbors.iter()).map(|n| n.velocity);
         let turned: f64 = velocities.map(|velocity| dot(unit(velocity), side)).sum();
         let turned = turned / moment.neighbors.len().max(1) as f64;
         let home = match self.params.rules.circling > 0.0 {
@@ -130,37 +146,30 @@ impl Steering<'_> {
     }
 
     /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
+    #[inline(always)]
     fn with_rules(&self, moment: &Moment) -> (Vec3, [Vec3; 4]) {
         let rules = &self.params.rules;
-        let seen: Vec<&Neighbor> = moment
-            .neighbors
-            .iter()
-            .filter(|n| self.sees(moment.velocity, n))
-            .collect();
+        let ahead = unit(moment.velocity);
+        let seen = Seen::of(moment.neighbors, ahead, self.cos_half_view, rules);
+        let alignment = self.alignment(&seen, moment);
         let apart = match self.params.separation {
-            Separation::Repulsion => separation(&seen, rules),
-            Separation::Papers => self.rule_a_of_the_papers(&seen, moment),
+            Separation::Repulsion => seen.apart,
+            Separation::Papers => self.rule_a_of_the_papers(moment, ahead, alignment),
         };
         let together = if moment.leads { 0.0 } else { 1.0 };
         let wishes = [
-            scaled(together * rules.alignment, self.alignment(&seen, moment)),
+            scaled(together * rules.alignment, alignment),
             scaled(rules.circling, self.circling(moment)),
             scaled(BROADSIDE, self.broadside(&seen, moment)),
-            scaled(together * rules.cohesion, cohesion(&seen, rules)),
+            scaled(together * rules.cohesion, seen.cohesion(rules)),
         ];
         (scaled(rules.separation, apart), wishes)
     }
 
     /// Couzin et al. 2002: as fast as may be onto the course of the zones.
     fn with_zones(&self, zones: &Zones, moment: &Moment) -> Vec3 {
-        let around = (moment.neighbors, self.velocities);
-        let course = zones::course(
-            zones,
-            moment.velocity,
-            around.0,
-            around.1,
-            self.cos_half_view,
-        );
+        let (velocity, cos) = (moment.velocity, self.cos_half_view);
+        let course = zones::course(zones, velocity, moment.neighbors, cos);
         let course = course.unwrap_or_else(|| unit(moment.velocity));
         let wished = unit(add_scaled(course, 1.0, moment.noise));
         let cruise = self.calibration.cruise_bl_per_s;
@@ -168,36 +177,30 @@ impl Steering<'_> {
         scaled(WITHOUT_DELAY / cruise, gap)
     }
 
-    fn sees(&self, velocity: Vec3, neighbor: &Neighbor) -> bool {
-        let cos = dot(unit(velocity), neighbor.offset);
-        cos >= self.cos_half_view * neighbor.square_bl2.sqrt()
-    }
-
     /// mean v_j - v_i, in cruising speeds.
-    fn alignment(&self, seen: &[&Neighbor], moment: &Moment) -> Vec3 {
-        let reach = self.params.rules.alignment_bl;
-        let mut sum = [0.0; 3];
-        let mut n = 0.0;
-        for neighbor in seen.iter().filter(|n| n.square_bl2 < reach * reach) {
-            sum = add_scaled(sum, 1.0, self.velocities[neighbor.id as usize]);
-            n += 1.0;
-        }
-        if n == 0.0 {
+    #[inline(always)]
+    fn alignment(&self, seen: &Seen, moment: &Moment) -> Vec3 {
+        if seen.n_along == 0 {
             return [0.0; 3];
         }
-        let gap = minus(scaled(1.0 / n, sum), moment.velocity);
+        let gap = minus(
+            scaled(1.0 / f64::from(seen.n_along), seen.along),
+            moment.velocity,
+        );
         scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
     }
 
     /// O 4, rule A: slower when ahead of the neighbors, faster when behind, and their direction.
-    fn rule_a_of_the_papers(&self, seen: &[&Neighbor], moment: &Moment) -> Vec3 {
-        if seen.is_empty() {
+    fn rule_a_of_the_papers(&self, moment: &Moment, ahead: Vec3, alignment: Vec3) -> Vec3 {
+        let neighbors = moment.neighbors.iter();
+        let seen = neighbors.filter(|n| is_seen(n, ahead, self.cos_half_view));
+        let (lead, n) = seen.fold((0.0, 0.0), |(lead, n), neighbor| {
+            (lead - dot(ahead, unit(neighbor.offset)), n + 1.0)
+        });
+        if n == 0.0 {
             return [0.0; 3];
         }
-        let ahead = unit(moment.velocity);
-        let lead: f64 = seen.iter().map(|n| -dot(ahead, unit(n.offset))).sum();
-        let pace = -lead / seen.len() as f64;
-        add_scaled(scaled(pace, ahead), 0.5, self.alignment(seen, moment))
+        add_scaled(scaled(-lead / n, ahead), 0.5, alignment)
     }
 
     /// Toward swimming round the middle of the tank, on a ring that its narrower side holds, in
@@ -224,14 +227,13 @@ impl Steering<'_> {
 
     /// In side view: out of the line of sight, to the side where the neighbors go. Footage shows an animal best
     /// broadside, and a flock that lingers in depth would be seen end-on half the time.
-    fn broadside(&self, seen: &[&Neighbor], moment: &Moment) -> Vec3 {
+    fn broadside(&self, seen: &Seen, moment: &Moment) -> Vec3 {
         if self.tank.is_flat() || self.params.rules.circling > 0.0 {
             return [0.0; 3];
         }
-        let others: f64 = seen.iter().map(|n| self.velocities[n.id as usize][0]).sum();
         let cruise = self.calibration.cruise_bl_per_s;
-        let follow = 2.0 * self.params.rules.alignment.min(1.0) / seen.len().max(1) as f64;
-        let side = ((moment.velocity[0] + follow * others) / cruise).clamp(-1.0, 1.0);
+        let follow = 2.0 * self.params.rules.alignment.min(1.0) / f64::from(seen.n.max(1));
+        let side = ((moment.velocity[0] + follow * seen.across) / cruise).clamp(-1.0, 1.0);
         // Not onto a wall: its push leads back.
         let across = [cruise.copysign(side), 0.0, 0.0];
         let wall = self.tank.push(moment.position, across, WALL_HORIZON_S)[0];
@@ -243,6 +245,7 @@ impl Steering<'_> {
     /// The wandering turn, as the acceleration that makes it, and the way back to the slopes that the animal has:
     /// left to the rules alone, boids swim as steeply as they may, and who is both steep and seen nearly end-on
     /// heads in the picture where the animal never did.
+    #[inline(always)]
     fn wander(&self, moment: &Moment) -> Vec3 {
         let up = self.tank.up();
         let sideways = cross(up, moment.velocity);
@@ -256,6 +259,7 @@ impl Steering<'_> {
     }
 
     /// Back to cruising speed; leaders are faster.
+    #[inline(always)]
     fn cruise(&self, moment: &Moment) -> Vec3 {
         let speed = norm(moment.velocity);
         let pace = if moment.leads { 1.4 } else { 1.0 };
@@ -264,35 +268,62 @@ impl Steering<'_> {
     }
 }
 
-/// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
-fn separation(seen: &[&Neighbor], rules: &Rules) -> Vec3 {
-    let reach = rules.separation_bl;
-    let mut push = [0.0; 3];
-    for neighbor in seen.iter().filter(|n| n.square_bl2 < reach * reach) {
-        let distance = neighbor.square_bl2.sqrt().max(0.05);
-        let strength = (reach / distance - 1.0) / distance;
-        push = add_scaled(push, -strength, neighbor.offset);
+impl Seen {
+    /// Of neighbors, nearest first, who looks `ahead`, a unit vector.
+    #[inline(always)]
+    fn of(neighbors: &[Neighbor], ahead: Vec3, cos_half_view: f64, rules: &Rules) -> Seen {
+        let apart_bl2 = rules.separation_bl * rules.separation_bl;
+        let along_bl2 = rules.alignment_bl * rules.alignment_bl;
+        let toward_bl2 = rules.cohesion_bl * rules.cohesion_bl;
+        let mut seen = Seen::default();
+        for neighbor in neighbors {
+            // Nothing is added instead of nothing being done: who is seen is not to be guessed.
+            let sees = is_seen(neighbor, ahead, cos_half_view);
+            let along = sees & (neighbor.square_bl2 < along_bl2);
+            let toward = sees & (neighbor.square_bl2 < toward_bl2);
+            seen.n += u32::from(sees);
+            seen.n_along += u32::from(along);
+            seen.n_toward += u32::from(toward);
+            seen.across += only_if(sees, neighbor.velocity[0]);
+            for axis in 0..3 {
+                seen.along[axis] += only_if(along, neighbor.velocity[axis]);
+                seen.toward[axis] += only_if(toward, neighbor.offset[axis]);
+            }
+        }
+        let near = neighbors.iter().take_while(|n| n.square_bl2 < apart_bl2);
+        for neighbor in near.filter(|n| is_seen(n, ahead, cos_half_view)) {
+            let distance = neighbor.square_bl2.sqrt().max(0.05);
+            let strength = (rules.separation_bl / distance - 1.0) / distance;
+            seen.apart = add_scaled(seen.apart, -strength, neighbor.offset);
+        }
+        seen
     }
-    push
+
+    /// mean p_j - p_i over those nearer than r_c, in r_c.
+    #[inline(always)]
+    fn cohesion(&self, rules: &Rules) -> Vec3 {
+        if self.n_toward == 0 {
+            return self.toward;
+        }
+        scaled(
+            1.0 / (f64::from(self.n_toward) * rules.cohesion_bl),
+            self.toward,
+        )
+    }
 }
 
-/// mean p_j - p_i over those nearer than r_c, in r_c.
-fn cohesion(seen: &[&Neighbor], rules: &Rules) -> Vec3 {
-    let reach = rules.cohesion_bl;
-    let mut sum = [0.0; 3];
-    let mut n = 0.0;
-    for neighbor in seen.iter().filter(|n| n.square_bl2 < reach * reach) {
-        sum = add_scaled(sum, 1.0, neighbor.offset);
-        n += 1.0;
-    }
-    if n == 0.0 {
-        sum
-    } else {
-        scaled(1.0 / (n * reach), sum)
-    }
+#[inline(always)]
+fn only_if(is: bool, number: f64) -> f64 {
+    f64::from_bits(number.to_bits() & u64::from(is).wrapping_neg())
+}
+
+#[inline(always)]
+fn is_seen(neighbor: &Neighbor, ahead: Vec3, cos_half_view: f64) -> bool {
+    dot(ahead, neighbor.offset) >= cos_half_view * neighbor.square_bl2.sqrt()
 }
 
 /// Requests in order, until the sum of their sizes reaches `most`; the last one is cut.
+#[inline(always)]
 fn granted(requests: &[Vec3], most: f64) -> Vec3 {
     let mut left = most;
     let mut sum = [0.0; 3];
@@ -317,6 +348,7 @@ mod tests {
             id: 1,
             offset,
             square_bl2: dot(offset, offset),
+            velocity: [0.0; 3],
         }
     }
 
@@ -324,9 +356,11 @@ mod tests {
     fn a_near_neighbor_pushes_away_and_a_farther_one_attracts() {
         let (near, far) = (neighbor([0.5, 0.0, 0.0]), neighbor([3.0, 0.0, 0.0]));
         let rules = Rules::default();
-        assert_eq!(separation(&[&near], &rules), [-1.0, 0.0, 0.0]);
-        assert_eq!(separation(&[&far], &rules), [0.0; 3]);
-        assert_eq!(cohesion(&[&far], &rules), [0.5, 0.0, 0.0]);
+        let seen = |neighbor| Seen::of(&[neighbor], [1.0, 0.0, 0.0], 0.0, &rules);
+        assert_eq!(seen(near).apart, [-1.0, 0.0, 0.0]);
+        assert_eq!(seen(far).apart, [0.0; 3]);
+        assert_eq!(seen(far).cohesion(&rules), [0.5, 0.0, 0.0]);
+        assert_eq!(seen(neighbor([-0.5, 0.0, 0.0])), Seen::default(), "behind");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What a flock of boids promises: order, walls, limits, and the same numbers on any threads.
 
 use super::measures::Order;
+use super::vector::{add_scaled, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;

@@ -4,31 +4,37 @@
 pub type Vec3 = [f64; 3];
 
 /// a . b
+#[inline(always)]
 pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// |a|
+#[inline(always)]
 pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// a + k b
+#[inline(always)]
 pub fn add_scaled(a: Vec3, k: f64, b: Vec3) -> Vec3 {
     [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]
 }
 
 /// a - b
+#[inline(always)]
 pub fn minus(a: Vec3, b: Vec3) -> Vec3 {
     add_scaled(a, -1.0, b)
 }
 
 /// k a
+#[inline(always)]
 pub fn scaled(k: f64, a: Vec3) -> Vec3 {
-    a.map(|v| k * v)
+    [k * a[0], k * a[1], k * a[2]]
 }
 
 /// a / |a|, and nothing for (nearly) nothing.
+#[inline(always)]
 pub fn unit(a: Vec3) -> Vec3 {
     let length = norm(a);
     if length > 1e-12 {
@@ -44,6 +50,7 @@ pub fn angle_between(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// a x b
+#[inline(always)]
 pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [
         a[1] * b[2] - a[2] * b[1],
@@ -54,6 +61,7 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 
 /// `to` turned back toward `from` until the angle between them is at most that of (cos, sin); the
 /// length stays that of `to`. Opposite directions turn toward `aside`.
+#[inline(always)]
 pub fn turned_at_most(from: Vec3, to: Vec3, cos_sin: (f64, f64), aside: Vec3) -> Vec3 {
     let (speed, u) = (norm(to), unit(from));
     let along = dot(unit(to), u);

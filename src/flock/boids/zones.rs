@@ -1,7 +1,7 @@
 //! The course of a boid with three zones around it (Couzin et al. 2002, eqs 1 to 3): away from the too near, or
 //! with those in the zone of orientation and toward those in the zone of attraction, half and half.
 
-use super::grid::Neighbor;
+use super::nearest::Neighbor;
 use super::params::Zones;
 use super::vector::{Vec3, add_scaled, dot, norm, unit};
 
@@ -12,7 +12,6 @@ pub fn course(
     zones: &Zones,
     velocity: Vec3,
     neighbors: &[Neighbor],
-    velocities: &[Vec3],
     cos_half_view: f64,
 ) -> Option<Vec3> {
     let [near, middle, far] = zones.radii_bl().map(|radius| radius * radius);
@@ -24,7 +23,7 @@ pub fn course(
             away = add_scaled(away, -1.0, to);
         } else if dot(ahead, to) < cos_half_view {
         } else if neighbor.square_bl2 < middle {
-            along = add_scaled(along, 1.0, unit(velocities[neighbor.id as usize]));
+            along = add_scaled(along, 1.0, unit(neighbor.velocity));
         } else if neighbor.square_bl2 < far {
             toward = add_scaled(toward, 1.0, to);
         }
@@ -51,15 +50,14 @@ mod tests {
             id,
             offset,
             square_bl2: dot(offset, offset),
+            velocity: [0.0, 1.0, 0.0],
         }
     }
 
     #[test]
     fn who_is_too_near_counts_alone_and_behind_one_only_that_is_felt() {
         let zones = Zones::default();
-        let velocities = [[0.0, 1.0, 0.0]; 3];
-        let course =
-            |neighbors: &[Neighbor]| course(&zones, [1.0, 0.0, 0.0], neighbors, &velocities, -0.5);
+        let course = |neighbors: &[Neighbor]| course(&zones, [1.0, 0.0, 0.0], neighbors, -0.5);
         let (close, beside, far) = (
             at(0, [0.5, 0.0, 0.0]),
             at(1, [0.0, 2.0, 0.0]),

@@ -149,6 +149,7 @@ impl Painter {
             &self.second,
             fade.weight[k],
             &mut self.mixed,
+            scene.cpu,
         );
     }
 }

@@ -35,6 +35,15 @@ pub struct Feature {
     pub away: i16,
 }
 
+/// The features of all states of a trellis.
+#[derive(Clone, Debug)]
+pub struct Features {
+    all: Vec<Feature>,
+    /// The parts that are always compared, each side by side.
+    turns: Vec<u16>,
+    log_speeds: Vec<u16>,
+}
+
 /// The weights as integers: 256ths, and turns.
 #[derive(Clone, Copy, Debug)]
 pub struct Weights {
@@ -50,6 +59,22 @@ pub struct Weights {
     /// Whether it is known if the animal points away from the viewer or toward.
     is_signed: bool,
     v0_bl_per_s: f64,
+}
+
+impl Features {
+    /// Of every state, by state.
+    pub fn new(all: Vec<Feature>) -> Features {
+        Features {
+            turns: all.iter().map(|feature| feature.turns).collect(),
+            log_speeds: all.iter().map(|feature| feature.log_speed).collect(),
+            all,
+        }
+    }
+
+    /// What a state shows.
+    pub fn of(&self, state: usize) -> Feature {
+        self.all[state]
+    }
 }
 
 impl Weights {
@@ -92,17 +117,46 @@ impl Weights {
     /// What showing `state` costs who wants `wanted`, turns, without the ceiling: heading (with
     /// rotation), and speed.
     pub fn of_state(&self, wanted: Feature, state: Feature) -> [u32; 2] {
-        let gap = (wanted.turns.wrapping_sub(state.turns) as i16).unsigned_abs();
-        let within = u32::from(gap.min(self.rho_turns));
-        let beyond = match self.by {
-            MatchBy::Direction => self.chord_turns(wanted, state, u32::from(gap) - within),
-            _ => u32::from(gap) - within,
-        };
-        let speed_gap = u32::from(wanted.log_speed.abs_diff(state.log_speed));
+        match self.by {
+            MatchBy::Direction => {
+                let [beyond, within] = self.parts(wanted.turns, state.turns);
+                let chord_turns = self.chord_turns(wanted, state, u32::from(beyond));
+                let speed = self.of_speeds(wanted.log_speed, state.log_speed);
+                [self.of_parts(chord_turns, within), speed]
+            }
+            _ => self.of_gaps(
+                [wanted.turns, state.turns],
+                [wanted.log_speed, state.log_speed],
+            ),
+        }
+    }
+
+    /// `of_state` where no depth counts.
+    #[inline(always)]
+    fn of_gaps(&self, turns: [u16; 2], log_speeds: [u16; 2]) -> [u32; 2] {
+        let [beyond, within] = self.parts(turns[0], turns[1]);
         [
-            (self.heading * beyond + self.rotation * within) >> 8,
-            (self.speed * speed_gap) >> 8,
+            self.of_parts(u32::from(beyond), within),
+            self.of_speeds(log_speeds[0], log_speeds[1]),
         ]
+    }
+
+    /// How far two headings are apart beyond rho, and within.
+    #[inline(always)]
+    fn parts(&self, a: u16, b: u16) -> [u16; 2] {
+        let gap = (a.wrapping_sub(b) as i16).unsigned_abs();
+        let within = gap.min(self.rho_turns);
+        [gap - within, within]
+    }
+
+    #[inline(always)]
+    fn of_parts(&self, beyond: u32, within: u16) -> u32 {
+        (self.heading * beyond + self.rotation * u32::from(within)) >> 8
+    }
+
+    #[inline(always)]
+    fn of_speeds(&self, a: u16, b: u16) -> u32 {
+        (self.speed * u32::from(a.abs_diff(b))) >> 8
     }
 
     /// The chord between two directions whose headings are `beyond` turns apart, turns to the radian: the angle
@@ -126,6 +180,39 @@ impl Weights {
     pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
         let [heading, speed] = self.of_state(wanted, state);
         (heading + speed).min(CEILING - 1)
+    }
+
+    /// The `total` of the states from `first` on, for several who want something.
+    #[inline(always)]
+    pub fn fill<const LANES: usize>(
+        &self,
+        wanted: &[Feature; LANES],
+        features: &Features,
+        first: usize,
+        out: &mut [[u32; LANES]],
+    ) {
+        let weights = *self;
+        let states = first..first + out.len();
+        if weights.by == MatchBy::Direction {
+            for (out, &state) in out.iter_mut().zip(&features.all[states]) {
+                for lane in 0..LANES {
+                    out[lane] = weights.total(wanted[lane], state);
+                }
+            }
+            return;
+        }
+        let wanted = wanted.map(|wanted| (wanted.turns, wanted.log_speed));
+        let (turns, log_speeds) = (
+            &features.turns[states.clone()],
+            &features.log_speeds[states],
+        );
+        for ((out, &turns), &log_speed) in out.iter_mut().zip(turns).zip(log_speeds) {
+            for lane in 0..LANES {
+                let turns = [wanted[lane].0, turns];
+                let [heading, speed] = weights.of_gaps(turns, [wanted[lane].1, log_speed]);
+                out[lane] = (heading + speed).min(CEILING - 1);
+            }
+        }
     }
 
     /// What a boid wants at every frame, from its track as the file holds it.

@@ -15,7 +15,7 @@ pub mod viterbi;
 use rayon::prelude::*;
 
 use self::circle::Ends;
-use self::cost::{CEILING, Feature, Weights};
+use self::cost::{CEILING, Feature, Features, Weights};
 use self::crowd::{Crowd, Place, Settled};
 use self::memory::Memory;
 use self::round::Round;
@@ -70,7 +70,7 @@ impl Found {
 pub struct Planner<'a> {
     trellis: Trellis,
     weights: Weights,
-    features: Vec<Feature>,
+    features: Features,
     crowd: Crowd,
     memory: Memory,
     /// The states that look like each state.
@@ -100,7 +100,7 @@ impl<'a> Planner<'a> {
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let crowd = Crowd::new(params.matching.w_c, fps, length_px);
-        let features = weights.features(&trellis, motion);
+        let features = Features::new(weights.features(&trellis, motion));
         let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
         let place = |t| boids.iter().map(|boid| crowd.place(boid, t)).collect();
         Planner {
@@ -170,10 +170,7 @@ impl<'a> Planner<'a> {
         let wanted = [wanted, &heir[..dwell]].concat();
         let ends = Ends { first, next: 0 };
         let rows = |t: usize, start: usize, out: &mut [[u32; 1]]| {
-            let features = &self.features[start..start + out.len()];
-            for (out, &feature) in out.iter_mut().zip(features) {
-                *out = [self.weights.total(wanted[t], feature)];
-            }
+            (self.weights).fill(&[wanted[t]], &self.features, start, out);
             ends.close((t, usize::MAX, dwell), start, out, 0);
         };
         let film = Film {
@@ -258,7 +255,7 @@ impl<'a> Planner<'a> {
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
         let states = self.film_of(path);
         for (&wanted, &state) in wanted.iter().zip(states) {
-            let feature = self.features[state as usize];
+            let feature = self.features.of(state as usize);
             let [h, s] = self.weights.of_state(wanted, feature);
             heading += h;
             speed += s;
@@ -308,7 +305,7 @@ impl<'a> Planner<'a> {
             let crowd: u32 = near
                 .map(|(_, &place)| u32::from(self.crowd.cost_at(places[id], place)))
                 .sum();
-            let alone = (self.weights).total(wanted[t], self.features[state as usize]);
+            let alone = (self.weights).total(wanted[t], self.features.of(state as usize));
             cost += (alone + crowd).min(CEILING - 1);
         }
         cost

@@ -19,12 +19,8 @@ impl<const LANES: usize> Rows<LANES> for Alone<'_, LANES> {
     #[inline(always)]
     fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
         let wanted: [Feature; LANES] = std::array::from_fn(|lane| self.wanted[lane][t]);
-        let features = &self.planner.features[first..first + out.len()];
-        for (out, &feature) in out.iter_mut().zip(features) {
-            for lane in 0..LANES {
-                out[lane] = self.planner.weights.total(wanted[lane], feature);
-            }
-        }
+        let planner = self.planner;
+        (planner.weights).fill(&wanted, &planner.features, first, out);
     }
 }
 
@@ -89,20 +85,22 @@ impl<'a, const LANES: usize> InCrowd<'a, LANES> {
             self.gather(t);
         }
         let wanted: [Feature; LANES] = std::array::from_fn(|lane| self.wanted[lane][t]);
-        let features = &self.planner.features[first..first + out.len()];
+        let planner = self.planner;
+        (planner.weights).fill(&wanted, &planner.features, first, out);
         let added = &self.added[first..first + out.len()];
-        for ((out, &feature), added) in out.iter_mut().zip(features).zip(added) {
+        let mut sum = self.sum;
+        for (out, added) in out.iter_mut().zip(added) {
             for lane in 0..LANES {
                 let crowd = if LANES == 1 {
                     added[lane]
                 } else {
-                    self.sum[lane] = self.sum[lane].wrapping_add(added[lane]);
-                    self.sum[lane]
+                    sum[lane] = sum[lane].wrapping_add(added[lane]);
+                    sum[lane]
                 };
-                let alone = self.planner.weights.total(wanted[lane], feature);
-                out[lane] = (alone + crowd).min(CEILING - 1);
+                out[lane] = (out[lane] + crowd).min(CEILING - 1);
             }
         }
+        self.sum = sum;
     }
 
     #[inline(always)]

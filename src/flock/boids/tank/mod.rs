@@ -128,17 +128,22 @@ impl Tank {
     /// would be caught in corners, never getting round. True when a wall was met.
     pub fn keep_inside(&self, position: &mut Vec3, velocity: &mut Vec3) -> bool {
         let mut met = false;
-        // A few rounds settle most corners.
+        // A few rounds settle most corners; one that meets no wall leaves all as it is.
         for _ in 0..3 {
+            let mut meets = false;
             for wall in &self.walls {
                 let beyond = dot(wall.outward, *position) - wall.offset_bl;
                 if beyond > 0.0 {
                     let outward_speed = dot(wall.outward, *velocity).max(0.0);
                     *position = add_scaled(*position, -beyond, wall.outward);
                     *velocity = add_scaled(*velocity, -2.0 * outward_speed, wall.outward);
-                    met = true;
+                    meets = true;
                 }
             }
+            if !meets {
+                break;
+            }
+            met = true;
         }
         if met {
             *position = self.on_the_way(self.middle, *position);

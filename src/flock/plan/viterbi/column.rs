@@ -7,7 +7,7 @@
 //! for AVX2; results are the same integers.
 
 use super::landing;
-use super::walk::Trace;
+use super::walk::{Frame, Trace};
 use super::{Film, Rows, UNREACHED};
 use crate::cpu::Level;
 use crate::flock::plan::landings::{GROUP, Way};
@@ -72,53 +72,77 @@ impl<const LANES: usize> Column<LANES> {
         rows: &mut R,
         trace: &mut Trace<'_, LANES>,
     ) {
+        self.advance_on::<R, true>(film, rows, trace.next_frame());
+    }
+
+    /// Goes on by a frame and keeps no way back.
+    pub(super) fn advance_untraced<R: Rows<LANES>>(&mut self, film: &Film<'_>, rows: &mut R) {
+        self.advance_on::<R, false>(film, rows, (&mut [], &mut []));
+    }
+
+    fn advance_on<R: Rows<LANES>, const TRACED: bool>(
+        &mut self,
+        film: &Film<'_>,
+        rows: &mut R,
+        trace: Frame<'_, LANES>,
+    ) {
         match film.cpu {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
                 #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
                 // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
-                    self.advance_avx2(film, rows, trace);
+                    self.advance_avx2::<R, TRACED>(film, rows, trace);
                 }
             }
-            _ => self.advance_with::<R, false>(film, rows, trace),
+            _ => self.advance_with::<R, false, TRACED>(film, rows, trace),
         }
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn advance_avx2<R: Rows<LANES>>(
+    fn advance_avx2<R: Rows<LANES>, const TRACED: bool>(
         &mut self,
         film: &Film<'_>,
         rows: &mut R,
-        trace: &mut Trace<'_, LANES>,
+        trace: Frame<'_, LANES>,
     ) {
-        self.advance_with::<R, true>(film, rows, trace);
+        self.advance_with::<R, true, TRACED>(film, rows, trace);
     }
 
     #[inline(always)]
-    fn advance_with<R: Rows<LANES>, const AVX2: bool>(
+    fn advance_with<R: Rows<LANES>, const AVX2: bool, const TRACED: bool>(
         &mut self,
         film: &Film<'_>,
         rows: &mut R,
-        trace: &mut Trace<'_, LANES>,
+        (ranks, wins): Frame<'_, LANES>,
     ) {
-        let (ranks, wins) = trace.next_frame();
-        self.land::<AVX2>(film, ranks);
+        self.land::<AVX2, TRACED>(film, ranks);
         self.slide();
-        self.settle(wins);
+        self.settle::<TRACED>(wins);
         self.close_barriers();
         self.pay(film.time(self.way, self.age), rows);
     }
 
     /// The cheapest jump to each state that jumps lead to.
     #[inline(always)]
-    fn land<const AVX2: bool>(&mut self, film: &Film<'_>, ranks: &mut [[u16; LANES]]) {
+    fn land<const AVX2: bool, const TRACED: bool>(
+        &mut self,
+        film: &Film<'_>,
+        ranks: &mut [[u16; LANES]],
+    ) {
         let landings = film.trellis.landings(self.way);
         let (values, n_states) = (&self.values[..], landings.n_states());
         assert_eq!(values.len(), n_states, "one trellis all along");
-        let (ranks, _) = ranks.as_chunks_mut::<GROUP>();
-        for ((states, jumps), ranks) in landings.groups().zip(ranks) {
+        let (mut ranks, mut nowhere) = (
+            ranks.as_chunks_mut::<GROUP>().0.iter_mut(),
+            [[0; LANES]; GROUP],
+        );
+        for (states, jumps) in landings.groups() {
+            let ranks = match ranks.next() {
+                Some(ranks) if TRACED => ranks,
+                _ => &mut nowhere,
+            };
             #[cfg(target_arch = "x86_64")]
             if AVX2 && LANES == 1 {
                 let ranks = ranks.as_flattened_mut().try_into();
@@ -134,7 +158,7 @@ impl<const LANES: usize> Column<LANES> {
             }
             #[expect(unsafe_code, reason = "a kernel that looks at no bounds")]
             // SAFETY: landings name states below `n_states`, all of which have values.
-            let landed = unsafe { landing::lanes(jumps, values, ranks) };
+            let landed = unsafe { landing::lanes::<LANES, TRACED>(jumps, values, ranks) };
             for (&state, landed) in states.iter().zip(landed) {
                 self.landed[state as usize] = landed;
             }
@@ -172,7 +196,7 @@ impl<const LANES: usize> Column<LANES> {
 
     /// Every state from the one before it, or from a landing where that is cheaper.
     #[inline(always)]
-    fn settle(&mut self, wins: &mut [[u8; LANES]]) {
+    fn settle<const TRACED: bool>(&mut self, wins: &mut [[u8; LANES]]) {
         let window = self.window();
         let slot = self.slot(0);
         let mut leads = std::mem::take(&mut self.leads[slot]);
@@ -180,11 +204,18 @@ impl<const LANES: usize> Column<LANES> {
         let sums = self.sums[window.clone()].as_flattened();
         let now = leads[window].as_flattened_mut().iter_mut();
         let offers = self.landed.as_flattened().iter().zip(sums);
-        let wins = wins.as_flattened_mut().iter_mut();
-        for ((now, &before), ((&landed, &sum), win)) in now.zip(before).zip(offers.zip(wins)) {
-            let lead = landed as i32 - sum as i32;
-            *win = u8::from(lead < before);
-            *now = lead.min(before);
+        let places = now.zip(before).zip(offers);
+        if TRACED {
+            let wins = wins.as_flattened_mut().iter_mut();
+            for (((now, &before), (&landed, &sum)), win) in places.zip(wins) {
+                let lead = landed as i32 - sum as i32;
+                *win = u8::from(lead < before);
+                *now = lead.min(before);
+            }
+        } else {
+            for ((now, &before), (&landed, &sum)) in places {
+                *now = (landed as i32 - sum as i32).min(before);
+            }
         }
         self.leads[slot] = leads;
     }

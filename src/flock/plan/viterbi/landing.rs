@@ -7,14 +7,14 @@ use super::UNREACHED;
 use crate::flock::plan::landings::{GROUP, Jumps};
 
 /// The least V, its own cost aside, with which each of a group of states is landed on, and by which of
-/// its jumps.
+/// its jumps; `RANKED`, or the latter is left as it was.
 ///
 /// # Safety
 ///
 /// All sources of the jumps lie below `values.len()`.
 #[inline(always)]
 #[expect(unsafe_code, reason = "to look at its bounds takes longer than a jump")]
-pub(super) unsafe fn lanes<const LANES: usize>(
+pub(super) unsafe fn lanes<const LANES: usize, const RANKED: bool>(
     jumps: &[Jumps],
     values: &[[u32; LANES]],
     ranks: &mut [[u16; LANES]; GROUP],
@@ -34,7 +34,9 @@ pub(super) unsafe fn lanes<const LANES: usize>(
             }
         }
         *landed = best;
-        *ranks = best_rank.map(|rank| rank as u16);
+        if RANKED {
+            *ranks = best_rank.map(|rank| rank as u16);
+        }
     }
     landed
 }

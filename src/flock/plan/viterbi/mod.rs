@@ -82,9 +82,8 @@ impl Film<'_> {
         rows: &mut impl Rows<LANES>,
     ) -> Option<[u32; LANES]> {
         let mut column = Column::start(self, Way::Ahead, rows);
-        let mut trace = Trace::new(self, Way::Ahead, 1);
         for _ in 1..self.n_frames {
-            column.advance(self, rows, &mut trace);
+            column.advance_untraced(self, rows);
         }
         let least = |lane| column.landed_since(self, 1, lane).min();
         let costs = std::array::from_fn(|lane| least(lane).unwrap_or(UNREACHED));

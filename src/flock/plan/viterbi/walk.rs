@@ -5,6 +5,9 @@ use super::Film;
 use super::shelf::{Sheets, Shelf};
 use crate::flock::plan::landings::{GROUP, Way};
 
+/// Places for a frame's ranks, and for its wins.
+pub(super) type Frame<'a, const LANES: usize> = (&'a mut [[u16; LANES]], &'a mut [[u8; LANES]]);
+
 /// What led where, for some frames in a row.
 pub(super) struct Trace<'a, const LANES: usize> {
     shelf: &'a Shelf,
@@ -52,7 +55,7 @@ impl<'a, const LANES: usize> Trace<'a, LANES> {
 
     /// The next frame: the places for its ranks and its wins, all to be written.
     #[inline(always)]
-    pub(super) fn next_frame(&mut self) -> (&mut [[u16; LANES]], &mut [[u8; LANES]]) {
+    pub(super) fn next_frame(&mut self) -> Frame<'_, LANES> {
         self.n_frames = (self.n_frames + 1).min(self.room);
         let frame = self.n_frames - 1;
         let (ranks, _) = self.sheets.ranks.as_chunks_mut();
