@@ -165,13 +165,6 @@ impl SquareSums {
             }
         }
     }
-
-    /// At least what the row sprite (of these) differs by from one column sprite.
-    pub(super) fn pair(&self, cpu: Level, row: usize, columns: &SquareSums, column: usize) -> u32 {
-        let mut least = [0];
-        self.against(cpu, row, columns, column, &mut least);
-        least[0]
-    }
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ mod gate;
 mod tests;
 
 use crate::analysis::distance::{
-    Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Side,
+    Asked, Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Side,
 };
 use gate::Gate;
 
@@ -39,7 +39,7 @@ pub struct Connections {
     pub natural_step: u64,
     /// The multiple of the natural step that epsilon is, rounded up; `None` when epsilon was given.
     pub kappa_used: Option<f64>,
-    /// Pairs i < j of clips whose sprites are all present with D < epsilon, before any other test.
+    /// Pairs i < j of clips that may be joined and have D < epsilon, before only the nearest around are kept.
     pub n_candidates: u64,
     /// By (from, to, mirrored).
     pub transitions: Vec<Transition>,
@@ -62,15 +62,26 @@ pub fn connect(
     cpu: Level,
     progress: &dyn Progress,
 ) -> Result<Connections, Error> {
-    let clip_frames = params.clip_frames_at(poses.fps);
     let pixels = ComparedSprites::new(sprites, poses, params.planes)?;
+    connect_compared(&pixels, (sprites, poses), params, cpu, progress)
+}
+
+/// As [`connect`], of sprites that are laid out for comparison already.
+pub fn connect_compared(
+    pixels: &ComparedSprites,
+    (sprites, poses): (&Sprites, &Poses),
+    params: &Params,
+    cpu: Level,
+    progress: &dyn Progress,
+) -> Result<Connections, Error> {
+    let clip_frames = params.clip_frames_at(poses.fps);
     let clips = Clips::new(sprites, poses, clip_frames);
     let clip = params.clip(clip_frames);
-    let steps = natural_steps(&pixels, &clips, &clip.weights());
+    let steps = natural_steps(pixels, &clips, &clip.weights());
     let rungs = rungs(params, steps);
     let search = Search {
         distances: Distances {
-            pixels: &pixels,
+            pixels,
             clip,
             side: Side::Plain,
             cpu,
@@ -227,15 +238,22 @@ impl Search<'_> {
             side,
             ..self.distances
         };
+        let asked = Joinable {
+            search: self,
+            side,
+            least_gap,
+        };
         let Found {
             transitions,
             n_candidates,
         } = found;
-        distances.for_each_row_below(epsilon, progress, |i, row| {
-            if side == Side::Plain && self.clips.all_present[i] {
-                let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
-                let alike = others.filter(|(d, present)| **d < epsilon && **present);
-                *n_candidates += alike.count() as u64;
+        distances.for_each_row_below(epsilon, &asked, progress, |i, row| {
+            if side == Side::Plain {
+                let alike = (i..)
+                    .zip(row)
+                    .skip(least_gap)
+                    .filter(|(_, d)| **d < epsilon);
+                *n_candidates += alike.filter(|&(j, _)| asked.holds(i, j)).count() as u64;
             }
             minima.push(row, |pair| transitions.extend(self.transition(pair, side)));
         })?;
@@ -253,6 +271,37 @@ impl Search<'_> {
             distance: pair.distance,
             heading_gap_rad,
         })
+    }
+}
+
+/// The pairs of clips that may be joined, whatever their distance.
+struct Joinable<'a> {
+    search: &'a Search<'a>,
+    side: Side,
+    least_gap: usize,
+}
+
+impl Joinable<'_> {
+    /// Of two clips at least the least gap apart.
+    fn holds(&self, i: usize, j: usize) -> bool {
+        let usable = &self.search.clips.usable;
+        let mirrored = self.side == Side::Mirrored;
+        usable[i] && usable[j] && self.search.gate.pass(i, j, mirrored).is_some()
+    }
+}
+
+impl Asked for Joinable<'_> {
+    fn mark(&self, i: usize, row: &mut [bool]) {
+        let usable = &self.search.clips.usable[i..];
+        if !usable[0] {
+            return;
+        }
+        let mirrored = self.side == Side::Mirrored;
+        self.search.gate.mark(i, mirrored, row);
+        let least_gap = self.least_gap.min(row.len());
+        row[..least_gap].fill(false);
+        let each = row.iter_mut().zip(usable);
+        each.for_each(|(marked, usable)| *marked &= usable);
     }
 }
 
