@@ -2,7 +2,10 @@
 //! `bench/transitions.py`. Prints one line of JSON.
 //!
 //! `LIBRARY_DIR`: the library's own sprites; all distances against the search for transitions below its
-//! epsilon, on one thread and on all. `N`: so many sprites drawn by code; the search for transitions from end to end.
+//! epsilon, on one thread and on all. `N`: so many sprites drawn by code; the search for transitions from end to end, exact or, with
+//! `approximate` after it, so.
+
+mod clock;
 
 use std::hint::black_box;
 use std::path::Path;
@@ -24,7 +27,10 @@ fn main() {
     match arguments.next() {
         None => println!("arguments: LIBRARY_DIR, or a number of frames"),
         Some(argument) => match argument.parse() {
-            Ok(n_frames) => from_end_to_end(n_frames),
+            Ok(n_frames) => {
+                let approximate = arguments.next().is_some_and(|word| word == "approximate");
+                from_end_to_end(n_frames, approximate);
+            }
             Err(_) => pruned_against_all(Path::new(&argument)),
         },
     }
@@ -80,6 +86,9 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
     let pool = pool.expect("threads can be made");
     let best = |run: &mut dyn FnMut()| {
         let seconds = |_| {
+            if n_threads == 1 {
+                return clock::core_seconds(&mut *run);
+            }
             let start = Instant::now();
             run();
             start.elapsed().as_secs_f64()
@@ -125,7 +134,7 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
 }
 
 /// Draws sprites of 96 x 64 and finds their transitions; times only the latter.
-fn from_end_to_end(n_frames: usize) {
+fn from_end_to_end(n_frames: usize, approximate: bool) {
     let swim = Swim::new(n_frames);
     let scratch = Arc::new(Spill::into(&std::env::temp_dir()));
     let sprites = Sprites::drawn([96, 64], n_frames, scratch, |frame_idx, rgba| {
@@ -134,23 +143,24 @@ fn from_end_to_end(n_frames: usize) {
     });
     let sprites = sprites.expect("the disk has room");
     let poses = swim.poses();
+    let params = Params {
+        approximate,
+        ..Params::default()
+    };
     let start = Instant::now();
-    let found = transition::connect(
-        &sprites,
-        &poses,
-        &Params::default(),
-        Level::detect(),
-        &Silent,
-    );
+    let found = transition::connect(&sprites, &poses, &params, Level::detect(), &Silent);
     let found = found.expect("nobody cancels");
     println!(
         "{{\"frames\":{n_frames},\"seconds\":{:.3},\"peak_mb\":{},\"candidates\":{},\
-         \"transitions\":{},\"component_share\":{:.3}}}",
+         \"transitions\":{},\"component_share\":{:.3},\"recall\":{}}}",
         start.elapsed().as_secs_f64(),
         peak_mb(),
         found.n_candidates,
         found.transitions.len(),
         found.component_share,
+        found
+            .recall
+            .map_or("null".into(), |recall| format!("{recall:.4}")),
     );
 }
 

@@ -141,7 +141,8 @@ impl SquareSums {
         }
     }
 
-    fn row(&self, frame_idx: usize) -> &[u16] {
+    /// Of one sprite, each below 2^15.
+    pub(super) fn row(&self, frame_idx: usize) -> &[u16] {
         &self.values[frame_idx * self.n_values..][..self.n_values]
     }
 

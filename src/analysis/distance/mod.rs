@@ -8,6 +8,7 @@ mod asked;
 mod bounds;
 mod group;
 mod kernel;
+mod lists;
 mod matrix;
 mod minima;
 mod pixels;
@@ -19,6 +20,7 @@ mod window;
 pub(crate) mod tests;
 
 pub use asked::{Asked, Everything};
+pub use lists::Lists;
 pub use matrix::DistanceMatrix;
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;

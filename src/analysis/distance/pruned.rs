@@ -54,6 +54,27 @@ impl Distances<'_> {
     }
 }
 
+impl Distances<'_> {
+    /// Calls `on_clip(j)` for every clip j >= i with D(i, j) < `limit`, of those asked for.
+    pub fn for_each_below(
+        &self,
+        i: usize,
+        limit: u64,
+        asked: &impl Asked,
+        progress: &dyn Progress,
+        on_clip: impl FnMut(usize),
+    ) -> Result<(), Cancelled> {
+        if progress.cancelled() {
+            return Err(Cancelled);
+        }
+        let asked = asked::rows(asked, [i, 1, self.n_clips()]);
+        let row = Panel::of(self, i, limit, asked).distances().remove(0);
+        let below = (i..).zip(row).filter(|(_, d)| *d != NOT_BELOW);
+        below.map(|(j, _)| j).for_each(on_clip);
+        Ok(())
+    }
+}
+
 /// Some clips against all that come after them.
 struct Panel<'a> {
     distances: &'a Distances<'a>,
