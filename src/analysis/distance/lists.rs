@@ -1,7 +1,7 @@
 //! Which clips may be alike, without asking every pair: inverted lists, for footage so long that even bounds
 //! of all pairs take long (ALGORITHMS.md 5, above 50 000 frames).
 //!
-//! The sums over 16 x 16 squares of the frame in a clip's middle, where playback jumps, are its vector. Vectors
+//! The sums over 8 x 8 squares of the frame in a clip's middle, where playback jumps, are its vector. Vectors
 //! are gathered around centers (k-means, from vectors spread evenly through the footage), and a clip is compared with those
 //! of the lists whose centers are nearest to it. What is found is measured exactly afterward; what is
 //! missed is told as recall. Whole numbers and ties to the smaller: the same with any number of threads.
@@ -38,7 +38,7 @@ impl Lists {
     /// Of all clips; `mirrored`: they will be asked for mirrored too.
     pub fn of(pixels: &ComparedSprites, clip: Clip, mirrored: bool, cpu: Level) -> Lists {
         let n_clips = (pixels.n_frames() + 1).saturating_sub(clip.frames);
-        let plain = &pixels.bounds(Side::Plain).coarse;
+        let plain = &pixels.bounds(Side::Plain).fine;
         let middle = |i: usize| i + clip.frames / 2;
         let centers = Centers::learn(plain, n_clips, middle, cpu);
         let all = (0..n_clips).into_par_iter();
@@ -56,7 +56,7 @@ impl Lists {
             } else {
                 0
             };
-            let rows = &pixels.bounds(side).coarse;
+            let rows = &pixels.bounds(side).fine;
             let of = |i: usize| {
                 let mut lists = centers.nearest(rows.row(middle(i)), n_probed);
                 lists.sort_unstable();
