@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit truth-test page-test docs deny bench accuracy papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit truth-test page-test arm-test docs deny bench accuracy papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -47,6 +47,17 @@ truth-test: target/vendor ## a flock's ground truth, read by the field's own too
 page-test: vendor ## the page in a browser, against a really started service
 	$(CARGO) test --locked --no-run
 	@scripts/page-tests.sh $(DEBUG)
+
+# Not part of `check`: an emulated processor takes half an hour. ARM_TESTS=analysis::distance runs the kernels' alone.
+ARM = aarch64-unknown-linux-gnu
+ARM_TESTS ?=
+arm-test: target/vendor ## the tests of the library on an emulated ARM processor, with its own vector instructions
+	@scripts/system-packages.sh arm-test
+	@rustup target list --installed 2>/dev/null | grep -q $(ARM) || rustup target add $(ARM)
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu" \
+	CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc PROPTEST_CASES=8 \
+	$(CARGO) test --locked --lib --target $(ARM) --target-dir target/arm $(ARM_TESTS)
 
 docs: target/vendor ## the documentation, warnings as errors
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items

@@ -1,14 +1,18 @@
 //! How fast transitions are found, and how that grows with the footage (ALGORITHMS.md 5 and 9), for
 //! `bench/transitions.py`. Prints one line of JSON.
 //!
-//! `LIBRARY_DIR`: the library's own sprites; all distances against only those below epsilon, on one thread
-//! and on all. `N`: so many sprites drawn by code; the search for transitions from end to end.
+//! `LIBRARY_DIR`: the library's own sprites; all distances against the search for transitions below its
+//! epsilon, on one thread and on all. `N`: so many sprites drawn by code; the search for transitions from end to end, exact or, with
+//! `approximate` after it, so.
 
+mod clock;
+
+use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use flockreel::analysis::distance::{ComparedSprites, Distances, NOT_BELOW, Side};
+use flockreel::analysis::distance::{ComparedSprites, Distances, Side};
 use flockreel::analysis::{Params, transition};
 use flockreel::cpu::Level;
 use flockreel::formats::library_dir;
@@ -23,7 +27,10 @@ fn main() {
     match arguments.next() {
         None => println!("arguments: LIBRARY_DIR, or a number of frames"),
         Some(argument) => match argument.parse() {
-            Ok(n_frames) => from_end_to_end(n_frames),
+            Ok(n_frames) => {
+                let approximate = arguments.next().is_some_and(|word| word == "approximate");
+                from_end_to_end(n_frames, approximate);
+            }
             Err(_) => pruned_against_all(Path::new(&argument)),
         },
     }
@@ -31,71 +38,103 @@ fn main() {
 
 fn pruned_against_all(folder: &Path) {
     let stored = library_dir::read(folder, Arc::new(InMemory::default())).expect("a library");
-    let library = stored.library;
-    let planes = stored.params.planes;
-    let pixels = ComparedSprites::new(&library.sprites, &library.poses, planes);
+    let (library, params) = (stored.library, stored.params);
+    let pixels = ComparedSprites::new(&library.sprites, &library.poses, params.planes);
     let pixels = pixels.expect("memory has room");
     let threads = rayon::current_num_threads();
-    let [plain, mirrored] = [Side::Plain, Side::Mirrored].map(|side| {
-        let [one, all] = [1, threads].map(|n| times(&library, &pixels, side, n));
+    let found = [1, threads].map(|n_threads| times(&library, &params, &pixels, n_threads));
+    let [one, all] = &found;
+    let side = |k: usize| {
         format!(
-            "{{\"all_s\":{:.6},\"below_s\":{:.6},\"times_faster\":{:.2},\
-             \"two_threads_faster\":{:.2},\"share_below\":{:.5}}}",
-            one.0,
-            one.1,
-            one.0 / one.1,
-            one.1 / all.1,
-            one.2,
+            "{{\"all_s\":{:.6},\"search_s\":{:.6},\"times_faster\":{:.2},\"two_threads_faster\":{:.2}}}",
+            one.all_s[k],
+            one.search_s[k],
+            one.all_s[k] / one.search_s[k],
+            one.search_s[k] / all.search_s[k],
         )
-    });
+    };
     println!(
-        "{{\"frames\":{},\"size\":[{},{}],\"level\":\"{}\",\"plain\":{plain},\"mirrored\":{mirrored}}}",
+        "{{\"frames\":{},\"size\":[{},{}],\"level\":\"{}\",\"candidates\":{},\"transitions\":{},\
+         \"plain\":{},\"both_sides\":{}}}",
         library.sprites.n_frames(),
         library.sprites.width(),
         library.sprites.height(),
         Level::detect().name(),
+        one.n_candidates,
+        one.n_transitions,
+        side(0),
+        side(1),
     );
 }
 
-/// Seconds for all distances and for those below epsilon, the best of seven; and their share.
-fn times(
-    library: &Library,
-    pixels: &ComparedSprites,
-    side: Side,
-    n_threads: usize,
-) -> (f64, f64, f64) {
+/// Seconds, of the plain side and of both.
+#[derive(Default)]
+struct Times {
+    /// For all distances.
+    all_s: [f64; 2],
+    /// For the transitions, from the steps to the playback graph.
+    search_s: [f64; 2],
+    n_candidates: u64,
+    n_transitions: usize,
+}
+
+/// The best of seven runs each.
+fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads: usize) -> Times {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(n_threads)
         .build();
     let pool = pool.expect("threads can be made");
-    let distances = Distances {
-        pixels,
-        clip: Params::default().clip(library.clip_frames),
-        side,
-        cpu: Level::detect(),
+    let best = |run: &mut dyn FnMut()| {
+        let seconds = |_| {
+            if n_threads == 1 {
+                return clock::core_seconds(&mut *run);
+            }
+            let start = Instant::now();
+            run();
+            start.elapsed().as_secs_f64()
+        };
+        (0..7).map(seconds).fold(f64::INFINITY, f64::min)
     };
-    let (mut n_all, mut n_below) = (0, 0);
-    let mut best = [f64::INFINITY; 2];
-    for _ in 0..7 {
-        let start = Instant::now();
-        n_all = 0;
-        let count = |_: usize, row: &[u64]| n_all += row.len();
-        pool.install(|| distances.for_each_row(&Silent, count))
-            .expect("nobody cancels");
-        best[0] = best[0].min(start.elapsed().as_secs_f64());
-        let start = Instant::now();
-        n_below = 0;
-        let count =
-            |_: usize, row: &[u64]| n_below += row.iter().filter(|d| **d != NOT_BELOW).count();
-        let below = || distances.for_each_row_below(library.epsilon, &Silent, count);
-        pool.install(below).expect("nobody cancels");
-        best[1] = best[1].min(start.elapsed().as_secs_f64());
+    let mut times = Times::default();
+    for (k, sides) in [&[Side::Plain][..], &[Side::Plain, Side::Mirrored]]
+        .into_iter()
+        .enumerate()
+    {
+        let distances = |side| Distances {
+            pixels,
+            clip: params.clip(library.clip_frames),
+            side,
+            cpu: Level::detect(),
+        };
+        times.all_s[k] = best(&mut || {
+            for &side in sides {
+                let look = |_: usize, row: &[u64]| {
+                    black_box(row);
+                };
+                let all = || distances(side).for_each_row(&Silent, look);
+                pool.install(all).expect("nobody cancels");
+            }
+        });
+        // The library's own epsilon: one search, whatever rung of kappa it was found on.
+        let params = Params {
+            epsilon: Some(library.epsilon),
+            mirror: k == 1,
+            ..params.clone()
+        };
+        let of = (&library.sprites, &library.poses);
+        times.search_s[k] = best(&mut || {
+            let search =
+                || transition::connect_compared(pixels, of, &params, Level::detect(), &Silent);
+            let found = pool.install(search).expect("nobody cancels");
+            times.n_candidates = found.n_candidates;
+            times.n_transitions = found.transitions.len();
+        });
     }
-    (best[0], best[1], n_below as f64 / n_all as f64)
+    times
 }
 
 /// Draws sprites of 96 x 64 and finds their transitions; times only the latter.
-fn from_end_to_end(n_frames: usize) {
+fn from_end_to_end(n_frames: usize, approximate: bool) {
     let swim = Swim::new(n_frames);
     let scratch = Arc::new(Spill::into(&std::env::temp_dir()));
     let sprites = Sprites::drawn([96, 64], n_frames, scratch, |frame_idx, rgba| {
@@ -104,23 +143,24 @@ fn from_end_to_end(n_frames: usize) {
     });
     let sprites = sprites.expect("the disk has room");
     let poses = swim.poses();
+    let params = Params {
+        approximate,
+        ..Params::default()
+    };
     let start = Instant::now();
-    let found = transition::connect(
-        &sprites,
-        &poses,
-        &Params::default(),
-        Level::detect(),
-        &Silent,
-    );
+    let found = transition::connect(&sprites, &poses, &params, Level::detect(), &Silent);
     let found = found.expect("nobody cancels");
     println!(
         "{{\"frames\":{n_frames},\"seconds\":{:.3},\"peak_mb\":{},\"candidates\":{},\
-         \"transitions\":{},\"component_share\":{:.3}}}",
+         \"transitions\":{},\"component_share\":{:.3},\"recall\":{}}}",
         start.elapsed().as_secs_f64(),
         peak_mb(),
         found.n_candidates,
         found.transitions.len(),
         found.component_share,
+        found
+            .recall
+            .map_or("null".into(), |recall| format!("{recall:.4}")),
     );
 }
 

@@ -39,6 +39,9 @@ pub struct Params {
     pub epsilon: Option<u64>,
     /// Multiple of the natural step, > 0, when epsilon is null.
     pub kappa: f64,
+    /// Whether only clips that look roughly alike are compared, which is faster above 50 000 frames and misses
+    /// some transitions: `stats.recall` says how many. Those found are transitions all the same.
+    pub approximate: bool,
     /// Largest difference of the mean headings of two like clips, degrees, 0..=180.
     pub heading_gate_deg: f64,
     /// Sum over the color planes and alpha (`rgba`), or over the color planes alone (`rgb`, O 3).
@@ -198,6 +201,7 @@ impl Default for Params {
             clip_weights: ClipWeights::Uniform,
             epsilon: None,
             kappa: 2.0,
+            approximate: false,
             heading_gate_deg: 15.0,
             planes: Planes::Rgba,
             mirror: true,

@@ -77,6 +77,10 @@ pub struct Matching {
     /// Cost of each frame that an individual shows again within 3 s, radians; 0 = no matter, and every plan is the
     /// cheapest.
     pub w_p: f64,
+    /// Frames that a plan looks ahead, 20..=2000; null = to the end of the film, so that the plan is the cheapest.
+    /// With it memory does not grow with the film, plans follow boids whose later ways they need not know,
+    /// `cost.gap` says what that costs, and repeats are paid for but not avoided. Not in a loop.
+    pub horizon_frames: Option<u32>,
 }
 
 /// What real frames and boids are matched by.
@@ -139,6 +143,7 @@ impl Default for Matching {
             wx: 0.8,
             w_c: 0.3,
             w_p: 0.0,
+            horizon_frames: None,
         }
     }
 }
@@ -225,6 +230,7 @@ impl Params {
                 wx: 0.0,
                 w_c: 0.0,
                 w_p: 0.0,
+                horizon_frames: None,
             },
             dwell_frames: Some(1),
             fade_frames: 0,
@@ -249,6 +255,9 @@ impl Params {
                     "position papers sums up speeds and never comes back: not in a loop".into(),
                 );
             }
+        }
+        if self.is_loop && self.matching.horizon_frames.is_some() {
+            return Err("matching.horizon_frames sees no end of the film: not in a loop".into());
         }
         if let Some(dwell) = self.dwell_frames {
             within("dwell_frames", f64::from(dwell), 1.0, 120.0)?;
@@ -283,6 +292,9 @@ impl Matching {
         ];
         for (name, value) in weights {
             within(name, value, 0.0, 4.0)?;
+        }
+        if let Some(frames) = self.horizon_frames {
+            within("matching.horizon_frames", f64::from(frames), 20.0, 2000.0)?;
         }
         within("matching.w_d", self.w_d, 0.0, 1.0)?;
         within("matching.rho_deg", self.rho_deg, 0.0, 45.0)

@@ -8,7 +8,7 @@
 //! of a longer footage a cell shows the least of its pairs, so that a single like moment still shows.
 
 use super::picture;
-use crate::analysis::distance::{Cancelled, Distances, NOT_BELOW};
+use crate::analysis::distance::{Cancelled, Distances, Everything, NOT_BELOW};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
@@ -54,7 +54,8 @@ impl DistanceMap {
         match distances.n_clips() > MOST_WHOLE {
             false => distances.for_each_row(progress, pool)?,
             true => {
-                distances.for_each_row_below(library.epsilon.saturating_mul(FAR), progress, pool)?
+                let limit = library.epsilon.saturating_mul(FAR);
+                distances.for_each_row_below(limit, &Everything, progress, pool)?
             }
         }
         map.mirror_triangle();

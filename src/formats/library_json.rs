@@ -221,6 +221,8 @@ struct StatsFile {
     #[serde(default)]
     animal_too_small: bool,
     n_candidates: u64,
+    #[serde(default)]
+    recall: Option<f64>,
     n_transitions: usize,
     kappa_used: Option<f64>,
     component_share: f64,
@@ -265,6 +267,7 @@ impl StatsFile {
             several_animals: stats.several_animals,
             animal_too_small: stats.animal_too_small,
             n_candidates: stats.n_candidates,
+            recall: stats.recall.map(digits(5)),
             n_transitions: stats.n_transitions,
             kappa_used: stats.kappa_used,
             component_share: digits(5)(stats.component_share),
@@ -284,6 +287,7 @@ impl StatsFile {
             several_animals: self.several_animals,
             animal_too_small: self.animal_too_small,
             n_candidates: self.n_candidates,
+            recall: self.recall,
             n_transitions: self.n_transitions,
             kappa_used: self.kappa_used,
             component_share: self.component_share,

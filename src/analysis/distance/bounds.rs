@@ -141,7 +141,8 @@ impl SquareSums {
         }
     }
 
-    fn row(&self, frame_idx: usize) -> &[u16] {
+    /// Of one sprite, each below 2^15.
+    pub(super) fn row(&self, frame_idx: usize) -> &[u16] {
         &self.values[frame_idx * self.n_values..][..self.n_values]
     }
 
@@ -164,13 +165,6 @@ impl SquareSums {
                 *sum = sum.saturating_mul(2).saturating_sub(rounding);
             }
         }
-    }
-
-    /// At least what the row sprite (of these) differs by from one column sprite.
-    pub(super) fn pair(&self, cpu: Level, row: usize, columns: &SquareSums, column: usize) -> u32 {
-        let mut least = [0];
-        self.against(cpu, row, columns, column, &mut least);
-        least[0]
     }
 }
 

@@ -9,7 +9,7 @@
 use std::cmp::Ordering;
 
 /// Neighbors this far away, in each clip, are compared.
-const REACH: usize = 2;
+pub(super) const REACH: usize = 2;
 const N_ROWS: usize = 2 * REACH + 1;
 
 /// Two clips, `from <= to`, and their distance.

@@ -4,9 +4,11 @@
 //! two clips; the mirrored Dm compares i with j mirrored. Both are symmetric, so only j >= i is
 //! computed. The rows stream by in order, in panels of 4 times 48: no N x N matrix is held here.
 
+mod asked;
 mod bounds;
 mod group;
 mod kernel;
+mod lists;
 mod matrix;
 mod minima;
 mod pixels;
@@ -17,6 +19,8 @@ mod window;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use asked::{Asked, Everything};
+pub use lists::Lists;
 pub use matrix::DistanceMatrix;
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;

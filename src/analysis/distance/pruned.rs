@@ -1,16 +1,18 @@
 //! Only the distances below a limit, without computing most of the others (ALGORITHMS.md 5, exact pruning).
 //!
-//! For a panel of clips all sums over 16 x 16 squares are compared; where the bound of a pair of clips is
-//! below the limit, those over 8 x 8 squares; where it still is, the pixels. What comes out is exact:
-//! a distance is left out only when a bound says that it is not below the limit.
+//! Of the pairs of clips in a panel that are asked for the sums over 16 x 16 squares are compared; where the
+//! bound of a pair is below the limit, those over 8 x 8 squares; where it still is, the pixels. What comes out
+//! is exact: a distance that is asked for is left out only when a bound says that it is not below the limit.
 //!
 //! Pairs of clips are told by their offset j - i, so that all that one of them adds up stands in one column.
 
 use rayon::prelude::*;
 
+use super::asked::{self, Asked};
+use super::bounds::SquareSums;
 use super::group::{GROUP, Group, GroupMemory};
 use super::kernel::{self, SadTile, Tile, Wanted};
-use super::{Cancelled, Distances};
+use super::{Cancelled, Distances, Side};
 use crate::progress::Progress;
 
 /// Bytes that the bounds of a panel take, about.
@@ -23,10 +25,11 @@ pub const NOT_BELOW: u64 = u64::MAX;
 
 impl Distances<'_> {
     /// As [`for_each_row`](Distances::for_each_row), but of the distances that are not below `limit` it
-    /// is only told that they are not: they are [`NOT_BELOW`].
+    /// is only told that they are not: they are [`NOT_BELOW`]. So are those not asked for.
     pub fn for_each_row_below(
         &self,
         limit: u64,
+        asked: &impl Asked,
         progress: &dyn Progress,
         mut on_row: impl FnMut(usize, &[u64]),
     ) -> Result<(), Cancelled> {
@@ -40,7 +43,8 @@ impl Distances<'_> {
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
             let n_rows = n_rows.min(n_clips - first);
-            let rows = Panel::of(self, first, n_rows, limit).distances();
+            let asked = asked::rows(asked, [first, n_rows, n_clips]);
+            let rows = Panel::of(self, first, limit, asked).distances();
             for (clip_idx, row) in (first..).zip(rows) {
                 on_row(clip_idx, &row);
             }
@@ -50,81 +54,108 @@ impl Distances<'_> {
     }
 }
 
+impl Distances<'_> {
+    /// Calls `on_clip(j)` for every clip j >= i with D(i, j) < `limit`, of those asked for.
+    pub fn for_each_below(
+        &self,
+        i: usize,
+        limit: u64,
+        asked: &impl Asked,
+        progress: &dyn Progress,
+        on_clip: impl FnMut(usize),
+    ) -> Result<(), Cancelled> {
+        if progress.cancelled() {
+            return Err(Cancelled);
+        }
+        let asked = asked::rows(asked, [i, 1, self.n_clips()]);
+        let row = Panel::of(self, i, limit, asked).distances().remove(0);
+        let below = (i..).zip(row).filter(|(_, d)| *d != NOT_BELOW);
+        below.map(|(j, _)| j).for_each(on_clip);
+        Ok(())
+    }
+}
+
 /// Some clips against all that come after them.
 struct Panel<'a> {
     distances: &'a Distances<'a>,
     limit: u64,
-    /// The first clip, and how many there are.
+    weights: Vec<u64>,
+    /// The first clip.
     first: usize,
-    n_clips: usize,
-    /// Per frame of these clips: at least d of it and the frame so many after it.
+    /// Per clip: which pairs with so many clips after it may be below the limit.
+    near: Vec<Vec<bool>>,
+    /// Per frame of these clips: at least d of it and the frame so many after it, where that was looked at.
     least: Vec<Vec<u32>>,
 }
 
 impl<'a> Panel<'a> {
-    fn of(distances: &'a Distances<'a>, first: usize, n_clips: usize, limit: u64) -> Panel<'a> {
+    /// Of the clips from `first` on, of which these pairs are asked for.
+    fn of(
+        distances: &'a Distances<'a>,
+        first: usize,
+        limit: u64,
+        asked: Vec<Vec<bool>>,
+    ) -> Panel<'a> {
         let n_frames = distances.pixels.n_frames();
-        let rows = &distances.pixels.bounds(distances.side).coarse;
-        let columns = &distances.pixels.bounds(super::Side::Plain).coarse;
-        let least = (first..first + n_clips + distances.clip.frames - 1)
-            .into_par_iter()
-            .map(|row| {
-                let mut least = vec![0; n_frames - row];
-                rows.against(distances.cpu, row, columns, row, &mut least);
-                least
-            })
-            .collect();
+        let last = first + asked.len() + distances.clip.frames - 1;
         Panel {
             distances,
             limit,
+            weights: distances.clip.weights(),
             first,
-            n_clips,
-            least,
+            near: asked,
+            least: (first..last).map(|row| vec![0; n_frames - row]).collect(),
         }
     }
 
     /// D of every clip of the panel and all from it on.
     fn distances(mut self) -> Vec<Vec<u64>> {
-        let near = self.near();
-        self.look_closer(&self.frames_of(&near));
-        let near = self.near();
-        let tiles = Tiles::of(&self, &self.frames_of(&near));
-        let weights = self.distances.clip.weights();
+        let pixels = self.distances.pixels;
+        let [rows, columns] = [self.distances.side, Side::Plain].map(|side| pixels.bounds(side));
+        self.look_at(&rows.coarse, &columns.coarse);
+        self.look_at(&rows.fine, &columns.fine);
+        let tiles = Tiles::of(&self, &self.frames());
         let one = |(clip, near): (usize, &Vec<bool>)| {
             let exact = |(offset, &near): (usize, &bool)| match near {
                 false => NOT_BELOW,
-                true => self.exact(&tiles, &weights, [clip, offset]),
+                true => self.exact(&tiles, [clip, offset]),
             };
             near.iter().enumerate().map(exact).collect()
         };
-        near.par_iter().enumerate().map(one).collect()
+        self.near.par_iter().enumerate().map(one).collect()
     }
 
-    /// Which pairs of clips the bounds leave below the limit.
-    fn near(&self) -> Vec<Vec<bool>> {
-        let weights = self.distances.clip.weights();
-        let all_clips = self.distances.n_clips();
-        let of_clip = |clip: usize| {
-            let mut sums = vec![0u32; all_clips - self.first - clip];
-            for (&weight, row) in weights.iter().zip(&self.least[clip..]) {
-                let weight = u32::try_from(weight).unwrap_or(u32::MAX);
-                for (sum, least) in sums.iter_mut().zip(row) {
-                    *sum = sum.saturating_add(least.saturating_mul(weight));
-                }
+    /// Raises the bounds of the frames of all pairs that are near to those of such squares, and drops the
+    /// pairs that are not near by these.
+    fn look_at(&mut self, rows: &SquareSums, columns: &SquareSums) {
+        let wanted = self.frames();
+        let (first, cpu) = (self.first, self.distances.cpu);
+        // So low that all that is added up fits 32 bits, and where it can be as high as the limit.
+        let most = u64::from(u32::MAX) / self.weights.iter().sum::<u64>();
+        let most = most.min(self.limit) as u32;
+        let of_frame = |(k, (least, wanted)): (usize, (&mut Vec<u32>, &Vec<bool>))| {
+            let row = first + k;
+            for run in asked::runs(wanted) {
+                let least = &mut least[run.clone()];
+                rows.against(cpu, row, columns, row + run.start, least);
+                least
+                    .iter_mut()
+                    .for_each(|least| *least = (*least).min(most));
             }
-            sums.iter()
-                .map(|&sum| u64::from(sum) < self.limit)
-                .collect()
         };
-        (0..self.n_clips).into_par_iter().map(of_clip).collect()
+        let frames = self.least.par_iter_mut().zip(&wanted);
+        frames.enumerate().for_each(of_frame);
+        let (least, weights, limit) = (&self.least, &self.weights, self.limit);
+        let clips = self.near.par_iter_mut().enumerate();
+        clips.for_each(|(clip, near)| drop_far(near, &least[clip..], weights, limit));
     }
 
-    /// Which pairs of frames those pairs of clips consist of.
-    fn frames_of(&self, near: &[Vec<bool>]) -> Vec<Vec<bool>> {
+    /// Which pairs of frames the pairs of clips that are near consist of.
+    fn frames(&self) -> Vec<Vec<bool>> {
         let f = self.distances.clip.frames;
         let of_frame = |row: usize| {
             let mut wanted = vec![false; self.least[row].len()];
-            for clip in &near[(row + 1).saturating_sub(f)..self.n_clips.min(row + 1)] {
+            for clip in &self.near[(row + 1).saturating_sub(f)..self.near.len().min(row + 1)] {
                 let both = wanted.iter_mut().zip(clip);
                 both.for_each(|(wanted, near)| *wanted |= near);
             }
@@ -136,31 +167,33 @@ impl<'a> Panel<'a> {
             .collect()
     }
 
-    /// Raises the bounds of the wanted pairs of frames to those of the fine squares.
-    fn look_closer(&mut self, wanted: &[Vec<bool>]) {
-        let Distances {
-            pixels, side, cpu, ..
-        } = *self.distances;
-        let rows = &pixels.bounds(side).fine;
-        let columns = &pixels.bounds(super::Side::Plain).fine;
-        let first = self.first;
-        let of_frame = |(k, (least, wanted)): (usize, (&mut Vec<u32>, &Vec<bool>))| {
-            let row = first + k;
-            for (offset, least) in least.iter_mut().enumerate().filter(|(k, _)| wanted[*k]) {
-                *least = rows.pair(cpu, row, columns, row + offset);
-            }
-        };
-        let rows = self.least.par_iter_mut().zip(wanted);
-        rows.enumerate().for_each(of_frame);
-    }
-
-    fn exact(&self, tiles: &Tiles, weights: &[u64], [clip, offset]: [usize; 2]) -> u64 {
+    fn exact(&self, tiles: &Tiles, [clip, offset]: [usize; 2]) -> u64 {
         let first = self.first + clip;
-        let weighed = (first..).zip(weights);
+        let weighed = (first..).zip(&self.weights);
         let sum = weighed
             .map(|(row, w)| w * tiles.sad(row, row + offset))
             .sum();
         if sum < self.limit { sum } else { NOT_BELOW }
+    }
+}
+
+/// Drops the pairs of a clip that the bounds of their frames say are not below the limit. All that is
+/// added up fits 32 bits.
+fn drop_far(near: &mut [bool], least: &[Vec<u32>], weights: &[u64], limit: u64) {
+    let mut sums = Vec::new();
+    for run in asked::runs(&near.to_vec()) {
+        sums.clear();
+        sums.resize(run.len(), 0u32);
+        for (&weight, row) in weights.iter().zip(least) {
+            let each = sums.iter_mut().zip(&row[run.clone()]);
+            match weight as u32 {
+                1 => each.for_each(|(sum, least)| *sum += least),
+                weight => each.for_each(|(sum, least)| *sum += least * weight),
+            }
+        }
+        for (near, &sum) in near[run].iter_mut().zip(&sums) {
+            *near &= u64::from(sum) < limit;
+        }
     }
 }
 

@@ -267,7 +267,7 @@ proptest! {
                 let distances = Distances { pixels: &pixels, clip, side, cpu };
                 let mut rows = Vec::new();
                 let push = |_: usize, row: &[u64]| rows.push(row.to_vec());
-                distances.for_each_row_below(limit, &Silent, push).expect("nobody cancels");
+                distances.for_each_row_below(limit, &Everything, &Silent, push).expect("nobody cancels");
                 let below = |&d: &u64| if d < limit { d } else { NOT_BELOW };
                 let wanted: Vec<Vec<u64>> =
                     whole.iter().map(|row| row.iter().map(below).collect()).collect();

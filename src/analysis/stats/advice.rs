@@ -19,6 +19,8 @@ const LEVEL_BINS: usize = 3;
 /// is no jitter of the heading.
 const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
+/// Of more frames it is said that their transitions can be found approximately.
+const MANY_FRAMES: usize = 50_000;
 /// Slower than this is rest, lengths a second; measured over so long either way.
 const REST_BL_PER_S: f64 = 0.1;
 const REACH_S: f64 = 0.1;
@@ -45,6 +47,10 @@ pub enum Advice {
     LooseJumps(f64),
     /// The animal moves in this share of what can be played, below a quarter.
     MostlyRests(f64),
+    /// Transitions were looked for approximately, and this share of the like moments was found.
+    SomeMissed(f64),
+    /// So many frames, above 50 000, were all compared: `approximate` is faster.
+    ManyFrames(usize),
     /// Of a motion there are so many seconds in what can be played, below 0.5, and so many in the footage.
     Lacks(Motion, f64, f64),
 }
@@ -85,6 +91,8 @@ impl Advice {
             Advice::FewJumps(_) => "few_jumps",
             Advice::LooseJumps(_) => "loose_jumps",
             Advice::MostlyRests(_) => "mostly_rests",
+            Advice::SomeMissed(_) => "some_missed",
+            Advice::ManyFrames(_) => "many_frames",
             Advice::Lacks(motion, ..) => motion.names().0,
         }
     }
@@ -173,6 +181,16 @@ impl fmt::Display for Advice {
                 "the animal moves in only {} of what can be played: film it while it is lively",
                 percent(share)
             ),
+            Advice::SomeMissed(recall) => write!(
+                f,
+                "like moments were looked for approximately, and {} of them were found: set approximate to false \
+                 to find all",
+                percent(recall)
+            ),
+            Advice::ManyFrames(n) => write!(
+                f,
+                "all {n} frames were compared with one another: set approximate to true where that takes too long"
+            ),
             Advice::Lacks(motion, playable_s, filmed_s) => {
                 motion.lacking(f, *playable_s, *filmed_s)
             }
@@ -200,6 +218,7 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     if cut > 0.2 {
         all.push(Advice::OftenAtBorder(cut));
     }
+    of_search(library, params, &mut all);
     match library.playback.jumps.is_empty() {
         // Without sprites nothing is compared: the animal's size is the reason.
         true if stats.animal_too_small => {}
@@ -207,6 +226,18 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
         false => of_playback(library, params, &mut all),
     }
     all
+}
+
+/// How the search for transitions went, and how else it could.
+fn of_search(library: &Library, params: &Params, all: &mut Vec<Advice>) {
+    let n_frames = library.stats.n_frames;
+    match library.stats.recall {
+        Some(recall) => all.push(Advice::SomeMissed(recall)),
+        None if n_frames > MANY_FRAMES && !params.approximate => {
+            all.push(Advice::ManyFrames(n_frames));
+        }
+        None => {}
+    }
 }
 
 fn of_playback(library: &Library, params: &Params, all: &mut Vec<Advice>) {

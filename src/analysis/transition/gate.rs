@@ -16,7 +16,19 @@ pub(super) struct Gate {
     turn_rate_rad_per_s: Vec<Option<f64>>,
     view: View,
     heading_gate_rad: f64,
+    /// What the view's gate compares, in parts of a circle that wrap; 0 where it is unknown.
+    parts: Vec<u32>,
+    /// Clips further apart than this never pass.
+    most_parts: u32,
 }
+
+/// Parts of a circle: so many that what rounding does is far below any gap that matters.
+const PARTS_PER_RAD: f64 = 4_294_967_296.0 / TAU;
+/// Faster turns than this, radians a second, are taken for it: half a circle's parts stay apart.
+const FASTEST_RAD_PER_S: f64 = 1000.0;
+/// Radians of those parts for a radian a second: the fastest two ways are less than a circle apart by more
+/// than the gate.
+const RATE_SCALE: f64 = 1e-3;
 
 impl Gate {
     /// For every clip of the footage.
@@ -30,14 +42,42 @@ impl Gate {
                 .collect()
         };
         let per_frame = of_clips(|clip| Some(turn_rate(clip)));
+        let mean_heading_rad = of_clips(|clip| mean_rad(clip.iter().copied()));
+        let turn_rate_rad_per_s: Vec<Option<f64>> = per_frame
+            .into_iter()
+            .map(|rate| Some(rate? * poses.fps))
+            .collect();
+        let heading_gate_rad = params.heading_gate_deg.to_radians();
+        let (compared, most) = match poses.view {
+            View::Side => (&mean_heading_rad, heading_gate_rad),
+            View::Top => (&turn_rate_rad_per_s, TURN_GATE_RAD_PER_S * RATE_SCALE),
+        };
         Gate {
-            mean_heading_rad: of_clips(|clip| mean_rad(clip.iter().copied())),
-            turn_rate_rad_per_s: per_frame
-                .into_iter()
-                .map(|rate| Some(rate? * poses.fps))
+            parts: compared
+                .iter()
+                .map(|v| parts(poses.view, v.unwrap_or(0.0)))
                 .collect(),
+            most_parts: ((most * PARTS_PER_RAD).ceil() as u32).saturating_add(4),
+            mean_heading_rad,
+            turn_rate_rad_per_s,
             view: poses.view,
-            heading_gate_rad: params.heading_gate_deg.to_radians(),
+            heading_gate_rad,
+        }
+    }
+
+    /// Marks which pairs of clip `i` may pass: entry k is (i, i + k). Every pair that passes is marked, and
+    /// hardly any other. Whole numbers, because every pair of a footage is asked.
+    pub(super) fn mark(&self, i: usize, mirrored: bool, row: &mut [bool]) {
+        let turned = match (self.view, mirrored) {
+            // Of half a circle less the heading, and of the rate the other way.
+            (_, false) => |parts: u32| parts,
+            (View::Side, true) => |parts: u32| (1u32 << 31).wrapping_sub(parts),
+            (View::Top, true) => |parts: u32| parts.wrapping_neg(),
+        };
+        let here = turned(self.parts[i]);
+        for (marked, &there) in row.iter_mut().zip(&self.parts[i..]) {
+            let gap = here.wrapping_sub(there) as i32;
+            *marked = gap.unsigned_abs() <= self.most_parts;
         }
     }
 
@@ -57,6 +97,15 @@ impl Gate {
         };
         passes.then_some(gap_rad)
     }
+}
+
+/// A heading, or a rate of turning, in parts of a circle.
+fn parts(view: View, value: f64) -> u32 {
+    let rad = match view {
+        View::Side => value,
+        View::Top => value.clamp(-FASTEST_RAD_PER_S, FASTEST_RAD_PER_S) * RATE_SCALE,
+    };
+    (rad * PARTS_PER_RAD).round() as i64 as u32
 }
 
 /// Slope of the line fitted to the unwrapped headings, radians a frame; 0 for a single frame.
@@ -129,6 +178,31 @@ mod tests {
         assert!(gate.pass(0, 2, false).is_some());
         assert!(gate.pass(0, 4, false).is_none());
         assert!(gate.pass(0, 4, true).is_some());
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn whatever_passes_was_marked_and_hardly_anything_else(
+            headings_deg in proptest::collection::vec(-179f64..180.0, 3..40),
+            whole: bool, from_above: bool, mirrored: bool,
+        ) {
+            // Whole degrees lie on the gate's edge now and then.
+            let headings: Vec<f64> = match whole {
+                true => headings_deg.iter().map(|h| h.round()).collect(),
+                false => headings_deg,
+            };
+            let gate = gate(if from_above { View::Top } else { View::Side }, &headings);
+            for i in 0..headings.len() - 1 {
+                let mut row = vec![false; headings.len() - 1 - i];
+                gate.mark(i, mirrored, &mut row);
+                for (j, marked) in (i..).zip(row) {
+                    let passes = gate.pass(i, j, mirrored).is_some();
+                    proptest::prop_assert!(marked || !passes, "({}, {})", i, j);
+                    let on_edge = whole;
+                    proptest::prop_assert!(!marked || passes || on_edge, "({}, {})", i, j);
+                }
+            }
+        }
     }
 
     #[test]

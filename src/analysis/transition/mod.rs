@@ -7,13 +7,15 @@
 //! where it nearly is, seen head-on, turning over on the spot is just what is wanted.
 
 mod gate;
+mod joinable;
 #[cfg(test)]
 mod tests;
 
 use crate::analysis::distance::{
-    Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Side,
+    Cancelled, ClipPair, ComparedSprites, Distances, Lists, LocalMinima, Side,
 };
 use gate::Gate;
+use joinable::Joinable;
 
 use crate::analysis::{Error, Params, playback};
 use crate::cpu::Level;
@@ -39,8 +41,11 @@ pub struct Connections {
     pub natural_step: u64,
     /// The multiple of the natural step that epsilon is, rounded up; `None` when epsilon was given.
     pub kappa_used: Option<f64>,
-    /// Pairs i < j of clips whose sprites are all present with D < epsilon, before any other test.
+    /// Pairs i < j of clips that may be joined and have D < epsilon, before only the nearest around are kept.
     pub n_candidates: u64,
+    /// Share of such pairs that a search by lists finds, measured on the pairs of 256 clips, 0..=1; `None` where
+    /// every pair was looked at.
+    pub recall: Option<f64>,
     /// By (from, to, mirrored).
     pub transitions: Vec<Transition>,
     /// What may follow what.
@@ -62,21 +67,33 @@ pub fn connect(
     cpu: Level,
     progress: &dyn Progress,
 ) -> Result<Connections, Error> {
-    let clip_frames = params.clip_frames_at(poses.fps);
     let pixels = ComparedSprites::new(sprites, poses, params.planes)?;
+    connect_compared(&pixels, (sprites, poses), params, cpu, progress)
+}
+
+/// As [`connect`], of sprites that are laid out for comparison already.
+pub fn connect_compared(
+    pixels: &ComparedSprites,
+    (sprites, poses): (&Sprites, &Poses),
+    params: &Params,
+    cpu: Level,
+    progress: &dyn Progress,
+) -> Result<Connections, Error> {
+    let clip_frames = params.clip_frames_at(poses.fps);
     let clips = Clips::new(sprites, poses, clip_frames);
     let clip = params.clip(clip_frames);
-    let steps = natural_steps(&pixels, &clips, &clip.weights());
+    let steps = natural_steps(pixels, &clips, &clip.weights());
     let rungs = rungs(params, steps);
     let search = Search {
         distances: Distances {
-            pixels: &pixels,
+            pixels,
             clip,
             side: Side::Plain,
             cpu,
         },
         clips: &clips,
         gate: Gate::new(poses, clip_frames, params),
+        lists: (params.approximate).then(|| Lists::of(pixels, clip, params.mirror, cpu)),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
     let mut connections = None;
@@ -91,7 +108,11 @@ pub fn connect(
             break;
         }
     }
-    Ok(connections.expect("there is always a first rung"))
+    let mut connections = connections.expect("there is always a first rung");
+    connections.recall = search
+        .recall(connections.epsilon, params.mirror)
+        .map_err(|Cancelled| Error::Cancelled)?;
+    Ok(connections)
 }
 
 /// Which frames and clips can be used.
@@ -189,6 +210,8 @@ struct Search<'a> {
     clips: &'a Clips,
     gate: Gate,
     least_gap: usize,
+    /// Of an approximate search: which clips are compared.
+    lists: Option<Lists>,
 }
 
 /// What a search found below an epsilon.
@@ -218,10 +241,8 @@ impl Search<'_> {
         progress: &dyn Progress,
         found: &mut Found,
     ) -> Result<(), Cancelled> {
-        let least_gap = match side {
-            Side::Plain => self.least_gap,
-            Side::Mirrored => 0,
-        };
+        let asked = self.joinable(side);
+        let least_gap = asked.least_gap;
         let mut minima = LocalMinima::new(&self.clips.usable, least_gap, epsilon);
         let distances = Distances {
             side,
@@ -231,21 +252,57 @@ impl Search<'_> {
             transitions,
             n_candidates,
         } = found;
-        distances.for_each_row_below(epsilon, progress, |i, row| {
-            if side == Side::Plain && self.clips.all_present[i] {
-                let others = row.iter().zip(&self.clips.all_present[i..]).skip(1);
-                let alike = others.filter(|(d, present)| **d < epsilon && **present);
-                *n_candidates += alike.count() as u64;
+        distances.for_each_row_below(epsilon, &asked, progress, |i, row| {
+            if side == Side::Plain {
+                let alike = (i..)
+                    .zip(row)
+                    .skip(least_gap)
+                    .filter(|(_, d)| **d < epsilon);
+                let known = |j| asked.holds(i, j) && asked.is_compared(i, j);
+                *n_candidates += alike.filter(|&(j, _)| known(j)).count() as u64;
             }
-            minima.push(row, |pair| transitions.extend(self.transition(pair, side)));
+            minima.push(row, |pair| {
+                transitions.extend(self.transition(pair, &asked))
+            });
         })?;
-        minima.finish(|pair| transitions.extend(self.transition(pair, side)));
+        minima.finish(|pair| transitions.extend(self.transition(pair, &asked)));
         Ok(())
     }
 
-    fn transition(&self, pair: ClipPair, side: Side) -> Option<Transition> {
-        let mirrored = side == Side::Mirrored;
+    fn joinable(&self, side: Side) -> Joinable<'_> {
+        let least_gap = match side {
+            Side::Plain => self.least_gap,
+            Side::Mirrored => 0,
+        };
+        Joinable {
+            search: self,
+            side,
+            least_gap,
+        }
+    }
+
+    /// Of the pairs of some clips that are alike, the share that an approximate search compares.
+    fn recall(&self, epsilon: u64, mirror: bool) -> Result<Option<f64>, Cancelled> {
+        if self.lists.is_none() {
+            return Ok(None);
+        }
+        let mut counts = self.joinable(Side::Plain).found_of_sample(epsilon)?;
+        if mirror {
+            let mirrored = self.joinable(Side::Mirrored).found_of_sample(epsilon)?;
+            (0..2).for_each(|k| counts[k] += mirrored[k]);
+        }
+        let [all, found] = counts.map(|n| n as f64);
+        Ok(Some(if all > 0.0 { found / all } else { 1.0 }))
+    }
+
+    /// A local minimum, if it may be joined. Around a pair that is compared so is all that it competes with; what was
+    /// looked at for that alone is none.
+    fn transition(&self, pair: ClipPair, asked: &Joinable<'_>) -> Option<Transition> {
+        let mirrored = asked.side == Side::Mirrored;
         let heading_gap_rad = self.gate.pass(pair.from, pair.to, mirrored)?;
+        if !asked.is_compared(pair.from, pair.to) {
+            return None;
+        }
         Some(Transition {
             from: pair.from as u32,
             to: pair.to as u32,
@@ -267,6 +324,7 @@ impl Found {
             natural_step,
             kappa_used: rung.kappa,
             n_candidates: self.n_candidates,
+            recall: None,
             component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
             patches: playback::patches(&playback),
             transitions: self.transitions,

@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
+use proptest::prelude::*;
+
 use super::*;
-use crate::geometry::angle::mirrored_rad;
+use crate::geometry::angle::{mirrored_rad, wrap_rad};
 use crate::library::{Pose, View};
 use crate::progress::Silent;
+use crate::random;
 use crate::scratch::{Full, InMemory};
 use libm::{cos, sin};
 
@@ -86,20 +89,159 @@ fn an_animal_that_repeats_its_stroke_may_jump_by_whole_strokes() {
 }
 
 #[test]
-fn candidates_are_counted_before_any_other_test() {
-    let still = vec![Some((0.0, 0.0)); 8];
+fn candidates_are_counted_before_only_the_nearest_are_kept() {
+    let still = vec![Some((0.0, 0.0)); 10];
     let params = Params {
         epsilon: Some(1),
         ..params()
     };
     let found = connections(&still, &params);
-    // Five clips, all equal: ten pairs. They lie too near each other for a transition.
-    assert_eq!((found.n_candidates, found.kappa_used), (10, None));
+    // Seven clips, all equal: three pairs are half a second apart, and the first of them is kept.
+    assert_eq!((found.n_candidates, found.kappa_used), (3, None));
+    let plain = found.transitions.iter().filter(|t| !t.mirrored);
+    let pairs: Vec<_> = plain.map(|t| (t.from, t.to)).collect();
+    assert_eq!(pairs, [(0, 5)]);
+}
+
+/// The transitions by the definition: all distances, the minima among them, and only then the gate.
+fn by_definition(
+    sprites: &Sprites,
+    poses: &Poses,
+    params: &Params,
+    epsilon: u64,
+) -> Vec<Transition> {
+    let pixels = ComparedSprites::new(sprites, poses, params.planes).expect("memory has room");
+    let f = params.clip_frames_at(poses.fps);
+    let clips = Clips::new(sprites, poses, f);
+    let gate = Gate::new(poses, f, params);
+    let mut all = Vec::new();
+    for (side, least_gap) in [
+        (
+            Side::Plain,
+            f.max((LEAST_GAP_S * poses.fps).ceil() as usize),
+        ),
+        (Side::Mirrored, 0),
+    ] {
+        let mirrored = side == Side::Mirrored;
+        let mut minima = LocalMinima::new(&clips.usable, least_gap, epsilon);
+        let mut keep = |pair: ClipPair| {
+            let gap = gate.pass(pair.from, pair.to, mirrored);
+            all.extend(gap.map(|heading_gap_rad| Transition {
+                from: pair.from as u32,
+                to: pair.to as u32,
+                mirrored,
+                distance: pair.distance,
+                heading_gap_rad,
+            }));
+        };
+        let (clip, pixels, cpu) = (params.clip(f), &pixels, Level::Scalar);
+        let distances = Distances {
+            pixels,
+            clip,
+            side,
+            cpu,
+        };
+        let push = |_: usize, row: &[u64]| minima.push(row, &mut keep);
+        distances
+            .for_each_row(&Silent, push)
+            .expect("nobody cancels");
+        minima.finish(&mut keep);
+    }
+    all.sort_unstable_by_key(|t| (t.from, t.to, t.mirrored));
+    all
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(40))]
+
+    /// An animal that turns and strokes at random, now and then lost, cut or headless.
+    #[test]
+    fn with_the_gate_first_the_transitions_are_those_of_all_distances(
+        (n_frames, f, seed) in (1usize..230, 1u32..6, any::<u64>()),
+        (turn, kappa, gate_deg) in (0.0f64..0.6, 0.5f64..6.0, 2.0f64..60.0),
+        from_above: bool,
+    ) {
+        let (mut phase, mut heading_rad) = (0.0f64, 0.3f64);
+        let moments: Vec<Option<Moment>> = (0..n_frames as u64).map(|t| {
+            phase += 0.04 + 0.02 * random::normal(seed, &[t, 0]);
+            heading_rad = wrap_rad(heading_rad + turn * random::normal(seed, &[t, 1]));
+            (random::bits(seed, &[t, 2]) % 60 > 0).then_some((phase.rem_euclid(1.0), heading_rad))
+        }).collect();
+        let (sprites, mut poses) = film(&moments);
+        for (t, pose) in (0..).zip(&mut poses.frames) {
+            pose.cut = random::bits(seed, &[t, 3]).is_multiple_of(50);
+        }
+        poses.view = if from_above { View::Top } else { View::Side };
+        let params = Params {
+            clip_frames: Some(f),
+            heading_gate_deg: gate_deg,
+            kappa,
+            ..Params::default()
+        };
+        for cpu in [Level::Scalar, Level::detect()] {
+            let found = connect(&sprites, &poses, &params, cpu, &Silent).expect("nobody cancels");
+            let wanted = by_definition(&sprites, &poses, &params, found.epsilon);
+            prop_assert!(found.transitions == wanted, "{:?} {:?}", found.transitions.len(), wanted.len());
+        }
+    }
+}
+
+/// An animal whose stroke drifts, so that no two moments are quite the same.
+fn drifting(n_frames: u64) -> (Sprites, Poses) {
+    let mut phase = 0.0f64;
+    let moments: Vec<Option<Moment>> = (0..n_frames)
+        .map(|t| {
+            phase = (phase + 0.05 + 0.02 * random::normal(9, &[t])).rem_euclid(1.0);
+            Some((phase, 0.2 * sin(t as f64 / 50.0)))
+        })
+        .collect();
+    film(&moments)
+}
+
+#[test]
+fn what_an_approximate_search_finds_is_true_and_what_it_misses_is_told() {
+    let (sprites, poses) = drifting(230);
+    let exact = Params {
+        mirror: false,
+        ..params()
+    };
+    let approximate = Params {
+        approximate: true,
+        ..exact.clone()
+    };
+    let of = |params| connect(&sprites, &poses, params, Level::detect(), &Silent);
+    let (all, some) = (of(&exact), of(&approximate));
+    let (all, some) = (all.expect("not cancelled"), some.expect("not cancelled"));
+    assert_eq!((all.recall, all.epsilon), (None, some.epsilon));
+    assert!(!some.transitions.is_empty());
+    assert!(some.transitions.iter().all(|t| all.transitions.contains(t)));
+    // So few clips are all in the sample.
+    let share = some.n_candidates as f64 / all.n_candidates as f64;
+    assert_eq!(some.recall, Some(share));
+    assert!((0.8..1.0).contains(&share), "{share}");
+}
+
+#[test]
+fn an_approximate_search_is_the_same_with_any_number_of_threads_and_at_any_level() {
+    let (sprites, poses) = drifting(700);
+    let params = Params {
+        approximate: true,
+        ..params()
+    };
+    let with = |n_threads, cpu| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n_threads)
+            .build();
+        let run = || connect(&sprites, &poses, &params, cpu, &Silent).expect("not cancelled");
+        pool.expect("threads can be made").install(run)
+    };
+    let one = with(1, Level::Scalar);
     assert!(
-        found.transitions.iter().all(|t| t.mirrored),
+        one.recall.is_some_and(|recall| recall > 0.7),
         "{:?}",
-        found.transitions
+        one.recall
     );
+    assert_eq!(one, with(2, Level::detect()));
 }
 
 #[test]

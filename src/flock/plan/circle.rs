@@ -10,7 +10,7 @@ use super::trellis::Trellis;
 
 /// What a plan that may not be costs at least. Three of these and all costs of a loop's plan stay below
 /// 2^31.
-const FORBIDDEN: u32 = 1 << 28;
+pub(super) const FORBIDDEN: u32 = 1 << 28;
 
 /// Where a plan begins, and what follows its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@ pub mod certificate;
 pub mod circle;
 pub mod cost;
 pub mod crowd;
+pub mod horizon;
 pub mod landings;
 pub mod memory;
 mod round;
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 use self::circle::Ends;
 use self::cost::{CEILING, Feature, Features, Weights};
 use self::crowd::{Crowd, Place, Settled};
+use self::horizon::Horizon;
 use self::memory::Memory;
 use self::round::Round;
 use self::trellis::Trellis;
@@ -80,6 +82,8 @@ pub struct Planner<'a> {
     dwell: usize,
     fps: f64,
     shelf: Shelf,
+    /// How far plans look ahead; to the end, when absent.
+    horizon: Option<Horizon>,
     boids: &'a [BoidTrack],
     /// Of each individual, in a loop.
     ends: Vec<Ends>,
@@ -103,16 +107,19 @@ impl<'a> Planner<'a> {
         let features = Features::new(weights.features(&trellis, motion));
         let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
         let place = |t| boids.iter().map(|boid| crowd.place(boid, t)).collect();
+        let dwell = params
+            .dwell_frames
+            .map_or(library.clip_frames, |frames| frames as usize)
+            .max(1);
+        let horizon = params.matching.horizon_frames;
         Planner {
             features,
             alike: crowd.alike(&trellis),
             places: (0..n_frames).map(place).collect(),
             crowd,
             memory: Memory::new(params.matching.w_p, fps),
-            dwell: params
-                .dwell_frames
-                .map_or(library.clip_frames, |frames| frames as usize)
-                .max(1),
+            horizon: horizon.map(|n| Horizon::new(n as usize, &trellis, dwell)),
+            dwell,
             trellis,
             weights,
             fps,

@@ -85,6 +85,23 @@ impl Round<'_> {
             rows = rows.between(ids.map(|id| planner.ends[id]));
         }
         let film = planner.film();
+        if let Some(horizon) = &planner.horizon {
+            let least = film.least_costs(&mut rows.clone());
+            let plans = horizon.paths(&film, &rows).zip(least);
+            let (plans, least) = plans.ok_or(Error::NoTransitions)?;
+            let found = |lane: usize| {
+                let mut path = Path {
+                    states: plans[lane].clone(),
+                    cost: 0,
+                };
+                path.cost = planner.cost_among(ids[lane], wanted[lane], settled, &path);
+                Found {
+                    least: least[lane],
+                    ..planner.found(path)
+                }
+            };
+            return Ok(std::array::from_fn(found));
+        }
         let paths = film.cheapest_paths(&rows).ok_or(Error::NoTransitions)?;
         let is_closed = |(id, path): (&usize, &Path)| match planner.ends.get(*id) {
             Some(ends) => ends.holds(&path.states),

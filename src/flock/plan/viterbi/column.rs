@@ -9,6 +9,7 @@
 use super::landing;
 use super::walk::{Frame, Trace};
 use super::{Film, Rows, UNREACHED};
+#[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;
 use crate::flock::plan::landings::{GROUP, Way};
 
