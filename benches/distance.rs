@@ -8,8 +8,6 @@
     reason = "the bare instruction is timed by inline assembly"
 )]
 
-mod clock;
-
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -116,7 +114,9 @@ fn busy_gb_per_s(clip_frames: usize) -> f64 {
             std::hint::black_box(row);
         };
         let all = || distances(&pixels, clip_frames).for_each_row(&Silent, look);
-        clock::core_seconds(|| pool.install(all).expect("not cancelled"))
+        let start = Instant::now();
+        pool.install(all).expect("not cancelled");
+        start.elapsed().as_secs_f64()
     };
     let seconds = (0..7).map(run).fold(f64::INFINITY, f64::min);
     let n = n_frames as f64;
@@ -148,7 +148,6 @@ fn peak_gb_per_s() -> f64 {
     if is_x86_feature_detected!("avx2") {
         const ROUNDS: u64 = 2_000_000;
         let run = || {
-            // By the clock: a run is shorter than what the system tells time on a core by.
             let start = Instant::now();
             // SAFETY: AVX2 is there; only registers that are declared are touched.
             unsafe { sad_and_add_8(ROUNDS) };

@@ -5,8 +5,6 @@
 //! epsilon, on one thread and on all. `N`: so many sprites drawn by code; the search for transitions from end to end, exact or, with
 //! `approximate` after it, so.
 
-mod clock;
-
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -86,9 +84,6 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
     let pool = pool.expect("threads can be made");
     let best = |run: &mut dyn FnMut()| {
         let seconds = |_| {
-            if n_threads == 1 {
-                return clock::core_seconds(&mut *run);
-            }
             let start = Instant::now();
             run();
             start.elapsed().as_secs_f64()

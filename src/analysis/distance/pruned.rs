@@ -181,7 +181,8 @@ impl<'a> Panel<'a> {
 /// added up fits 32 bits.
 fn drop_far(near: &mut [bool], least: &[Vec<u32>], weights: &[u64], limit: u64) {
     let mut sums = Vec::new();
-    for run in asked::runs(&near.to_vec()) {
+    let asked: Vec<_> = asked::runs(near).collect();
+    for run in asked {
         sums.clear();
         sums.resize(run.len(), 0u32);
         for (&weight, row) in weights.iter().zip(least) {

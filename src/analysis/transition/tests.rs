@@ -165,7 +165,7 @@ proptest! {
         let moments: Vec<Option<Moment>> = (0..n_frames as u64).map(|t| {
             phase += 0.04 + 0.02 * random::normal(seed, &[t, 0]);
             heading_rad = wrap_rad(heading_rad + turn * random::normal(seed, &[t, 1]));
-            (random::bits(seed, &[t, 2]) % 60 > 0).then_some((phase.rem_euclid(1.0), heading_rad))
+            (!random::bits(seed, &[t, 2]).is_multiple_of(60)).then_some((phase.rem_euclid(1.0), heading_rad))
         }).collect();
         let (sprites, mut poses) = film(&moments);
         for (t, pose) in (0..).zip(&mut poses.frames) {
