@@ -1,7 +1,7 @@
 //! Analyses: footage to library, as a job.
 
 use axum::body::Body;
-use axum::extract::State;
+use axum::extract::{FromRequest, Query, Request, State};
 use axum::http::Response;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -9,13 +9,16 @@ use utoipa::ToSchema;
 
 use super::AppState;
 use super::extract::Json;
+use super::footage::{Naming, admit};
 use super::jobs::accepted;
 use super::problem::{Problem, ProblemBody};
+use super::receive::{is_film, receive_with};
 use crate::analysis::Params;
 use crate::code::Code;
 use crate::formats::params;
 use crate::ids::{FootageId, JobId, LibraryId};
 use crate::jobs::analysis::{Input, enqueue};
+use crate::store::footage::Added;
 
 /// What to measure, and how.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -36,30 +39,71 @@ pub(super) struct AnalysisAccepted {
     job_id: JobId,
     #[schema(value_type = uuid::Uuid)]
     library_id: LibraryId,
+    /// The footage: of a film that came with the request, its new id or that of the same bytes before.
+    #[schema(value_type = uuid::Uuid)]
+    footage_id: FootageId,
 }
 
-/// Measure the animal of a footage.
-#[utoipa::path(post, path = "/v1/analyses", request_body = AnalysisRequest, responses(
+/// The film to measure and how, in one form.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the form in the OpenAPI document"
+)]
+pub(super) struct AnalysisForm {
+    #[schema(value_type = String, format = Binary)]
+    video: Vec<u8>,
+    #[schema(value_type = Option<String>, format = Binary)]
+    background: Option<Vec<u8>>,
+    /// JSON.
+    params: Option<Params>,
+}
+
+/// Measure the animal of a footage, or of a film that comes with the request: as the raw body, or as a form.
+#[utoipa::path(post, path = "/v1/analyses", params(Naming),
+    request_body(content((AnalysisRequest = "application/json"), ([u8] = "application/octet-stream"),
+        (AnalysisForm = "multipart/form-data"))), responses(
     (status = 202, body = AnalysisAccepted, headers(("location" = String), ("link" = String))),
+    (status = 201, body = AnalysisAccepted, headers(("location" = String)), description = "done within the wait asked for"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create_analysis(
     State(state): State<AppState>,
-    Json(request): Json<AnalysisRequest>,
+    Query(naming): Query<Naming>,
+    request: Request,
 ) -> Result<Response<Body>, Problem> {
+    if is_film(&request) {
+        let (arrival, mut wishes) = receive_with(&state, request, naming.name, &["params"]).await?;
+        let params = params::read(wishes.remove("params").unwrap_or_default())?;
+        let (Added::New(footage) | Added::Known(footage)) = admit(&state, arrival).await?;
+        return measure(&state, FootageId(footage.id), params).await;
+    }
+    let Json(request) = Json::<AnalysisRequest>::from_request(request, &state).await?;
     let params: Params = params::read(request.params)?;
     let footage_id = request.footage_id;
     if state.context.store.footage(footage_id.0).await?.is_none() {
         let sentence = format!("there is no such footage: {footage_id}");
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
+    measure(&state, footage_id, params).await
+}
+
+async fn measure(
+    state: &AppState,
+    footage_id: FootageId,
+    params: Params,
+) -> Result<Response<Body>, Problem> {
     let input = Input { footage_id, params };
     let (job_id, library_id) = enqueue(&state.context, &input).await?;
     let result = format!("/v1/libraries/{library_id}");
     Ok(accepted(
         job_id,
         &result,
-        AnalysisAccepted { job_id, library_id },
+        AnalysisAccepted {
+            job_id,
+            library_id,
+            footage_id,
+        },
     ))
 }

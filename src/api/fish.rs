@@ -2,7 +2,7 @@
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::Response;
+use axum::http::{Response, StatusCode};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
@@ -65,6 +65,7 @@ pub(super) struct FishView {
 /// Make a virtual fish of a library, or of one that is still being made.
 #[utoipa::path(post, path = "/v1/fish", request_body = FishRequest, responses(
     (status = 202, body = FishAccepted, headers(("location" = String), ("link" = String))),
+    (status = 201, body = FishAccepted, headers(("location" = String)), description = "done within the wait asked for"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
@@ -105,6 +106,22 @@ pub(super) async fn get_fish(
     Id(id): Id,
 ) -> Result<axum::Json<FishView>, Problem> {
     Ok(axum::Json(FishView::of(find(&state, id).await?)?))
+}
+
+/// Delete a virtual fish.
+#[utoipa::path(delete, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 204, description = "it is gone"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn delete_fish(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
+    find(&state, id).await?;
+    match state.context.store.delete_film(id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(Problem::not_found()),
+    }
 }
 
 /// A file of a virtual fish: model.glb, video.mp4.

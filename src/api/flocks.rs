@@ -1,8 +1,8 @@
 //! Flocks: made of a library, as a job.
 
 use axum::body::Body;
-use axum::extract::State;
-use axum::http::Response;
+use axum::extract::{FromRequest, Request, State};
+use axum::http::{Response, StatusCode};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
@@ -11,15 +11,19 @@ use uuid::Uuid;
 use super::AppState;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
+use super::footage::admit;
 use super::jobs::{absent_result, accepted, job_to_follow};
 use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody};
+use super::receive::{is_film, receive_with};
 use super::timestamp::rfc3339;
 use crate::flock::Params;
 use crate::formats::params;
-use crate::ids::{FlockId, JobId, LibraryId};
+use crate::ids::{FlockId, FootageId, JobId, LibraryId};
+use crate::jobs::analysis;
 use crate::jobs::flock::{Input, Summary, enqueue};
 use crate::store::flocks::Flock;
+use crate::store::footage::Added;
 
 const FILES: Files = &[
     ("flock.json", "application/json"),
@@ -53,6 +57,26 @@ pub(super) struct FlockAccepted {
     job_id: JobId,
     #[schema(value_type = Uuid)]
     flock_id: FlockId,
+    /// The library that it is made of, there or still to be made.
+    #[schema(value_type = Uuid)]
+    library_id: LibraryId,
+}
+
+/// A film, and the flock to make of it, in one form.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the form in the OpenAPI document"
+)]
+pub(super) struct FlockForm {
+    #[schema(value_type = String, format = Binary)]
+    footage: Vec<u8>,
+    #[schema(value_type = Option<String>, format = Binary)]
+    background: Option<Vec<u8>>,
+    /// How to make the flock, JSON.
+    params: Option<Params>,
+    /// How to measure the film, JSON.
+    analysis: Option<crate::analysis::Params>,
 }
 
 /// One flock.
@@ -72,26 +96,63 @@ pub(super) struct FlockView {
     summary: Summary,
 }
 
-/// Make a flock of a library, or of one that is still being made.
-#[utoipa::path(post, path = "/v1/flocks", request_body = FlockRequest, responses(
+/// Make a flock of a library, or of one that is still being made; or, as a form, of a film.
+#[utoipa::path(post, path = "/v1/flocks",
+    request_body(content((FlockRequest = "application/json"), (FlockForm = "multipart/form-data"))), responses(
     (status = 202, body = FlockAccepted, headers(("location" = String), ("link" = String))),
+    (status = 201, body = FlockAccepted, headers(("location" = String)), description = "done within the wait asked for"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create_flock(
     State(state): State<AppState>,
-    Json(request): Json<FlockRequest>,
+    request: Request,
 ) -> Result<Response<Body>, Problem> {
+    if is_film(&request) {
+        return create_flock_of_film(&state, request).await;
+    }
+    let Json(request) = Json::<FlockRequest>::from_request(request, &state).await?;
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
     let after_job = job_to_follow(&state, library_id).await?;
+    make(&state, library_id, params, after_job).await
+}
+
+/// The whole way in one call: the film is stored, its analysis queued, and the flock after it.
+async fn create_flock_of_film(
+    state: &AppState,
+    request: Request,
+) -> Result<Response<Body>, Problem> {
+    let wishes = ["params", "analysis"];
+    let (arrival, mut wishes) = receive_with(state, request, None, &wishes).await?;
+    let params = params::read(wishes.remove("params").unwrap_or_default())?;
+    let analysis = params::read(wishes.remove("analysis").unwrap_or_default())?;
+    let (Added::New(footage) | Added::Known(footage)) = admit(state, arrival).await?;
+    let input = analysis::Input {
+        footage_id: FootageId(footage.id),
+        params: analysis,
+    };
+    let (job_id, library_id) = analysis::enqueue(&state.context, &input).await?;
+    make(state, library_id, params, Some(job_id)).await
+}
+
+async fn make(
+    state: &AppState,
+    library_id: LibraryId,
+    params: Params,
+    after_job: Option<JobId>,
+) -> Result<Response<Body>, Problem> {
     let input = Input { library_id, params };
     let (job_id, flock_id) = enqueue(&state.context, &input, after_job).await?;
     let result = format!("/v1/flocks/{flock_id}");
     Ok(accepted(
         job_id,
         &result,
-        FlockAccepted { job_id, flock_id },
+        FlockAccepted {
+            job_id,
+            flock_id,
+            library_id,
+        },
     ))
 }
 
@@ -119,6 +180,22 @@ pub(super) async fn get_flock(
     Id(id): Id,
 ) -> Result<axum::Json<FlockView>, Problem> {
     Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
+}
+
+/// Delete a flock.
+#[utoipa::path(delete, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 204, description = "it is gone"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn delete_flock(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
+    find(&state, id).await?;
+    match state.context.store.delete_film(id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(Problem::not_found()),
+    }
 }
 
 /// A file of a flock: flock.json, plan.svg, video.mp4; tracks.csv and ground-truth.zip unless declined; and,

@@ -16,6 +16,7 @@ use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody};
 use super::receive::receive;
 use super::timestamp::rfc3339;
+use crate::jobs::admit::Arrival;
 use crate::jobs::{Error, admit};
 use crate::store::blobs::hex;
 use crate::store::footage::{Added, Footage, VIDEO};
@@ -47,7 +48,7 @@ pub(super) struct FootageView {
 #[into_params(parameter_in = Query)]
 pub(super) struct Naming {
     /// What to call it: a label for people.
-    name: Option<String>,
+    pub(super) name: Option<String>,
 }
 
 /// The form of a multipart upload.
@@ -78,14 +79,19 @@ pub(super) async fn create_footage(
     request: Request,
 ) -> Result<Response<Body>, Problem> {
     let arrival = receive(&state, request, naming.name).await?;
-    // In a task of its own, so that a sender who hangs up now leaves no half of it behind.
-    let admitted = tokio::spawn(async move { admit::admit(&state.context.store, arrival).await });
-    let (status, footage) = match admitted.await.unwrap_or(Err(Error::Panicked))? {
+    let (status, footage) = match admit(&state, arrival).await? {
         Added::New(footage) => (StatusCode::CREATED, footage),
         Added::Known(footage) => (StatusCode::OK, footage),
     };
     let location = [(header::LOCATION, format!("/v1/footage/{}", footage.id))];
     Ok((status, location, axum::Json(FootageView::of(footage))).into_response())
+}
+
+/// In a task of its own, so that a sender who hangs up now leaves no half of it behind.
+pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, Problem> {
+    let store = state.context.store.clone();
+    let admitted = tokio::spawn(async move { admit::admit(&store, arrival).await });
+    Ok(admitted.await.unwrap_or(Err(Error::Panicked))?)
 }
 
 /// Every footage, newest first.
@@ -112,6 +118,22 @@ pub(super) async fn get_footage(
     Id(id): Id,
 ) -> Result<axum::Json<FootageView>, Problem> {
     Ok(axum::Json(FootageView::of(find(&state, id).await?)))
+}
+
+/// Delete a footage with all that came of it: libraries, flocks, virtual fish and jobs.
+#[utoipa::path(delete, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 204, description = "it is gone"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn delete_footage(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
+    find(&state, id).await?;
+    match state.context.store.delete_footage(id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(Problem::not_found()),
+    }
 }
 
 /// The video as it was uploaded, to keep: never shown in place.

@@ -2,7 +2,7 @@
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::Response;
+use axum::http::{Response, StatusCode};
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
@@ -78,6 +78,22 @@ pub(super) async fn get_library(
     Id(id): Id,
 ) -> Result<axum::Json<LibraryView>, Problem> {
     Ok(axum::Json(LibraryView::of(find(&state, id).await?)?))
+}
+
+/// Delete a library with all that was made of it.
+#[utoipa::path(delete, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 204, description = "it is gone"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn delete_library(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
+    find(&state, id).await?;
+    match state.context.store.delete_library(id).await? {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(Problem::not_found()),
+    }
 }
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,

@@ -3,13 +3,13 @@
 //! Handlers are thin: extract, one call, answer. What an error means to HTTP is `problem`'s alone.
 
 mod guard; // who may ask, and the headers of every answer
+mod idempotency; // same key and body, same answer
 mod problem;
 pub mod server; // the accept loop
 
 mod download;
 mod extract; // ids, JSON, conditions
 mod paging;
-mod range;
 mod receive; // bodies to disk
 mod timestamp;
 
@@ -22,6 +22,7 @@ mod jobs;
 mod libraries;
 mod openapi;
 mod page;
+mod uploads;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -86,14 +87,24 @@ impl AppState {
 
 /// The whole service over a state: the same for the program and for tests.
 pub fn router(state: AppState) -> Router {
-    let (routes, document) = table().split_for_parts();
+    let (routes, mut document) = table().split_for_parts();
+    openapi::add_headers(&mut document);
     let stop = state.context.draining.clone();
     routes
         .merge(openapi::route(&document))
         .merge(page::routes())
         .fallback(|| async { Problem::from(Code::NotFound) })
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
-        .with_state(state)
+        .with_state(state.clone())
+        .layer(middleware::from_fn_with_state(
+            state.clone(),
+            idempotency::run_once,
+        ))
+        .layer(middleware::from_fn_with_state(
+            state,
+            jobs::wait::wait_for_result,
+        ))
+        .layer(middleware::from_fn(uploads::speak_tus))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
         .layer(CatchPanicLayer::custom(panicked))
@@ -108,17 +119,23 @@ pub fn router(state: AppState) -> Router {
 fn table() -> OpenApiRouter<AppState> {
     OpenApiRouter::with_openapi(openapi::Document::openapi())
         .routes(routes!(footage::create_footage, footage::list_footage))
-        .routes(routes!(footage::get_footage))
+        .routes(routes!(footage::get_footage, footage::delete_footage))
         .routes(routes!(footage::get_footage_file))
+        .routes(routes!(uploads::describe_uploads, uploads::create_upload))
+        .routes(routes!(
+            uploads::head_upload,
+            uploads::patch_upload,
+            uploads::delete_upload
+        ))
         .routes(routes!(analyses::create_analysis))
         .routes(routes!(libraries::list_libraries))
-        .routes(routes!(libraries::get_library))
+        .routes(routes!(libraries::get_library, libraries::delete_library))
         .routes(routes!(libraries::get_library_file))
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
-        .routes(routes!(flocks::get_flock))
+        .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
         .routes(routes!(fish::create_fish, fish::list_fish))
-        .routes(routes!(fish::get_fish))
+        .routes(routes!(fish::get_fish, fish::delete_fish))
         .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))

@@ -3,8 +3,11 @@
 use axum::Router;
 use axum::http::header;
 use axum::routing::get;
+use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
+use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::{OpenApi, RefOr, Required};
 
-use super::AppState;
+use super::{AppState, idempotency};
 
 /// The frame of the document; the routes add themselves.
 #[derive(utoipa::OpenApi)]
@@ -13,6 +16,45 @@ use super::AppState;
     description = "One filmed animal in, a flock of it out.",
 ))]
 pub(super) struct Document;
+
+/// The headers that whole groups of calls take.
+pub(super) fn add_headers(document: &mut OpenApi) {
+    for (path, item) in &mut document.paths.paths {
+        if let Some(post) = item
+            .post
+            .as_mut()
+            .filter(|_| idempotency::ROUTES.contains(&path.as_str()))
+        {
+            let meaning = "The same key with the same body gets the same answer for a day, marked by \
+                Idempotent-Replayed: true; another body 422; 409 while the first still runs.";
+            add_header(post, "Idempotency-Key", meaning);
+        }
+        let waits = item
+            .post
+            .as_mut()
+            .filter(|post| post.responses.responses.contains_key("202"));
+        let get = item.get.as_mut().filter(|_| path == "/v1/jobs/{id}");
+        for operation in waits.into_iter().chain(get) {
+            let meaning = "wait=N: answer when the job has ended, or after N seconds, at most 60. A POST whose job \
+                is done by then answers 201 with the result's address in Location.";
+            add_header(operation, "Prefer", meaning);
+        }
+    }
+}
+
+fn add_header(operation: &mut Operation, name: &str, meaning: &str) {
+    let header = ParameterBuilder::new()
+        .name(name)
+        .parameter_in(ParameterIn::Header)
+        .required(Required::False)
+        .description(Some(meaning))
+        .schema(Some(ObjectBuilder::new().schema_type(Type::String).build()))
+        .build();
+    operation
+        .parameters
+        .get_or_insert_default()
+        .push(RefOr::T(header));
+}
 
 /// /openapi.json.
 pub(super) fn route(document: &utoipa::openapi::OpenApi) -> Router<AppState> {

@@ -103,7 +103,7 @@ impl IntoResponse for Problem {
         headers.insert(header::CONTENT_TYPE, media_type);
         if matches!(
             self.code,
-            Code::Stopping | Code::NotReady | Code::StorageFull
+            Code::Stopping | Code::NotReady | Code::StorageFull | Code::RequestInProgress
         ) {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         }
@@ -137,6 +137,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::BackgroundSizeDiffers
         | Code::NoTransitions
         | Code::InputFailed
+        | Code::IdempotencyKeyReused
         | Code::InvalidParams => StatusCode::UNPROCESSABLE_ENTITY,
         Code::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
         Code::NotFound | Code::NotReady => StatusCode::NOT_FOUND,
@@ -146,7 +147,12 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::TooLarge => StatusCode::PAYLOAD_TOO_LARGE,
         Code::BodyTimeout => StatusCode::REQUEST_TIMEOUT,
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
-        Code::AlreadyFinished => StatusCode::CONFLICT,
+        // A status of tus that HTTP has no name for.
+        Code::ChecksumMismatch => StatusCode::from_u16(460).unwrap_or(StatusCode::BAD_REQUEST),
+        Code::TusVersionNotSupported => StatusCode::PRECONDITION_FAILED,
+        Code::AlreadyFinished | Code::RequestInProgress | Code::OffsetDiffers => {
+            StatusCode::CONFLICT
+        }
         Code::CrossSite => StatusCode::FORBIDDEN,
         Code::Stopping => StatusCode::SERVICE_UNAVAILABLE,
         Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,

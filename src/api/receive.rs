@@ -1,15 +1,17 @@
 //! Bodies to disk: one way for raw bodies and multipart fields (RELIABILITY.md, store rules, H2).
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use axum::extract::multipart::{Field, MultipartError};
-use axum::extract::{FromRequest, Multipart, Request};
+use axum::extract::{DefaultBodyLimit, FromRequest, Multipart, Request};
 use axum::http::header;
 use bytes::Bytes;
 use futures_util::{Stream, StreamExt};
+use serde_json::{Map, Value};
 use tokio::time::timeout;
 
-use super::{AppState, Problem};
+use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::code::Code;
 use crate::jobs::admit::Arrival;
 use crate::store;
@@ -18,9 +20,12 @@ use crate::store::intake::Intake;
 use crate::store::{BlobFile, Draft};
 
 /// The longest wait for the next piece of a body.
-const PIECE: Duration = Duration::from_secs(30);
+pub(super) const PIECE: Duration = Duration::from_secs(30);
 /// The largest given background.
 const MAX_BACKGROUND_BYTES: u64 = 64 << 20;
+
+/// What a form says besides its files: JSON objects by the names of their fields.
+pub(super) type Wishes = BTreeMap<&'static str, Map<String, Value>>;
 
 /// Receives a footage, raw or as a form with `video` and, if given, `background`.
 pub(super) async fn receive(
@@ -28,39 +33,55 @@ pub(super) async fn receive(
     request: Request,
     name: Option<String>,
 ) -> Result<Arrival, Problem> {
+    let (arrival, _no_wishes) = receive_with(state, request, name, &[]).await?;
+    Ok(arrival)
+}
+
+/// The same, from a form that may hold wishes besides.
+pub(super) async fn receive_with(
+    state: &AppState,
+    request: Request,
+    name: Option<String>,
+    wishes: &[&'static str],
+) -> Result<(Arrival, Wishes), Problem> {
     check_headers(&request, state.config.max_upload_bytes)?;
     let draft_name = uuid::Uuid::now_v7().to_string();
     let draft = state.context.store.blobs().draft(&draft_name);
     let draft = draft.map_err(store::Error::Io)?;
     if is_form(&request) {
-        return receive_form(state, request, draft, name).await;
+        return receive_form(state, request, draft, name, wishes).await;
     }
     let body = request.into_body().into_data_stream();
     let limit_bytes = state.config.max_upload_bytes;
     let video = receive_file(body, &draft, VIDEO, limit_bytes).await?;
-    Ok(Arrival {
+    let arrival = Arrival {
         draft,
         video,
         background: None,
         name: label(name.as_deref().unwrap_or_default()),
         sample: false,
-    })
+    };
+    Ok((arrival, Wishes::new()))
 }
 
 async fn receive_form(
     state: &AppState,
-    request: Request,
+    mut request: Request,
     draft: Draft,
     name: Option<String>,
-) -> Result<Arrival, Problem> {
+    wishes: &[&'static str],
+) -> Result<(Arrival, Wishes), Problem> {
+    // Each field has a limit of its own.
+    DefaultBodyLimit::disable().apply(&mut request);
     let malformed = |sentence: &str| Problem::new(Code::MalformedRequest, sentence);
     let mut form = Multipart::from_request(request, state)
         .await
         .map_err(|rejection| malformed(&rejection.body_text()))?;
     let (mut video, mut background, mut file_name) = (None, None, None);
+    let mut wished = Wishes::new();
     while let Some(field) = next_field(&mut form).await? {
         match field.name() {
-            Some("video") if video.is_none() => {
+            Some("video" | "footage") if video.is_none() => {
                 file_name = field.file_name().map(str::to_owned);
                 let limit_bytes = state.config.max_upload_bytes;
                 video = Some(receive_file(field, &draft, VIDEO, limit_bytes).await?);
@@ -69,20 +90,41 @@ async fn receive_form(
                 let file = receive_file(field, &draft, BACKGROUND, MAX_BACKGROUND_BYTES).await?;
                 background = Some(file);
             }
-            _ => {
-                return Err(malformed(
-                    "the form has fields besides one video and one background",
-                ));
+            name => {
+                let wish = wishes.iter().find(|wish| name == Some(wish));
+                let wish = wish.filter(|wish| !wished.contains_key(*wish));
+                let wish =
+                    wish.ok_or_else(|| malformed("the form has fields that are not asked for"))?;
+                wished.insert(wish, receive_wish(field).await?);
             }
         }
     }
-    Ok(Arrival {
+    let arrival = Arrival {
         draft,
         video: video.ok_or_else(|| malformed("the form has no field: video"))?,
         background,
         name: label(&name.or(file_name).unwrap_or_default()),
         sample: false,
-    })
+    };
+    Ok((arrival, wished))
+}
+
+async fn receive_wish(mut field: Field<'_>) -> Result<Map<String, Value>, Problem> {
+    let mut text = Vec::new();
+    loop {
+        let piece = timeout(PIECE, field.chunk())
+            .await
+            .map_err(|_| Code::BodyTimeout)?;
+        let Some(bytes) = piece.map_err(|error| from_multipart(&error))? else {
+            break;
+        };
+        text.extend_from_slice(&bytes);
+        if text.len() > MAX_JSON_BYTES {
+            return Err(Code::TooLarge.into());
+        }
+    }
+    serde_json::from_slice(&text)
+        .map_err(|error| Problem::new(Code::InvalidParams, error.to_string()))
 }
 
 async fn next_field(form: &mut Multipart) -> Result<Option<Field<'_>>, Problem> {
@@ -132,6 +174,16 @@ fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
     Ok(())
 }
 
+/// Whether the body is a film, or a form with one, and not a request in JSON.
+pub(super) fn is_film(request: &Request) -> bool {
+    let media_type = request.headers().get(header::CONTENT_TYPE);
+    let media_type = media_type.and_then(|value| value.to_str().ok());
+    let media_type = media_type.unwrap_or_default().to_ascii_lowercase();
+    ["multipart/", "video/", "application/octet-stream"]
+        .iter()
+        .any(|film| media_type.starts_with(film))
+}
+
 fn is_form(request: &Request) -> bool {
     let media_type = request.headers().get(header::CONTENT_TYPE);
     let media_type = media_type.and_then(|value| value.to_str().ok());
@@ -144,7 +196,7 @@ fn from_multipart(error: &MultipartError) -> Problem {
 
 /// A name as a label: its last part, without what controls a terminal or turns text around
 /// (RELIABILITY.md, S4); at most 200 characters.
-fn label(name: &str) -> String {
+pub(super) fn label(name: &str) -> String {
     let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
     let turns_text = |c: char| matches!(c, '\u{200e}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     let kept = last.chars().filter(|c| !c.is_control() && !turns_text(*c));

@@ -1,4 +1,4 @@
-//! Times as the API writes them: RFC 3339 in UTC, to the millisecond.
+//! Times as the API writes them: RFC 3339 in UTC, to the millisecond; in headers as HTTP has them.
 
 /// `2026-11-21T09:30:00.000Z`; `ms` counts from 1970 and is not negative.
 pub(super) fn rfc3339(ms: i64) -> String {
@@ -7,6 +7,20 @@ pub(super) fn rfc3339(ms: i64) -> String {
     let (second, ms) = (ms_of_day / 1000, ms_of_day % 1000);
     let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{ms:03}Z")
+}
+
+/// `Sat, 21 Nov 2026 09:30:00 GMT` (RFC 9110); `ms` counts from 1970 and is not negative.
+pub(super) fn http_date(ms: i64) -> String {
+    const DAYS: [&str; 7] = ["Thu", "Fri", "Sat", "Sun", "Mon", "Tue", "Wed"];
+    const MONTHS: [&str; 12] = [
+        "Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec",
+    ];
+    let (days, second) = (ms.div_euclid(86_400_000), ms.rem_euclid(86_400_000) / 1000);
+    let (year, month, day) = civil(days);
+    let weekday = DAYS[days.rem_euclid(7) as usize];
+    let month = MONTHS[(month - 1) as usize];
+    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
+    format!("{weekday}, {day:02} {month} {year:04} {hour:02}:{minute:02}:{second:02} GMT")
 }
 
 /// Year, month and day of a count of days since 1970. Years are counted from March, so that the
@@ -42,5 +56,10 @@ mod tests {
         ] {
             assert_eq!(rfc3339(ms), text);
         }
+    }
+
+    #[test]
+    fn a_date_of_a_header_is_as_http_has_it() {
+        assert_eq!(http_date(784_111_777_000), "Sun, 06 Nov 1994 08:49:37 GMT");
     }
 }

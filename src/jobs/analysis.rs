@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use uuid::Uuid;
 
+use super::allotted::next_id;
 use super::{Attempt, Context, Error, Product, Stages, clock, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
@@ -76,7 +76,7 @@ pub struct Advice {
 
 /// Queues an analysis; the library will have the id given back.
 pub async fn enqueue(context: &Context, input: &Input) -> Result<(JobId, LibraryId), store::Error> {
-    let (job_id, library_id) = (JobId(Uuid::now_v7()), LibraryId(Uuid::now_v7()));
+    let (job_id, library_id) = (JobId(next_id()), LibraryId(next_id()));
     let job = NewJob {
         job_id,
         kind: Kind::Analysis,

@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use uuid::Uuid;
 
+use super::allotted::next_id;
 use super::{Attempt, Context, Error, Product, Stages, clock};
 use crate::fish::{Film, Params, drive};
 use crate::formats::{glb, library_dir};
@@ -48,7 +48,7 @@ pub async fn enqueue(
     input: &Input,
     after_job: Option<JobId>,
 ) -> Result<(JobId, FishId), store::Error> {
-    let (job_id, fish_id) = (JobId(Uuid::now_v7()), FishId(Uuid::now_v7()));
+    let (job_id, fish_id) = (JobId(next_id()), FishId(next_id()));
     let job = NewJob {
         job_id,
         kind: Kind::Fish,

@@ -9,6 +9,8 @@ pub mod supervisor; // the pool, rescue, drain
 
 pub mod worker; // claim, run, finish
 
+pub mod allotted; // the ids under which a request makes things
+
 pub mod attempt; // what one run of a job is given
 
 pub mod listener; // progress out, cancellation in

@@ -81,6 +81,8 @@ async fn rescue(context: Context) {
 /// Mends what a crash left, before the first worker starts: leases of the dead, drafts, strays.
 pub async fn recover(context: &Context) -> Result<(), crate::store::Error> {
     context.store.rescue_all(clock::now_ms()).await?;
+    context.store.interrupt_all_keys().await?;
+    context.store.sweep_uploads(clock::now_ms()).await?;
     context.store.sweep(std::time::SystemTime::now()).await?;
     Ok(())
 }

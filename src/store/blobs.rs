@@ -28,6 +28,7 @@ pub struct BlobFile {
 pub struct Blobs {
     root: PathBuf,
     tmp: PathBuf,
+    uploads: PathBuf,
 }
 
 /// A folder in the making; removed with all it holds unless it is moved into place.
@@ -43,10 +44,12 @@ impl Blobs {
         for folder in ["footage", "libraries", "flocks", "fish"] {
             fs::create_dir_all(root.join(folder))?;
         }
+        let uploads = data.join("uploads");
         fs::create_dir_all(&tmp)?;
+        fs::create_dir_all(&uploads)?;
         sync_folder(data)?;
         sync_folder(&root)?;
-        Ok(Blobs { root, tmp })
+        Ok(Blobs { root, tmp, uploads })
     }
 
     /// A fresh folder under `tmp/`. The name must not have been used before.
@@ -98,6 +101,11 @@ impl Blobs {
 
     pub(super) fn root(&self) -> &Path {
         &self.root
+    }
+
+    /// Where unfinished uploads grow.
+    pub(super) fn uploads(&self) -> &Path {
+        &self.uploads
     }
 
     pub(super) fn tmp(&self) -> &Path {

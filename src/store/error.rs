@@ -26,6 +26,9 @@ pub enum Error {
         /// The limit.
         limit_bytes: u64,
     },
+    /// A request that comes again under its ids asks for something else.
+    #[error("the request was another one when it came first: {0}")]
+    IdInUse(sqlx::types::Uuid),
     /// A row holds what this version does not know.
     #[error("a row of {table} cannot be read: {value}")]
     UnknownValue {
@@ -40,6 +43,7 @@ impl Error {
     /// The stable code.
     pub fn code(&self) -> Code {
         match self {
+            Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
             Error::Io(error) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,

@@ -7,15 +7,18 @@
 
 pub mod blobs;
 pub mod check;
+pub mod delete;
 pub mod error;
 pub mod fish;
 pub mod flocks;
 pub mod footage;
+pub mod idempotency;
 pub mod intake;
 pub mod jobs;
 pub mod libraries;
 pub mod spill;
 pub mod sweep;
+pub mod uploads;
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -41,6 +44,7 @@ pub struct Store {
     writer: SqlitePool,
     reader: SqlitePool,
     blobs: Blobs,
+    holders: uploads::Holders,
     /// Held while the store is open: whoever holds it knows that every other process is gone.
     _lock: Arc<File>,
 }
@@ -66,6 +70,7 @@ impl Store {
             writer,
             reader,
             blobs,
+            holders: uploads::Holders::default(),
             _lock: Arc::new(lock),
         })
     }

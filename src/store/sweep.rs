@@ -32,6 +32,7 @@ impl Store {
             }
             swept.n_drafts += 1;
         }
+        self.sweep_upload_files().await?;
         for folder in self.folders_without_row().await? {
             let modified = fs::metadata(self.blobs.folder(&folder))?.modified()?;
             if now.duration_since(modified).is_ok_and(|age| age > GRACE) {

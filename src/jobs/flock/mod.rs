@@ -11,9 +11,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
-use uuid::Uuid;
 
 use self::film::{Backdrop, Film, Output, Target};
+use super::allotted::next_id;
 use super::{Attempt, Context, Error, Product, Stages, clock};
 use crate::flock::composite::params::{Format, Render};
 use crate::flock::{Flock, Params, plan_flock};
@@ -64,7 +64,7 @@ pub async fn enqueue(
     input: &Input,
     after_job: Option<JobId>,
 ) -> Result<(JobId, FlockId), store::Error> {
-    let (job_id, flock_id) = (JobId(Uuid::now_v7()), FlockId(Uuid::now_v7()));
+    let (job_id, flock_id) = (JobId(next_id()), FlockId(next_id()));
     let job = NewJob {
         job_id,
         kind: Kind::Flock,

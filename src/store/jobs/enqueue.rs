@@ -24,8 +24,12 @@ pub struct NewJob {
 }
 
 impl Store {
-    /// Adds the job to the queue.
+    /// Adds the job to the queue. A job that is there already under its id, because its request comes again
+    /// after a crash, is left as it is; [`Error::IdInUse`] where that one has another input.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
+        if self.is_queued_already(job).await? {
+            return Ok(());
+        }
         sqlx::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
              created_ms) values ($1, $2, 'queued', $3, $4, $5, $6, $7, $7)",
@@ -41,5 +45,16 @@ impl Store {
         .await?;
         tracing::info!(job.id = %job.job_id, job.kind = job.kind.name(), "job queued");
         Ok(())
+    }
+
+    async fn is_queued_already(&self, job: &NewJob) -> Result<bool, Error> {
+        let input: Option<String> = sqlx::query_scalar("select input from jobs where id = $1")
+            .bind(job.job_id.0)
+            .fetch_optional(&self.writer)
+            .await?;
+        match input {
+            Some(input) if input != job.input => Err(Error::IdInUse(job.job_id.0)),
+            found => Ok(found.is_some()),
+        }
     }
 }

@@ -1,6 +1,11 @@
 //! The API, through the real router over a real connection; a file per noun.
 
 mod contract;
+mod deletes;
 mod downloads;
 mod footage;
+mod idempotency;
 mod jobs;
+mod one_call;
+mod uploads;
+mod wait;

@@ -68,6 +68,11 @@ impl TestApp {
         }
     }
 
+    /// The whole address of a path.
+    pub(crate) fn address(&self, path: &str) -> String {
+        format!("{}{path}", self.base)
+    }
+
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {
         self.client.get(format!("{}{path}", self.base))
     }
@@ -118,6 +123,11 @@ impl TestApp {
     /// Files and folders under `tmp/`.
     pub(crate) fn n_drafts(&self) -> usize {
         entries(&self.data.path().join("tmp"))
+    }
+
+    /// Files of unfinished uploads.
+    pub(crate) fn n_uploads(&self) -> usize {
+        entries(&self.data.path().join("uploads"))
     }
 
     /// Folders of a kind in the store.

@@ -1,11 +1,13 @@
 //! Jobs: their state, their events, the wish to cancel them; and what other nouns say of jobs.
 
+pub(super) mod wait; // Prefer: wait=N
+
 use std::convert::Infallible;
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::{Response, StatusCode, header};
+use axum::http::{HeaderMap, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use axum::response::sse::{Event, KeepAlive, Sse};
 use futures_util::stream::{Stream, unfold};
@@ -13,11 +15,13 @@ use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use self::wait::Wait;
 use super::AppState;
 use super::extract::Id;
 use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody};
 use super::timestamp::rfc3339;
+
 use crate::code::Code;
 use crate::ids::{JobId, LibraryId};
 use crate::jobs::clock::now_ms;
@@ -84,7 +88,7 @@ pub(super) async fn list_jobs(
     Page::of(rows, paging, |row| row.id.0, |row| Ok(JobView::of(row)))
 }
 
-/// One job.
+/// One job; with `Prefer: wait=N` once it has ended, or after N seconds.
 #[utoipa::path(get, path = "/v1/jobs/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = JobView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -92,8 +96,17 @@ pub(super) async fn list_jobs(
 pub(super) async fn get_job(
     State(state): State<AppState>,
     Id(id): Id,
-) -> Result<axum::Json<JobView>, Problem> {
-    Ok(axum::Json(find(&state, JobId(id)).await?))
+    headers: HeaderMap,
+) -> Result<Response<Body>, Problem> {
+    let job = find(&state, JobId(id)).await?;
+    let Some(wait) = Wait::of(&headers) else {
+        return Ok(axum::Json(job).into_response());
+    };
+    let job = wait.for_end(&state, job.id).await?;
+    let job = job.map(JobView::of).ok_or_else(Problem::not_found)?;
+    let mut answer = axum::Json(job).into_response();
+    wait.applied(answer.headers_mut());
+    Ok(answer)
 }
 
 /// Cancel a job: at once where it is queued (200), soon where it runs (202).
@@ -200,6 +213,16 @@ pub(super) async fn job_to_follow(
     }
 }
 
+/// Where a job's result is, or will be.
+pub(super) fn result_of(row: &JobRow) -> String {
+    let noun = match row.kind {
+        Kind::Analysis => "libraries",
+        Kind::Flock => "flocks",
+        Kind::Fish => "fish",
+    };
+    format!("/v1/{noun}/{}", row.result_id)
+}
+
 fn is_lost(state: JobState) -> bool {
     matches!(state, JobState::Failed | JobState::Cancelled)
 }
@@ -210,11 +233,7 @@ fn is_final(job: &JobView) -> bool {
 
 impl JobView {
     fn of(row: JobRow) -> JobView {
-        let result = match row.kind {
-            Kind::Analysis => "libraries",
-            Kind::Flock => "flocks",
-            Kind::Fish => "fish",
-        };
+        let result = result_of(&row);
         JobView {
             id: row.id,
             kind: row.kind.name(),
@@ -234,7 +253,7 @@ impl JobView {
             links: JobLinks {
                 this: format!("/v1/jobs/{}", row.id),
                 events: format!("/v1/jobs/{}/events", row.id),
-                result: format!("/v1/{result}/{}", row.result_id),
+                result,
             },
         }
     }

@@ -1,6 +1,8 @@
 //! A file of the store as an answer: Range, ETag, HEAD, 304, 416 (RELIABILITY.md, H4, S4, S5). Files
 //! never change under their address, so they may be kept for ever; the tag is the content's hash.
 
+mod range;
+
 use std::io::SeekFrom;
 
 use axum::body::Body;
@@ -10,9 +12,9 @@ use tokio::fs::File;
 use tokio::io::{AsyncReadExt, AsyncSeekExt};
 use tokio_util::io::ReaderStream;
 
+use self::range::{Wanted, wanted};
 use super::Problem;
 use super::extract::Conditions;
-use super::range::{Wanted, wanted};
 use crate::code::Code;
 use crate::store::Store;
 use crate::store::blobs::hex;

@@ -1,0 +1,269 @@
+//! Idempotency-Key on every POST that makes something (RELIABILITY.md, store and queue rules): the same
+//! key with the same body gets the same answer again, with another body 422, and 409 while the first
+//! still runs. Kept for a day, for each caller and route by itself; a 5xx is never kept.
+//!
+//! A JSON body is read and hashed before the request runs; others are hashed on their way to the disk.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Context, Poll};
+
+use axum::body::{Body, BodyDataStream, to_bytes};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use futures_util::Stream;
+use futures_util::stream::{StreamExt, poll_fn};
+use sha2::{Digest, Sha256};
+
+use super::{AppState, MAX_JSON_BYTES, Problem};
+use crate::code::Code;
+use crate::jobs::allotted;
+use crate::jobs::clock::now_ms;
+use crate::store::Store;
+use crate::store::blobs::hex;
+use crate::store::idempotency::{Answer, Begun, Scope};
+
+/// The routes that make something.
+pub(super) const ROUTES: [&str; 4] = ["/v1/footage", "/v1/analyses", "/v1/flocks", "/v1/fish"];
+/// The header that carries the key.
+pub(super) const KEY: &str = "idempotency-key";
+const REPLAYED: HeaderName = HeaderName::from_static("idempotent-replayed");
+const MAX_KEY_BYTES: usize = 255;
+/// What may come after the end of a form.
+const MAX_EPILOGUE_BYTES: usize = 64 << 10;
+/// The headers that belong to an answer; all others are set anew.
+const KEPT: [HeaderName; 4] = [
+    header::CONTENT_TYPE,
+    header::LOCATION,
+    header::LINK,
+    header::RETRY_AFTER,
+];
+
+/// Answers a request with a key that was answered before; runs and keeps any other.
+pub(super) async fn run_once(
+    State(state): State<AppState>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let makes = request.method() == Method::POST && ROUTES.contains(&request.uri().path());
+    match request.headers().get(KEY).filter(|_| makes) {
+        None => next.run(request).await,
+        Some(key) => match scope_of(&request, key) {
+            Ok(scope) => run_keyed(state, scope, request, next)
+                .await
+                .unwrap_or_else(Problem::into_response),
+            Err(problem) => problem.into_response(),
+        },
+    }
+}
+
+async fn run_keyed(
+    state: AppState,
+    scope: Scope,
+    request: Request,
+    next: Next,
+) -> Result<Response, Problem> {
+    let (parts, body) = request.into_parts();
+    let mut hasher = Sha256::new();
+    hasher.update(parts.uri.query().unwrap_or_default());
+    let (tally, known) = if is_json(&parts.headers) {
+        let too_large = |_| Problem::from(Code::TooLarge);
+        let bytes = to_bytes(body, MAX_JSON_BYTES).await.map_err(too_large)?;
+        let known = hasher.clone().chain_update(&bytes).finalize().to_vec();
+        (Tally::of(Body::from(bytes), hasher), Some(known))
+    } else {
+        (Tally::of(body, hasher), None)
+    };
+    let store = state.context.store.clone();
+    let family = match store.begin_key(&scope, known.as_deref(), now_ms()).await? {
+        Begun::Run(family) => family,
+        Begun::Running => return Err(Code::RequestInProgress.into()),
+        Begun::OtherBody => return Err(Code::IdempotencyKeyReused.into()),
+        Begun::Done(answer) => {
+            let max_bytes = state.config.max_upload_bytes + MAX_JSON_BYTES as u64;
+            return replay(answer, &tally, max_bytes).await;
+        }
+    };
+    let held = Held(Some((store, scope)));
+    let request = Request::from_parts(parts, tally.body());
+    let answer = allotted::under(family, next.run(request)).await;
+    keep(held, answer, &tally).await
+}
+
+/// The kept answer, where the body is the one that it answers.
+async fn replay(answer: Answer, tally: &Tally, max_bytes: u64) -> Result<Response, Problem> {
+    let sha256 = tally.rest(max_bytes).await.ok_or(Code::BodyCutOff)?;
+    if sha256 != answer.body_sha256 {
+        return Err(Code::IdempotencyKeyReused.into());
+    }
+    let headers: Vec<(String, String)> = super::stored(&answer.headers)?;
+    let mut response = Response::new(Body::from(answer.answer));
+    *response.status_mut() = StatusCode::from_u16(answer.status).unwrap_or(StatusCode::OK);
+    for (name, value) in headers {
+        if let (Ok(name), Ok(value)) = (HeaderName::try_from(name), HeaderValue::try_from(value)) {
+            response.headers_mut().insert(name, value);
+        }
+    }
+    let yes = HeaderValue::from_static("true");
+    response.headers_mut().insert(REPLAYED, yes);
+    Ok(response)
+}
+
+/// Keeps the answer if it is one to keep and the body was read to its end.
+async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Response, Problem> {
+    if !is_kept(answer.status()) {
+        return Ok(answer);
+    }
+    let Some(body_sha256) = tally.rest(MAX_EPILOGUE_BYTES as u64).await else {
+        return Ok(answer);
+    };
+    let (parts, body) = answer.into_parts();
+    let body = to_bytes(body, MAX_JSON_BYTES).await.map_err(|error| {
+        tracing::error!(%error, "an answer could not be kept");
+        Code::Internal
+    })?;
+    let text_of = |name: &HeaderName| {
+        let value = parts.headers.get(name)?.to_str().ok()?;
+        Some((name.as_str().to_owned(), value.to_owned()))
+    };
+    let headers: Vec<_> = KEPT.iter().filter_map(text_of).collect();
+    let kept = Answer {
+        body_sha256,
+        status: parts.status.as_u16(),
+        headers: serde_json::json!(headers).to_string(),
+        answer: body.to_vec(),
+    };
+    if let Some((store, scope)) = held.0.take() {
+        store.finish_key(&scope, &kept).await?;
+    }
+    Ok(Response::from_parts(parts, Body::from(body)))
+}
+
+/// Successes and the sender's own faults; not what another moment would answer otherwise.
+fn is_kept(status: StatusCode) -> bool {
+    let passes = [
+        StatusCode::REQUEST_TIMEOUT,
+        StatusCode::CONFLICT,
+        StatusCode::TOO_MANY_REQUESTS,
+    ];
+    status.as_u16() < 500 && !passes.contains(&status)
+}
+
+/// A key whose request is under way; given back when it ends without an answer to keep, also where the
+/// sender hung up.
+struct Held(Option<(Store, Scope)>);
+
+impl Drop for Held {
+    fn drop(&mut self) {
+        let Some((store, scope)) = self.0.take() else {
+            return;
+        };
+        tokio::spawn(async move {
+            if let Err(error) = store.interrupt_key(&scope).await {
+                tracing::warn!(%error, "an idempotency key could not be given back");
+            }
+        });
+    }
+}
+
+/// A body that is hashed while somebody else reads it.
+#[derive(Clone)]
+struct Tally(Arc<Mutex<Reading>>);
+
+struct Reading {
+    stream: BodyDataStream,
+    hasher: Sha256,
+    ended: bool,
+}
+
+impl Tally {
+    fn of(body: Body, hasher: Sha256) -> Tally {
+        let stream = body.into_data_stream();
+        let ended = false;
+        Tally(Arc::new(Mutex::new(Reading {
+            stream,
+            hasher,
+            ended,
+        })))
+    }
+
+    fn body(&self) -> Body {
+        let this = self.clone();
+        Body::from_stream(poll_fn(move |context| this.poll(context)))
+    }
+
+    fn poll(&self, context: &mut Context<'_>) -> Poll<Option<Result<Bytes, axum::Error>>> {
+        let mut reading = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if reading.ended {
+            return Poll::Ready(None);
+        }
+        let polled = Pin::new(&mut reading.stream).poll_next(context);
+        match &polled {
+            Poll::Ready(Some(Ok(bytes))) => reading.hasher.update(bytes),
+            Poll::Ready(None) => reading.ended = true,
+            Poll::Ready(Some(Err(_))) | Poll::Pending => {}
+        }
+        polled
+    }
+
+    /// Reads what nobody read, at most `max_bytes`; the hash of the whole, if it came to its end.
+    async fn rest(&self, max_bytes: u64) -> Option<Vec<u8>> {
+        let mut left = max_bytes;
+        let mut stream = std::pin::pin!(poll_fn(|context| self.poll(context)));
+        while let Some(piece) = stream.next().await {
+            left = left.checked_sub(piece.ok()?.len() as u64)?;
+        }
+        let reading = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(reading.hasher.clone().finalize().to_vec())
+    }
+}
+
+fn scope_of(request: &Request, key: &HeaderValue) -> Result<Scope, Problem> {
+    let key = key.to_str().unwrap_or_default();
+    if key.is_empty() || key.len() > MAX_KEY_BYTES {
+        let sentence = "an Idempotency-Key has 1 to 255 visible characters";
+        return Err(Problem::new(Code::MalformedRequest, sentence));
+    }
+    Ok(Scope {
+        caller: caller_of(request.headers()),
+        route: request.uri().path().to_owned(),
+        key: key.to_owned(),
+    })
+}
+
+/// Who asks, by what he proves it with, hashed; empty where nobody has to.
+fn caller_of(headers: &HeaderMap) -> String {
+    let proofs = [header::AUTHORIZATION, header::COOKIE];
+    let proofs: Vec<&[u8]> = proofs
+        .iter()
+        .filter_map(|name| Some(headers.get(name)?.as_bytes()))
+        .collect();
+    match proofs.is_empty() {
+        true => String::new(),
+        false => hex(&Sha256::digest(proofs.join(&b'\n'))),
+    }
+}
+
+fn is_json(headers: &HeaderMap) -> bool {
+    let media_type = headers.get(header::CONTENT_TYPE);
+    let media_type = media_type.and_then(|value| value.to_str().ok());
+    media_type.is_some_and(|text| text.to_ascii_lowercase().starts_with("application/json"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_failure_of_ours_is_kept_and_nothing_that_passes() {
+        for status in [200, 201, 202, 400, 413, 422] {
+            assert!(is_kept(StatusCode::from_u16(status).unwrap()), "{status}");
+        }
+        for status in [408, 409, 429, 500, 503, 507] {
+            assert!(!is_kept(StatusCode::from_u16(status).unwrap()), "{status}");
+        }
+    }
+}

@@ -1,0 +1,362 @@
+//! Resumable uploads: tus 1.0.0 with creation, creation-with-upload, termination, checksum and expiration
+//! (RELIABILITY.md, R1 and H3). An upload ends as a footage by the same admission as any other; the answer
+//! to its last bytes names it in Link. What the gate refuses is gone, and the reason is the answer.
+
+use axum::body::{Body, BodyDataStream};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Response, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::IntoResponse;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use futures_util::StreamExt;
+use sha1::Sha1;
+use sha2::{Digest, Sha256};
+use tokio::time::timeout;
+use uuid::Uuid;
+
+use super::AppState;
+use super::extract::Id;
+use super::problem::{Problem, ProblemBody};
+use super::receive::{PIECE, label};
+use crate::code::Code;
+use crate::jobs::admit::Arrival;
+use crate::jobs::clock::now_ms;
+use crate::store::footage::Added;
+use crate::store::uploads::{Hold, LIFE_MS, Upload};
+
+const VERSION: HeaderValue = HeaderValue::from_static("1.0.0");
+const RESUMABLE: HeaderName = HeaderName::from_static("tus-resumable");
+const OFFSET: HeaderName = HeaderName::from_static("upload-offset");
+const LENGTH: HeaderName = HeaderName::from_static("upload-length");
+const PIECE_TYPE: &str = "application/offset+octet-stream";
+/// Bytes after which what came is synced and noted: what a crash can cost at most.
+const SAFE_EVERY: i64 = 8 << 20;
+
+/// Says of every answer of these routes which protocol it speaks, and refuses other versions.
+pub(super) async fn speak_tus(request: Request, next: Next) -> Response<Body> {
+    let path = request.uri().path();
+    if path != "/v1/uploads" && !path.starts_with("/v1/uploads/") {
+        return next.run(request).await;
+    }
+    let version = request.headers().get(RESUMABLE);
+    let is_known = request.method() == "OPTIONS" || version == Some(&VERSION);
+    let mut answer = match is_known {
+        true => next.run(request).await,
+        false => Problem::from(Code::TusVersionNotSupported).into_response(),
+    };
+    let headers = answer.headers_mut();
+    headers.insert(RESUMABLE, VERSION);
+    headers.insert(HeaderName::from_static("tus-version"), VERSION);
+    answer
+}
+
+/// What of tus is spoken here.
+#[utoipa::path(options, path = "/v1/uploads", responses((status = 204, description = "in the headers Tus-*")))]
+pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<Body> {
+    let headers = [
+        ("tus-max-size", state.config.max_upload_bytes.to_string()),
+        (
+            "tus-extension",
+            "creation,creation-with-upload,termination,checksum,expiration".to_owned(),
+        ),
+        ("tus-checksum-algorithm", "sha1,sha256".to_owned()),
+    ];
+    (StatusCode::NO_CONTENT, headers).into_response()
+}
+
+/// Begin an upload: Upload-Length in bytes, Upload-Metadata with `filename`; first bytes may come along.
+#[utoipa::path(post, path = "/v1/uploads", request_body(content = [u8], content_type = "application/offset+octet-stream"),
+    responses(
+    (status = 201, headers(("location" = String), ("upload-offset" = i64), ("upload-expires" = String))),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn create_upload(
+    State(state): State<AppState>,
+    request: Request,
+) -> Result<Response<Body>, Problem> {
+    let headers = request.headers();
+    let size_bytes = number(headers, &LENGTH)?;
+    let limit_bytes = state.config.max_upload_bytes;
+    if size_bytes.unsigned_abs() > limit_bytes {
+        return Err(crate::store::Error::TooLarge { limit_bytes }.into());
+    }
+    let upload = Upload {
+        id: Uuid::now_v7(),
+        name: label(&file_name(headers)?),
+        size_bytes,
+        offset_bytes: 0,
+        footage_id: None,
+        expires_ms: now_ms() + LIFE_MS,
+    };
+    let store = &state.context.store;
+    store.sweep_uploads(now_ms()).await?;
+    store.create_upload(&upload).await?;
+    let location = [(header::LOCATION, format!("/v1/uploads/{}", upload.id))];
+    let hold = store.hold_upload(upload.id).await;
+    let upload = match is_piece(headers) {
+        true => take(&state, &hold, upload, request).await?,
+        false => upload,
+    };
+    Ok((StatusCode::CREATED, location, standing(&upload)).into_response())
+}
+
+/// How much of an upload is safe.
+#[utoipa::path(head, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, headers(("upload-offset" = i64), ("upload-length" = i64), ("upload-expires" = String))),
+    (status = "4XX", description = "as problem+json, of which HEAD has no body"),
+))]
+pub(super) async fn head_upload(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<Response<Body>, Problem> {
+    let hold = state.context.store.hold_upload(id).await;
+    let upload = find(&state, id).await?;
+    // The process ended between the last byte and the admission.
+    let upload = end_if_whole(&state, upload).await?;
+    drop(hold);
+    Ok((StatusCode::OK, standing(&upload)).into_response())
+}
+
+/// Send the next bytes, from Upload-Offset on; with Upload-Checksum they count only as a whole.
+#[utoipa::path(patch, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)),
+    request_body(content = [u8], content_type = "application/offset+octet-stream"), responses(
+    (status = 204, headers(("upload-offset" = i64), ("upload-expires" = String), ("link" = String)),
+        description = "with the last bytes Link names the footage"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn patch_upload(
+    State(state): State<AppState>,
+    Id(id): Id,
+    request: Request,
+) -> Result<Response<Body>, Problem> {
+    if !is_piece(request.headers()) {
+        let sentence = format!("the bytes of an upload come as {PIECE_TYPE}");
+        return Err(Problem::new(Code::UnsupportedMediaType, sentence));
+    }
+    let offset_bytes = number(request.headers(), &OFFSET)?;
+    let hold = state.context.store.hold_upload(id).await;
+    let upload = find(&state, id).await?;
+    if offset_bytes != upload.offset_bytes {
+        let sentence = format!("the upload stands at {} bytes", upload.offset_bytes);
+        return Err(Problem::new(Code::OffsetDiffers, sentence));
+    }
+    let upload = take(&state, &hold, upload, request).await?;
+    Ok((StatusCode::NO_CONTENT, standing(&upload)).into_response())
+}
+
+/// Give an upload up. The footage that it became, if it did, stays.
+#[utoipa::path(delete, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 204, description = "it is gone"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn delete_upload(
+    State(state): State<AppState>,
+    Id(id): Id,
+) -> Result<StatusCode, Problem> {
+    let _hold = state.context.store.hold_upload(id).await;
+    find(&state, id).await?;
+    state.context.store.delete_upload(id).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+async fn find(state: &AppState, id: Uuid) -> Result<Upload, Problem> {
+    let upload = state.context.store.upload(id, now_ms()).await?;
+    upload.ok_or_else(Problem::not_found)
+}
+
+/// Takes the bytes of a request; what came before a cut stays, unless a checksum was to vouch for it.
+async fn take(
+    state: &AppState,
+    hold: &Hold,
+    mut upload: Upload,
+    request: Request,
+) -> Result<Upload, Problem> {
+    let store = &state.context.store;
+    let mut checksum = Checksum::of(request.headers())?;
+    let mut body = request.into_body().into_data_stream();
+    if upload.footage_id.is_some() {
+        return Ok(upload);
+    }
+    let mut growing = store.grow_upload(&upload).await?;
+    let mut came_bytes = upload.offset_bytes;
+    let ended = loop {
+        let piece = match next_piece(&mut body, hold).await {
+            Ok(Some(piece)) => piece,
+            Ok(None) => break Ok(()),
+            Err(problem) => break Err(problem),
+        };
+        came_bytes += piece.len() as i64;
+        if came_bytes > upload.size_bytes {
+            came_bytes -= piece.len() as i64;
+            break Err(Code::TooLarge.into());
+        }
+        growing.add(&piece).await?;
+        if let Some(checksum) = &mut checksum {
+            checksum.update(&piece);
+        } else if came_bytes - upload.offset_bytes >= SAFE_EVERY {
+            growing.sync().await?;
+            upload.offset_bytes = came_bytes;
+            store.note_upload(&upload).await?;
+        }
+    };
+    if let Some(checksum) = checksum {
+        ended.clone()?;
+        checksum.verify()?;
+    }
+    growing.sync().await?;
+    upload.offset_bytes = came_bytes;
+    upload.expires_ms = now_ms() + LIFE_MS;
+    store.note_upload(&upload).await?;
+    ended?;
+    end_if_whole(state, upload).await
+}
+
+async fn next_piece(
+    body: &mut BodyDataStream,
+    hold: &Hold,
+) -> Result<Option<bytes::Bytes>, Problem> {
+    let next = tokio::select! {
+        next = timeout(PIECE, body.next()) => next,
+        () = hold.wanted.cancelled() => return Err(Code::OffsetDiffers.into()),
+    };
+    match next {
+        Ok(piece) => piece.transpose().map_err(|error| {
+            tracing::debug!(%error, "an upload was cut off");
+            Code::BodyCutOff.into()
+        }),
+        Err(_) => Err(Code::BodyTimeout.into()),
+    }
+}
+
+/// Makes a footage of an upload whose bytes are all there. In a task of its own, so that a sender who hangs
+/// up now leaves no half of it behind.
+async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Problem> {
+    if upload.offset_bytes < upload.size_bytes || upload.footage_id.is_some() {
+        return Ok(upload);
+    }
+    let store = &state.context.store;
+    let (draft, video) = store.draft_of_upload(&upload).await?;
+    let arrival = Arrival {
+        draft,
+        video,
+        background: None,
+        name: upload.name.clone(),
+        sample: false,
+    };
+    match super::footage::admit(state, arrival).await {
+        Ok(Added::New(footage) | Added::Known(footage)) => {
+            store.end_upload(&upload, footage.id).await?;
+            upload.footage_id = Some(footage.id);
+            Ok(upload)
+        }
+        Err(problem) if super::problem::status_of(problem.code).is_client_error() => {
+            store.delete_upload(upload.id).await?;
+            Err(problem)
+        }
+        Err(problem) => Err(problem),
+    }
+}
+
+/// Where an upload stands, as headers.
+fn standing(upload: &Upload) -> HeaderMap {
+    let expires = super::timestamp::http_date(upload.expires_ms);
+    let link = upload
+        .footage_id
+        .map(|id| format!("</v1/footage/{id}>; rel=\"related\""));
+    let lines = [
+        (OFFSET, Some(upload.offset_bytes.to_string())),
+        (LENGTH, Some(upload.size_bytes.to_string())),
+        (HeaderName::from_static("upload-expires"), Some(expires)),
+        (header::LINK, link),
+    ];
+    let lines = lines.into_iter().filter_map(|(name, value)| {
+        let value = HeaderValue::from_str(&value?).ok()?;
+        Some((name, value))
+    });
+    lines.collect()
+}
+
+fn number(headers: &HeaderMap, name: &HeaderName) -> Result<i64, Problem> {
+    let value = headers.get(name).and_then(|value| value.to_str().ok());
+    let number = value.and_then(|text| text.parse().ok()).filter(|n| *n >= 0);
+    let malformed = || format!("{name} must be a number of bytes");
+    number.ok_or_else(|| Problem::new(Code::MalformedRequest, malformed()))
+}
+
+/// The value of `filename` in Upload-Metadata; empty where there is none.
+fn file_name(headers: &HeaderMap) -> Result<String, Problem> {
+    let malformed = || Problem::new(Code::MalformedRequest, "Upload-Metadata cannot be read");
+    let Some(pairs) = headers.get("upload-metadata") else {
+        return Ok(String::new());
+    };
+    let pairs = pairs.to_str().map_err(|_| malformed())?;
+    for pair in pairs.split(',') {
+        let (key, value) = pair.trim().split_once(' ').unwrap_or((pair.trim(), ""));
+        let value = STANDARD.decode(value.trim()).map_err(|_| malformed())?;
+        if key == "filename" || key == "name" {
+            return Ok(String::from_utf8_lossy(&value).into_owned());
+        }
+    }
+    Ok(String::new())
+}
+
+fn is_piece(headers: &HeaderMap) -> bool {
+    let media_type = headers.get(header::CONTENT_TYPE);
+    media_type.is_some_and(|value| value.as_bytes() == PIECE_TYPE.as_bytes())
+}
+
+/// A hash that the bytes of one request are to have.
+struct Checksum {
+    hasher: Hasher,
+    wanted: Vec<u8>,
+}
+
+enum Hasher {
+    Sha1(Sha1),
+    Sha256(Sha256),
+}
+
+impl Checksum {
+    fn of(headers: &HeaderMap) -> Result<Option<Checksum>, Problem> {
+        let Some(line) = headers.get("upload-checksum") else {
+            return Ok(None);
+        };
+        let malformed = || {
+            Problem::new(
+                Code::MalformedRequest,
+                "Upload-Checksum: sha1 or sha256, and base64",
+            )
+        };
+        let (name, value) = (line.to_str().ok())
+            .and_then(|line| line.split_once(' '))
+            .ok_or_else(malformed)?;
+        let hasher = match name {
+            "sha1" => Hasher::Sha1(Sha1::new()),
+            "sha256" => Hasher::Sha256(Sha256::new()),
+            _ => return Err(malformed()),
+        };
+        let wanted = STANDARD.decode(value.trim()).map_err(|_| malformed())?;
+        Ok(Some(Checksum { hasher, wanted }))
+    }
+
+    fn update(&mut self, bytes: &[u8]) {
+        match &mut self.hasher {
+            Hasher::Sha1(hasher) => hasher.update(bytes),
+            Hasher::Sha256(hasher) => hasher.update(bytes),
+        }
+    }
+
+    fn verify(self) -> Result<(), Problem> {
+        let found = match self.hasher {
+            Hasher::Sha1(hasher) => hasher.finalize().to_vec(),
+            Hasher::Sha256(hasher) => hasher.finalize().to_vec(),
+        };
+        match found == self.wanted {
+            true => Ok(()),
+            false => Err(Code::ChecksumMismatch.into()),
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The table of idempotency keys (RELIABILITY.md, store and queue rules): same key and body, same
+//! answer. A key is running while its first request is; done once the answer is noted; interrupted
+//! where that request ended without an answer to keep (a crash, a sender who hung up, a 5xx), and then
+//! the next one runs under the same ids, so that nothing is made twice.
+
+use sqlx::types::Uuid;
+
+use super::{Error, Store};
+
+/// How long an answer is kept, milliseconds.
+pub const KEPT_MS: i64 = 24 * 3600 * 1000;
+
+/// Where a key means what it means.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Scope {
+    /// Who asks.
+    pub caller: String,
+    /// What is asked for.
+    pub route: String,
+    /// The key, as it was sent.
+    pub key: String,
+}
+
+/// An answer as it is kept.
+#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
+pub struct Answer {
+    /// SHA-256 of the body that it answers.
+    pub body_sha256: Vec<u8>,
+    /// HTTP status, below 500.
+    pub status: u16,
+    /// Headers, JSON: pairs of name and value.
+    pub headers: String,
+    /// The body.
+    pub answer: Vec<u8>,
+}
+
+/// What a key met.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Begun {
+    /// The request is to be run, and what it makes has ids of this family.
+    Run(Uuid),
+    /// Another one with this key is under way.
+    Running,
+    /// An interrupted one with this key had another body.
+    OtherBody,
+    /// It has been answered.
+    Done(Answer),
+}
+
+impl Store {
+    /// Takes the key for a request. `body_sha256` where it is known before the request runs. Answers older
+    /// than a day are forgotten first.
+    pub async fn begin_key(
+        &self,
+        scope: &Scope,
+        body_sha256: Option<&[u8]>,
+        now_ms: i64,
+    ) -> Result<Begun, Error> {
+        let mut transaction = self.begin().await?;
+        sqlx::query("delete from idempotency where created_ms <= $1")
+            .bind(now_ms - KEPT_MS)
+            .execute(&mut *transaction)
+            .await?;
+        let known: Option<(String, Uuid, Option<Vec<u8>>)> = sqlx::query_as(
+            "select state, ids, body_sha256 from idempotency \
+             where caller = $1 and route = $2 and key = $3",
+        )
+        .bind(&scope.caller)
+        .bind(&scope.route)
+        .bind(&scope.key)
+        .fetch_optional(&mut *transaction)
+        .await?;
+        let ids = match known {
+            Some((state, _, _)) if state == "running" => return Ok(Begun::Running),
+            Some((state, _, _)) if state == "done" => {
+                return Ok(Begun::Done(self.answer(scope).await?));
+            }
+            Some((_, _, Some(then))) if body_sha256.is_some_and(|now| now != then) => {
+                return Ok(Begun::OtherBody);
+            }
+            Some((_, ids, _)) => ids,
+            None => Uuid::now_v7(),
+        };
+        sqlx::query(
+            "insert into idempotency (caller, route, key, ids, state, body_sha256, created_ms) \
+             values ($1, $2, $3, $4, 'running', $5, $6) on conflict do update set state = 'running'",
+        )
+        .bind(&scope.caller)
+        .bind(&scope.route)
+        .bind(&scope.key)
+        .bind(ids)
+        .bind(body_sha256)
+        .bind(now_ms)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        Ok(Begun::Run(ids))
+    }
+
+    async fn answer(&self, scope: &Scope) -> Result<Answer, Error> {
+        let row = sqlx::query_as(
+            "select body_sha256, status, headers, answer from idempotency \
+             where caller = $1 and route = $2 and key = $3",
+        );
+        let row = row.bind(&scope.caller).bind(&scope.route).bind(&scope.key);
+        Ok(row.fetch_one(&self.reader).await?)
+    }
+
+    /// Notes the answer to the request that holds the key.
+    pub async fn finish_key(&self, scope: &Scope, answer: &Answer) -> Result<(), Error> {
+        sqlx::query(
+            "update idempotency set state = 'done', body_sha256 = $4, status = $5, headers = $6, \
+             answer = $7 where caller = $1 and route = $2 and key = $3 and state = 'running'",
+        )
+        .bind(&scope.caller)
+        .bind(&scope.route)
+        .bind(&scope.key)
+        .bind(&answer.body_sha256)
+        .bind(answer.status)
+        .bind(&answer.headers)
+        .bind(&answer.answer)
+        .execute(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    /// Gives the key back: its request ended without an answer to keep.
+    pub async fn interrupt_key(&self, scope: &Scope) -> Result<(), Error> {
+        sqlx::query(
+            "update idempotency set state = 'interrupted' \
+             where caller = $1 and route = $2 and key = $3 and state = 'running'",
+        )
+        .bind(&scope.caller)
+        .bind(&scope.route)
+        .bind(&scope.key)
+        .execute(&self.writer)
+        .await?;
+        Ok(())
+    }
+
+    /// Gives every key back, at the start of the process: whoever held one is gone, because the store's
+    /// lock on the data folder is held.
+    pub async fn interrupt_all_keys(&self) -> Result<(), Error> {
+        let sql = "update idempotency set state = 'interrupted' where state = 'running'";
+        sqlx::query(sql).execute(&self.writer).await?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scope() -> Scope {
+        Scope {
+            caller: String::new(),
+            route: "/v1/fish".into(),
+            key: "k".into(),
+        }
+    }
+
+    #[tokio::test]
+    async fn an_answer_is_kept_for_a_day_and_not_longer() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let Begun::Run(first) = store.begin_key(&scope(), None, 0).await.unwrap() else {
+            panic!("nobody had this key");
+        };
+        let answer = Answer {
+            body_sha256: vec![7; 32],
+            status: 202,
+            headers: "[]".into(),
+            answer: b"{}".to_vec(),
+        };
+        store.finish_key(&scope(), &answer).await.unwrap();
+        let met = store.begin_key(&scope(), None, KEPT_MS - 1).await.unwrap();
+        assert_eq!(met, Begun::Done(answer));
+        let met = store.begin_key(&scope(), None, KEPT_MS).await.unwrap();
+        assert!(matches!(met, Begun::Run(ids) if ids != first), "{met:?}");
+    }
+
+    #[tokio::test]
+    async fn an_interrupted_request_runs_again_under_its_ids_and_with_its_body() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let first = store.begin_key(&scope(), Some(&[1; 32]), 0).await.unwrap();
+        let met = store.begin_key(&scope(), Some(&[1; 32]), 1).await.unwrap();
+        assert_eq!(met, Begun::Running);
+        store.interrupt_all_keys().await.unwrap();
+        let met = store.begin_key(&scope(), Some(&[2; 32]), 2).await.unwrap();
+        assert_eq!(met, Begun::OtherBody);
+        let met = store.begin_key(&scope(), Some(&[1; 32]), 3).await.unwrap();
+        assert_eq!(met, first);
+    }
+}

@@ -1,0 +1,210 @@
+//! The table of resumable uploads, and their files (RELIABILITY.md, R1 and H3): what a sender is told to
+//! have sent has been synced, whatever happens to the process. One sender at a time: a newcomer asks the
+//! one before to let go, because he is most often the same one after a cut that only he has noticed.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io::SeekFrom;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use sqlx::types::Uuid;
+use tokio::fs::{File, OpenOptions};
+use tokio::io::{AsyncSeekExt, AsyncWriteExt};
+use tokio::sync::OwnedMutexGuard;
+use tokio_util::sync::CancellationToken;
+
+use super::blobs::hash_file;
+use super::footage::VIDEO;
+use super::{BlobFile, Draft, Error, Store};
+
+/// How long an upload waits for its next bytes, milliseconds.
+pub const LIFE_MS: i64 = 24 * 3600 * 1000;
+
+/// One upload as stored.
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
+pub struct Upload {
+    /// Its id.
+    pub id: Uuid,
+    /// What the sender calls it: a label.
+    pub name: String,
+    /// How many bytes it will have.
+    pub size_bytes: i64,
+    /// How many of them are safe.
+    pub offset_bytes: i64,
+    /// The footage that it became.
+    pub footage_id: Option<Uuid>,
+    /// When it is given up, milliseconds since 1970.
+    pub expires_ms: i64,
+}
+
+/// Who holds which upload.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Holders(Arc<Mutex<HashMap<Uuid, Holder>>>);
+
+#[derive(Clone, Debug, Default)]
+struct Holder {
+    wanted: CancellationToken,
+    mutex: Arc<tokio::sync::Mutex<()>>,
+}
+
+/// The right to change an upload, until dropped.
+#[derive(Debug)]
+pub struct Hold {
+    /// Cancelled when a newcomer wants the upload: let go.
+    pub wanted: CancellationToken,
+    _guard: OwnedMutexGuard<()>,
+}
+
+/// The file of an upload while bytes are added to it.
+#[derive(Debug)]
+pub struct Growing {
+    file: File,
+}
+
+impl Store {
+    /// Adds an upload without bytes.
+    pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
+        File::create_new(self.upload_path(upload.id)).await?;
+        let sql = "insert into uploads (id, name, size_bytes, expires_ms) values ($1, $2, $3, $4)";
+        sqlx::query(sql)
+            .bind(upload.id)
+            .bind(&upload.name)
+            .bind(upload.size_bytes)
+            .bind(upload.expires_ms)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
+    /// One upload that has not expired.
+    pub async fn upload(&self, id: Uuid, now_ms: i64) -> Result<Option<Upload>, Error> {
+        let sql = "select * from uploads where id = $1 and expires_ms > $2";
+        let row = sqlx::query_as(sql).bind(id).bind(now_ms);
+        Ok(row.fetch_optional(&self.reader).await?)
+    }
+
+    /// Asks whoever holds the upload to let go, and holds it.
+    pub async fn hold_upload(&self, id: Uuid) -> Hold {
+        let (wanted, mutex) = {
+            let mut holders = self
+                .holders
+                .0
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner);
+            // Those that nobody holds or waits for are forgotten.
+            holders.retain(|of, holder| *of == id || Arc::strong_count(&holder.mutex) > 1);
+            let holder = holders.entry(id).or_default();
+            holder.wanted.cancel();
+            holder.wanted = CancellationToken::new();
+            (holder.wanted.clone(), holder.mutex.clone())
+        };
+        let _guard = mutex.lock_owned().await;
+        Hold { wanted, _guard }
+    }
+
+    /// Opens the file of an upload where its safe bytes end; those beyond are cut off.
+    pub async fn grow_upload(&self, upload: &Upload) -> Result<Growing, Error> {
+        let path = self.upload_path(upload.id);
+        let mut file = OpenOptions::new().write(true).open(path).await?;
+        file.set_len(upload.offset_bytes.unsigned_abs()).await?;
+        file.seek(SeekFrom::End(0)).await?;
+        Ok(Growing { file })
+    }
+
+    /// Notes how many bytes are safe, after they have been synced.
+    pub async fn note_upload(&self, upload: &Upload) -> Result<(), Error> {
+        let sql = "update uploads set offset_bytes = $2, expires_ms = $3 where id = $1";
+        let update = sqlx::query(sql).bind(upload.id).bind(upload.offset_bytes);
+        update.bind(upload.expires_ms).execute(&self.writer).await?;
+        Ok(())
+    }
+
+    /// A draft with the whole upload as its video, hashed. The upload keeps its file meanwhile.
+    pub async fn draft_of_upload(&self, upload: &Upload) -> Result<(Draft, BlobFile), Error> {
+        let (blobs, path) = (self.blobs.clone(), self.upload_path(upload.id));
+        let made = tokio::task::spawn_blocking(move || {
+            let draft = blobs.draft(&Uuid::now_v7().to_string())?;
+            let video = draft.path().join(VIDEO);
+            fs::hard_link(path, &video)?;
+            let (size_bytes, sha256) = hash_file(&video)?;
+            let name = VIDEO.to_owned();
+            Ok((
+                draft,
+                BlobFile {
+                    name,
+                    size_bytes,
+                    sha256,
+                },
+            ))
+        });
+        made.await.map_err(std::io::Error::other)?
+    }
+
+    /// Notes the footage that the upload became; its own file goes.
+    pub async fn end_upload(&self, upload: &Upload, footage: Uuid) -> Result<(), Error> {
+        let update = sqlx::query("update uploads set footage_id = $2 where id = $1");
+        let update = update.bind(upload.id).bind(footage);
+        update.execute(&self.writer).await?;
+        self.remove_upload_file(upload.id)
+    }
+
+    /// Gives an upload up, with its bytes.
+    pub async fn delete_upload(&self, id: Uuid) -> Result<(), Error> {
+        let delete = sqlx::query("delete from uploads where id = $1").bind(id);
+        delete.execute(&self.writer).await?;
+        self.remove_upload_file(id)
+    }
+
+    /// Removes expired uploads, and files of uploads that are not there (any more). Must not run beside
+    /// [`Store::create_upload`], which makes the file before the row: at the start, or for expired rows alone.
+    pub async fn sweep_uploads(&self, now_ms: i64) -> Result<usize, Error> {
+        let sql = "delete from uploads where expires_ms <= $1 returning id";
+        let expired: Vec<Uuid> = sqlx::query_scalar(sql)
+            .bind(now_ms)
+            .fetch_all(&self.writer)
+            .await?;
+        for id in &expired {
+            self.remove_upload_file(*id)?;
+        }
+        Ok(expired.len())
+    }
+
+    /// Removes files that no unfinished upload names: at the start of the process.
+    pub(super) async fn sweep_upload_files(&self) -> Result<(), Error> {
+        let sql = "select id from uploads where footage_id is null";
+        let known: Vec<Uuid> = sqlx::query_scalar(sql).fetch_all(&self.reader).await?;
+        for entry in fs::read_dir(self.blobs.uploads())? {
+            let entry = entry?;
+            let id = entry.file_name().to_string_lossy().parse::<Uuid>().ok();
+            if id.is_none_or(|id| !known.contains(&id)) {
+                fs::remove_file(entry.path())?;
+            }
+        }
+        Ok(())
+    }
+
+    fn upload_path(&self, id: Uuid) -> PathBuf {
+        self.blobs.uploads().join(id.to_string())
+    }
+
+    fn remove_upload_file(&self, id: Uuid) -> Result<(), Error> {
+        match fs::remove_file(self.upload_path(id)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Growing {
+    /// Adds bytes.
+    pub async fn add(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        Ok(self.file.write_all(bytes).await?)
+    }
+
+    /// Makes all bytes added so far outlive a power cut.
+    pub async fn sync(&mut self) -> Result<(), Error> {
+        self.file.flush().await?;
+        Ok(self.file.sync_all().await?)
+    }
+}

@@ -1,0 +1,143 @@
+//! Deleting: what is gone is gone with all that came of it, rows and files, and nothing else is.
+
+use flockreel::jobs::worker::{Step, Worker};
+use flockreel::jobs::{Attempt, Error, Product};
+use flockreel::progress::Progress;
+use flockreel::store::jobs::Lease;
+use flockreel::store::jobs::finish::Made;
+use reqwest::StatusCode;
+use serde_json::{Value, json};
+
+use crate::common::TestApp;
+use crate::common::app::code_of;
+use crate::common::clip::TINY;
+
+/// What the job was to make, without its work.
+fn pretend(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
+    std::fs::write(attempt.folder().join("some.json"), b"{}")?;
+    let input: Value = serde_json::from_str(&lease.input)?;
+    let id = |name: &str| serde_json::from_value(input[name].clone());
+    Ok(Product {
+        made: match lease.kind.name() {
+            "analysis" => Made::Library(id("footage_id")?),
+            "flock" => Made::Flock(id("library_id")?),
+            _ => Made::Fish(id("library_id")?),
+        },
+        params: "{}".into(),
+        summary: "{}".into(),
+    })
+}
+
+/// A footage with a library, a flock and a fish of it, and one more flock that is still queued: their paths.
+async fn family(app: &TestApp) -> Vec<String> {
+    let footage = app.upload(&TINY).await;
+    let analysis = app.accept("/v1/analyses", json!({"footage_id": footage}));
+    let library = analysis.await["library_id"].clone();
+    let of_library = json!({"library_id": library});
+    let flock = app.accept("/v1/flocks", of_library.clone()).await;
+    let fish = app.accept("/v1/fish", of_library.clone()).await;
+    let worker = Worker::new(app.context.clone());
+    for _ in 0..3 {
+        let step = worker.step_by(pretend).await.unwrap();
+        assert!(matches!(step, Step::Done(_)), "{step:?}");
+    }
+    let queued = app.accept("/v1/flocks", of_library).await;
+    [
+        ("footage", &json!(footage)),
+        ("libraries", &library),
+        ("flocks", &flock["flock_id"]),
+        ("fish", &fish["fish_id"]),
+        ("jobs", &queued["job_id"]),
+        ("jobs", &flock["job_id"]),
+    ]
+    .map(|(noun, id)| format!("/v1/{noun}/{}", id.as_str().unwrap()))
+    .to_vec()
+}
+
+async fn delete(app: &TestApp, path: &str) {
+    let answer = app.delete(path).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::NO_CONTENT, "{path}");
+}
+
+async fn assert_gone(app: &TestApp, path: &str) {
+    let answer = app.get(path).send().await.unwrap();
+    assert_eq!(code_of(answer, 404).await, "not_found", "{path}");
+}
+
+/// How many folders of each kind the store holds.
+fn folders(app: &TestApp) -> [usize; 4] {
+    ["footage", "libraries", "flocks", "fish"].map(|kind| app.n_folders(kind))
+}
+
+#[tokio::test]
+async fn a_footage_goes_with_all_that_came_of_it_and_can_come_again() {
+    let app = TestApp::idle().await;
+    let paths = family(&app).await;
+    assert_eq!(folders(&app), [1, 1, 1, 1]);
+    delete(&app, &paths[0]).await;
+    for path in &paths {
+        assert_gone(&app, path).await;
+    }
+    assert_eq!(folders(&app), [0, 0, 0, 0]);
+    assert_eq!(app.json("/v1/jobs").await["items"], json!([]));
+    let again = app.delete(&paths[0]).send().await.unwrap();
+    assert_eq!(code_of(again, 404).await, "not_found");
+    app.upload(&TINY).await;
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_library_goes_with_what_was_made_of_it_and_leaves_the_footage() {
+    let app = TestApp::idle().await;
+    let paths = family(&app).await;
+    delete(&app, &paths[1]).await;
+    for path in &paths[1..] {
+        assert_gone(&app, path).await;
+    }
+    assert_eq!(folders(&app), [1, 0, 0, 0]);
+    app.json(&paths[0]).await;
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_flock_and_a_fish_go_alone() {
+    let app = TestApp::idle().await;
+    let paths = family(&app).await;
+    delete(&app, &paths[2]).await;
+    assert_eq!(folders(&app), [1, 1, 0, 1]);
+    delete(&app, &paths[3]).await;
+    assert_eq!(folders(&app), [1, 1, 0, 0]);
+    let queued = app.json(&paths[4]).await;
+    assert_eq!(queued["state"], "queued");
+    let ahead_of_time = queued["links"]["result"].as_str().unwrap();
+    let answer = app.delete(ahead_of_time).send().await.unwrap();
+    assert_eq!(code_of(answer, 404).await, "not_ready");
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_running_job_lets_go_when_its_footage_is_deleted() {
+    let mut app = TestApp::idle().await;
+    app.context.lease = std::time::Duration::from_millis(300);
+    let footage = app.upload(&TINY).await;
+    app.accept("/v1/analyses", json!({"footage_id": footage}))
+        .await;
+    let (begun, has_begun) = tokio::sync::oneshot::channel();
+    let worker = Worker::new(app.context.clone());
+    let step = tokio::spawn(async move {
+        let work = move |lease: &Lease, attempt: &Attempt| {
+            begun.send(()).ok();
+            while !attempt.listener.cancelled() {
+                std::thread::yield_now();
+            }
+            // Too late to notice: it finishes all the same.
+            pretend(lease, attempt)
+        };
+        worker.step_by(work).await
+    });
+    has_begun.await.unwrap();
+    delete(&app, &format!("/v1/footage/{footage}")).await;
+    assert!(matches!(step.await.unwrap().unwrap(), Step::Lost(_)));
+    assert_eq!(folders(&app), [0, 0, 0, 0]);
+    app.assert_sound().await;
+}

@@ -1,0 +1,128 @@
+//! Idempotency-Key: what is asked for twice is made once (RELIABILITY.md, store and queue rules).
+
+use flockreel::ids::FootageId;
+use flockreel::jobs::clock::now_ms;
+use flockreel::jobs::supervisor::recover;
+use flockreel::jobs::{allotted, analysis};
+use flockreel::store::idempotency::{Begun, Scope};
+use reqwest::{Response, StatusCode};
+use serde_json::{Value, json};
+
+use crate::common::TestApp;
+use crate::common::app::{code_of, json_of};
+use crate::common::clip::TINY;
+
+async fn analyze(app: &TestApp, body: &Value) -> Response {
+    let request = app.post("/v1/analyses").header("idempotency-key", "k-1");
+    request.json(body).send().await.unwrap()
+}
+
+fn scope() -> Scope {
+    Scope {
+        caller: String::new(),
+        route: "/v1/analyses".into(),
+        key: "k-1".into(),
+    }
+}
+
+async fn n_jobs(app: &TestApp) -> usize {
+    app.json("/v1/jobs").await["items"]
+        .as_array()
+        .unwrap()
+        .len()
+}
+
+#[tokio::test]
+async fn the_same_request_again_gets_the_same_answer_and_another_one_422() {
+    let app = TestApp::idle().await;
+    let body = json!({"footage_id": app.upload(&TINY).await});
+    let first = analyze(&app, &body).await;
+    let location = first.headers()["location"].clone();
+    assert!(!first.headers().contains_key("idempotent-replayed"));
+    let first = json_of(first, StatusCode::ACCEPTED).await;
+    let again = analyze(&app, &body).await;
+    assert_eq!(again.headers()["idempotent-replayed"], "true");
+    assert_eq!(again.headers()["location"], location);
+    assert_eq!(json_of(again, StatusCode::ACCEPTED).await, first);
+    let other = json!({"footage_id": body["footage_id"], "params": {"threshold": 30}});
+    let other = analyze(&app, &other).await;
+    assert_eq!(code_of(other, 422).await, "idempotency_key_reused");
+    let unkeyed = app.accept("/v1/analyses", body).await;
+    assert_ne!(unkeyed["job_id"], first["job_id"]);
+    assert_eq!(n_jobs(&app).await, 2);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_refusal_is_the_same_refusal_again_and_an_upload_the_same_footage() {
+    let app = TestApp::idle().await;
+    for _ in 0..2 {
+        let refused = analyze(&app, &json!({"footage_id": uuid::Uuid::nil()})).await;
+        assert_eq!(code_of(refused, 422).await, "invalid_params");
+    }
+    let upload = async |film: &[u8]| {
+        let request = app.post("/v1/footage").header("idempotency-key", "k-2");
+        request.body(film.to_vec()).send().await.unwrap()
+    };
+    let first = json_of(upload(&TINY).await, StatusCode::CREATED).await;
+    let again = upload(&TINY).await;
+    assert_eq!(again.headers()["idempotent-replayed"], "true");
+    assert_eq!(json_of(again, StatusCode::CREATED).await, first);
+    let other = upload(&TINY[1..]).await;
+    assert_eq!(code_of(other, 422).await, "idempotency_key_reused");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn while_the_first_request_runs_the_second_is_told_so() {
+    let app = TestApp::idle().await;
+    let body = json!({"footage_id": app.upload(&TINY).await});
+    let held = app.context.store.begin_key(&scope(), None, now_ms()).await;
+    assert!(matches!(held.unwrap(), Begun::Run(_)));
+    let second = analyze(&app, &body).await;
+    assert!(second.headers().contains_key("retry-after"));
+    assert_eq!(code_of(second, 409).await, "request_in_progress");
+    assert_eq!(n_jobs(&app).await, 0);
+    app.assert_sound().await;
+}
+
+/// The first request as far as it came: the key taken, the job queued, no answer noted; then a start.
+async fn crashed_between(app: &TestApp, footage: &str) -> Value {
+    let begun = app.context.store.begin_key(&scope(), None, now_ms()).await;
+    let Begun::Run(family) = begun.unwrap() else {
+        panic!("nobody had this key");
+    };
+    let input = analysis::Input {
+        footage_id: FootageId(footage.parse().unwrap()),
+        params: flockreel::analysis::Params::default(),
+    };
+    let queued = allotted::under(family, analysis::enqueue(&app.context, &input));
+    let (job_id, library_id) = queued.await.unwrap();
+    recover(&app.context).await.unwrap();
+    json!({"job_id": job_id, "library_id": library_id, "footage_id": footage})
+}
+
+#[tokio::test]
+async fn a_crash_between_the_job_and_its_answer_makes_no_second_job() {
+    let app = TestApp::idle().await;
+    let footage = app.upload(&TINY).await;
+    let made = crashed_between(&app, &footage).await;
+    for _ in 0..2 {
+        let again = analyze(&app, &json!({"footage_id": footage})).await;
+        assert_eq!(json_of(again, StatusCode::ACCEPTED).await, made);
+    }
+    assert_eq!(n_jobs(&app).await, 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_key_of_before_a_crash_does_not_serve_another_request() {
+    let app = TestApp::idle().await;
+    let footage = app.upload(&TINY).await;
+    crashed_between(&app, &footage).await;
+    let other = json!({"footage_id": footage, "params": {"threshold": 30}});
+    let other = analyze(&app, &other).await;
+    assert_eq!(code_of(other, 422).await, "idempotency_key_reused");
+    assert_eq!(n_jobs(&app).await, 1);
+    app.assert_sound().await;
+}
