@@ -114,7 +114,7 @@ async fn receive_wish(mut field: Field<'_>) -> Result<Map<String, Value>, Proble
     loop {
         let piece = timeout(PIECE, field.chunk())
             .await
-            .map_err(|_| Code::BodyTimeout)?;
+            .map_err(|_elapsed| Code::BodyTimeout)?;
         let Some(bytes) = piece.map_err(|error| from_multipart(&error))? else {
             break;
         };

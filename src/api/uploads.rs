@@ -292,10 +292,12 @@ fn file_name(headers: &HeaderMap) -> Result<String, Problem> {
     let Some(pairs) = headers.get("upload-metadata") else {
         return Ok(String::new());
     };
-    let pairs = pairs.to_str().map_err(|_| malformed())?;
+    let pairs = pairs.to_str().map_err(|_not_text| malformed())?;
     for pair in pairs.split(',') {
         let (key, value) = pair.trim().split_once(' ').unwrap_or((pair.trim(), ""));
-        let value = STANDARD.decode(value.trim()).map_err(|_| malformed())?;
+        let value = STANDARD
+            .decode(value.trim())
+            .map_err(|_not_base64| malformed())?;
         if key == "filename" || key == "name" {
             return Ok(String::from_utf8_lossy(&value).into_owned());
         }
@@ -338,7 +340,9 @@ impl Checksum {
             "sha256" => Hasher::Sha256(Sha256::new()),
             _ => return Err(malformed()),
         };
-        let wanted = STANDARD.decode(value.trim()).map_err(|_| malformed())?;
+        let wanted = STANDARD
+            .decode(value.trim())
+            .map_err(|_not_base64| malformed())?;
         Ok(Some(Checksum { hasher, wanted }))
     }
 
