@@ -32,6 +32,15 @@ fn a_school_follows_its_boids_without_clones() {
 }
 
 #[test]
+fn a_flock_tells_how_many_the_tank_has_room_for() {
+    // 16 x 12 body lengths, less the margins, at 1.2 x 1.2 each.
+    let top = planned(View::Top, "scatter").stats.room_for;
+    assert!((40..140).contains(&top), "{top}");
+    let side = planned(View::Side, "scatter").stats.room_for;
+    assert!(side > top, "one behind another: {side} {top}");
+}
+
+#[test]
 fn in_side_view_nobody_is_rotated_beyond_the_budget() {
     let flock = planned(View::Side, "swarm");
     let rho = flock.params.matching.rho_deg.to_radians();

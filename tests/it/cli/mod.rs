@@ -42,6 +42,16 @@ fn a_film_that_is_refused_gets_one_sentence_and_leaves_nothing_behind() {
 }
 
 #[test]
+fn a_film_that_is_not_there_is_named() {
+    let films = Films::new();
+    let done = flockreel(&films, "analyze nowhere.mp4 -o library");
+    let sentence = String::from_utf8(done.stderr).expect("it is text");
+    assert_eq!(done.status.code(), Some(2), "{sentence}");
+    assert!(sentence.contains("nowhere.mp4"), "{sentence}");
+    assert!(names(&films).is_empty());
+}
+
+#[test]
 fn a_folder_that_is_no_library_is_named() {
     let films = Films::new();
     for command in ["flock", "fish", "matrix", "sprites"] {
