@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
+use super::access::Caller;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::jobs::{absent_result, accepted, job_to_follow};
@@ -80,13 +81,14 @@ pub(super) struct FlockView {
 ))]
 pub(super) async fn create_flock(
     State(state): State<AppState>,
+    caller: Caller,
     Json(request): Json<FlockRequest>,
 ) -> Result<Response<Body>, Problem> {
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
-    let after_job = job_to_follow(&state, library_id).await?;
+    let after_job = job_to_follow(&state, &caller, library_id).await?;
     let input = Input { library_id, params };
-    let (job_id, flock_id) = enqueue(&state.context, &input, after_job).await?;
+    let (job_id, flock_id) = enqueue(&state.context, &input, after_job, &caller.account).await?;
     let result = format!("/v1/flocks/{flock_id}");
     Ok(accepted(
         job_id,
@@ -102,10 +104,13 @@ pub(super) async fn create_flock(
 ))]
 pub(super) async fn list_flocks(
     State(state): State<AppState>,
+    caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FlockView>>, Problem> {
     let store = &state.context.store;
-    let rows = store.list_flocks(paging.limit + 1, paging.cursor).await?;
+    let rows = store
+        .list_flocks(paging.limit + 1, paging.cursor, &caller.reach)
+        .await?;
     Page::of(rows, paging, |row| row.id, FlockView::of)
 }
 
@@ -116,9 +121,10 @@ pub(super) async fn list_flocks(
 ))]
 pub(super) async fn get_flock(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FlockView>, Problem> {
-    Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
+    Ok(axum::Json(FlockView::of(find(&state, &caller, id).await?)?))
 }
 
 /// A file of a flock: flock.json, plan.svg, video.mp4; tracks.csv and ground-truth.zip unless declined; and,
@@ -133,11 +139,12 @@ pub(super) async fn get_flock(
 ))]
 pub(super) async fn get_flock_file(
     State(state): State<AppState>,
+    caller: Caller,
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
-    let flock = find(&state, id).await?;
+    let flock = find(&state, &caller, id).await?;
     // What a browser cannot show is saved.
     let kind = match media_type {
         "application/zip" | "video/quicktime" => "attachment",
@@ -163,10 +170,10 @@ fn label_of(name: &str, id: Uuid) -> String {
     }
 }
 
-async fn find(state: &AppState, id: Uuid) -> Result<Flock, Problem> {
-    match state.context.store.flock(id).await? {
+async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Flock, Problem> {
+    match state.context.store.flock(id, &caller.reach).await? {
         Some(flock) => Ok(flock),
-        None => Err(absent_result(state, id).await?),
+        None => Err(absent_result(state, caller, id).await?),
     }
 }
 

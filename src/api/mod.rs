@@ -2,7 +2,7 @@
 //!
 //! Handlers are thin: extract, one call, answer. What an error means to HTTP is `problem`'s alone.
 
-mod guard; // who may ask, and the headers of every answer
+mod access; // who may ask, and the headers of every answer
 mod problem;
 pub mod server; // the accept loop
 
@@ -40,6 +40,8 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 pub use problem::Problem;
+
+use access::{Names, authenticate, guard, session};
 
 use crate::code::Code;
 use crate::config::Config;
@@ -88,17 +90,22 @@ impl AppState {
 pub fn router(state: AppState) -> Router {
     let (routes, document) = table().split_for_parts();
     let stop = state.context.draining.clone();
+    let names = match state.config.demands_tokens() {
+        true => Names::Any,
+        false => Names::Loopback,
+    };
     routes
         .merge(openapi::route(&document))
         .merge(page::routes())
         .fallback(|| async { Problem::from(Code::NotFound) })
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
-        .with_state(state)
+        .with_state(state.clone())
+        .layer(middleware::from_fn_with_state(state, authenticate))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(middleware::from_fn_with_state(stop, refuse_while_stopping))
-        .layer(middleware::from_fn(guard::guard))
+        .layer(middleware::from_fn_with_state(names, guard))
         .layer(PropagateRequestIdLayer::x_request_id())
         .layer(TraceLayer::new_for_http())
         .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
@@ -123,6 +130,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::get_job_events))
+        .routes(routes!(session::begin_session, session::end_session))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))
 }

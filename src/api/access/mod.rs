@@ -1,0 +1,9 @@
+//! Who may ask, before any handler is reached (RELIABILITY.md, S5 to S7): from where a browser asks
+//! (`guard`), whose token came with the request (`auth`), browsers that signed in (`session`).
+
+mod auth;
+mod guard;
+pub(super) mod session;
+
+pub(super) use auth::{Caller, authenticate};
+pub(super) use guard::{Names, guard};
