@@ -75,6 +75,7 @@ codes! {
     Unauthenticated "unauthenticated" "A valid token is needed: none was given, or it is wrong, expired or revoked."
     ScopeTooSmall "scope_too_small" "The token may not do this."
     QuotaExceeded "quota_exceeded" "There are as many jobs under way as the token may have."
+    RateLimited "rate_limited" "Too many requests in a short time: ask again soon."
     CrossSite "cross_site" "Another site may not ask for this."
     Stopping "stopping" "The service is stopping: ask again soon."
     Internal "internal" "Something failed inside flockreel."

@@ -30,6 +30,9 @@ pub struct Config {
     /// Do not fill an empty data folder with a sample.
     #[arg(long, env = "FLOCKREEL_NO_SAMPLE")]
     pub no_sample: bool,
+    /// Requests a second that each owner of a token may make, four seconds' at once; 0 for any number.
+    #[arg(long, env = "FLOCKREEL_RATE", default_value_t = 200, value_name = "N")]
+    pub rate: u32,
     /// The largest upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,

@@ -39,9 +39,10 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+pub use access::signed;
 pub use problem::Problem;
 
-use access::{Names, authenticate, guard, session};
+use access::{Names, Rates, authenticate, guard, session};
 
 use crate::code::Code;
 use crate::config::Config;
@@ -64,6 +65,8 @@ pub struct AppState {
     pub context: Context,
     /// The version of the media tool, or why there is none; asked for at the start.
     pub media_tool: Arc<Result<String, String>>,
+    /// How often each owner may ask.
+    rates: Arc<Rates>,
 }
 
 impl AppState {
@@ -79,6 +82,7 @@ impl AppState {
             Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
         }
         Ok(AppState {
+            rates: Arc::new(Rates::new(config.rate)),
             config: Arc::new(config),
             context,
             media_tool: Arc::new(tool.map_err(|error| error.to_string())),
@@ -124,6 +128,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
         .routes(routes!(flocks::get_flock))
         .routes(routes!(flocks::get_flock_file))
+        .routes(routes!(flocks::create_flock_link))
         .routes(routes!(fish::create_fish, fish::list_fish))
         .routes(routes!(fish::get_fish))
         .routes(routes!(fish::get_fish_file))

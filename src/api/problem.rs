@@ -103,7 +103,11 @@ impl IntoResponse for Problem {
         headers.insert(header::CONTENT_TYPE, media_type);
         if matches!(
             self.code,
-            Code::Stopping | Code::NotReady | Code::StorageFull | Code::QuotaExceeded
+            Code::Stopping
+                | Code::NotReady
+                | Code::StorageFull
+                | Code::QuotaExceeded
+                | Code::RateLimited
         ) {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
         }
@@ -152,7 +156,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
         Code::AlreadyFinished => StatusCode::CONFLICT,
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,
-        Code::QuotaExceeded => StatusCode::TOO_MANY_REQUESTS,
+        Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
         Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
         Code::Stopping => StatusCode::SERVICE_UNAVAILABLE,
         Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,

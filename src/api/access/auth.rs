@@ -2,12 +2,15 @@
 //! its handler (RELIABILITY.md, S6). On loopback a request without a token is the local owner's, unless
 //! tokens are demanded. What a handler may see and to whom it charges comes from its [`Caller`] alone.
 
+use std::time::Instant;
+
 use axum::extract::{FromRequestParts, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, Method, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
+use super::link::caller_of_link;
 use super::session::cookie;
 use crate::api::{AppState, Problem};
 use crate::code::Code;
@@ -36,6 +39,18 @@ impl Caller {
         }
     }
 
+    /// Whoever holds a signed link: `link` lets it no further than its path.
+    pub(super) fn of_link() -> Caller {
+        Caller {
+            reach: Reach::All,
+            account: Account {
+                owner: Owner("link".to_owned()),
+                quota: Some(0),
+            },
+            scope: Scope::Read,
+        }
+    }
+
     fn of(token: &Token) -> Caller {
         Caller {
             reach: token.reach(),
@@ -60,16 +75,20 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
 /// Finds the caller of every request that is not open to all.
 pub(in crate::api) async fn authenticate(
     State(state): State<AppState>,
-    mut request: Request,
+    request: Request,
     next: Next,
 ) -> Response {
     if is_open(request.uri().path()) {
         return next.run(request).await;
     }
-    match caller(&state, request.method(), request.headers()).await {
+    let (mut parts, body) = request.into_parts();
+    match caller(&state, &parts).await {
+        Ok(caller) if !state.rates.take(&caller.account, Instant::now()) => {
+            Problem::from(Code::RateLimited).into_response()
+        }
         Ok(caller) => {
-            request.extensions_mut().insert(caller);
-            next.run(request).await
+            parts.extensions.insert(caller);
+            next.run(Request::from_parts(parts, body)).await
         }
         Err(problem) => problem.into_response(),
     }
@@ -83,10 +102,11 @@ fn is_open(path: &str) -> bool {
     exact.contains(&path) || below.iter().any(|start| path.starts_with(start))
 }
 
-async fn caller(state: &AppState, method: &Method, headers: &HeaderMap) -> Result<Caller, Problem> {
+async fn caller(state: &AppState, parts: &Parts) -> Result<Caller, Problem> {
+    let (method, headers) = (&parts.method, &parts.headers);
     let caller = match bearer(headers) {
         Some(text) => Caller::of(&token(state, text).await?),
-        None => match of_session(state, method, headers).await? {
+        None => match of_browser(state, parts).await? {
             Some(caller) => caller,
             None if state.config.demands_tokens() => return Err(Code::Unauthenticated.into()),
             None => Caller::local(),
@@ -96,6 +116,14 @@ async fn caller(state: &AppState, method: &Method, headers: &HeaderMap) -> Resul
         return Err(Code::ScopeTooSmall.into());
     }
     Ok(caller)
+}
+
+/// Whoever has a signed link or a cookie.
+async fn of_browser(state: &AppState, parts: &Parts) -> Result<Option<Caller>, Problem> {
+    match caller_of_link(state, &parts.method, &parts.uri).await? {
+        None => of_session(state, &parts.method, &parts.headers).await,
+        caller => Ok(caller),
+    }
 }
 
 /// The good token of this text, or 401.

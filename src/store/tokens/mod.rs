@@ -1,6 +1,7 @@
 //! The table of tokens: who may ask, for how long, and for how much (RELIABILITY.md, S6 and R9). Of
 //! a token only the hash of its secret is kept; it is shown once, when it is made.
 
+mod key;
 pub mod secret;
 pub mod sessions;
 

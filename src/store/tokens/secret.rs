@@ -1,4 +1,4 @@
-//! The secrets of tokens and sessions: 256 random bits as 43 letters and digits, shown once, kept as
+//! The secrets of tokens, sessions and signed links: 256 random bits as 43 letters and digits, shown once, kept as
 //! SHA-256. They are compared in a time that says nothing of where they differ.
 
 use std::hint::black_box;
@@ -53,9 +53,7 @@ impl Presented {
 impl Secret {
     /// 32 bytes of the system's randomness.
     pub(super) fn random() -> io::Result<Secret> {
-        let mut bytes = [0; 32];
-        fill(&mut bytes)?;
-        let text = base62(&bytes, SECRET_LETTERS);
+        let text = base62(&random_key()?, SECRET_LETTERS);
         Ok(Secret {
             sha256: hash(&text),
             text,
@@ -70,6 +68,25 @@ pub(super) fn random_id() -> io::Result<String> {
     Ok(base62(&bytes, ID_LETTERS))
 }
 
+/// 32 bytes of the system's randomness.
+pub(super) fn random_key() -> io::Result<[u8; 32]> {
+    let mut bytes = [0; 32];
+    fill(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// The keyed hash of a message (RFC 2104), for keys of at most 64 bytes.
+pub fn hmac_sha256(key: &[u8], message: &[u8]) -> [u8; 32] {
+    let pad = |with: u8| {
+        let mut block = [with; 64];
+        block.iter_mut().zip(key).for_each(|(pad, key)| *pad ^= key);
+        block
+    };
+    let inner = Sha256::new().chain_update(pad(0x36)).chain_update(message);
+    let outer = Sha256::new().chain_update(pad(0x5c));
+    outer.chain_update(inner.finalize()).finalize().into()
+}
+
 /// The token of an id and a secret, as it is handed out.
 pub(super) fn written(id: &str, secret: &str) -> String {
     format!("{PREFIX}_{id}_{secret}")
@@ -80,8 +97,8 @@ pub(super) fn hash(secret: &str) -> [u8; 32] {
     Sha256::digest(secret.as_bytes()).into()
 }
 
-/// Whether two hashes are the same, looked at to the last byte in any case.
-pub(super) fn is_same(a: &[u8], b: &[u8; 32]) -> bool {
+/// Whether two secrets or hashes are the same, looked at to the last byte in any case.
+pub fn is_same(a: &[u8], b: &[u8]) -> bool {
     let differing = a
         .iter()
         .zip(b)
@@ -139,6 +156,14 @@ mod tests {
         ] {
             assert!(Presented::parse(other).is_none(), "{other}");
         }
+    }
+
+    #[test]
+    fn the_keyed_hash_is_that_of_rfc_4231() {
+        let hash = hmac_sha256(b"Jefe", b"what do ya want for nothing?");
+        let hash: String = hash.iter().map(|byte| format!("{byte:02x}")).collect();
+        let wanted = "5bdcc146bf60754e6a042426089575c75a003f089d2739839dec58b964ec3843";
+        assert_eq!(hash, wanted);
     }
 
     #[test]

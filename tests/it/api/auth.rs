@@ -182,3 +182,26 @@ async fn a_token_above_its_quota_is_told_to_come_back() {
     app.accept("/v1/analyses", body).await;
     app.assert_sound().await;
 }
+
+#[tokio::test]
+async fn a_token_that_asks_too_often_is_told_to_come_back_and_others_are_answered() {
+    let app = TestApp::start(&["--rate", "2"]).await;
+    let (hasty, other) = (
+        app.token(Scope::Read, 1).await,
+        app.token(Scope::Read, 1).await,
+    );
+    let ask = async |token: &str| app.get("/v1/jobs").bearer_auth(token).send().await.unwrap();
+    let mut refused = None;
+    for _ in 0..60 {
+        let answer = ask(&hasty).await;
+        if answer.status() != 200 {
+            refused = Some(answer);
+            break;
+        }
+    }
+    let refused = refused.expect("sixty requests at once are more than eight");
+    assert!(refused.headers().contains_key("retry-after"));
+    assert_eq!(code_of(refused, 429).await, "rate_limited");
+    assert_eq!(ask(&other).await.status(), 200);
+    app.assert_sound().await;
+}

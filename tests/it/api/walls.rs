@@ -1,17 +1,18 @@
 //! Owners are walls (RELIABILITY.md, S6): every call of the document, with every kind of id, tells a
 //! stranger what a random id tells. A call that is missing from the table fails the test.
 
+use flockreel::api::signed;
 use flockreel::jobs::Product;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::store::jobs::Kind;
 use flockreel::store::jobs::finish::Made;
 use flockreel::store::tokens::Scope;
-use reqwest::Method;
+use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use uuid::Uuid;
 
 use crate::common::TestApp;
-use crate::common::app::routes;
+use crate::common::app::{json_of, routes};
 use crate::common::clip::TINY;
 
 /// How a call touches what people own.
@@ -48,6 +49,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("POST", "/v1/analyses", Body("footage_id", "footage")),
         ("POST", "/v1/flocks", Body("library_id", "libraries")),
         ("POST", "/v1/fish", Body("library_id", "libraries")),
+        ("POST", "/v1/flocks/{id}/links", Path("flocks")),
         ("DELETE", "/v1/jobs/{id}", Path("jobs")),
         ("POST", "/v1/footage", Nothing),
         ("POST", "/v1/session", Nothing),
@@ -126,6 +128,7 @@ async fn told(app: &TestApp, call: (&str, &str, &Touch), kind: &str, id: &str) -
     let request = app.request(method.parse::<Method>().unwrap(), &path);
     let request = match touch {
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
+        Touch::Path(_) if *method == "POST" => request.json(&json!({})),
         _ => request,
     };
     let answer = request.send().await.unwrap();
@@ -211,6 +214,56 @@ async fn a_list_holds_the_callers_own_and_an_administrator_sees_all() {
         assert!(counts[0] > 0, "{path}");
         assert_eq!(counts, [counts[0], 0, counts[0]], "{path}");
     }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_link_opens_one_file_for_whoever_holds_it_until_it_ends() {
+    let mut app = TestApp::start(&["--auth", "required"]).await;
+    let owner = app.token(Scope::Write, 9).await;
+    app.sign_in(&owner);
+    let things = belongings(&app).await;
+    let flock = &things.iter().find(|(kind, _)| *kind == "flocks").unwrap().1;
+    let path = format!("/v1/flocks/{flock}");
+    let ask = |wish: Value| app.post(&format!("{path}/links")).json(&wish).send();
+    let made = ask(json!({"file": "flock.json", "expires_s": 60}))
+        .await
+        .unwrap();
+    let url = json_of(made, StatusCode::CREATED).await["url"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    for (wish, status) in [
+        (json!({"file": "lock"}), 404),
+        (json!({"expires_s": 1}), 422),
+    ] {
+        assert_eq!(ask(wish).await.unwrap().status(), status);
+    }
+    app.sign_out();
+    let file = app.get(&url).send().await.unwrap();
+    assert_eq!(file.text().await.unwrap(), "{}");
+    let (_, query) = url.split_once('?').unwrap();
+    let (_, signature) = query.split_once("&signature=").unwrap();
+    let earlier = signed(
+        &app.context.store.signing_key().await.unwrap(),
+        &format!("{path}/flock.json"),
+        1,
+    );
+    for closed in [
+        format!("{path}/plan.svg?{query}"),
+        format!("{path}?{query}"),
+        format!("/v1/flocks?{query}"),
+        format!("{path}/flock.json?expires=99999999999&signature={signature}"),
+        url.replace(&signature[..4], "0000"),
+        earlier,
+    ] {
+        assert_eq!(
+            app.get(&closed).send().await.unwrap().status(),
+            401,
+            "{closed}"
+        );
+    }
+    assert_eq!(app.post(&url).send().await.unwrap().status(), 401);
     app.assert_sound().await;
 }
 
