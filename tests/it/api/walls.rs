@@ -128,7 +128,7 @@ async fn told(app: &TestApp, call: (&str, &str, &Touch), kind: &str, id: &str) -
     let request = app.request(method.parse::<Method>().unwrap(), &path);
     let request = match touch {
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
-        Touch::Path(_) if *method == "POST" => request.json(&json!({})),
+        Touch::Path(_) if method == "POST" => request.json(&json!({})),
         _ => request,
     };
     let answer = request.send().await.unwrap();
