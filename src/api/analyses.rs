@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
 use super::AppState;
+use super::access::Caller;
 use super::extract::Json;
 use super::jobs::accepted;
 use super::problem::{Problem, ProblemBody};
@@ -46,16 +47,18 @@ pub(super) struct AnalysisAccepted {
 ))]
 pub(super) async fn create_analysis(
     State(state): State<AppState>,
+    caller: Caller,
     Json(request): Json<AnalysisRequest>,
 ) -> Result<Response<Body>, Problem> {
     let params: Params = params::read(request.params)?;
     let footage_id = request.footage_id;
-    if state.context.store.footage(footage_id.0).await?.is_none() {
+    let footage = state.context.store.footage(footage_id.0, &caller.reach);
+    if footage.await?.is_none() {
         let sentence = format!("there is no such footage: {footage_id}");
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
     let input = Input { footage_id, params };
-    let (job_id, library_id) = enqueue(&state.context, &input).await?;
+    let (job_id, library_id) = enqueue(&state.context, &input, &caller.account).await?;
     let result = format!("/v1/libraries/{library_id}");
     Ok(accepted(
         job_id,

@@ -103,9 +103,17 @@ impl IntoResponse for Problem {
         headers.insert(header::CONTENT_TYPE, media_type);
         if matches!(
             self.code,
-            Code::Stopping | Code::NotReady | Code::StorageFull
+            Code::Stopping
+                | Code::NotReady
+                | Code::StorageFull
+                | Code::QuotaExceeded
+                | Code::RateLimited
         ) {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+        }
+        if self.code == Code::Unauthenticated {
+            let challenge = HeaderValue::from_static("Bearer realm=\"flockreel\"");
+            headers.insert(header::WWW_AUTHENTICATE, challenge);
         }
         response
     }
@@ -147,7 +155,9 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::BodyTimeout => StatusCode::REQUEST_TIMEOUT,
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
         Code::AlreadyFinished => StatusCode::CONFLICT,
-        Code::CrossSite => StatusCode::FORBIDDEN,
+        Code::Unauthenticated => StatusCode::UNAUTHORIZED,
+        Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
+        Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
         Code::Stopping => StatusCode::SERVICE_UNAVAILABLE,
         Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
     }

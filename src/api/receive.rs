@@ -15,6 +15,7 @@ use crate::jobs::admit::Arrival;
 use crate::store;
 use crate::store::footage::{BACKGROUND, VIDEO};
 use crate::store::intake::Intake;
+use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
 /// The longest wait for the next piece of a body.
@@ -27,13 +28,14 @@ pub(super) async fn receive(
     state: &AppState,
     request: Request,
     name: Option<String>,
+    owner: Owner,
 ) -> Result<Arrival, Problem> {
     check_headers(&request, state.config.max_upload_bytes)?;
     let draft_name = uuid::Uuid::now_v7().to_string();
     let draft = state.context.store.blobs().draft(&draft_name);
     let draft = draft.map_err(store::Error::Io)?;
     if is_form(&request) {
-        return receive_form(state, request, draft, name).await;
+        return receive_form(state, request, draft, name, owner).await;
     }
     let body = request.into_body().into_data_stream();
     let limit_bytes = state.config.max_upload_bytes;
@@ -44,6 +46,7 @@ pub(super) async fn receive(
         background: None,
         name: label(name.as_deref().unwrap_or_default()),
         sample: false,
+        owner,
     })
 }
 
@@ -52,6 +55,7 @@ async fn receive_form(
     request: Request,
     draft: Draft,
     name: Option<String>,
+    owner: Owner,
 ) -> Result<Arrival, Problem> {
     let malformed = |sentence: &str| Problem::new(Code::MalformedRequest, sentence);
     let mut form = Multipart::from_request(request, state)
@@ -82,6 +86,7 @@ async fn receive_form(
         background,
         name: label(&name.or(file_name).unwrap_or_default()),
         sample: false,
+        owner,
     })
 }
 

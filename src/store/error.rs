@@ -26,6 +26,12 @@ pub enum Error {
         /// The limit.
         limit_bytes: u64,
     },
+    /// The owner has as many jobs queued and running as it may.
+    #[error("no more than {quota} jobs may be queued or running at once: wait for one to end")]
+    QuotaExceeded {
+        /// The limit.
+        quota: i64,
+    },
     /// A row holds what this version does not know.
     #[error("a row of {table} cannot be read: {value}")]
     UnknownValue {
@@ -41,6 +47,7 @@ impl Error {
     pub fn code(&self) -> Code {
         match self {
             Error::TooLarge { .. } => Code::TooLarge,
+            Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::Io(error) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if is_sqlite_full(error.code()) => {

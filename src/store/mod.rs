@@ -14,8 +14,10 @@ pub mod footage;
 pub mod intake;
 pub mod jobs;
 pub mod libraries;
+pub mod owners;
 pub mod spill;
 pub mod sweep;
+pub mod tokens;
 
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
@@ -42,7 +44,7 @@ pub struct Store {
     reader: SqlitePool,
     blobs: Blobs,
     /// Held while the store is open: whoever holds it knows that every other process is gone.
-    _lock: Arc<File>,
+    _lock: Option<Arc<File>>,
 }
 
 impl Store {
@@ -51,13 +53,28 @@ impl Store {
     pub async fn open(data: &Path) -> Result<Store, Error> {
         std::fs::create_dir_all(data)?;
         let lock = lock(data)?;
+        Store::connect(data, Some(lock)).await
+    }
+
+    /// The same, but beside a process that has the folder open, where there is one: for rows that do
+    /// not belong to that process, as those of tokens. The database's form is that process's then.
+    pub async fn open_beside(data: &Path) -> Result<Store, Error> {
+        match Store::open(data).await {
+            Err(Error::InUse(_)) => Store::connect(data, None).await,
+            opened => opened,
+        }
+    }
+
+    async fn connect(data: &Path, lock: Option<File>) -> Result<Store, Error> {
         let blobs = Blobs::open(data)?;
         let options = options(data.join("flockreel.db"));
         let writer = SqlitePoolOptions::new()
             .max_connections(1)
             .connect_with(options.clone())
             .await?;
-        MIGRATIONS.run(&writer).await?;
+        if lock.is_some() {
+            MIGRATIONS.run(&writer).await?;
+        }
         let reader = SqlitePoolOptions::new()
             .max_connections(READERS)
             .connect_with(options.read_only(true))
@@ -66,7 +83,7 @@ impl Store {
             writer,
             reader,
             blobs,
-            _lock: Arc::new(lock),
+            _lock: lock.map(Arc::new),
         })
     }
 
