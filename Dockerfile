@@ -26,5 +26,5 @@ HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
     CMD ["curl", "-fsS", "-o", "/dev/null", "http://127.0.0.1:8080/healthz"]
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["flockreel"]
-# On loopback, as there are no accounts yet: run it with `--network host` (README).
+# On loopback: run it with `--network host`, or make a token and bind to 0.0.0.0 (README).
 CMD ["serve", "--data", "/data"]

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 /// How the service runs. Flags win over environment variables, those over defaults.
 #[derive(Args, Clone, Debug)]
@@ -13,6 +13,9 @@ pub struct Config {
     /// Where to listen. Off loopback the service needs authentication.
     #[arg(long, env = "FLOCKREEL_BIND", default_value = "127.0.0.1:8080")]
     pub bind: SocketAddr,
+    /// Who needs a token: `auto` demands one off loopback, `required` from everybody.
+    #[arg(long, env = "FLOCKREEL_AUTH", default_value = "auto")]
+    pub auth: Auth,
     /// The folder that holds the database and all files.
     #[arg(
         long,
@@ -27,12 +30,29 @@ pub struct Config {
     /// Do not fill an empty data folder with a sample.
     #[arg(long, env = "FLOCKREEL_NO_SAMPLE")]
     pub no_sample: bool,
+    /// Requests a second that each owner of a token may make, four seconds' at once; 0 for any number.
+    #[arg(long, env = "FLOCKREEL_RATE", default_value_t = 200, value_name = "N")]
+    pub rate: u32,
     /// The largest upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,
 }
 
+/// Who needs a token (RELIABILITY.md, S6).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Auth {
+    /// Whoever comes from beyond this machine.
+    Auto,
+    /// Everybody.
+    Required,
+}
+
 impl Config {
+    /// Whether a request without a token is refused.
+    pub fn demands_tokens(&self) -> bool {
+        self.auth == Auth::Required || !self.bind.ip().is_loopback()
+    }
+
     /// Threads that one worker may use, at least 1: the cores divided by the workers.
     pub fn threads_per_worker(&self) -> usize {
         (cores() / self.workers).max(1)

@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
 use super::AppState;
+use super::access::Caller;
 use super::extract::Json;
 use super::footage::{Naming, admit};
 use super::jobs::accepted;
@@ -71,31 +72,35 @@ pub(super) struct AnalysisForm {
 pub(super) async fn create_analysis(
     State(state): State<AppState>,
     Query(naming): Query<Naming>,
+    caller: Caller,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
     if is_film(&request) {
-        let (arrival, mut wishes) = receive_with(&state, request, naming.name, &["params"]).await?;
+        let label = (naming.name, caller.account.owner.clone());
+        let (arrival, mut wishes) = receive_with(&state, request, label, &["params"]).await?;
         let params = params::read(wishes.remove("params").unwrap_or_default())?;
         let (Added::New(footage) | Added::Known(footage)) = admit(&state, arrival).await?;
-        return measure(&state, FootageId(footage.id), params).await;
+        return measure(&state, &caller, FootageId(footage.id), params).await;
     }
     let Json(request) = Json::<AnalysisRequest>::from_request(request, &state).await?;
     let params: Params = params::read(request.params)?;
     let footage_id = request.footage_id;
-    if state.context.store.footage(footage_id.0).await?.is_none() {
+    let footage = state.context.store.footage(footage_id.0, &caller.reach);
+    if footage.await?.is_none() {
         let sentence = format!("there is no such footage: {footage_id}");
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
-    measure(&state, footage_id, params).await
+    measure(&state, &caller, footage_id, params).await
 }
 
 async fn measure(
     state: &AppState,
+    caller: &Caller,
     footage_id: FootageId,
     params: Params,
 ) -> Result<Response<Body>, Problem> {
     let input = Input { footage_id, params };
-    let (job_id, library_id) = enqueue(&state.context, &input).await?;
+    let (job_id, library_id) = enqueue(&state.context, &input, &caller.account).await?;
     let result = format!("/v1/libraries/{library_id}");
     Ok(accepted(
         job_id,

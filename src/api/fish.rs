@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
+use super::access::Caller;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::jobs::{absent_result, accepted, job_to_follow};
@@ -71,13 +72,14 @@ pub(super) struct FishView {
 ))]
 pub(super) async fn create_fish(
     State(state): State<AppState>,
+    caller: Caller,
     Json(request): Json<FishRequest>,
 ) -> Result<Response<Body>, Problem> {
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
-    let after_job = job_to_follow(&state, library_id).await?;
+    let after_job = job_to_follow(&state, &caller, library_id).await?;
     let input = Input { library_id, params };
-    let (job_id, fish_id) = enqueue(&state.context, &input, after_job).await?;
+    let (job_id, fish_id) = enqueue(&state.context, &input, after_job, &caller.account).await?;
     let result = format!("/v1/fish/{fish_id}");
     Ok(accepted(job_id, &result, FishAccepted { job_id, fish_id }))
 }
@@ -89,10 +91,13 @@ pub(super) async fn create_fish(
 ))]
 pub(super) async fn list_fish(
     State(state): State<AppState>,
+    caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FishView>>, Problem> {
     let store = &state.context.store;
-    let rows = store.list_fish(paging.limit + 1, paging.cursor).await?;
+    let rows = store
+        .list_fish(paging.limit + 1, paging.cursor, &caller.reach)
+        .await?;
     Page::of(rows, paging, |row| row.id, FishView::of)
 }
 
@@ -103,9 +108,10 @@ pub(super) async fn list_fish(
 ))]
 pub(super) async fn get_fish(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FishView>, Problem> {
-    Ok(axum::Json(FishView::of(find(&state, id).await?)?))
+    Ok(axum::Json(FishView::of(find(&state, &caller, id).await?)?))
 }
 
 /// Delete a virtual fish.
@@ -115,9 +121,10 @@ pub(super) async fn get_fish(
 ))]
 pub(super) async fn delete_fish(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, id).await?;
+    find(&state, &caller, id).await?;
     match state.context.store.delete_film(id).await? {
         true => Ok(StatusCode::NO_CONTENT),
         false => Err(Problem::not_found()),
@@ -134,11 +141,12 @@ pub(super) async fn delete_fish(
 ))]
 pub(super) async fn get_fish_file(
     State(state): State<AppState>,
+    caller: Caller,
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
-    let fish = find(&state, id).await?;
+    let fish = find(&state, &caller, id).await?;
     let label = match name {
         "video.mp4" => format!("fish-{id}.mp4"),
         _ => format!("fish-{id}.glb"),
@@ -152,10 +160,10 @@ pub(super) async fn get_fish_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-async fn find(state: &AppState, id: Uuid) -> Result<Fish, Problem> {
-    match state.context.store.fish(id).await? {
+async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Fish, Problem> {
+    match state.context.store.fish(id, &caller.reach).await? {
         Some(fish) => Ok(fish),
-        None => Err(absent_result(state, id).await?),
+        None => Err(absent_result(state, caller, id).await?),
     }
 }
 

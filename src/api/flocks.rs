@@ -1,14 +1,18 @@
 //! Flocks: made of a library, as a job.
 
+use std::ops::RangeInclusive;
+
 use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
 use axum::http::{Response, StatusCode};
+use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
+use super::access::{Caller, signed};
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::footage::admit;
@@ -17,10 +21,12 @@ use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody};
 use super::receive::{is_film, receive_with};
 use super::timestamp::rfc3339;
+use crate::code::Code;
 use crate::flock::Params;
 use crate::formats::params;
 use crate::ids::{FlockId, FootageId, JobId, LibraryId};
 use crate::jobs::analysis;
+use crate::jobs::clock::now_ms;
 use crate::jobs::flock::{Input, Summary, enqueue};
 use crate::store::flocks::Flock;
 use crate::store::footage::Added;
@@ -48,6 +54,39 @@ pub(super) struct FlockRequest {
     #[serde(flatten)]
     #[schema(value_type = Params)]
     params: Map<String, Value>,
+}
+
+/// How long a link may hold, seconds.
+const LINK_S: RangeInclusive<i64> = 60..=604_800;
+
+/// To which file, and for how long.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LinkRequest {
+    /// One of the flock's files.
+    #[serde(default = "video")]
+    #[schema(default = "video.mp4")]
+    file: String,
+    /// Seconds, 60..=604800 (a week).
+    #[serde(default = "an_hour")]
+    #[schema(minimum = 60, maximum = 604_800, default = 3600)]
+    expires_s: i64,
+}
+
+/// A link that needs no token.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct LinkView {
+    /// The path with its signature, on this host.
+    url: String,
+    expires_at: String,
+}
+
+fn video() -> String {
+    "video.mp4".to_owned()
+}
+
+fn an_hour() -> i64 {
+    3600
 }
 
 /// The job, and the flock that it will make.
@@ -106,25 +145,27 @@ pub(super) struct FlockView {
 ))]
 pub(super) async fn create_flock(
     State(state): State<AppState>,
+    caller: Caller,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
     if is_film(&request) {
-        return create_flock_of_film(&state, request).await;
+        return create_flock_of_film(&state, &caller, request).await;
     }
     let Json(request) = Json::<FlockRequest>::from_request(request, &state).await?;
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
-    let after_job = job_to_follow(&state, library_id).await?;
-    make(&state, library_id, params, after_job).await
+    let after_job = job_to_follow(&state, &caller, library_id).await?;
+    make(&state, &caller, (library_id, after_job), params).await
 }
 
 /// The whole way in one call: the film is stored, its analysis queued, and the flock after it.
 async fn create_flock_of_film(
     state: &AppState,
+    caller: &Caller,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
-    let wishes = ["params", "analysis"];
-    let (arrival, mut wishes) = receive_with(state, request, None, &wishes).await?;
+    let (label, wishes) = ((None, caller.account.owner.clone()), ["params", "analysis"]);
+    let (arrival, mut wishes) = receive_with(state, request, label, &wishes).await?;
     let params = params::read(wishes.remove("params").unwrap_or_default())?;
     let analysis = params::read(wishes.remove("analysis").unwrap_or_default())?;
     let (Added::New(footage) | Added::Known(footage)) = admit(state, arrival).await?;
@@ -132,18 +173,20 @@ async fn create_flock_of_film(
         footage_id: FootageId(footage.id),
         params: analysis,
     };
-    let (job_id, library_id) = analysis::enqueue(&state.context, &input).await?;
-    make(state, library_id, params, Some(job_id)).await
+    let queued = analysis::enqueue(&state.context, &input, &caller.account);
+    let (job_id, library_id) = queued.await?;
+    make(state, caller, (library_id, Some(job_id)), params).await
 }
 
+/// A flock of a library, after the job that makes it.
 async fn make(
     state: &AppState,
-    library_id: LibraryId,
+    caller: &Caller,
+    (library_id, after_job): (LibraryId, Option<JobId>),
     params: Params,
-    after_job: Option<JobId>,
 ) -> Result<Response<Body>, Problem> {
     let input = Input { library_id, params };
-    let (job_id, flock_id) = enqueue(&state.context, &input, after_job).await?;
+    let (job_id, flock_id) = enqueue(&state.context, &input, after_job, &caller.account).await?;
     let result = format!("/v1/flocks/{flock_id}");
     Ok(accepted(
         job_id,
@@ -163,10 +206,13 @@ async fn make(
 ))]
 pub(super) async fn list_flocks(
     State(state): State<AppState>,
+    caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FlockView>>, Problem> {
     let store = &state.context.store;
-    let rows = store.list_flocks(paging.limit + 1, paging.cursor).await?;
+    let rows = store
+        .list_flocks(paging.limit + 1, paging.cursor, &caller.reach)
+        .await?;
     Page::of(rows, paging, |row| row.id, FlockView::of)
 }
 
@@ -177,9 +223,10 @@ pub(super) async fn list_flocks(
 ))]
 pub(super) async fn get_flock(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FlockView>, Problem> {
-    Ok(axum::Json(FlockView::of(find(&state, id).await?)?))
+    Ok(axum::Json(FlockView::of(find(&state, &caller, id).await?)?))
 }
 
 /// Delete a flock.
@@ -189,9 +236,10 @@ pub(super) async fn get_flock(
 ))]
 pub(super) async fn delete_flock(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, id).await?;
+    find(&state, &caller, id).await?;
     match state.context.store.delete_film(id).await? {
         true => Ok(StatusCode::NO_CONTENT),
         false => Err(Problem::not_found()),
@@ -210,11 +258,12 @@ pub(super) async fn delete_flock(
 ))]
 pub(super) async fn get_flock_file(
     State(state): State<AppState>,
+    caller: Caller,
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
-    let flock = find(&state, id).await?;
+    let flock = find(&state, &caller, id).await?;
     // What a browser cannot show is saved.
     let kind = match media_type {
         "application/zip" | "video/quicktime" => "attachment",
@@ -229,6 +278,33 @@ pub(super) async fn get_flock_file(
     download.answer(&state.context.store, &conditions).await
 }
 
+/// Make a link to a file of a flock that needs no token and ends by itself.
+#[utoipa::path(post, path = "/v1/flocks/{id}/links", params(("id" = Uuid, Path)),
+    request_body = LinkRequest, responses(
+    (status = 201, body = LinkView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn create_flock_link(
+    State(state): State<AppState>,
+    caller: Caller,
+    Id(id): Id,
+    Json(request): Json<LinkRequest>,
+) -> Result<Response<Body>, Problem> {
+    let flock = find(&state, &caller, id).await?;
+    let (name, _) = find_file(FILES, &request.file)?;
+    if !LINK_S.contains(&request.expires_s) {
+        let sentence = format!("expires_s must lie in 60..=604800: {}", request.expires_s);
+        return Err(Problem::new(Code::InvalidParams, sentence));
+    }
+    let expires_s = now_ms() / 1000 + request.expires_s;
+    let key = state.context.store.signing_key().await?;
+    let view = LinkView {
+        url: signed(&key, &format!("/v1/flocks/{}/{name}", flock.id), expires_s),
+        expires_at: rfc3339(expires_s * 1000),
+    };
+    Ok((StatusCode::CREATED, axum::Json(view)).into_response())
+}
+
 /// The name under which a file is saved.
 fn label_of(name: &str, id: Uuid) -> String {
     match name {
@@ -240,10 +316,10 @@ fn label_of(name: &str, id: Uuid) -> String {
     }
 }
 
-async fn find(state: &AppState, id: Uuid) -> Result<Flock, Problem> {
-    match state.context.store.flock(id).await? {
+async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Flock, Problem> {
+    match state.context.store.flock(id, &caller.reach).await? {
         Some(flock) => Ok(flock),
-        None => Err(absent_result(state, id).await?),
+        None => Err(absent_result(state, caller, id).await?),
     }
 }
 

@@ -10,6 +10,7 @@ use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::AppState;
+use super::access::Caller;
 use super::download::{Download, disposition};
 use super::extract::{Conditions, Id};
 use super::paging::{Page, Paging};
@@ -75,10 +76,11 @@ pub(super) struct FootageForm {
     ))]
 pub(super) async fn create_footage(
     State(state): State<AppState>,
+    caller: Caller,
     Query(naming): Query<Naming>,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
-    let arrival = receive(&state, request, naming.name).await?;
+    let arrival = receive(&state, request, naming.name, caller.account.owner).await?;
     let (status, footage) = match admit(&state, arrival).await? {
         Added::New(footage) => (StatusCode::CREATED, footage),
         Added::Known(footage) => (StatusCode::OK, footage),
@@ -101,10 +103,13 @@ pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, P
 ))]
 pub(super) async fn list_footage(
     State(state): State<AppState>,
+    caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FootageView>>, Problem> {
     let store = &state.context.store;
-    let rows = store.list_footage(paging.limit + 1, paging.cursor).await?;
+    let rows = store
+        .list_footage(paging.limit + 1, paging.cursor, &caller.reach)
+        .await?;
     Page::of(rows, paging, |row| row.id, |row| Ok(FootageView::of(row)))
 }
 
@@ -115,9 +120,12 @@ pub(super) async fn list_footage(
 ))]
 pub(super) async fn get_footage(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FootageView>, Problem> {
-    Ok(axum::Json(FootageView::of(find(&state, id).await?)))
+    Ok(axum::Json(FootageView::of(
+        find(&state, &caller, id).await?,
+    )))
 }
 
 /// Delete a footage with all that came of it: libraries, flocks, virtual fish and jobs.
@@ -127,9 +135,10 @@ pub(super) async fn get_footage(
 ))]
 pub(super) async fn delete_footage(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, id).await?;
+    find(&state, &caller, id).await?;
     match state.context.store.delete_footage(id).await? {
         true => Ok(StatusCode::NO_CONTENT),
         false => Err(Problem::not_found()),
@@ -145,10 +154,11 @@ pub(super) async fn delete_footage(
 ))]
 pub(super) async fn get_footage_file(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
-    let footage = find(&state, id).await?;
+    let footage = find(&state, &caller, id).await?;
     let label = match footage.name.as_str() {
         "" => "footage",
         name => name,
@@ -162,8 +172,8 @@ pub(super) async fn get_footage_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-pub(super) async fn find(state: &AppState, id: Uuid) -> Result<Footage, Problem> {
-    let footage = state.context.store.footage(id).await?;
+pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Footage, Problem> {
+    let footage = state.context.store.footage(id, &caller.reach).await?;
     footage.ok_or_else(Problem::not_found)
 }
 

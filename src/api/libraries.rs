@@ -9,6 +9,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
+use super::access::Caller;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id};
 use super::jobs::absent_result;
@@ -59,11 +60,12 @@ pub(super) struct LibraryView {
 ))]
 pub(super) async fn list_libraries(
     State(state): State<AppState>,
+    caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<LibraryView>>, Problem> {
     let store = &state.context.store;
     let rows = store
-        .list_libraries(paging.limit + 1, paging.cursor)
+        .list_libraries(paging.limit + 1, paging.cursor, &caller.reach)
         .await?;
     Page::of(rows, paging, |row| row.id, LibraryView::of)
 }
@@ -75,9 +77,12 @@ pub(super) async fn list_libraries(
 ))]
 pub(super) async fn get_library(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<LibraryView>, Problem> {
-    Ok(axum::Json(LibraryView::of(find(&state, id).await?)?))
+    Ok(axum::Json(LibraryView::of(
+        find(&state, &caller, id).await?,
+    )?))
 }
 
 /// Delete a library with all that was made of it.
@@ -87,9 +92,10 @@ pub(super) async fn get_library(
 ))]
 pub(super) async fn delete_library(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, id).await?;
+    find(&state, &caller, id).await?;
     match state.context.store.delete_library(id).await? {
         true => Ok(StatusCode::NO_CONTENT),
         false => Err(Problem::not_found()),
@@ -107,11 +113,12 @@ pub(super) async fn delete_library(
 ))]
 pub(super) async fn get_library_file(
     State(state): State<AppState>,
+    caller: Caller,
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
-    let library = find(&state, id).await?;
+    let library = find(&state, &caller, id).await?;
     let download = Download {
         folder: &library.folder,
         name,
@@ -121,10 +128,10 @@ pub(super) async fn get_library_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-async fn find(state: &AppState, id: Uuid) -> Result<Library, Problem> {
-    match state.context.store.library(id).await? {
+async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Library, Problem> {
+    match state.context.store.library(id, &caller.reach).await? {
         Some(library) => Ok(library),
-        None => Err(absent_result(state, id).await?),
+        None => Err(absent_result(state, caller, id).await?),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! Handlers are thin: extract, one call, answer. What an error means to HTTP is `problem`'s alone.
 
-mod guard; // who may ask, and the headers of every answer
+mod access; // who may ask, and the headers of every answer
 mod idempotency; // same key and body, same answer
 mod problem;
 pub mod server; // the accept loop
@@ -40,7 +40,10 @@ use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
+pub use access::signed;
 pub use problem::Problem;
+
+use access::{Names, Rates, authenticate, guard, session};
 
 use crate::code::Code;
 use crate::config::Config;
@@ -63,6 +66,8 @@ pub struct AppState {
     pub context: Context,
     /// The version of the media tool, or why there is none; asked for at the start.
     pub media_tool: Arc<Result<String, String>>,
+    /// How often each owner may ask.
+    rates: Arc<Rates>,
 }
 
 impl AppState {
@@ -78,6 +83,7 @@ impl AppState {
             Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
         }
         Ok(AppState {
+            rates: Arc::new(Rates::new(config.rate)),
             config: Arc::new(config),
             context,
             media_tool: Arc::new(tool.map_err(|error| error.to_string())),
@@ -90,6 +96,10 @@ pub fn router(state: AppState) -> Router {
     let (routes, mut document) = table().split_for_parts();
     openapi::add_headers(&mut document);
     let stop = state.context.draining.clone();
+    let names = match state.config.demands_tokens() {
+        true => Names::Any,
+        false => Names::Loopback,
+    };
     routes
         .merge(openapi::route(&document))
         .merge(page::routes())
@@ -101,15 +111,16 @@ pub fn router(state: AppState) -> Router {
             idempotency::run_once,
         ))
         .layer(middleware::from_fn_with_state(
-            state,
+            state.clone(),
             jobs::wait::wait_for_result,
         ))
         .layer(middleware::from_fn(uploads::speak_tus))
+        .layer(middleware::from_fn_with_state(state, authenticate))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(middleware::from_fn_with_state(stop, refuse_while_stopping))
-        .layer(middleware::from_fn(guard::guard))
+        .layer(middleware::from_fn_with_state(names, guard))
         .layer(PropagateRequestIdLayer::x_request_id())
         .layer(TraceLayer::new_for_http())
         .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
@@ -134,12 +145,14 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
         .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
+        .routes(routes!(flocks::create_flock_link))
         .routes(routes!(fish::create_fish, fish::list_fish))
         .routes(routes!(fish::get_fish, fish::delete_fish))
         .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::get_job_events))
+        .routes(routes!(session::begin_session, session::end_session))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))
 }

@@ -3,18 +3,24 @@
 use axum::Router;
 use axum::http::header;
 use axum::routing::get;
+use utoipa::Modify;
 use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
 use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::openapi::{OpenApi, RefOr, Required};
 
 use super::{AppState, idempotency};
 
 /// The frame of the document; the routes add themselves.
 #[derive(utoipa::OpenApi)]
-#[openapi(info(
-    title = "flockreel",
-    description = "One filmed animal in, a flock of it out.",
-))]
+#[openapi(
+    info(
+        title = "flockreel",
+        description = "One filmed animal in, a flock of it out.",
+    ),
+    modifiers(&Schemes),
+    security((), ("token" = []), ("session" = [])),
+)]
 pub(super) struct Document;
 
 /// The headers that whole groups of calls take.
@@ -54,6 +60,23 @@ fn add_header(operation: &mut Operation, name: &str, meaning: &str) {
         .parameters
         .get_or_insert_default()
         .push(RefOr::T(header));
+}
+
+/// How a caller shows who asks. On loopback, unless the service demands tokens, nobody has to.
+struct Schemes;
+
+impl Modify for Schemes {
+    fn modify(&self, document: &mut OpenApi) {
+        let token = HttpBuilder::new()
+            .scheme(HttpAuthScheme::Bearer)
+            .bearer_format("frl_<id>_<secret>")
+            .description(Some("made by `flockreel token create`"))
+            .build();
+        let cookie = ApiKeyValue::with_description("flockreel_session", "set by POST /v1/session");
+        let components = document.components.get_or_insert_default();
+        components.add_security_scheme("token", SecurityScheme::Http(token));
+        components.add_security_scheme("session", SecurityScheme::ApiKey(ApiKey::Cookie(cookie)));
+    }
 }
 
 /// /openapi.json.

@@ -103,9 +103,18 @@ impl IntoResponse for Problem {
         headers.insert(header::CONTENT_TYPE, media_type);
         if matches!(
             self.code,
-            Code::Stopping | Code::NotReady | Code::StorageFull | Code::RequestInProgress
+            Code::Stopping
+                | Code::NotReady
+                | Code::StorageFull
+                | Code::RequestInProgress
+                | Code::QuotaExceeded
+                | Code::RateLimited
         ) {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
+        }
+        if self.code == Code::Unauthenticated {
+            let challenge = HeaderValue::from_static("Bearer realm=\"flockreel\"");
+            headers.insert(header::WWW_AUTHENTICATE, challenge);
         }
         response
     }
@@ -153,7 +162,9 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::AlreadyFinished | Code::RequestInProgress | Code::OffsetDiffers => {
             StatusCode::CONFLICT
         }
-        Code::CrossSite => StatusCode::FORBIDDEN,
+        Code::Unauthenticated => StatusCode::UNAUTHORIZED,
+        Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
+        Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
         Code::Stopping => StatusCode::SERVICE_UNAVAILABLE,
         Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
     }

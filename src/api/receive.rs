@@ -17,6 +17,7 @@ use crate::jobs::admit::Arrival;
 use crate::store;
 use crate::store::footage::{BACKGROUND, VIDEO};
 use crate::store::intake::Intake;
+use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
 /// The longest wait for the next piece of a body.
@@ -32,8 +33,9 @@ pub(super) async fn receive(
     state: &AppState,
     request: Request,
     name: Option<String>,
+    owner: Owner,
 ) -> Result<Arrival, Problem> {
-    let (arrival, _no_wishes) = receive_with(state, request, name, &[]).await?;
+    let (arrival, _no_wishes) = receive_with(state, request, (name, owner), &[]).await?;
     Ok(arrival)
 }
 
@@ -41,7 +43,7 @@ pub(super) async fn receive(
 pub(super) async fn receive_with(
     state: &AppState,
     request: Request,
-    name: Option<String>,
+    (name, owner): (Option<String>, Owner),
     wishes: &[&'static str],
 ) -> Result<(Arrival, Wishes), Problem> {
     check_headers(&request, state.config.max_upload_bytes)?;
@@ -49,7 +51,7 @@ pub(super) async fn receive_with(
     let draft = state.context.store.blobs().draft(&draft_name);
     let draft = draft.map_err(store::Error::Io)?;
     if is_form(&request) {
-        return receive_form(state, request, draft, name, wishes).await;
+        return receive_form(state, request, draft, (name, owner), wishes).await;
     }
     let body = request.into_body().into_data_stream();
     let limit_bytes = state.config.max_upload_bytes;
@@ -60,6 +62,7 @@ pub(super) async fn receive_with(
         background: None,
         name: label(name.as_deref().unwrap_or_default()),
         sample: false,
+        owner,
     };
     Ok((arrival, Wishes::new()))
 }
@@ -68,7 +71,7 @@ async fn receive_form(
     state: &AppState,
     mut request: Request,
     draft: Draft,
-    name: Option<String>,
+    (name, owner): (Option<String>, Owner),
     wishes: &[&'static str],
 ) -> Result<(Arrival, Wishes), Problem> {
     // Each field has a limit of its own.
@@ -105,6 +108,7 @@ async fn receive_form(
         background,
         name: label(&name.or(file_name).unwrap_or_default()),
         sample: false,
+        owner,
     };
     Ok((arrival, wished))
 }

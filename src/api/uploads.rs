@@ -16,6 +16,7 @@ use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::AppState;
+use super::access::Caller;
 use super::extract::Id;
 use super::problem::{Problem, ProblemBody};
 use super::receive::{PIECE, label};
@@ -23,6 +24,7 @@ use crate::code::Code;
 use crate::jobs::admit::Arrival;
 use crate::jobs::clock::now_ms;
 use crate::store::footage::Added;
+use crate::store::owners::Reach;
 use crate::store::uploads::{Hold, LIFE_MS, Upload};
 
 const VERSION: HeaderValue = HeaderValue::from_static("1.0.0");
@@ -74,6 +76,7 @@ pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<
 ))]
 pub(super) async fn create_upload(
     State(state): State<AppState>,
+    caller: Caller,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
     let headers = request.headers();
@@ -84,6 +87,7 @@ pub(super) async fn create_upload(
     }
     let upload = Upload {
         id: Uuid::now_v7(),
+        owner: caller.account.owner,
         name: label(&file_name(headers)?),
         size_bytes,
         offset_bytes: 0,
@@ -109,10 +113,12 @@ pub(super) async fn create_upload(
 ))]
 pub(super) async fn head_upload(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<Response<Body>, Problem> {
+    find(&state, &caller.reach, id).await?;
     let hold = state.context.store.hold_upload(id).await;
-    let upload = find(&state, id).await?;
+    let upload = find(&state, &caller.reach, id).await?;
     // The process ended between the last byte and the admission.
     let upload = end_if_whole(&state, upload).await?;
     drop(hold);
@@ -129,6 +135,7 @@ pub(super) async fn head_upload(
 ))]
 pub(super) async fn patch_upload(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
@@ -137,8 +144,9 @@ pub(super) async fn patch_upload(
         return Err(Problem::new(Code::UnsupportedMediaType, sentence));
     }
     let offset_bytes = number(request.headers(), &OFFSET)?;
+    find(&state, &caller.reach, id).await?;
     let hold = state.context.store.hold_upload(id).await;
-    let upload = find(&state, id).await?;
+    let upload = find(&state, &caller.reach, id).await?;
     if offset_bytes != upload.offset_bytes {
         let sentence = format!("the upload stands at {} bytes", upload.offset_bytes);
         return Err(Problem::new(Code::OffsetDiffers, sentence));
@@ -154,16 +162,18 @@ pub(super) async fn patch_upload(
 ))]
 pub(super) async fn delete_upload(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
+    find(&state, &caller.reach, id).await?;
     let _hold = state.context.store.hold_upload(id).await;
-    find(&state, id).await?;
+    find(&state, &caller.reach, id).await?;
     state.context.store.delete_upload(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-async fn find(state: &AppState, id: Uuid) -> Result<Upload, Problem> {
-    let upload = state.context.store.upload(id, now_ms()).await?;
+async fn find(state: &AppState, reach: &Reach, id: Uuid) -> Result<Upload, Problem> {
+    let upload = state.context.store.upload(id, reach, now_ms()).await?;
     upload.ok_or_else(Problem::not_found)
 }
 
@@ -245,6 +255,7 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
         background: None,
         name: upload.name.clone(),
         sample: false,
+        owner: upload.owner.clone(),
     };
     match super::footage::admit(state, arrival).await {
         Ok(Added::New(footage) | Added::Known(footage)) => {

@@ -69,6 +69,14 @@ pub struct Args {
 /// Analyses the video and writes the library.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
+    for path in [Some(&args.video), args.background.as_ref()]
+        .into_iter()
+        .flatten()
+    {
+        File::open(path).map_err(|cause| {
+            Error::Usage(format!("cannot be read: {cause}: {}", path.display()))
+        })?;
+    }
     let limits = Limits::default();
     let media = |error: crate::media::Error| Error::work(error.code(), &error);
     let video = Video::open(&args.video, &limits).map_err(media)?;

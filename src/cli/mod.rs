@@ -1,7 +1,7 @@
 //! The command line: one file a command (DESIGN.md, Command line).
 //!
 //! Results go to files, progress and errors to stderr, and with `--json` one line of JSON to
-//! stdout. Exit codes: 0; 2 for bad usage or input; 1 for a failure inside.
+//! stdout (`token` prints to stdout without it too). Exit codes: 0; 2 for bad usage or input; 1 for a failure inside.
 
 pub mod analyze;
 pub mod check_plan;
@@ -13,6 +13,7 @@ pub mod progress;
 pub mod sample;
 pub mod serve;
 pub mod sprites;
+pub mod token;
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -50,6 +51,8 @@ pub struct Cli {
 enum Command {
     /// Start the service: API, page and workers in one process.
     Serve(serve::Args),
+    /// Make, list and revoke the tokens with which the service is reached from elsewhere.
+    Token(token::Args),
     /// Measure the animal in a video: footage to library.
     Analyze(analyze::Args),
     /// Make a flock out of a library, as a video.
@@ -73,7 +76,7 @@ pub struct Summary(pub Value);
 /// Runs the command and says how it went; never panics on a user's input.
 pub fn main(cli: Cli) -> ExitCode {
     start_logging(cli.log.as_deref(), matches!(cli.command, Command::Serve(_)));
-    match run(cli.command) {
+    match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
         Err(error) => {
             say(&format!("flockreel: {error}"));
@@ -82,9 +85,10 @@ pub fn main(cli: Cli) -> ExitCode {
     }
 }
 
-fn run(command: Command) -> Result<Option<Summary>, Error> {
+fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
     match command {
         Command::Serve(args) => serve::run(args),
+        Command::Token(args) => token::run(args, json),
         Command::Analyze(args) => analyze::run(args),
         Command::Flock(args) => flock::run(args),
         Command::CheckPlan(args) => check_plan::run(args),

@@ -7,10 +7,11 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Error, Summary, say};
 use crate::api::{self, AppState};
-use crate::config::Config;
+use crate::config::{Auth, Config};
+use crate::jobs::clock::now_ms;
 use crate::jobs::supervisor::Supervisor;
 use crate::jobs::{self, Context, sample};
-use crate::store;
+use crate::store::{self, Store};
 
 /// Arguments of `serve`.
 #[derive(Debug, clap::Args)]
@@ -22,11 +23,6 @@ pub struct Args {
 /// Serves until it is told to stop.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let config = args.config;
-    if !config.bind.ip().is_loopback() {
-        let advice = "listening beyond this machine needs authentication, which is not there yet; \
-                      bind to 127.0.0.1 and put a proxy that authenticates before it";
-        return Err(Error::Usage(format!("{advice}: {}", config.bind)));
-    }
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     let served = runtime.block_on(serve(config));
     // A job that does not let go must not hold the process: it is rescued at the next start.
@@ -37,6 +33,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 async fn serve(config: Config) -> Result<(), Error> {
     let (bind, n_workers) = (config.bind, config.workers.get());
     let with_sample = !config.no_sample;
+    refuse_open_door(&config).await?;
     let state = AppState::open(config).await.map_err(from_store)?;
     let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
     let listener = TcpListener::bind(bind).await.map_err(cannot)?;
@@ -64,6 +61,24 @@ async fn serve(config: Config) -> Result<(), Error> {
     Ok(())
 }
 
+/// Beyond this machine nobody is answered without a token: where none is good, nobody could be.
+async fn refuse_open_door(config: &Config) -> Result<(), Error> {
+    if config.bind.ip().is_loopback() || config.auth == Auth::Required {
+        return Ok(());
+    }
+    let store = Store::open(&config.data).await.map_err(from_store)?;
+    let has_tokens = store.has_tokens(now_ms()).await.map_err(from_store)?;
+    store.close().await;
+    match has_tokens {
+        true => Ok(()),
+        false => Err(Error::Usage(format!(
+            "listening beyond this machine needs a token: make one with `flockreel token create \
+             --name NAME`, or bind to 127.0.0.1 instead of: {}",
+            config.bind
+        ))),
+    }
+}
+
 async fn fill(context: Context) {
     match sample::fill(&context).await {
         Ok(()) | Err(jobs::Error::Cancelled) => {}
@@ -82,7 +97,7 @@ async fn wait_for_signal() -> Result<(), Error> {
     Ok(())
 }
 
-fn from_store(error: store::Error) -> Error {
+pub(super) fn from_store(error: store::Error) -> Error {
     match error {
         store::Error::InUse(_) => Error::Usage(error.to_string()),
         _ => Error::work(error.code(), &error),

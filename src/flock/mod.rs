@@ -110,13 +110,16 @@ pub fn plan_flock(
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
         length_px: lens.length_px,
-        stats: quality::measure(
-            &individuals,
-            &course.orders,
-            library,
-            params,
-            lens.length_px,
-        ),
+        stats: Stats {
+            room_for: tank.room_for(),
+            ..quality::measure(
+                &individuals,
+                &course.orders,
+                library,
+                params,
+                lens.length_px,
+            )
+        },
         params: params.clone(),
         predator_px: course.predator_px,
         individuals,

@@ -37,6 +37,8 @@ pub struct Stats {
     /// How many can be shown at once without any two looking alike: frames of the component far
     /// enough apart, on each side allowed. A larger flock has clones whatever the plan.
     pub distinct_looks: u32,
+    /// How many the tank has room for; of a larger flock some lie over others. 0 = not known.
+    pub room_for: u32,
     /// Share of the component's frames that are shown.
     pub variety: f64,
     /// Mean over the frames.
@@ -47,7 +49,7 @@ pub struct Stats {
     pub nearest_neighbor_bl: f64,
 }
 
-/// Measures a flock; rounded as files hold it.
+/// Measures a flock, all but its room; rounded as files hold it.
 pub fn measure(
     individuals: &[Individual],
     orders: &[Order],
@@ -75,6 +77,7 @@ pub fn measure(
         clone_share: clone_share(individuals, CLONE_BL * length_px, CLONE_S * fps),
         distinct_looks: distinct_looks(&library.playback.component, CLONE_S * fps)
             * if params.mirror { 2 } else { 1 },
+        room_for: 0,
         variety: variety(individuals, library),
         polarization: mean(|order| order.polarization),
         milling: mean(|order| order.milling),
@@ -95,6 +98,7 @@ impl Stats {
             slip_median_rad: r(self.slip_median_rad),
             clone_share: r(self.clone_share),
             distinct_looks: self.distinct_looks,
+            room_for: self.room_for,
             variety: r(self.variety),
             polarization: r(self.polarization),
             milling: r(self.milling),

@@ -144,6 +144,9 @@ struct StatsFile {
     /// Absent in files of before; 0 then.
     #[serde(default)]
     distinct_looks: u32,
+    /// Absent in files of before; 0 then.
+    #[serde(default)]
+    room_for: u32,
     variety: f64,
     polarization: f64,
     milling: f64,
@@ -264,6 +267,7 @@ impl StatsFile {
             slip_median_rad: stats.slip_median_rad,
             clone_share: stats.clone_share,
             distinct_looks: stats.distinct_looks,
+            room_for: stats.room_for,
             variety: stats.variety,
             polarization: stats.polarization,
             milling: stats.milling,
@@ -281,6 +285,7 @@ impl StatsFile {
             slip_median_rad: self.slip_median_rad,
             clone_share: self.clone_share,
             distinct_looks: self.distinct_looks,
+            room_for: self.room_for,
             variety: self.variety,
             polarization: self.polarization,
             milling: self.milling,

@@ -8,6 +8,7 @@ use super::clock::now_ms;
 use crate::footage::{FootageFormat, FrameSource};
 use crate::media::{Limits, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, VIDEO};
+use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft, Store};
 
 /// Files received into a draft, synced and hashed, and what the sender calls them.
@@ -22,6 +23,8 @@ pub struct Arrival {
     pub name: String,
     /// Made by the program itself.
     pub sample: bool,
+    /// Whose it is.
+    pub owner: Owner,
 }
 
 /// Looks at the files and stores them; the same bytes as before give the footage of then.
@@ -57,6 +60,7 @@ fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
     let background_bytes = background.map_or(0, |file| file.size_bytes);
     Footage {
         id: Uuid::now_v7(),
+        owner: arrival.owner.clone(),
         folder: String::new(),
         sha256: arrival.video.sha256.clone(),
         background_sha256: background.map_or(Vec::new(), |file| file.sha256.clone()),

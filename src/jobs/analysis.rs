@@ -19,6 +19,7 @@ use crate::store::footage::{BACKGROUND, Footage, VIDEO};
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::finish::Made;
+use crate::store::owners::Account;
 use crate::{cpu, store};
 
 /// The stages, with their measured shares.
@@ -75,10 +76,15 @@ pub struct Advice {
 }
 
 /// Queues an analysis; the library will have the id given back.
-pub async fn enqueue(context: &Context, input: &Input) -> Result<(JobId, LibraryId), store::Error> {
+pub async fn enqueue(
+    context: &Context,
+    input: &Input,
+    account: &Account,
+) -> Result<(JobId, LibraryId), store::Error> {
     let (job_id, library_id) = (JobId(next_id()), LibraryId(next_id()));
     let job = NewJob {
         job_id,
+        account: account.clone(),
         kind: Kind::Analysis,
         input: serde_json::json!(input).to_string(),
         result_id: library_id.0,

@@ -10,6 +10,7 @@ use super::{Error, Listener};
 use crate::ids::{FootageId, LibraryId};
 use crate::scratch::Scratch;
 use crate::store::jobs::finish::Made;
+use crate::store::owners::Reach;
 use crate::store::{Blobs, Draft, Spill, Store, footage, libraries};
 
 /// One run of a job: where to write, how to load, whom to report to.
@@ -63,13 +64,17 @@ impl<'a> Attempt<'a> {
 
     /// A footage's row; must be called on a blocking thread.
     pub fn footage(&self, id: FootageId) -> Result<footage::Footage, Error> {
-        let row = self.runtime.block_on(self.store.footage(id.0))?;
+        let row = self
+            .runtime
+            .block_on(self.store.footage(id.0, &Reach::All))?;
         row.ok_or(Error::InputAbsent(id.0))
     }
 
     /// A library's row and folder; must be called on a blocking thread.
     pub fn library(&self, id: LibraryId) -> Result<(libraries::Library, PathBuf), Error> {
-        let row = self.runtime.block_on(self.store.library(id.0))?;
+        let row = self
+            .runtime
+            .block_on(self.store.library(id.0, &Reach::All))?;
         let row = row.ok_or(Error::InputAbsent(id.0))?;
         let folder = self.blobs().folder(&row.folder);
         Ok((row, folder))

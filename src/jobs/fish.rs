@@ -16,6 +16,7 @@ use crate::store;
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::finish::Made;
+use crate::store::owners::Account;
 
 /// The stages, with their shares.
 pub const STAGES: Stages = &[("loading", 0.05), ("rendering", 0.95)];
@@ -47,10 +48,12 @@ pub async fn enqueue(
     context: &Context,
     input: &Input,
     after_job: Option<JobId>,
+    account: &Account,
 ) -> Result<(JobId, FishId), store::Error> {
     let (job_id, fish_id) = (JobId(next_id()), FishId(next_id()));
     let job = NewJob {
         job_id,
+        account: account.clone(),
         kind: Kind::Fish,
         input: serde_json::json!(input).to_string(),
         result_id: fish_id.0,

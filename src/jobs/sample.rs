@@ -14,6 +14,7 @@ use crate::ids::FootageId;
 use crate::media::VideoWriter;
 use crate::raster::Frame;
 use crate::store::footage::{Added, VIDEO};
+use crate::store::owners::{Account, Owner, Reach};
 use crate::store::{BlobFile, Draft};
 
 /// Long enough for transitions in every direction.
@@ -22,7 +23,12 @@ const N_FRAMES: usize = 1200;
 /// Fills an empty store; a store that has any footage is left alone. A process that dies on the way
 /// leaves the store empty, and the next start begins again.
 pub async fn fill(context: &Context) -> Result<(), Error> {
-    if !context.store.list_footage(1, None).await?.is_empty() {
+    if !context
+        .store
+        .list_footage(1, None, &Reach::All)
+        .await?
+        .is_empty()
+    {
         return Ok(());
     }
     tracing::info!("filming the sample");
@@ -35,12 +41,12 @@ pub async fn fill(context: &Context) -> Result<(), Error> {
         footage_id: FootageId(footage.id),
         params: crate::analysis::Params::default(),
     };
-    let (job_id, library_id) = analysis::enqueue(context, &measure).await?;
+    let (job_id, library_id) = analysis::enqueue(context, &measure, &Account::local()).await?;
     let make = flock::Input {
         library_id,
         params: crate::flock::Params::default(),
     };
-    flock::enqueue(context, &make, Some(job_id)).await?;
+    flock::enqueue(context, &make, Some(job_id), &Account::local()).await?;
     Ok(())
 }
 
@@ -59,6 +65,7 @@ fn film(draft: Draft, stopped: impl Fn() -> bool) -> Result<Arrival, Error> {
         background: None,
         name: "sample.mp4".to_owned(),
         sample: true,
+        owner: Owner::local(),
         draft,
     })
 }

@@ -29,6 +29,12 @@ pub enum Error {
     /// A request that comes again under its ids asks for something else.
     #[error("the request was another one when it came first: {0}")]
     IdInUse(sqlx::types::Uuid),
+    /// The owner has as many jobs queued and running as it may.
+    #[error("no more than {quota} jobs may be queued or running at once: wait for one to end")]
+    QuotaExceeded {
+        /// The limit.
+        quota: i64,
+    },
     /// A row holds what this version does not know.
     #[error("a row of {table} cannot be read: {value}")]
     UnknownValue {
@@ -45,6 +51,7 @@ impl Error {
         match self {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
+            Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::Io(error) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if is_sqlite_full(error.code()) => {

@@ -4,6 +4,7 @@ use sqlx::types::Uuid;
 
 use super::jobs::Lease;
 use super::jobs::finish::Outcome;
+use super::owners::Reach;
 use super::{Connection, Error, Store};
 
 /// One fish as stored; its files lie in `folder`.
@@ -30,29 +31,37 @@ pub struct Fish {
 }
 
 impl Store {
-    /// One fish, if it is finished and there.
-    pub async fn fish(&self, id: Uuid) -> Result<Option<Fish>, Error> {
+    /// One fish, if it is finished, there and within reach.
+    pub async fn fish(&self, id: Uuid, reach: &Reach) -> Result<Option<Fish>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
                    from fish r join libraries l on l.id = library_id \
-                   join footage f on f.id = footage_id where r.id = $1";
-        let row = sqlx::query_as(sql).bind(id);
+                   join footage f on f.id = footage_id where r.id = $1 \
+                   and ($2 is null or r.owner = $2)";
+        let row = sqlx::query_as(sql).bind(id).bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
     /// The newest fish, at most `limit`, older than `before`.
-    pub async fn list_fish(&self, limit: i64, before: Option<Uuid>) -> Result<Vec<Fish>, Error> {
+    pub async fn list_fish(
+        &self,
+        limit: i64,
+        before: Option<Uuid>,
+        reach: &Reach,
+    ) -> Result<Vec<Fish>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
                    from fish r join libraries l on l.id = library_id \
                    join footage f on f.id = footage_id \
-                   where $1 is null or r.id < $1 order by r.id desc limit $2";
+                   where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3) \
+                   order by r.id desc limit $2";
         let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        let rows = rows.bind(reach.owner());
         Ok(rows.fetch_all(&self.reader).await?)
     }
 }
 
-/// Adds the row, in the transaction that finishes the job.
+/// Adds the row, the job's owner's, in the transaction that finishes the job.
 pub(super) async fn insert(
     connection: &mut Connection,
     lease: &Lease,
@@ -62,7 +71,8 @@ pub(super) async fn insert(
 ) -> Result<(), sqlx::Error> {
     sqlx::query(
         "insert into fish (id, job_id, fence, library_id, folder, params, summary, \
-         size_bytes, created_ms) values ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+         size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+         (select owner from jobs where id = $2))",
     )
     .bind(lease.result_id)
     .bind(lease.job_id.0)

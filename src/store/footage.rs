@@ -2,6 +2,7 @@
 
 use sqlx::types::Uuid;
 
+use super::owners::{Owner, Reach};
 use super::{BlobFile, Draft, Error, Store, blobs};
 
 /// The name of the video's file in its folder.
@@ -14,6 +15,8 @@ pub const BACKGROUND: &str = "background";
 pub struct Footage {
     /// Its id.
     pub id: Uuid,
+    /// Whose it is.
+    pub owner: Owner,
     /// Its folder in the blob store.
     pub folder: String,
     /// SHA-256 of the video's bytes.
@@ -76,9 +79,10 @@ impl Store {
         }
     }
 
-    /// One footage, if it is there.
-    pub async fn footage(&self, id: Uuid) -> Result<Option<Footage>, Error> {
-        let row = sqlx::query_as("select * from footage where id = $1").bind(id);
+    /// One footage, if it is there and within reach.
+    pub async fn footage(&self, id: Uuid, reach: &Reach) -> Result<Option<Footage>, Error> {
+        let sql = "select * from footage where id = $1 and ($2 is null or owner = $2)";
+        let row = sqlx::query_as(sql).bind(id).bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
@@ -87,17 +91,22 @@ impl Store {
         &self,
         limit: i64,
         before: Option<Uuid>,
+        reach: &Reach,
     ) -> Result<Vec<Footage>, Error> {
-        let sql = "select * from footage where $1 is null or id < $1 order by id desc limit $2";
+        let sql = "select * from footage where ($1 is null or id < $1) \
+                   and ($3 is null or owner = $3) order by id desc limit $2";
         let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        let rows = rows.bind(reach.owner());
         Ok(rows.fetch_all(&self.reader).await?)
     }
 
     async fn footage_of_bytes(&self, footage: &Footage) -> Result<Option<Footage>, Error> {
-        let sql = "select * from footage where sha256 = $1 and background_sha256 = $2";
+        let sql = "select * from footage where sha256 = $1 and background_sha256 = $2 \
+                   and owner = $3";
         let row = sqlx::query_as(sql)
             .bind(&footage.sha256)
-            .bind(&footage.background_sha256);
+            .bind(&footage.background_sha256)
+            .bind(&footage.owner);
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
@@ -115,8 +124,8 @@ impl Store {
         let mut transaction = self.begin().await?;
         sqlx::query(
             "insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, \
-             height, fps, n_frames_hint, sample, created_ms) \
-             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)",
+             height, fps, n_frames_hint, sample, created_ms, owner) \
+             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13)",
         )
         .bind(footage.id)
         .bind(&footage.folder)
@@ -130,6 +139,7 @@ impl Store {
         .bind(footage.n_frames_hint)
         .bind(footage.sample)
         .bind(footage.created_ms)
+        .bind(&footage.owner)
         .execute(&mut *transaction)
         .await?;
         blobs::insert(&mut transaction, &footage.folder, files).await?;

@@ -4,6 +4,7 @@ use sqlx::types::Uuid;
 
 use super::jobs::Lease;
 use super::jobs::finish::Outcome;
+use super::owners::Reach;
 use super::{Connection, Error, Store};
 
 /// One library as stored; its files lie in `folder`.
@@ -32,12 +33,13 @@ pub struct Library {
 }
 
 impl Store {
-    /// One library, if it is finished and there.
-    pub async fn library(&self, id: Uuid) -> Result<Option<Library>, Error> {
+    /// One library, if it is finished, there and within reach.
+    pub async fn library(&self, id: Uuid, reach: &Reach) -> Result<Option<Library>, Error> {
         let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
-                   from libraries l join footage f on f.id = footage_id where l.id = $1";
-        let row = sqlx::query_as(sql).bind(id);
+                   from libraries l join footage f on f.id = footage_id where l.id = $1 \
+                   and ($2 is null or l.owner = $2)";
+        let row = sqlx::query_as(sql).bind(id).bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
@@ -46,17 +48,20 @@ impl Store {
         &self,
         limit: i64,
         before: Option<Uuid>,
+        reach: &Reach,
     ) -> Result<Vec<Library>, Error> {
         let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
                    from libraries l join footage f on f.id = footage_id \
-                   where $1 is null or l.id < $1 order by l.id desc limit $2";
+                   where ($1 is null or l.id < $1) and ($3 is null or l.owner = $3) \
+                   order by l.id desc limit $2";
         let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        let rows = rows.bind(reach.owner());
         Ok(rows.fetch_all(&self.reader).await?)
     }
 }
 
-/// Adds the row, in the transaction that finishes the job.
+/// Adds the row, the job's owner's, in the transaction that finishes the job.
 pub(super) async fn insert(
     connection: &mut Connection,
     lease: &Lease,
@@ -66,7 +71,8 @@ pub(super) async fn insert(
 ) -> Result<(), sqlx::Error> {
     sqlx::query(
         "insert into libraries (id, job_id, fence, footage_id, folder, params, summary, \
-         size_bytes, created_ms) values ($1, $2, $3, $4, $5, $6, $7, $8, $9)",
+         size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+         (select owner from jobs where id = $2))",
     )
     .bind(lease.result_id)
     .bind(lease.job_id.0)

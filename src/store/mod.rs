@@ -16,8 +16,10 @@ pub mod idempotency;
 pub mod intake;
 pub mod jobs;
 pub mod libraries;
+pub mod owners;
 pub mod spill;
 pub mod sweep;
+pub mod tokens;
 pub mod uploads;
 
 use std::fs::{File, TryLockError};
@@ -46,7 +48,7 @@ pub struct Store {
     blobs: Blobs,
     holders: uploads::Holders,
     /// Held while the store is open: whoever holds it knows that every other process is gone.
-    _lock: Arc<File>,
+    _lock: Option<Arc<File>>,
 }
 
 impl Store {
@@ -55,13 +57,28 @@ impl Store {
     pub async fn open(data: &Path) -> Result<Store, Error> {
         std::fs::create_dir_all(data)?;
         let lock = lock(data)?;
+        Store::connect(data, Some(lock)).await
+    }
+
+    /// The same, but beside a process that has the folder open, where there is one: for rows that do
+    /// not belong to that process, as those of tokens. The database's form is that process's then.
+    pub async fn open_beside(data: &Path) -> Result<Store, Error> {
+        match Store::open(data).await {
+            Err(Error::InUse(_)) => Store::connect(data, None).await,
+            opened => opened,
+        }
+    }
+
+    async fn connect(data: &Path, lock: Option<File>) -> Result<Store, Error> {
         let blobs = Blobs::open(data)?;
         let options = options(data.join("flockreel.db"));
         let writer = SqlitePoolOptions::new()
             .max_connections(1)
             .connect_with(options.clone())
             .await?;
-        MIGRATIONS.run(&writer).await?;
+        if lock.is_some() {
+            MIGRATIONS.run(&writer).await?;
+        }
         let reader = SqlitePoolOptions::new()
             .max_connections(READERS)
             .connect_with(options.read_only(true))
@@ -71,7 +88,7 @@ impl Store {
             reader,
             blobs,
             holders: uploads::Holders::default(),
-            _lock: Arc::new(lock),
+            _lock: lock.map(Arc::new),
         })
     }
 

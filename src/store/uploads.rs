@@ -16,6 +16,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::blobs::hash_file;
 use super::footage::VIDEO;
+use super::owners::{Owner, Reach};
 use super::{BlobFile, Draft, Error, Store};
 
 /// How long an upload waits for its next bytes, milliseconds.
@@ -26,6 +27,8 @@ pub const LIFE_MS: i64 = 24 * 3600 * 1000;
 pub struct Upload {
     /// Its id.
     pub id: Uuid,
+    /// Whose it is, and whose footage it becomes.
+    pub owner: Owner,
     /// What the sender calls it: a label.
     pub name: String,
     /// How many bytes it will have.
@@ -66,21 +69,30 @@ impl Store {
     /// Adds an upload without bytes.
     pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
         File::create_new(self.upload_path(upload.id)).await?;
-        let sql = "insert into uploads (id, name, size_bytes, expires_ms) values ($1, $2, $3, $4)";
+        let sql = "insert into uploads (id, name, size_bytes, expires_ms, owner) \
+                   values ($1, $2, $3, $4, $5)";
         sqlx::query(sql)
             .bind(upload.id)
             .bind(&upload.name)
             .bind(upload.size_bytes)
             .bind(upload.expires_ms)
+            .bind(&upload.owner)
             .execute(&self.writer)
             .await?;
         Ok(())
     }
 
-    /// One upload that has not expired.
-    pub async fn upload(&self, id: Uuid, now_ms: i64) -> Result<Option<Upload>, Error> {
-        let sql = "select * from uploads where id = $1 and expires_ms > $2";
+    /// One upload within reach that has not expired.
+    pub async fn upload(
+        &self,
+        id: Uuid,
+        reach: &Reach,
+        now_ms: i64,
+    ) -> Result<Option<Upload>, Error> {
+        let sql = "select * from uploads where id = $1 and expires_ms > $2 \
+                   and ($3 is null or owner = $3)";
         let row = sqlx::query_as(sql).bind(id).bind(now_ms);
+        let row = row.bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 

@@ -20,6 +20,7 @@ export const unreachable = () => new Problem({
 
 /** @param {string} text @param {number} status */
 export function problemFrom(text, status) {
+  if (status === 401) dispatchEvent(new Event("signed-out"));
   try {
     return new Problem({ status, ...JSON.parse(text) });
   } catch {
@@ -37,6 +38,8 @@ async function call(method, path, body) {
   return text ? JSON.parse(text) : null;
 }
 
+export const beginSession = (token) => call("POST", "/v1/session", { token });
+export const endSession = () => call("DELETE", "/v1/session");
 export const createAnalysis = (footageId, params) => call("POST", "/v1/analyses", { footage_id: footageId, params });
 export const createFlock = (wishes) => call("POST", "/v1/flocks", wishes);
 export const getLibrary = (id) => call("GET", `/v1/libraries/${id}`);

@@ -7,8 +7,10 @@ import { filmForm } from "./film-form.js";
 import { flockForm } from "./flock-form.js";
 import { showJob } from "./job-card.js";
 import { showLibrary } from "./library-view.js";
+import { signIn } from "./sign-in.js";
 import { showEmptyStage, showFlock } from "./stage.js";
 
+signIn();
 const current = { library: null, flock: null };
 const made = { libraries: [], flocks: [] };
 const makeFlocksOf = flockForm(async (id) => { await refresh(); await chooseFlock(id); byId("stage").scrollIntoView(); byId("stage").focus(); });

@@ -75,12 +75,22 @@ def is_elsewhere(url):
     return not re.match(r"http://127\.0\.0\.1:\d+/|blob:|data:", url)
 
 
-def started(data):
+@pytest.fixture
+def closed_service(tmp_path):
+    """The address of a service that demands tokens, and one that it takes."""
+    data = tmp_path / "data"
+    command = [PROGRAM, "token", "create", "--name", "page", "--data", data]
+    token = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+    for address in started(data, "--auth", "required"):
+        yield address, token
+
+
+def started(data, *flags):
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     address = f"http://127.0.0.1:{port}"
-    arguments = ["serve", "--bind", f"127.0.0.1:{port}", "--data", data.name, "--no-sample"]
+    arguments = ["serve", "--bind", f"127.0.0.1:{port}", "--data", data.name, "--no-sample", *flags]
     service = subprocess.Popen([PROGRAM, *arguments], cwd=data.parent, stdin=subprocess.DEVNULL)
     try:
         wait_until_ready(service, address)

@@ -130,3 +130,23 @@ def test_a_job_goes_on_when_the_page_is_opened_again(page, filled_service):
     expect(page.locator("#flock-job .job")).to_be_visible()
     page.reload()
     expect(page.locator("#stage-title")).to_have_text("A flock of 7", timeout=LONG_MS)
+
+
+def test_a_service_that_asks_who_is_there_is_signed_in_to_and_out_of(page, closed_service, film):
+    address, token = closed_service
+    page.goto(address)
+    field = page.get_by_label("Token")
+    expect(field).to_be_focused()
+    expect(page.locator("#film-form")).to_be_hidden()
+    field.fill(token[:-1] + "!")
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.locator("#sign-in-problem")).to_contain_text("Reason code: unauthenticated")
+    field.fill(token)
+    page.get_by_role("button", name="Sign in").click()
+    expect(page.locator("#stage-note")).to_contain_text("Choose a film of one animal")
+    assert page.evaluate("document.cookie") == ""
+    measure(page, film)
+    until(page, "[...document.querySelectorAll('#library img')].every((image) => image.naturalWidth > 0)")
+    page.get_by_role("button", name="Sign out").click()
+    expect(page.get_by_label("Token")).to_be_focused()
+    expect(page.locator("#library")).to_be_hidden()

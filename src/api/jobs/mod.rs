@@ -17,6 +17,7 @@ use uuid::Uuid;
 
 use self::wait::Wait;
 use super::AppState;
+use super::access::Caller;
 use super::extract::Id;
 use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody};
@@ -81,10 +82,13 @@ pub(super) struct JobLinks {
 ))]
 pub(super) async fn list_jobs(
     State(state): State<AppState>,
+    caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<JobView>>, Problem> {
     let store = &state.context.store;
-    let rows = store.list_jobs(paging.limit + 1, paging.cursor).await?;
+    let rows = store
+        .list_jobs(paging.limit + 1, paging.cursor, &caller.reach)
+        .await?;
     Page::of(rows, paging, |row| row.id.0, |row| Ok(JobView::of(row)))
 }
 
@@ -95,10 +99,11 @@ pub(super) async fn list_jobs(
 ))]
 pub(super) async fn get_job(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
-    let job = find(&state, JobId(id)).await?;
+    let job = find(&state, &caller, JobId(id)).await?;
     let Some(wait) = Wait::of(&headers) else {
         return Ok(axum::Json(job).into_response());
     };
@@ -117,15 +122,21 @@ pub(super) async fn get_job(
 ))]
 pub(super) async fn cancel_job(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<Response<Body>, Problem> {
-    let status = match state.context.store.cancel(JobId(id), now_ms()).await? {
+    let status = match state
+        .context
+        .store
+        .cancel(JobId(id), &caller.reach, now_ms())
+        .await?
+    {
         Cancel::Cancelled => StatusCode::OK,
         Cancel::Requested => StatusCode::ACCEPTED,
         Cancel::Final(_) => return Err(Code::AlreadyFinished.into()),
         Cancel::Absent => return Err(Problem::not_found()),
     };
-    let job = find(&state, JobId(id)).await?;
+    let job = find(&state, &caller, JobId(id)).await?;
     Ok((status, axum::Json(job)).into_response())
 }
 
@@ -136,34 +147,40 @@ pub(super) async fn cancel_job(
 ))]
 pub(super) async fn get_job_events(
     State(state): State<AppState>,
+    caller: Caller,
     Id(id): Id,
 ) -> Result<Response<Body>, Problem> {
-    let job = find(&state, JobId(id)).await?;
-    let events = Sse::new(events(state, job)).keep_alive(KeepAlive::default());
+    let job = find(&state, &caller, JobId(id)).await?;
+    let events = Sse::new(events(state, caller, job)).keep_alive(KeepAlive::default());
     // A proxy that gathers answers would hold events back.
     Ok(([("x-accel-buffering", "no")], events).into_response())
 }
 
 /// The first state at once, then each that differs from the one before.
-fn events(state: AppState, first: JobView) -> impl Stream<Item = Result<Event, Infallible>> {
-    unfold((state, None, Some(first)), async |(state, last, first)| {
+fn events(
+    state: AppState,
+    caller: Caller,
+    first: JobView,
+) -> impl Stream<Item = Result<Event, Infallible>> {
+    let start = (state, caller, None, Some(first));
+    unfold(start, async |(state, caller, last, first)| {
         let job = match first {
             Some(first) => first,
-            None => next_change(&state, last.as_ref()?).await?,
+            None => next_change(&state, &caller, last.as_ref()?).await?,
         };
         let event = Event::default().event("job").json_data(&job).ok()?;
-        Some((Ok(event), (state, Some(job), None)))
+        Some((Ok(event), (state, caller, Some(job), None)))
     })
 }
 
 /// Waits for another state; none after a final one, or when the service stops.
-async fn next_change(state: &AppState, last: &JobView) -> Option<JobView> {
+async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Option<JobView> {
     while !is_final(last) && !state.context.draining.is_cancelled() {
         tokio::select! {
             () = tokio::time::sleep(LOOK) => {}
             () = state.context.draining.cancelled() => {}
         }
-        let job = find(state, last.id).await.ok()?;
+        let job = find(state, caller, last.id).await.ok()?;
         if job != *last {
             return Some(job);
         }
@@ -171,8 +188,8 @@ async fn next_change(state: &AppState, last: &JobView) -> Option<JobView> {
     None
 }
 
-async fn find(state: &AppState, id: JobId) -> Result<JobView, Problem> {
-    let job = state.context.store.job(id).await?;
+async fn find(state: &AppState, caller: &Caller, id: JobId) -> Result<JobView, Problem> {
+    let job = state.context.store.job(id, &caller.reach).await?;
     job.map(JobView::of).ok_or_else(Problem::not_found)
 }
 
@@ -187,8 +204,13 @@ pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Respon
 }
 
 /// Why a result is not there: its job has not finished, or there never was one.
-pub(super) async fn absent_result(state: &AppState, result: Uuid) -> Result<Problem, Problem> {
-    let Some(job) = state.context.store.job_of_result(result).await? else {
+pub(super) async fn absent_result(
+    state: &AppState,
+    caller: &Caller,
+    result: Uuid,
+) -> Result<Problem, Problem> {
+    let job = state.context.store.job_of_result(result, &caller.reach);
+    let Some(job) = job.await? else {
         return Ok(Problem::not_found());
     };
     let sentence = format!("its job is {}: /v1/jobs/{}", job.state.name(), job.id);
@@ -198,13 +220,14 @@ pub(super) async fn absent_result(state: &AppState, result: Uuid) -> Result<Prob
 /// The job to wait for before a library can be used: none when it is there already.
 pub(super) async fn job_to_follow(
     state: &AppState,
+    caller: &Caller,
     library_id: LibraryId,
 ) -> Result<Option<JobId>, Problem> {
     let store = &state.context.store;
-    if store.library(library_id.0).await?.is_some() {
+    if store.library(library_id.0, &caller.reach).await?.is_some() {
         return Ok(None);
     }
-    match store.job_of_result(library_id.0).await? {
+    match store.job_of_result(library_id.0, &caller.reach).await? {
         Some(job) if job.kind == Kind::Analysis && !is_lost(job.state) => Ok(Some(job.id)),
         _ => {
             let sentence = format!("there is no such library: {library_id}");

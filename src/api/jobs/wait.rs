@@ -13,6 +13,7 @@ use crate::api::AppState;
 use crate::ids::JobId;
 use crate::store::jobs::JobState;
 use crate::store::jobs::read::JobRow;
+use crate::store::owners::Reach;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 const MAX_WAIT_S: u64 = 60;
@@ -53,7 +54,7 @@ impl Wait {
     ) -> Result<Option<JobRow>, crate::store::Error> {
         let end = Instant::now() + Duration::from_secs(self.0);
         loop {
-            let job = state.context.store.job(id).await?;
+            let job = state.context.store.job(id, &Reach::All).await?;
             let is_running = job.as_ref().is_some_and(|job| !job.state.is_final());
             if !is_running || Instant::now() >= end || state.context.draining.is_cancelled() {
                 return Ok(job);

@@ -79,6 +79,13 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             path.display()
         )))?;
     }
+    let (count, room_for) = (flock.individuals.len(), flock.stats.room_for);
+    if room_for > 0 && count > room_for as usize {
+        let advice = "of so many some lie over others: ask for fewer, or film from farther away";
+        super::say(&format!(
+            "there is room for about {room_for}, and {advice} (little_room)"
+        ));
+    }
     let film = Film {
         library: &library,
         flock: &flock,
@@ -104,6 +111,7 @@ fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
         "heading_error_median_rad": flock.stats.heading_error_median_rad,
         "jumps_per_100_frames": flock.stats.jumps_per_100_frames,
         "clone_share": flock.stats.clone_share,
+        "room_for": flock.stats.room_for,
     }))
 }
 

@@ -25,6 +25,7 @@ use crate::store;
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::finish::Made;
+use crate::store::owners::Account;
 
 /// The stages, with their measured shares.
 pub const STAGES: Stages = &[
@@ -63,10 +64,12 @@ pub async fn enqueue(
     context: &Context,
     input: &Input,
     after_job: Option<JobId>,
+    account: &Account,
 ) -> Result<(JobId, FlockId), store::Error> {
     let (job_id, flock_id) = (JobId(next_id()), FlockId(next_id()));
     let job = NewJob {
         job_id,
+        account: account.clone(),
         kind: Kind::Flock,
         input: serde_json::json!(input).to_string(),
         result_id: flock_id.0,

@@ -3,6 +3,7 @@
 use super::JobState;
 use super::follow::cancel_followers;
 use crate::ids::JobId;
+use crate::store::owners::Reach;
 use crate::store::{Error, Store};
 
 /// What a wish to cancel met.
@@ -14,16 +15,18 @@ pub enum Cancel {
     Requested,
     /// The job had ended already.
     Final(JobState),
-    /// There is no such job.
+    /// There is no such job within reach.
     Absent,
 }
 
 impl Store {
     /// Cancels a queued job at once, asks the worker of a running one to stop.
-    pub async fn cancel(&self, job: JobId, now_ms: i64) -> Result<Cancel, Error> {
+    pub async fn cancel(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
         let mut transaction = self.begin().await?;
-        let state: Option<String> = sqlx::query_scalar("select state from jobs where id = $1")
+        let sql = "select state from jobs where id = $1 and ($2 is null or owner = $2)";
+        let state: Option<String> = sqlx::query_scalar(sql)
             .bind(job.0)
+            .bind(reach.owner())
             .fetch_optional(&mut *transaction)
             .await?;
         let Some(state) = state else {

@@ -1,9 +1,10 @@
-//! Enqueue: a job comes to be, queued.
+//! Enqueue: a job comes to be, queued, unless its owner has as many as it may (RELIABILITY.md, R9).
 
 use sqlx::types::Uuid;
 
 use super::Kind;
 use crate::ids::JobId;
+use crate::store::owners::Account;
 use crate::store::{Error, Store};
 
 /// A job to be queued.
@@ -11,6 +12,8 @@ use crate::store::{Error, Store};
 pub struct NewJob {
     /// Its id.
     pub job_id: JobId,
+    /// To whom it is charged.
+    pub account: Account,
     /// What it is.
     pub kind: Kind,
     /// What it needs to run, JSON.
@@ -24,15 +27,19 @@ pub struct NewJob {
 }
 
 impl Store {
-    /// Adds the job to the queue. A job that is there already under its id, because its request comes again
-    /// after a crash, is left as it is; [`Error::IdInUse`] where that one has another input.
+    /// Adds the job to the queue; [`Error::QuotaExceeded`] where its owner has too many queued and
+    /// running already. Counted and added in one statement, so that two at once cannot both be the last. A job
+    /// that is there already under its id, because its request comes again after a crash, is left as it is;
+    /// [`Error::IdInUse`] where that one has another input.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
         if self.is_queued_already(job).await? {
             return Ok(());
         }
-        sqlx::query(
+        let added = sqlx::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
-             created_ms) values ($1, $2, 'queued', $3, $4, $5, $6, $7, $7)",
+             created_ms, owner) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8 \
+             where $9 is null or $9 > (select count(*) from jobs \
+             where owner = $8 and state in ('queued', 'running'))",
         )
         .bind(job.job_id.0)
         .bind(job.kind.name())
@@ -41,8 +48,13 @@ impl Store {
         .bind(job.after_job.map(|id| id.0))
         .bind(job.priority)
         .bind(now_ms)
+        .bind(&job.account.owner)
+        .bind(job.account.quota)
         .execute(&self.writer)
         .await?;
+        if let (0, Some(quota)) = (added.rows_affected(), job.account.quota) {
+            return Err(Error::QuotaExceeded { quota });
+        }
         tracing::info!(job.id = %job.job_id, job.kind = job.kind.name(), "job queued");
         Ok(())
     }

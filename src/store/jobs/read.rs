@@ -5,6 +5,7 @@ use sqlx::types::Uuid;
 use super::{JobState, Kind};
 use crate::code::Code;
 use crate::ids::JobId;
+use crate::store::owners::Reach;
 use crate::store::{Error, Store};
 
 /// One job as people see it.
@@ -54,30 +55,45 @@ struct Row {
 }
 
 impl Store {
-    /// One job, if it is there.
-    pub async fn job(&self, id: JobId) -> Result<Option<JobRow>, Error> {
-        let row: Option<Row> = sqlx::query_as("select * from jobs where id = $1")
+    /// One job, if it is there and within reach.
+    pub async fn job(&self, id: JobId, reach: &Reach) -> Result<Option<JobRow>, Error> {
+        let sql = "select * from jobs where id = $1 and ($2 is null or owner = $2)";
+        let row: Option<Row> = sqlx::query_as(sql)
             .bind(id.0)
+            .bind(reach.owner())
             .fetch_optional(&self.reader)
             .await?;
         row.map(JobRow::try_from).transpose()
     }
 
-    /// The job that makes, or made, the result of that id.
-    pub async fn job_of_result(&self, result: Uuid) -> Result<Option<JobRow>, Error> {
-        let row: Option<Row> = sqlx::query_as("select * from jobs where result_id = $1")
+    /// The job that makes, or made, the result of that id, if it is within reach.
+    pub async fn job_of_result(
+        &self,
+        result: Uuid,
+        reach: &Reach,
+    ) -> Result<Option<JobRow>, Error> {
+        let sql = "select * from jobs where result_id = $1 and ($2 is null or owner = $2)";
+        let row: Option<Row> = sqlx::query_as(sql)
             .bind(result)
+            .bind(reach.owner())
             .fetch_optional(&self.reader)
             .await?;
         row.map(JobRow::try_from).transpose()
     }
 
     /// The newest jobs, at most `limit`, older than `before`.
-    pub async fn list_jobs(&self, limit: i64, before: Option<Uuid>) -> Result<Vec<JobRow>, Error> {
-        let sql = "select * from jobs where $1 is null or id < $1 order by id desc limit $2";
+    pub async fn list_jobs(
+        &self,
+        limit: i64,
+        before: Option<Uuid>,
+        reach: &Reach,
+    ) -> Result<Vec<JobRow>, Error> {
+        let sql = "select * from jobs where ($1 is null or id < $1) \
+                   and ($3 is null or owner = $3) order by id desc limit $2";
         let rows: Vec<Row> = sqlx::query_as(sql)
             .bind(before)
             .bind(limit)
+            .bind(reach.owner())
             .fetch_all(&self.reader)
             .await?;
         rows.into_iter().map(JobRow::try_from).collect()

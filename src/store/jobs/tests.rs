@@ -10,6 +10,7 @@ use super::heartbeat::Beat;
 use super::*;
 use crate::code::Code;
 use crate::store::Store;
+use crate::store::owners::{Account, Owner, Reach};
 
 const LEASE_MS: i64 = 15_000;
 
@@ -30,17 +31,28 @@ impl Queue {
     }
 
     async fn enqueue_at(&self, after_job: Option<JobId>, priority: i64) -> JobId {
+        let account = Account::local();
+        self.charge(account, after_job, priority).await.unwrap()
+    }
+
+    async fn charge(
+        &self,
+        account: Account,
+        after_job: Option<JobId>,
+        priority: i64,
+    ) -> Result<JobId, Error> {
         let job_id = JobId(Uuid::now_v7());
         let job = NewJob {
             job_id,
+            account,
             kind: Kind::Fish,
             input: "{}".into(),
             result_id: Uuid::now_v7(),
             after_job,
             priority,
         };
-        self.store.enqueue(&job, 0).await.unwrap();
-        job_id
+        self.store.enqueue(&job, 0).await?;
+        Ok(job_id)
     }
 
     async fn claim(&self, now_ms: i64) -> Option<Lease> {
@@ -49,7 +61,12 @@ impl Queue {
     }
 
     async fn state(&self, job: JobId) -> JobState {
-        self.store.job(job).await.unwrap().unwrap().state
+        self.store
+            .job(job, &Reach::All)
+            .await
+            .unwrap()
+            .unwrap()
+            .state
     }
 
     /// Finishes with a result of no files over a library made for it.
@@ -68,10 +85,10 @@ impl Queue {
     async fn library(&self) -> Uuid {
         let (footage, job, library) = (Uuid::now_v7(), Uuid::now_v7(), Uuid::now_v7());
         let rows = format!(
-            "insert into footage values (x'{f}', '{f}', randomblob(32), x'', '', 0, 1, 1, 1.0, 1, 0, 0); \
+            "insert into footage values (x'{f}', 'local', '{f}', randomblob(32), x'', '', 0, 1, 1, 1.0, 1, 0, 0); \
              insert into jobs (id, kind, state, input, result_id, priority, run_at_ms, created_ms, finished_ms) \
              values (x'{j}', 'analysis', 'done', '', x'{l}', 0, 0, 0, 0); \
-             insert into libraries values (x'{l}', x'{j}', 0, '{l}', x'{f}', '{{}}', '{{}}', 0, 0);",
+             insert into libraries values (x'{l}', x'{j}', 0, '{l}', x'{f}', '{{}}', '{{}}', 0, 0, 'local');",
             f = footage.simple(),
             j = job.simple(),
             l = library.simple(),
@@ -119,7 +136,12 @@ async fn finishing_links_the_result_in_the_same_step() {
     let lease = queue.claim(0).await.unwrap();
     assert_eq!(queue.finish(&lease).await, Change::Made);
     assert_eq!(queue.state(job).await, JobState::Done);
-    let fish = queue.store.fish(lease.result_id).await.unwrap().unwrap();
+    let fish = queue
+        .store
+        .fish(lease.result_id, &Reach::All)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(fish.job_id, job.0);
 }
 
@@ -163,7 +185,7 @@ async fn a_job_that_kills_its_worker_twice_is_quarantined() {
         queue.claim(0).await.unwrap();
         queue.store.rescue_all(1).await.unwrap();
     }
-    let row = queue.store.job(job).await.unwrap().unwrap();
+    let row = queue.store.job(job, &Reach::All).await.unwrap().unwrap();
     assert_eq!(row.state, JobState::Failed);
     assert_eq!(row.failure.unwrap().0, Code::CrashedWorker);
     assert_eq!(queue.claim(i64::MAX - LEASE_MS).await, None);
@@ -196,10 +218,10 @@ async fn a_queued_job_is_cancelled_at_once_with_what_follows_it() {
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
     let third = queue.enqueue(Some(second)).await;
-    let met = queue.store.cancel(first, 1).await.unwrap();
+    let met = queue.store.cancel(first, &Reach::All, 1).await.unwrap();
     assert_eq!(met, Cancel::Cancelled);
     assert_eq!(queue.state(third).await, JobState::Cancelled);
-    let met = queue.store.cancel(first, 2).await.unwrap();
+    let met = queue.store.cancel(first, &Reach::All, 2).await.unwrap();
     assert_eq!(met, Cancel::Final(JobState::Cancelled));
 }
 
@@ -208,7 +230,10 @@ async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
-    assert_eq!(queue.store.cancel(job, 1).await.unwrap(), Cancel::Requested);
+    assert_eq!(
+        queue.store.cancel(job, &Reach::All, 1).await.unwrap(),
+        Cancel::Requested
+    );
     let beat = queue.store.heartbeat(&lease, 1, "", 0.0).await.unwrap();
     assert_eq!(beat, Beat::CancelRequested);
     assert_eq!(queue.store.stop(&lease, 2).await.unwrap(), Change::Made);
@@ -220,7 +245,10 @@ async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     queue.claim(0).await.unwrap();
-    assert_eq!(queue.store.cancel(job, 1).await.unwrap(), Cancel::Requested);
+    assert_eq!(
+        queue.store.cancel(job, &Reach::All, 1).await.unwrap(),
+        Cancel::Requested
+    );
     queue.store.rescue_all(2).await.unwrap();
     assert_eq!(queue.state(job).await, JobState::Cancelled);
 }
@@ -245,7 +273,7 @@ async fn a_job_that_follows_a_failed_one_fails_with_it() {
     let lease = queue.claim(0).await.unwrap();
     let failed = queue.store.fail(&lease, Code::NothingMoves, "still", 1);
     assert_eq!(failed.await.unwrap(), Change::Made);
-    let row = queue.store.job(second).await.unwrap().unwrap();
+    let row = queue.store.job(second, &Reach::All).await.unwrap().unwrap();
     assert_eq!(row.failure.unwrap().0, Code::InputFailed);
 }
 
@@ -280,4 +308,72 @@ async fn a_folder_is_served_by_one_process_at_a_time() {
     assert!(matches!(second.err(), Some(Error::InUse(_))));
     drop(first);
     assert!(Store::open(data.path()).await.is_ok());
+}
+
+fn of(owner: &str, quota: i64) -> Account {
+    Account {
+        owner: Owner(owner.to_owned()),
+        quota: Some(quota),
+    }
+}
+
+/// How many jobs begin before the one of the owner who came last, with so many workers.
+async fn n_before_the_other(n_workers: usize) -> usize {
+    let queue = Queue::open().await;
+    for _ in 0..500 {
+        let charged = queue.charge(of("many", 500), None, 0).await;
+        charged.unwrap();
+    }
+    let mut running = std::collections::VecDeque::new();
+    for now_ms in 1..=n_workers {
+        running.extend(queue.claim(now_ms as i64).await);
+    }
+    let one = queue.charge(of("one", 1), None, 0).await.unwrap();
+    for n_begun in 0..500 {
+        let ended = running.pop_front().unwrap();
+        assert_eq!(queue.finish(&ended).await, Change::Made);
+        let lease = queue.claim(100 + n_begun as i64).await.unwrap();
+        if lease.job_id == one {
+            return n_begun;
+        }
+        running.push_back(lease);
+    }
+    500
+}
+
+#[tokio::test]
+async fn whoever_queues_one_job_does_not_wait_for_five_hundred_of_another() {
+    assert_eq!(n_before_the_other(1).await, 0);
+    assert_eq!(n_before_the_other(3).await, 0);
+}
+
+#[tokio::test]
+async fn owners_take_turns_job_by_job() {
+    let queue = Queue::open().await;
+    let mut jobs = Vec::new();
+    for owner in ["a", "a", "a", "b", "b"] {
+        jobs.push(queue.charge(of(owner, 9), None, 0).await.unwrap());
+    }
+    let mut turns = Vec::new();
+    for now_ms in 1..=5 {
+        let lease = queue.claim(now_ms).await.unwrap();
+        turns.push(jobs.iter().position(|job| *job == lease.job_id).unwrap());
+        assert_eq!(queue.finish(&lease).await, Change::Made);
+    }
+    assert_eq!(turns, [0, 3, 1, 4, 2]);
+}
+
+#[tokio::test]
+async fn no_more_jobs_are_queued_or_running_than_the_quota_allows() {
+    let queue = Queue::open().await;
+    let charge = async || queue.charge(of("a", 2), None, 0).await;
+    charge().await.unwrap();
+    charge().await.unwrap();
+    let refused = charge().await;
+    assert!(matches!(refused, Err(Error::QuotaExceeded { quota: 2 })));
+    let lease = queue.claim(1).await.unwrap();
+    assert!(charge().await.is_err(), "a running job counts");
+    queue.charge(of("b", 1), None, 0).await.unwrap();
+    assert_eq!(queue.finish(&lease).await, Change::Made);
+    charge().await.unwrap();
 }

@@ -5,7 +5,8 @@ use serde_json::json;
 use uuid::Uuid;
 
 use crate::common::TestApp;
-use crate::common::app::code_of;
+use crate::common::app::{code_of, routes};
+use crate::common::clip::TINY;
 
 #[tokio::test]
 async fn what_is_not_there_is_said_in_one_form() {
@@ -69,21 +70,33 @@ async fn a_body_that_is_wrong_is_told_what_is_wrong() {
 #[tokio::test]
 async fn nothing_served_runs_as_a_page_of_others() {
     let app = TestApp::idle().await;
-    for path in [
-        "/",
-        "/static/js/main.js",
-        "/v1/jobs",
-        "/nowhere",
-        "/openapi.json",
-        "/healthz",
-    ] {
-        let answer = app.get(path).send().await.unwrap();
+    let id = app.upload(&TINY).await;
+    let mut asked: Vec<(Method, String)> = ["/", "/static/js/main.js", "/nowhere", "/openapi.json"]
+        .map(|path| (Method::GET, path.to_owned()))
+        .into();
+    for (method, path) in routes(&app.json("/openapi.json").await) {
+        asked.push((method, path.replace("{id}", &id)));
+    }
+    assert!(asked.len() > 20, "the document names few routes");
+    for (method, path) in asked {
+        let answer = app.request(method, &path).send().await.unwrap();
         let header = |name: &str| answer.headers()[name].to_str().unwrap().to_owned();
         assert_eq!(header("x-content-type-options"), "nosniff", "{path}");
         assert_eq!(header("referrer-policy"), "no-referrer", "{path}");
+        assert_eq!(
+            header("cross-origin-opener-policy"),
+            "same-origin",
+            "{path}"
+        );
+        assert_eq!(header("x-frame-options"), "DENY", "{path}");
         let policy = header("content-security-policy");
         assert!(policy.contains("default-src 'none'") && policy.contains("frame-ancestors 'none'"));
         assert!(!policy.contains("unsafe"));
+        if path.starts_with("/v1/footage/") && path.ends_with("/file") {
+            assert_eq!(answer.status(), 200);
+            assert!(header("content-disposition").starts_with("attachment;"));
+            assert_eq!(header("content-type"), "application/octet-stream");
+        }
     }
     app.assert_sound().await;
 }

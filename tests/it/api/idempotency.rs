@@ -5,6 +5,7 @@ use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::recover;
 use flockreel::jobs::{allotted, analysis};
 use flockreel::store::idempotency::{Begun, Scope};
+use flockreel::store::owners::Account;
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 
@@ -96,7 +97,8 @@ async fn crashed_between(app: &TestApp, footage: &str) -> Value {
         footage_id: FootageId(footage.parse().unwrap()),
         params: flockreel::analysis::Params::default(),
     };
-    let queued = allotted::under(family, analysis::enqueue(&app.context, &input));
+    let account = Account::local();
+    let queued = allotted::under(family, analysis::enqueue(&app.context, &input, &account));
     let (job_id, library_id) = queued.await.unwrap();
     recover(&app.context).await.unwrap();
     json!({"job_id": job_id, "library_id": library_id, "footage_id": footage})

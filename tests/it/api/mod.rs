@@ -1,5 +1,6 @@
 //! The API, through the real router over a real connection; a file per noun.
 
+mod auth;
 mod contract;
 mod deletes;
 mod downloads;
@@ -9,3 +10,4 @@ mod jobs;
 mod one_call;
 mod uploads;
 mod wait;
+mod walls;

@@ -7,8 +7,11 @@ use clap::Parser;
 use flockreel::api::{self, AppState};
 use flockreel::config::Config;
 use flockreel::jobs::Context;
+use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::Supervisor;
-use reqwest::{Client, RequestBuilder, Response, StatusCode};
+use flockreel::store::tokens::{NewToken, Scope};
+use reqwest::header::{self, HeaderMap};
+use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::net::TcpListener;
@@ -71,6 +74,36 @@ impl TestApp {
     /// The whole address of a path.
     pub(crate) fn address(&self, path: &str) -> String {
         format!("{}{path}", self.base)
+    }
+
+    /// Makes a token, for an owner of its own.
+    pub(crate) async fn token(&self, scope: Scope, quota: i64) -> String {
+        let new = NewToken {
+            name: "test".to_owned(),
+            owner: None,
+            scope,
+            quota,
+            expires_ms: None,
+        };
+        let made = self.context.store.add_token(&new, now_ms()).await;
+        made.unwrap().1
+    }
+
+    /// From now on every request carries this token.
+    pub(crate) fn sign_in(&mut self, token: &str) {
+        let value = format!("Bearer {token}").parse().unwrap();
+        let headers = HeaderMap::from_iter([(header::AUTHORIZATION, value)]);
+        let client = Client::builder().default_headers(headers).build();
+        self.client = client.unwrap();
+    }
+
+    /// From now on requests carry nothing of their own.
+    pub(crate) fn sign_out(&mut self) {
+        self.client = Client::new();
+    }
+
+    pub(crate) fn request(&self, method: Method, path: &str) -> RequestBuilder {
+        self.client.request(method, format!("{}{path}", self.base))
     }
 
     pub(crate) fn get(&self, path: &str) -> RequestBuilder {
@@ -141,7 +174,7 @@ impl TestApp {
             supervisor.drain().await;
         }
         self.stop.cancel();
-        let faults = self.context.store.check(flockreel::jobs::clock::now_ms());
+        let faults = self.context.store.check(now_ms());
         assert_eq!(faults.await.unwrap(), Vec::<String>::new());
         assert_eq!(self.n_drafts(), 0, "drafts are left");
     }
@@ -172,6 +205,16 @@ pub(crate) async fn code_of(answer: Response, status: u16) -> String {
     assert_eq!(url, &format!("/docs/errors#{code}"));
     assert!(problem["title"].is_string() && problem["detail"].is_string());
     code.to_owned()
+}
+
+/// Every call that the document names.
+pub(crate) fn routes(document: &Value) -> Vec<(Method, String)> {
+    let paths = document["paths"].as_object().unwrap();
+    let calls = paths.iter().flat_map(|(path, calls)| {
+        let methods = calls.as_object().unwrap().keys();
+        methods.map(move |method| (method.to_uppercase().parse().unwrap(), path.clone()))
+    });
+    calls.collect()
 }
 
 fn entries(folder: &Path) -> usize {

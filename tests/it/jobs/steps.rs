@@ -8,6 +8,7 @@ use flockreel::progress::Progress;
 use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::cancel::Cancel;
 use flockreel::store::jobs::finish::Made;
+use flockreel::store::owners::Reach;
 use serde_json::json;
 
 use crate::common::TestApp;
@@ -91,7 +92,10 @@ async fn a_running_job_lets_go_when_it_is_cancelled() {
     let (claimed, is_claimed) = tokio::sync::oneshot::channel();
     let cancel = async {
         is_claimed.await.unwrap();
-        assert_eq!(store.cancel(job, 0).await.unwrap(), Cancel::Requested);
+        assert_eq!(
+            store.cancel(job, &Reach::All, 0).await.unwrap(),
+            Cancel::Requested
+        );
     };
     let step = worker.step_by(|_, attempt| {
         claimed.send(()).unwrap();
@@ -112,7 +116,13 @@ async fn a_job_under_way_goes_back_unused_when_the_service_stops() {
         wait_until_cancelled(attempt)
     });
     assert_eq!(step.await.unwrap(), Step::Released(job));
-    let row = app.context.store.job(job).await.unwrap().unwrap();
+    let row = app
+        .context
+        .store
+        .job(job, &Reach::All)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!((row.state, row.attempt), (JobState::Queued, 0));
     app.assert_sound().await;
 }
@@ -137,7 +147,13 @@ async fn what_may_pass_is_tried_again_three_times_at_most() {
     let fail = |_: &_, _: &Attempt| Err(Error::Io(std::io::Error::other("for a moment")));
     let step = worker.step_by(fail).await.unwrap();
     assert_eq!(step, Step::Retried(job));
-    let row = app.context.store.job(job).await.unwrap().unwrap();
+    let row = app
+        .context
+        .store
+        .job(job, &Reach::All)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!((row.state, row.attempt), (JobState::Queued, 1));
     assert_eq!(
         worker.step_by(fail).await.unwrap(),

@@ -108,6 +108,12 @@ impl Tank {
         ((self.section_bl2 / n as f64).sqrt() / ROOM_BL).clamp(0.05, 1.0)
     }
 
+    /// How many fit in at the usual distances: side by side, and in side view one behind another.
+    pub fn room_for(&self) -> u32 {
+        let layers = (2.0 * self.reach_bl[2]).max(1.0);
+        (self.section_bl2 / (ROOM_BL * ROOM_BL) * layers).max(1.0) as u32
+    }
+
     /// Inward pushes for whoever would pass a wall within `horizon_s`, growing to 1 at the wall.
     pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
         let mut push = [0.0; 3];

@@ -1,12 +1,12 @@
 //! What holds on every route: who may ask from a browser, and the headers of every answer
 //! (RELIABILITY.md, S5 and S7).
 
-use axum::extract::Request;
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Uri, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::Problem;
+use crate::api::Problem;
 use crate::code::Code;
 
 /// Nothing from elsewhere, nothing inline, in nobody's frame. Videos of our own may be shown from
@@ -39,9 +39,24 @@ const HEADERS: [(HeaderName, HeaderValue); 6] = [
     ),
 ];
 
+/// The names under which the service may be asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::api) enum Names {
+    /// This machine's own: whoever reaches it needs no token, so another site's name that was made to
+    /// point here must not.
+    Loopback,
+    /// Any: a page under another name has neither token nor cookie.
+    Any,
+}
+
 /// Refuses what another site makes a browser ask for, and sets the headers.
-pub(super) async fn guard(request: Request, next: Next) -> Response {
-    let mut response = match check(request.method(), request.uri(), request.headers()) {
+pub(in crate::api) async fn guard(
+    State(names): State<Names>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let (method, uri, headers) = (request.method(), request.uri(), request.headers());
+    let mut response = match check(names, method, uri, headers) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     };
@@ -55,12 +70,11 @@ pub(super) async fn guard(request: Request, next: Next) -> Response {
     response
 }
 
-/// The service listens on loopback: a name that is not loopback's is another site's that was made to
-/// point here. A write must come from our own page or from no page at all.
-fn check(method: &Method, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
+/// The name must be one of ours. A write must come from our own page or from no page at all.
+fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let host = text(header::HOST).or(uri.authority().map(|authority| authority.as_str()));
-    if !host.is_some_and(is_loopback) {
+    if names == Names::Loopback && !host.is_some_and(is_loopback) {
         let sentence = "the service is asked for under a name that is not this machine's own";
         return Err(Problem::new(Code::CrossSite, sentence));
     }
@@ -98,7 +112,7 @@ mod tests {
             .iter()
             .map(|(name, value)| (name.clone(), HeaderValue::from_static(value)))
             .collect();
-        check(&method, &Uri::from_static("/"), &headers).is_ok()
+        check(Names::Loopback, &method, &Uri::from_static("/"), &headers).is_ok()
     }
 
     #[test]

@@ -1,0 +1,202 @@
+//! `flockreel token`: who may reach the service (RELIABILITY.md, S6). It works on the data folder,
+//! beside a running service too, which knows of a new or revoked token with the next request. A new
+//! token goes to stdout, once.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use clap::Subcommand;
+use clap::builder::PossibleValuesParser;
+use serde_json::{Value, json};
+use tokio::runtime::Runtime;
+
+use super::serve::from_store;
+use super::{Error, Summary, say};
+use crate::jobs::clock::now_ms;
+use crate::store::Store;
+use crate::store::owners::Owner;
+use crate::store::tokens::{NewToken, Scope, Token};
+
+/// Arguments of `token`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The folder that the service keeps its data in.
+    #[arg(
+        long,
+        global = true,
+        env = "FLOCKREEL_DATA",
+        default_value = "data",
+        value_name = "DIR"
+    )]
+    data: PathBuf,
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    /// Make a token and print it: it cannot be shown again.
+    Create(CreateArgs),
+    /// List every token, without its secret.
+    List,
+    /// End a token and whoever signed in with it.
+    Revoke {
+        /// The part of the token between the underscores.
+        id: String,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+struct CreateArgs {
+    /// What to call it.
+    #[arg(long)]
+    name: String,
+    /// What it may do: see, make, or both with everybody's things.
+    #[arg(long, default_value = "write",
+        value_parser = PossibleValuesParser::new(Scope::ALL.map(Scope::name)))]
+    scope: String,
+    /// How long it holds, such as 30d, 12h or 90m; for ever unless given.
+    #[arg(long, value_parser = duration_ms, value_name = "TIME")]
+    expires: Option<i64>,
+    /// How many jobs may be queued or running at once.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(i64).range(0..), value_name = "N")]
+    quota: i64,
+    /// Whose things it reaches: the id of another token, to take its place, or `local` for what was made
+    /// without a token. Its own unless given.
+    #[arg(long, value_name = "ID")]
+    owner: Option<String>,
+}
+
+/// Makes, lists or revokes; the answer is JSON for programs, lines for people.
+pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
+    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    runtime.block_on(async {
+        let store = Store::open_beside(&args.data).await.map_err(from_store)?;
+        let done = match args.action {
+            Action::Create(wishes) => create(&store, wishes).await,
+            Action::List => list(&store).await,
+            Action::Revoke { id } => revoke(&store, &id).await,
+        };
+        store.close().await;
+        match json {
+            true => done.map(|value| Some(Summary(value))),
+            false => print_lines(&done?).map(|()| None),
+        }
+    })
+}
+
+/// A new token alone; tokens one a line.
+fn print_lines(answer: &Value) -> Result<(), Error> {
+    let mut out = std::io::stdout().lock();
+    let written = match answer {
+        Value::Array(tokens) => tokens.iter().try_for_each(|token| {
+            let word = |name: &str| token[name].as_str().unwrap_or_default();
+            let state = match token["good"] == true {
+                true => "good",
+                false => "ended",
+            };
+            let (id, scope, name) = (word("id"), word("scope"), word("name"));
+            writeln!(
+                out,
+                "{id}  {state:5}  {scope:5}  {:>5}  {name}",
+                token["quota"]
+            )
+        }),
+        made => match made["token"].as_str() {
+            Some(token) => writeln!(out, "{token}"),
+            None => Ok(()),
+        },
+    };
+    written.map_err(Error::io("writing to stdout"))
+}
+
+async fn create(store: &Store, wishes: CreateArgs) -> Result<Value, Error> {
+    let now_ms = now_ms();
+    let scope = Scope::from_name(&wishes.scope)
+        .ok_or_else(|| Error::Usage(format!("no such scope: {}", wishes.scope)))?;
+    let new = NewToken {
+        name: wishes.name,
+        owner: wishes.owner.map(Owner),
+        scope,
+        quota: wishes.quota,
+        expires_ms: wishes
+            .expires
+            .map(|lasts_ms| now_ms.saturating_add(lasts_ms)),
+    };
+    let (token, text) = store.add_token(&new, now_ms).await.map_err(from_store)?;
+    say("flockreel: keep this token, it is not shown again");
+    let mut value = described(&token);
+    value["token"] = json!(text);
+    Ok(value)
+}
+
+async fn list(store: &Store) -> Result<Value, Error> {
+    let tokens = store.list_tokens().await.map_err(from_store)?;
+    Ok(tokens.iter().map(described).collect())
+}
+
+async fn revoke(store: &Store, id: &str) -> Result<Value, Error> {
+    // Whoever has the whole token at hand need not take it apart.
+    let id = id.strip_prefix("frl_").unwrap_or(id);
+    let id = id.split('_').next().unwrap_or(id);
+    match store.revoke_token(id, now_ms()).await.map_err(from_store)? {
+        true => Ok(json!({"id": id, "revoked": true})),
+        false => Err(Error::Usage(format!("no token to revoke has the id: {id}"))),
+    }
+}
+
+fn described(token: &Token) -> Value {
+    json!({
+        "id": token.id,
+        "name": token.name,
+        "owner": token.owner.0,
+        "scope": token.scope.name(),
+        "quota": token.quota,
+        "created_ms": token.created_ms,
+        "expires_ms": token.expires_ms,
+        "revoked_ms": token.revoked_ms,
+        "good": token.is_good(now_ms()),
+    })
+}
+
+/// A whole number of days, hours or minutes.
+fn duration_ms(text: &str) -> Result<i64, String> {
+    let wrong = || "a whole number with d, h or m, such as 30d".to_owned();
+    let unit = text.chars().next_back().ok_or_else(wrong)?;
+    let minutes = match unit {
+        'd' => 24 * 60,
+        'h' => 60,
+        'm' => 1,
+        _ => return Err(wrong()),
+    };
+    let count: i64 = text[..text.len() - 1]
+        .parse()
+        .map_err(|_not_a_number| wrong())?;
+    let lasts_ms = count.checked_mul(minutes * 60_000).ok_or_else(wrong)?;
+    (count > 0).then_some(lasts_ms).ok_or_else(wrong)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::duration_ms;
+
+    #[test]
+    fn a_time_is_a_number_of_days_hours_or_minutes() {
+        assert_eq!(duration_ms("30d"), Ok(30 * 86_400_000));
+        assert_eq!(duration_ms("12h"), Ok(43_200_000));
+        assert_eq!(duration_ms("1m"), Ok(60_000));
+        for wrong in [
+            "",
+            "d",
+            "30",
+            "-1d",
+            "0d",
+            "1w",
+            "1.5d",
+            "99999999999999999d",
+            "3é",
+        ] {
+            assert!(duration_ms(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Whose things are whose (RELIABILITY.md, S6): every row that people make has one owner, and every
+//! question names whose rows it is about, so that a query without the wall does not compile.
+
+/// Who has a thing: the owner that a token names, or the local one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, sqlx::Type)]
+#[sqlx(transparent)]
+pub struct Owner(pub String);
+
+impl Owner {
+    /// Whoever asks on the machine itself without a token, and the program itself.
+    pub fn local() -> Owner {
+        Owner("local".to_owned())
+    }
+}
+
+/// Whose rows a question is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// Everybody's: administrators, and the workers.
+    All,
+    /// One owner's; the others' are not there.
+    Of(Owner),
+}
+
+impl Reach {
+    /// As a parameter of `$n is null or owner = $n`.
+    pub(super) fn owner(&self) -> Option<&str> {
+        match self {
+            Reach::All => None,
+            Reach::Of(Owner(name)) => Some(name),
+        }
+    }
+}
+
+/// To whom a new job is charged (RELIABILITY.md, R9).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Account {
+    /// Whose the job and its result will be.
+    pub owner: Owner,
+    /// How many jobs of the owner may be queued or running at once; any number where it is `None`.
+    pub quota: Option<i64>,
+}
+
+impl Account {
+    /// The local owner's, without a bound.
+    pub fn local() -> Account {
+        Account {
+            owner: Owner::local(),
+            quota: None,
+        }
+    }
+}

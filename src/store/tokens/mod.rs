@@ -1,0 +1,278 @@
+//! The table of tokens: who may ask, for how long, and for how much (RELIABILITY.md, S6 and R9). Of
+//! a token only the hash of its secret is kept; it is shown once, when it is made.
+
+mod key;
+pub mod secret;
+pub mod sessions;
+
+use secret::{Presented, Secret};
+
+use super::owners::{Account, Owner, Reach};
+use super::{Error, Store};
+
+/// How much a token may do; each may do what the ones before it may.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Scope {
+    /// See what its owner has.
+    Read,
+    /// Make and cancel.
+    Write,
+    /// The same with everybody's things.
+    Admin,
+}
+
+/// What a token is to be.
+#[derive(Clone, Debug)]
+pub struct NewToken {
+    /// A label for people.
+    pub name: String,
+    /// Whose things it reaches; an owner of its own where it is `None`.
+    pub owner: Option<Owner>,
+    /// What it may do.
+    pub scope: Scope,
+    /// How many jobs of its owner may be queued or running at once.
+    pub quota: i64,
+    /// When it ends, milliseconds since 1970.
+    pub expires_ms: Option<i64>,
+}
+
+/// One token as stored.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Token {
+    /// Its id: the part that is no secret.
+    pub id: String,
+    /// A label for people.
+    pub name: String,
+    /// Whose things it reaches.
+    pub owner: Owner,
+    /// What it may do.
+    pub scope: Scope,
+    /// How many jobs of its owner may be queued or running at once.
+    pub quota: i64,
+    /// When it was made, milliseconds since 1970.
+    pub created_ms: i64,
+    /// When it ends, if ever.
+    pub expires_ms: Option<i64>,
+    /// When it was revoked, if it was.
+    pub revoked_ms: Option<i64>,
+}
+
+#[derive(sqlx::FromRow)]
+struct Row {
+    id: String,
+    name: String,
+    owner: Owner,
+    sha256: Vec<u8>,
+    scope: String,
+    quota: i64,
+    created_ms: i64,
+    expires_ms: Option<i64>,
+    revoked_ms: Option<i64>,
+}
+
+impl Store {
+    /// Adds a token; the text given back is shown once and can never be had again.
+    pub async fn add_token(&self, new: &NewToken, now_ms: i64) -> Result<(Token, String), Error> {
+        let (id, secret) = (secret::random_id()?, Secret::random()?);
+        let token = Token {
+            owner: new.owner.clone().unwrap_or_else(|| Owner(id.clone())),
+            id,
+            name: new.name.clone(),
+            scope: new.scope,
+            quota: new.quota,
+            created_ms: now_ms,
+            expires_ms: new.expires_ms,
+            revoked_ms: None,
+        };
+        sqlx::query(
+            "insert into tokens (id, name, owner, sha256, scope, quota, created_ms, expires_ms) \
+             values ($1, $2, $3, $4, $5, $6, $7, $8)",
+        )
+        .bind(&token.id)
+        .bind(&token.name)
+        .bind(&token.owner)
+        .bind(secret.sha256.as_slice())
+        .bind(token.scope.name())
+        .bind(token.quota)
+        .bind(token.created_ms)
+        .bind(token.expires_ms)
+        .execute(&self.writer)
+        .await?;
+        tracing::info!(
+            token.id,
+            token.name,
+            scope = token.scope.name(),
+            "token made"
+        );
+        let text = secret::written(&token.id, &secret.text);
+        Ok((token, text))
+    }
+
+    /// Every token, the ended ones too, the oldest first.
+    pub async fn list_tokens(&self) -> Result<Vec<Token>, Error> {
+        let rows: Vec<Row> = sqlx::query_as("select * from tokens order by created_ms, id")
+            .fetch_all(&self.reader)
+            .await?;
+        rows.into_iter().map(Token::try_from).collect()
+    }
+
+    /// Ends a token and its sessions; false where there is none of that id that still held.
+    pub async fn revoke_token(&self, id: &str, now_ms: i64) -> Result<bool, Error> {
+        let sql = "update tokens set revoked_ms = $2 where id = $1 and revoked_ms is null";
+        let update = sqlx::query(sql).bind(id).bind(now_ms);
+        let n_rows = update.execute(&self.writer).await?.rows_affected();
+        tracing::info!(token.id = id, n_rows, "token revoked");
+        Ok(n_rows > 0)
+    }
+
+    /// Whether anybody holds a token that is good at that time.
+    pub async fn has_tokens(&self, now_ms: i64) -> Result<bool, Error> {
+        let sql = "select exists (select 1 from tokens where revoked_ms is null \
+                   and (expires_ms is null or expires_ms > $1))";
+        let known = sqlx::query_scalar(sql).bind(now_ms);
+        Ok(known.fetch_one(&self.reader).await?)
+    }
+
+    /// The token that was presented, if its secret is right and it is good at that time.
+    pub async fn token(&self, given: &Presented, now_ms: i64) -> Result<Option<Token>, Error> {
+        let row: Option<Row> = sqlx::query_as("select * from tokens where id = $1")
+            .bind(&given.id)
+            .fetch_optional(&self.reader)
+            .await?;
+        let right = row.filter(|row| secret::is_same(&row.sha256, &given.sha256));
+        let token = right.map(Token::try_from).transpose()?;
+        Ok(token.filter(|token| token.is_good(now_ms)))
+    }
+}
+
+impl Token {
+    /// Whether it has neither ended nor been revoked.
+    pub fn is_good(&self, now_ms: i64) -> bool {
+        self.revoked_ms.is_none() && self.expires_ms.is_none_or(|end_ms| end_ms > now_ms)
+    }
+
+    /// Whose rows it may see.
+    pub fn reach(&self) -> Reach {
+        match self.scope {
+            Scope::Admin => Reach::All,
+            Scope::Read | Scope::Write => Reach::Of(self.owner.clone()),
+        }
+    }
+
+    /// To whom its jobs are charged.
+    pub fn account(&self) -> Account {
+        Account {
+            owner: self.owner.clone(),
+            quota: Some(self.quota),
+        }
+    }
+}
+
+impl Scope {
+    /// Every scope, the smallest first.
+    pub const ALL: [Scope; 3] = [Scope::Read, Scope::Write, Scope::Admin];
+
+    /// The name in the database, the API and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scope::Read => "read",
+            Scope::Write => "write",
+            Scope::Admin => "admin",
+        }
+    }
+
+    /// The scope of a name.
+    pub fn from_name(name: &str) -> Option<Scope> {
+        Scope::ALL.into_iter().find(|scope| scope.name() == name)
+    }
+}
+
+impl TryFrom<Row> for Token {
+    type Error = Error;
+
+    fn try_from(row: Row) -> Result<Token, Error> {
+        let unknown = |value: String| Error::UnknownValue {
+            table: "tokens",
+            value,
+        };
+        Ok(Token {
+            id: row.id,
+            name: row.name,
+            owner: row.owner,
+            scope: Scope::from_name(&row.scope).ok_or_else(|| unknown(row.scope))?,
+            quota: row.quota,
+            created_ms: row.created_ms,
+            expires_ms: row.expires_ms,
+            revoked_ms: row.revoked_ms,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wanted(expires_ms: Option<i64>) -> NewToken {
+        NewToken {
+            name: "lab".to_owned(),
+            owner: None,
+            scope: Scope::Write,
+            quota: 3,
+            expires_ms,
+        }
+    }
+
+    #[tokio::test]
+    async fn a_token_is_good_until_it_ends_or_is_revoked() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        assert!(!store.has_tokens(0).await.unwrap());
+        let (made, text) = store.add_token(&wanted(Some(100)), 0).await.unwrap();
+        let given = Presented::parse(&text).unwrap();
+        let found = async |at_ms| store.token(&given, at_ms).await.unwrap();
+        assert_eq!(found(99).await, Some(made.clone()));
+        assert_eq!(found(100).await, None);
+        assert!(!store.has_tokens(100).await.unwrap() && store.has_tokens(99).await.unwrap());
+        assert!(store.revoke_token(&made.id, 50).await.unwrap());
+        assert!(!store.revoke_token(&made.id, 51).await.unwrap());
+        assert_eq!(found(60).await, None);
+        assert!(!store.has_tokens(60).await.unwrap());
+    }
+
+    #[tokio::test]
+    async fn another_secret_or_another_id_is_no_token() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let (_, first) = store.add_token(&wanted(None), 0).await.unwrap();
+        let (_, second) = store.add_token(&wanted(None), 0).await.unwrap();
+        let (first, second) = (
+            Presented::parse(&first).unwrap(),
+            Presented::parse(&second).unwrap(),
+        );
+        let crossed = Presented {
+            id: first.id.clone(),
+            sha256: second.sha256,
+        };
+        assert!(store.token(&first, 1).await.unwrap().is_some());
+        assert!(store.token(&crossed, 1).await.unwrap().is_none());
+        let absent = Presented {
+            id: "nobody".to_owned(),
+            ..second
+        };
+        assert!(store.token(&absent, 1).await.unwrap().is_none());
+    }
+
+    #[tokio::test]
+    async fn the_folder_holds_no_secret() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let (_, text) = store.add_token(&wanted(None), 0).await.unwrap();
+        store.close().await;
+        let secret = text.rsplit('_').next().unwrap().as_bytes().to_vec();
+        for entry in std::fs::read_dir(data.path()).unwrap().flatten() {
+            let bytes = std::fs::read(entry.path()).unwrap_or_default();
+            let holds = bytes.windows(secret.len()).any(|part| part == secret);
+            assert!(!holds, "{}", entry.path().display());
+        }
+    }
+}

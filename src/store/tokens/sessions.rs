@@ -1,0 +1,64 @@
+//! The table of sessions: browsers that were given a cookie for a token (RELIABILITY.md, S7). A session
+//! holds no longer than its token does.
+
+use super::secret::{self, Secret};
+use super::{Row, Token};
+use crate::store::{Error, Store};
+
+impl Store {
+    /// Begins a session of a token; the text given back is the cookie's value.
+    pub async fn begin_session(
+        &self,
+        token_id: &str,
+        now_ms: i64,
+        expires_ms: i64,
+    ) -> Result<String, Error> {
+        let secret = Secret::random()?;
+        let mut transaction = self.begin().await?;
+        sqlx::query("delete from sessions where expires_ms <= $1")
+            .bind(now_ms)
+            .execute(&mut *transaction)
+            .await?;
+        sqlx::query(
+            "insert into sessions (sha256, token_id, created_ms, expires_ms) \
+             values ($1, $2, $3, $4)",
+        )
+        .bind(secret.sha256.as_slice())
+        .bind(token_id)
+        .bind(now_ms)
+        .bind(expires_ms)
+        .execute(&mut *transaction)
+        .await?;
+        transaction.commit().await?;
+        tracing::info!(token.id = token_id, "session begun");
+        Ok(secret.text)
+    }
+
+    /// The token that a cookie stands for, if both hold at that time. It is looked for by the hash of
+    /// the secret, which nobody can choose, so the time that takes tells nothing.
+    pub async fn token_of_session(
+        &self,
+        cookie: &str,
+        now_ms: i64,
+    ) -> Result<Option<Token>, Error> {
+        let row: Option<Row> = sqlx::query_as(
+            "select t.* from tokens t join sessions s on s.token_id = t.id \
+             where s.sha256 = $1 and s.expires_ms > $2",
+        )
+        .bind(secret::hash(cookie).as_slice())
+        .bind(now_ms)
+        .fetch_optional(&self.reader)
+        .await?;
+        let token = row.map(Token::try_from).transpose()?;
+        Ok(token.filter(|token| token.is_good(now_ms)))
+    }
+
+    /// Ends a session; absence is no error.
+    pub async fn end_session(&self, cookie: &str) -> Result<(), Error> {
+        sqlx::query("delete from sessions where sha256 = $1")
+            .bind(secret::hash(cookie).as_slice())
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+}

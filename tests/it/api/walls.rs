@@ -1,0 +1,312 @@
+//! Owners are walls (RELIABILITY.md, S6): every call of the document, with every kind of id, tells a
+//! stranger what a random id tells. A call that is missing from the table fails the test.
+
+use flockreel::api::signed;
+use flockreel::jobs::Product;
+use flockreel::jobs::worker::{Step, Worker};
+use flockreel::store::jobs::Kind;
+use flockreel::store::jobs::finish::Made;
+use flockreel::store::tokens::Scope;
+use reqwest::{Method, StatusCode};
+use serde_json::{Value, json};
+use uuid::Uuid;
+
+use crate::common::TestApp;
+use crate::common::app::{json_of, routes};
+use crate::common::clip::TINY;
+
+/// How a call touches what people own.
+enum Touch {
+    /// By the id in its path, of this kind.
+    Path(&'static str),
+    /// By an id in its body, under this name and of this kind.
+    Body(&'static str, &'static str),
+    /// It lists the caller's own.
+    List,
+    /// Not at all.
+    Nothing,
+}
+
+/// Every call; those that change something come last, so that the owner's own still work before.
+fn table() -> Vec<(&'static str, &'static str, Touch)> {
+    use Touch::{Body, List, Nothing, Path};
+    vec![
+        ("GET", "/v1/footage", List),
+        ("GET", "/v1/footage/{id}", Path("footage")),
+        ("GET", "/v1/footage/{id}/file", Path("footage")),
+        ("GET", "/v1/libraries", List),
+        ("GET", "/v1/libraries/{id}", Path("libraries")),
+        ("GET", "/v1/libraries/{id}/{file}", Path("libraries")),
+        ("GET", "/v1/flocks", List),
+        ("GET", "/v1/flocks/{id}", Path("flocks")),
+        ("GET", "/v1/flocks/{id}/{file}", Path("flocks")),
+        ("GET", "/v1/fish", List),
+        ("GET", "/v1/fish/{id}", Path("fish")),
+        ("GET", "/v1/fish/{id}/{file}", Path("fish")),
+        ("GET", "/v1/jobs", List),
+        ("GET", "/v1/jobs/{id}", Path("jobs")),
+        ("GET", "/v1/jobs/{id}/events", Path("jobs")),
+        ("POST", "/v1/analyses", Body("footage_id", "footage")),
+        ("POST", "/v1/flocks", Body("library_id", "libraries")),
+        ("POST", "/v1/fish", Body("library_id", "libraries")),
+        ("POST", "/v1/flocks/{id}/links", Path("flocks")),
+        ("HEAD", "/v1/uploads/{id}", Path("uploads")),
+        ("PATCH", "/v1/uploads/{id}", Path("uploads")),
+        ("DELETE", "/v1/jobs/{id}", Path("jobs")),
+        ("DELETE", "/v1/uploads/{id}", Path("uploads")),
+        ("DELETE", "/v1/flocks/{id}", Path("flocks")),
+        ("DELETE", "/v1/fish/{id}", Path("fish")),
+        ("DELETE", "/v1/libraries/{id}", Path("libraries")),
+        ("DELETE", "/v1/footage/{id}", Path("footage")),
+        ("POST", "/v1/footage", Nothing),
+        ("POST", "/v1/uploads", Nothing),
+        ("OPTIONS", "/v1/uploads", Nothing),
+        ("POST", "/v1/session", Nothing),
+        ("DELETE", "/v1/session", Nothing),
+        ("GET", "/healthz", Nothing),
+        ("GET", "/readyz", Nothing),
+    ]
+}
+
+/// A file that each kind has.
+fn file_of(kind: &str) -> &'static str {
+    match kind {
+        "libraries" => "library.json",
+        "flocks" => "flock.json",
+        _ => "video.mp4",
+    }
+}
+
+/// One thing of every kind, owned by whoever is signed in: its kind and id. The works are stood in for.
+async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
+    let footage = app.upload(&TINY).await;
+    let analysis = app
+        .accept("/v1/analyses", json!({"footage_id": footage}))
+        .await;
+    let of_library = json!({"library_id": analysis["library_id"]});
+    let flock = app.accept("/v1/flocks", of_library.clone()).await;
+    let fish = app.accept("/v1/fish", of_library).await;
+    let id = |value: &Value| value.as_str().unwrap().to_owned();
+    let (footage_id, library): (Uuid, Uuid) = (
+        footage.parse().unwrap(),
+        id(&analysis["library_id"]).parse().unwrap(),
+    );
+    let worker = Worker::new(app.context.clone());
+    for _ in 0..3 {
+        let step = worker.step_by(move |lease, attempt| {
+            let (made, name, summary) = match lease.kind {
+                Kind::Analysis => (Made::Library(footage_id), "library.json", library_summary()),
+                Kind::Flock => (Made::Flock(library), "flock.json", flock_summary()),
+                Kind::Fish => (Made::Fish(library), "video.mp4", fish_summary()),
+            };
+            std::fs::write(attempt.folder().join(name), b"{}")?;
+            Ok(Product {
+                made,
+                params: "{}".to_owned(),
+                summary: summary.to_string(),
+            })
+        });
+        assert!(matches!(step.await.unwrap(), Step::Done(_)));
+    }
+    let upload = (app.post("/v1/uploads").header("tus-resumable", "1.0.0"))
+        .header("upload-length", 9)
+        .send();
+    let upload = upload.await.unwrap().headers()["location"]
+        .to_str()
+        .unwrap()
+        .replace("/v1/uploads/", "");
+    vec![
+        ("uploads", upload),
+        ("footage", footage),
+        ("libraries", id(&analysis["library_id"])),
+        ("flocks", id(&flock["flock_id"])),
+        ("fish", id(&fish["fish_id"])),
+        ("jobs", id(&analysis["job_id"])),
+    ]
+}
+
+fn library_summary() -> Value {
+    json!({"fps": 25.0, "image_size_px": [64, 64], "view": "side", "n_frames": 10, "detected_share": 1.0,
+        "n_transitions": 1, "component_share": 1.0, "clip_frames": 4, "length_px": null})
+}
+
+fn flock_summary() -> Value {
+    json!({"fps": 25.0, "image_size_px": [64, 64], "count": 1, "frames": 10, "seed": 1})
+}
+
+fn fish_summary() -> Value {
+    json!({"fps": 25.0, "image_size_px": [64, 64], "frames": 10, "visible_frames": 10})
+}
+
+/// What a call with an id answers: the status, and the body with the id taken out.
+async fn told(app: &TestApp, call: (&str, &str, &Touch), kind: &str, id: &str) -> (u16, String) {
+    let (method, path, touch) = call;
+    let path = path.replace("{id}", id).replace("{file}", file_of(kind));
+    let request = app.request(method.parse::<Method>().unwrap(), &path);
+    let request = match touch {
+        Touch::Body(name, _) => request.json(&json!({ *name: id })),
+        Touch::Path(_) if method == "POST" => request.json(&json!({})),
+        _ => request,
+    };
+    let request = match kind {
+        "uploads" => (request.header("tus-resumable", "1.0.0"))
+            .header("upload-offset", 0)
+            .header("content-type", "application/offset+octet-stream"),
+        _ => request,
+    };
+    let answer = request.send().await.unwrap();
+    let status = answer.status().as_u16();
+    (status, answer.text().await.unwrap().replace(id, "ID"))
+}
+
+#[tokio::test]
+async fn the_table_names_every_call_of_the_document() {
+    let app = TestApp::idle().await;
+    let mut of_document = routes(&app.json("/openapi.json").await);
+    let mut of_table: Vec<(Method, String)> = (table().iter())
+        .map(|(method, path, _)| (method.parse().unwrap(), (*path).to_owned()))
+        .collect();
+    for calls in [&mut of_document, &mut of_table] {
+        calls.sort_by_key(|(method, path)| (path.clone(), method.to_string()));
+    }
+    assert_eq!(
+        of_table, of_document,
+        "left: this test's table; right: the document"
+    );
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_stranger_is_told_what_a_random_id_tells() {
+    let mut app = TestApp::start(&["--auth", "required"]).await;
+    let (owner, stranger) = (
+        app.token(Scope::Write, 9).await,
+        app.token(Scope::Write, 9).await,
+    );
+    let admin = app.token(Scope::Admin, 9).await;
+    app.sign_in(&owner);
+    let things = belongings(&app).await;
+    for (method, path, touch) in &table() {
+        let call = (*method, *path, touch);
+        let (Touch::Path(wanted) | Touch::Body(_, wanted)) = touch else {
+            continue;
+        };
+        app.sign_in(&stranger);
+        for (kind, id) in &things {
+            let random = Uuid::now_v7().to_string();
+            let of_theirs = told(&app, call, wanted, id).await;
+            assert!(matches!(of_theirs.0, 404 | 422), "{method} {path} {kind}");
+            assert_eq!(
+                of_theirs,
+                told(&app, call, wanted, &random).await,
+                "{method} {path} {kind}"
+            );
+        }
+        let (_, own) = things.iter().find(|(kind, _)| kind == wanted).unwrap();
+        for allowed in [&owner, &admin] {
+            app.sign_in(allowed);
+            let (status, body) = told(&app, call, wanted, own).await;
+            // What the owner deleted is gone for the administrator too.
+            let is_gone = *method == "DELETE" && allowed == &admin && status == 404;
+            assert!(
+                status < 300 || status == 409 || is_gone,
+                "{method} {path}: {status} {body}"
+            );
+        }
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_list_holds_the_callers_own_and_an_administrator_sees_all() {
+    let mut app = TestApp::start(&["--auth", "required"]).await;
+    let (owner, stranger) = (
+        app.token(Scope::Write, 9).await,
+        app.token(Scope::Read, 9).await,
+    );
+    let admin = app.token(Scope::Admin, 9).await;
+    app.sign_in(&owner);
+    belongings(&app).await;
+    for (_, path, _) in table()
+        .iter()
+        .filter(|(_, _, touch)| matches!(touch, Touch::List))
+    {
+        let mut counts = Vec::new();
+        for token in [&owner, &stranger, &admin] {
+            app.sign_in(token);
+            counts.push(app.json(path).await["items"].as_array().unwrap().len());
+        }
+        assert!(counts[0] > 0, "{path}");
+        assert_eq!(counts, [counts[0], 0, counts[0]], "{path}");
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_link_opens_one_file_for_whoever_holds_it_until_it_ends() {
+    let mut app = TestApp::start(&["--auth", "required"]).await;
+    let owner = app.token(Scope::Write, 9).await;
+    app.sign_in(&owner);
+    let things = belongings(&app).await;
+    let flock = &things.iter().find(|(kind, _)| *kind == "flocks").unwrap().1;
+    let path = format!("/v1/flocks/{flock}");
+    let ask = |wish: Value| app.post(&format!("{path}/links")).json(&wish).send();
+    let made = ask(json!({"file": "flock.json", "expires_s": 60}))
+        .await
+        .unwrap();
+    let url = json_of(made, StatusCode::CREATED).await["url"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    for (wish, status) in [
+        (json!({"file": "lock"}), 404),
+        (json!({"expires_s": 1}), 422),
+    ] {
+        assert_eq!(ask(wish).await.unwrap().status(), status);
+    }
+    app.sign_out();
+    let file = app.get(&url).send().await.unwrap();
+    assert_eq!(file.text().await.unwrap(), "{}");
+    let (_, query) = url.split_once('?').unwrap();
+    let (_, signature) = query.split_once("&signature=").unwrap();
+    let earlier = signed(
+        &app.context.store.signing_key().await.unwrap(),
+        &format!("{path}/flock.json"),
+        1,
+    );
+    for closed in [
+        format!("{path}/plan.svg?{query}"),
+        format!("{path}?{query}"),
+        format!("/v1/flocks?{query}"),
+        format!("{path}/flock.json?expires=99999999999&signature={signature}"),
+        url.replace(&signature[..4], "0000"),
+        earlier,
+    ] {
+        assert_eq!(
+            app.get(&closed).send().await.unwrap().status(),
+            401,
+            "{closed}"
+        );
+    }
+    assert_eq!(app.post(&url).send().await.unwrap().status(), 401);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn the_same_bytes_of_two_owners_are_two_footage() {
+    let mut app = TestApp::idle().await;
+    let (first, second) = (
+        app.token(Scope::Write, 9).await,
+        app.token(Scope::Write, 9).await,
+    );
+    let mut ids = Vec::new();
+    for token in [&first, &second] {
+        app.sign_in(token);
+        ids.push(app.upload(&TINY).await);
+    }
+    assert_ne!(ids[0], ids[1]);
+    app.sign_out();
+    assert_eq!(app.json("/v1/footage").await["items"], json!([]));
+    assert_eq!(app.n_folders("footage"), 2);
+    app.assert_sound().await;
+}
