@@ -3,6 +3,7 @@
 
 mod site;
 
+use super::OVERLAP_BL;
 use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// The side of the square that a boid needs to keep the usual distances.
@@ -108,10 +109,10 @@ impl Tank {
         ((self.section_bl2 / n as f64).sqrt() / ROOM_BL).clamp(0.05, 1.0)
     }
 
-    /// How many fit in at the usual distances: side by side, and in side view one behind another.
+    /// How many fit in as near as boids may come to each other: side by side, and in side view one behind another.
     pub fn room_for(&self) -> u32 {
         let layers = (2.0 * self.reach_bl[2]).max(1.0);
-        (self.section_bl2 / (ROOM_BL * ROOM_BL) * layers).max(1.0) as u32
+        (self.section_bl2 / (OVERLAP_BL * OVERLAP_BL) * layers).max(1.0) as u32
     }
 
     /// Inward pushes for whoever would pass a wall within `horizon_s`, growing to 1 at the wall.
