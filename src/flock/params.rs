@@ -89,8 +89,8 @@ pub struct Matching {
 pub enum MatchBy {
     /// O: where the animal points in the picture, and how fast it is. A wrong heading is seen at once.
     Heading,
-    /// The same, but where it points in space: half the error of that, for twice the error of headings. Without depth
-    /// headings are matched. What stays wrong is the chord between two unit vectors; without a camera, away
+    /// The same, but where it points in space, at the expense of headings in the picture. Without depth headings are
+    /// matched. What stays wrong is the chord between two unit vectors; without a camera, away
     /// from the viewer and toward are one.
     Direction,
     /// Colqui et al. 2008: how the animal moved in the picture against how the boid moves, frame by
