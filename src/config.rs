@@ -38,6 +38,39 @@ pub struct Config {
     pub max_upload_bytes: u64,
 }
 
+/// How media tools are found and enclosed: the same for every command that reads or writes films.
+#[derive(Args, Clone, Debug)]
+#[command(next_help_heading = "Media tools")]
+pub struct Media {
+    /// The walls around ffmpeg: `auto` uses all that this machine has, `strict` does nothing unless it has
+    /// them all, `off` leaves plain limits alone.
+    #[arg(
+        long,
+        global = true,
+        env = "FLOCKREEL_SANDBOX",
+        default_value = "auto",
+        value_name = "MODE"
+    )]
+    pub sandbox: Sandbox,
+    /// The ffmpeg to use, instead of the first on the PATH.
+    #[arg(long, global = true, env = "FLOCKREEL_FFMPEG", value_name = "FILE")]
+    pub ffmpeg: Option<PathBuf>,
+    /// The ffprobe to use, instead of the first on the PATH.
+    #[arg(long, global = true, env = "FLOCKREEL_FFPROBE", value_name = "FILE")]
+    pub ffprobe: Option<PathBuf>,
+}
+
+/// How much of the sandbox must be there (RELIABILITY.md, the gate).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Sandbox {
+    /// Plain limits alone.
+    Off,
+    /// What this machine has; what it lacks is said.
+    Auto,
+    /// All of it, or nothing is started.
+    Strict,
+}
+
 /// Who needs a token (RELIABILITY.md, S6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Auth {

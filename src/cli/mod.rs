@@ -27,7 +27,9 @@ use tracing_subscriber::EnvFilter;
 pub use error::Error;
 pub use progress::Listener;
 
+use crate::config;
 use crate::formats::library_dir::{self, StoredLibrary};
+use crate::media;
 use crate::scratch::Scratch;
 use crate::store::Spill;
 
@@ -41,6 +43,8 @@ pub struct Cli {
     /// What to log to stderr, for example `debug` or `flockreel::jobs=debug`.
     #[arg(long, global = true, env = "FLOCKREEL_LOG", value_name = "FILTER")]
     log: Option<String>,
+    #[command(flatten)]
+    media: config::Media,
     /// What to do.
     #[command(subcommand)]
     command: Command,
@@ -76,6 +80,7 @@ pub struct Summary(pub Value);
 /// Runs the command and says how it went; never panics on a user's input.
 pub fn main(cli: Cli) -> ExitCode {
     start_logging(cli.log.as_deref(), matches!(cli.command, Command::Serve(_)));
+    media::set_up(&cli.media);
     match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
         Err(error) => {

@@ -11,10 +11,11 @@ use std::path::{Path, PathBuf};
 
 use super::allow_list::input_args;
 use super::error::Error;
-use super::gate::{Child, Order, Tool};
+use super::gate::{Child, Order};
 use super::limits::Limits;
 use super::probe::{Probe, Turn, is_rgb, probe};
 use super::timeline::Timeline;
+use super::tools::Tool;
 use crate::footage::{
     FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
 };
@@ -50,6 +51,11 @@ impl Video {
     }
 
     /// The order to decode every frame, or some.
+    fn order(&self, wanted: &Wanted) -> Order {
+        let n_packets = self.probe.n_packets;
+        Order::new(Tool::Ffmpeg, self.args(wanted), &self.limits, n_packets).with_input(&self.path)
+    }
+
     fn args(&self, wanted: &Wanted) -> Vec<OsString> {
         let probe = &self.probe;
         let threads = self.n_threads().to_string();
@@ -95,9 +101,7 @@ impl Video {
     /// Calls `visit` with the wanted frames; returns how many there were. They are not compared with
     /// what the header promised: who reads the whole footage finds out whether it is cut off.
     fn show(&self, wanted: &Wanted, visit: &mut Visit<'_>) -> Result<usize, Error> {
-        let n_packets = self.probe.n_packets;
-        let order = Order::new(Tool::Ffmpeg, self.args(wanted), &self.limits, n_packets);
-        let mut stream = VideoStream::of(self, order)?;
+        let mut stream = VideoStream::of(self, self.order(wanted))?;
         let mut frame = Frame::default();
         let mut n_shown = 0;
         while stream.read(&mut frame)? == frame.planes.len() {
@@ -179,9 +183,7 @@ impl FrameSource for Video {
     }
 
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
-        let args = self.args(&Wanted::All);
-        let order = Order::new(Tool::Ffmpeg, args, &self.limits, self.probe.n_packets);
-        Ok(Box::new(VideoStream::of(self, order)?))
+        Ok(Box::new(VideoStream::of(self, self.order(&Wanted::All))?))
     }
 
     /// The child hands over only the frames that are wanted. Of a long footage it decodes only those

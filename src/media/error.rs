@@ -105,9 +105,17 @@ pub enum Error {
     /// A frame of another size than the video that it is written to, or a rate that is none.
     #[error("the encoder was given what it cannot take: {0}")]
     BadOutput(&'static str),
-    /// ffmpeg is not installed.
+    /// ffmpeg is not installed, or does not run.
     #[error("the media tool is not installed: {0}")]
-    ToolMissing(&'static str),
+    ToolMissing(String),
+    /// `--sandbox strict` was asked for, and a layer is missing.
+    #[error("the sandbox is not whole, as `--sandbox strict` demands: {layer}: {reason}")]
+    SandboxIncomplete {
+        /// The first layer that is missing.
+        layer: &'static str,
+        /// Why.
+        reason: String,
+    },
     /// A file or pipe of ours failed.
     #[error("{doing}: {source}")]
     Io {
@@ -139,7 +147,10 @@ impl Error {
             Error::MemoryLimit { .. } => Code::MemoryLimit,
             Error::Crashed { .. } => Code::DecoderCrashed,
             Error::StorageFull => Code::StorageFull,
-            Error::BadOutput(_) | Error::ToolMissing(_) | Error::Io { .. } => Code::Internal,
+            Error::BadOutput(_)
+            | Error::ToolMissing(_)
+            | Error::SandboxIncomplete { .. }
+            | Error::Io { .. } => Code::Internal,
         }
     }
 

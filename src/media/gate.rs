@@ -8,7 +8,7 @@
 use std::ffi::OsString;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{self, ChildStdin, ChildStdout, Stdio};
 use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
 use std::thread::JoinHandle;
@@ -21,15 +21,7 @@ use super::end::End;
 use super::error::Error;
 use super::limits::Limits;
 use super::sandbox::{self, Cage};
-
-/// The two programs that may be started.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tool {
-    /// Reads headers and packet times.
-    Ffprobe,
-    /// Decodes and encodes.
-    Ffmpeg,
-}
+use super::tools::{self, Place, Tool};
 
 /// How much of a child's complaints is kept.
 const COMPLAINT_BYTES: usize = 8 << 10;
@@ -40,28 +32,19 @@ const PIPE_BYTES: usize = 1 << 20;
 /// How long a child may take to end by itself once it has closed its output.
 const END_TIME: Duration = Duration::from_secs(30);
 
-/// The version line of the installed ffmpeg, for the log.
-pub fn tool_version() -> Result<String, Error> {
-    let limits = Limits::default();
-    let order = Order::new(Tool::Ffmpeg, vec!["-version".into()], &limits, 0);
-    let mut child = Child::start(order, Stdio::null())?;
-    let mut text = vec![0; 4096];
-    let n = child.read_full(&mut text)?;
-    let text = String::from_utf8_lossy(&text[..n]);
-    Ok(text.lines().next().unwrap_or_default().to_owned())
-}
-
 /// What to start, and within which limits.
 pub(super) struct Order {
     tool: Tool,
     args: Vec<OsString>,
+    /// Ask the loader what the program is made of, instead of running it.
+    lists_libraries: bool,
     cage: Cage,
     time: Duration,
     stall: Duration,
 }
 
 impl Order {
-    /// An order for work on `n_frames` frames (0 for reading headers). It may write no file.
+    /// An order for work on `n_frames` frames (0 for reading headers). It may open no file.
     pub(super) fn new(tool: Tool, args: Vec<OsString>, limits: &Limits, n_frames: usize) -> Order {
         let time = match n_frames {
             0 => limits.probe_time,
@@ -70,10 +53,14 @@ impl Order {
         Order {
             tool,
             args,
+            lists_libraries: false,
             cage: Cage {
+                layers: limits.layers,
                 memory_bytes: limits.max_memory_bytes,
                 cpu_s: (time.as_secs() + 1) * n_cores(),
                 file_bytes: 0,
+                input: None,
+                output: None,
             },
             time,
             stall: limits.stall_time.min(time),
@@ -86,9 +73,22 @@ impl Order {
         self
     }
 
-    /// The same, allowed to write files of `bytes`.
-    pub(super) fn with_output(mut self, bytes: u64) -> Order {
+    /// The same, allowed to read a file.
+    pub(super) fn with_input(mut self, path: &Path) -> Order {
+        self.cage.input = Some(path.to_owned());
+        self
+    }
+
+    /// The same, allowed to write a file that is there already, up to `bytes`.
+    pub(super) fn with_output(mut self, path: &Path, bytes: u64) -> Order {
+        self.cage.output = Some(path.to_owned());
         self.cage.file_bytes = bytes;
+        self
+    }
+
+    /// The same, but the loader lists the program's libraries and ends.
+    pub(super) fn listing_libraries(mut self) -> Order {
+        self.lists_libraries = true;
         self
     }
 }
@@ -132,20 +132,21 @@ impl Child {
     }
 
     fn start(order: Order, stdin: Stdio) -> Result<Child, Error> {
-        let mut command = process::Command::new(program(order.tool)?);
-        command
-            .args(["-v", "error"])
-            .args(&order.args)
-            .env_clear()
-            .env("LC_ALL", "C")
-            // Each arena reserves address space, of which the cage leaves only so much.
-            .env("MALLOC_ARENA_MAX", "4")
-            .current_dir("/")
-            .stdin(stdin)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        sandbox::enclose(&mut command, order.cage);
-        let mut process = spawn(command).map_err(Error::io("starting the media tool"))?;
+        let place = tools::place(order.tool)?;
+        Child::launch(order, place, stdin)
+    }
+
+    /// Starts a program in all layers that both the order and the place know.
+    pub(super) fn launch(order: Order, place: &Place, stdin: Stdio) -> Result<Child, Error> {
+        let failed = Error::io("starting the media tool");
+        let cage = Cage {
+            layers: order.cage.layers.and(place.layers),
+            ..order.cage
+        };
+        let mut command = command(&order.args, place, order.lists_libraries);
+        command.stdin(stdin);
+        sandbox::enclose(&mut command, &cage, &place.reach).map_err(&failed)?;
+        let mut process = spawn(command).map_err(failed)?;
         let group = Pid::from_child(&process);
         let ended = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
             Ok(ended) => ended,
@@ -313,6 +314,24 @@ impl Drop for Child {
     }
 }
 
+fn command(args: &[OsString], place: &Place, lists_libraries: bool) -> process::Command {
+    let mut command = process::Command::new(&place.path);
+    command
+        .args(["-v", "error"])
+        .args(args)
+        .env_clear()
+        .env("LC_ALL", "C")
+        // Each arena reserves address space, of which the cage leaves only so much.
+        .env("MALLOC_ARENA_MAX", "4")
+        .current_dir("/")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    if lists_libraries {
+        command.env("LD_TRACE_LOADED_OBJECTS", "1");
+    }
+    command
+}
+
 /// Kills what is left of the group, then reaps the child. The order matters: until it is reaped
 /// nobody else can get its number.
 fn kill_and_reap(process: &mut process::Child, group: Pid) {
@@ -347,24 +366,6 @@ fn spawn(command: process::Command) -> io::Result<process::Child> {
         .clone();
     spawner.send((command, send)).map_err(|_closed| gone())?;
     receive.recv().map_err(|_closed| gone())?
-}
-
-/// Where a tool lies: looked up once, since the child's environment is empty.
-fn program(tool: Tool) -> Result<&'static Path, Error> {
-    static FFMPEG: OnceLock<Option<PathBuf>> = OnceLock::new();
-    static FFPROBE: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let (cell, name) = match tool {
-        Tool::Ffmpeg => (&FFMPEG, "ffmpeg"),
-        Tool::Ffprobe => (&FFPROBE, "ffprobe"),
-    };
-    let look = || {
-        let path = std::env::var_os("PATH")?;
-        let mut places = std::env::split_paths(&path).map(|folder| folder.join(name));
-        places.find(|file| file.is_absolute() && file.is_file())
-    };
-    cell.get_or_init(look)
-        .as_deref()
-        .ok_or(Error::ToolMissing(name))
 }
 
 /// A larger pipe means fewer turns between two processes; a refusal costs only speed.

@@ -3,6 +3,8 @@
 
 use std::time::Duration;
 
+use super::sandbox::Layers;
+
 /// The limits of one file and of the child processes that read it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
@@ -38,6 +40,8 @@ pub struct Limits {
     pub max_output_bytes: u64,
     /// Decoding threads; 0 = one for each core.
     pub threads: u32,
+    /// The layers of the sandbox that a child enters, as far as this machine has them.
+    pub layers: Layers,
     /// Accept a file that is cut off inside, up to the cut.
     pub allow_truncated: bool,
 }
@@ -61,6 +65,7 @@ impl Default for Limits {
             max_memory_bytes: 4 << 30,
             max_output_bytes: 16 << 30,
             threads: 0,
+            layers: Layers::ALL,
             allow_truncated: false,
         }
     }

@@ -17,10 +17,12 @@ mod packets; // when each packet is shown
 mod probe; // what a file holds
 mod sandbox; // what the child may do
 mod timeline; // presentation times -> a constant rate
+mod tools; // where the tools lie, and in which walls they work
 
 pub use decode::Video;
 pub use encode::{Coding, Quality, VideoFormat, VideoWriter};
 pub use error::Error;
-pub use gate::tool_version;
 pub use image::{decode_image, read_image};
 pub use limits::Limits;
+pub use sandbox::{Layer, Layers};
+pub use tools::{Walls, demanded_walls, set_up, tool_version, walls};

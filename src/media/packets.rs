@@ -10,10 +10,11 @@ use serde_json::Value;
 use super::allow_list::input_args;
 use super::container::Container;
 use super::error::Error;
-use super::gate::{Child, Order, Tool};
+use super::gate::{Child, Order};
 use super::limits::Limits;
 use super::probe::{n_streams, number, ratio, text};
 use super::timeline::Timeline;
+use super::tools::Tool;
 
 /// Disks read at least this fast, bytes a second; the packet times need the whole file.
 const SLOWEST_DISK: u64 = 50_000_000;
@@ -47,6 +48,7 @@ impl Packets {
         args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
         args.extend(input_args(container, path, limits));
         let order = Order::new(Tool::Ffprobe, args, limits, 0)
+            .with_input(path)
             .with_more_time(Duration::from_secs(n_bytes / SLOWEST_DISK));
         let mut child = Child::reading(order)?;
         let mut packets = Packets {

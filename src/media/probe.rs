@@ -12,10 +12,11 @@ use serde_json::Value;
 use super::allow_list::input_args;
 use super::container::{Container, HEAD_BYTES};
 use super::error::Error;
-use super::gate::{Child, Order, Tool};
+use super::gate::{Child, Order};
 use super::limits::Limits;
 use super::packets::Packets;
 use super::timeline::Timeline;
+use super::tools::Tool;
 use crate::raster::{ColorSpec, Matrix, Range};
 
 /// Codecs that are accepted, by ffprobe's names.
@@ -155,7 +156,8 @@ fn read_header(container: Container, path: &Path, limits: &Limits) -> Result<Val
         "json".into(),
     ];
     args.extend(input_args(container, path, limits));
-    let mut child = Child::reading(Order::new(Tool::Ffprobe, args, limits, 0))?;
+    let order = Order::new(Tool::Ffprobe, args, limits, 0).with_input(path);
+    let mut child = Child::reading(order)?;
     let mut json = vec![0; MAX_HEADER_BYTES];
     let n_read = child.read_full(&mut json)?;
     if n_read == json.len() {

@@ -14,8 +14,9 @@ use std::path::{Path, PathBuf};
 pub use coding::Coding;
 
 use super::error::Error;
-use super::gate::{Child, Order, Tool};
+use super::gate::{Child, Order};
 use super::limits::Limits;
+use super::tools::Tool;
 use crate::footage::FootageFormat;
 use crate::raster::{ColorSpec, Frame};
 
@@ -112,10 +113,10 @@ impl VideoWriter {
             return Err(Error::BadOutput("a frame rate outside 0..=1000"));
         }
         let path = std::path::absolute(path).map_err(Error::io("finding the output folder"))?;
-        let part = Part::beside(&path);
+        let part = Part::beside(&path)?;
         let args = coding.args(&part.0, format);
         let order = Order::new(Tool::Ffmpeg, args, limits, limits.max_frames)
-            .with_output(limits.max_output_bytes);
+            .with_output(&part.0, limits.max_output_bytes);
         Ok(VideoWriter {
             format: *format,
             coding,
@@ -184,11 +185,16 @@ impl VideoWriter {
 struct Part(PathBuf);
 
 impl Part {
-    fn beside(path: &Path) -> Part {
+    /// Made here, empty, because the encoder may write this file and make no other.
+    fn beside(path: &Path) -> Result<Part, Error> {
         let mut name = OsString::from(".");
         name.push(path.file_name().unwrap_or_default());
         name.push(".part");
-        Part(path.with_file_name(name))
+        let part = path.with_file_name(name);
+        // What another run has left, if anything, whatever it is.
+        std::fs::remove_file(&part).ok();
+        std::fs::File::create_new(&part).map_err(Error::io("making the video"))?;
+        Ok(Part(part))
     }
 }
 

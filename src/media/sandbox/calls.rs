@@ -1,0 +1,372 @@
+//! Seccomp (RELIABILITY.md, "The gate"): the system calls that no film needs, as a list with reasons.
+//! The program is written out here instructions by instruction, because it is short and must be read.
+//!
+//! A refused call fails with EPERM; it does not kill. Libraries are curious, and live with a refusal: a
+//! kill would turn the curiosity of the next version of some library into films that fail. What the call
+//! would have done is not done either way. Only a program that speaks another machine's language is killed.
+
+#![expect(
+    unsafe_code,
+    reason = "a filter is entered by a system call after the fork"
+)]
+
+use std::io;
+
+use libc::{c_long, sock_filter};
+
+/// Calls that are refused, with the reason.
+const REFUSED: &[(&str, &[c_long])] = &[
+    (
+        "a film is a file: it needs no network",
+        &[
+            libc::SYS_socket,
+            libc::SYS_socketpair,
+            libc::SYS_connect,
+            libc::SYS_bind,
+            libc::SYS_listen,
+            libc::SYS_accept,
+            libc::SYS_accept4,
+        ],
+    ),
+    (
+        "one program, which is running already: `clone` is looked at below, `execve` by Landlock",
+        &[
+            #[cfg(target_arch = "x86_64")]
+            libc::SYS_fork,
+            #[cfg(target_arch = "x86_64")]
+            libc::SYS_vfork,
+            libc::SYS_execveat,
+            libc::SYS_memfd_create,
+        ],
+    ),
+    (
+        "other processes are none of its business",
+        &[
+            libc::SYS_ptrace,
+            libc::SYS_process_vm_readv,
+            libc::SYS_process_vm_writev,
+            libc::SYS_process_madvise,
+            libc::SYS_kcmp,
+            libc::SYS_pidfd_open,
+            libc::SYS_pidfd_getfd,
+            libc::SYS_pidfd_send_signal,
+            libc::SYS_kill,
+            libc::SYS_rt_sigqueueinfo,
+            libc::SYS_rt_tgsigqueueinfo,
+        ],
+    ),
+    (
+        "the files are where they are",
+        &[
+            libc::SYS_mount,
+            libc::SYS_umount2,
+            libc::SYS_pivot_root,
+            libc::SYS_chroot,
+            libc::SYS_unshare,
+            libc::SYS_setns,
+            libc::SYS_open_tree,
+            libc::SYS_move_mount,
+            libc::SYS_fsopen,
+            libc::SYS_fsconfig,
+            libc::SYS_fsmount,
+            libc::SYS_fspick,
+            libc::SYS_mount_setattr,
+            libc::SYS_name_to_handle_at,
+            libc::SYS_open_by_handle_at,
+            libc::SYS_fanotify_init,
+            libc::SYS_quotactl,
+        ],
+    ),
+    (
+        "ways to make calls, or to catch them, that this list does not see",
+        &[
+            libc::SYS_io_uring_setup,
+            libc::SYS_io_uring_enter,
+            libc::SYS_io_uring_register,
+            libc::SYS_userfaultfd,
+        ],
+    ),
+    (
+        "limits that were lowered stay low; `prlimit64` is looked at below",
+        &[libc::SYS_setrlimit, libc::SYS_capset, libc::SYS_personality],
+    ),
+    (
+        "keys are somebody else's",
+        &[libc::SYS_add_key, libc::SYS_request_key, libc::SYS_keyctl],
+    ),
+    (
+        "the machine is not the film's",
+        &[
+            libc::SYS_bpf,
+            libc::SYS_perf_event_open,
+            libc::SYS_init_module,
+            libc::SYS_finit_module,
+            libc::SYS_delete_module,
+            libc::SYS_kexec_load,
+            libc::SYS_reboot,
+            libc::SYS_swapon,
+            libc::SYS_swapoff,
+            libc::SYS_syslog,
+            libc::SYS_acct,
+            libc::SYS_settimeofday,
+            libc::SYS_clock_settime,
+            libc::SYS_adjtimex,
+            libc::SYS_clock_adjtime,
+            libc::SYS_sethostname,
+            libc::SYS_setdomainname,
+            #[cfg(target_arch = "x86_64")]
+            libc::SYS_iopl,
+            #[cfg(target_arch = "x86_64")]
+            libc::SYS_ioperm,
+        ],
+    ),
+];
+
+/// Calls with larger numbers are newer than the list: they are answered as by a kernel that has not
+/// learned them yet, which every library knows how to meet. On x86 that holds the 32-bit numbers too.
+const NEWEST: u32 = libc::SYS_mseal as u32;
+
+#[cfg(target_arch = "x86_64")]
+const ARCH: Option<u32> = Some(0xc000_003e);
+#[cfg(target_arch = "aarch64")]
+const ARCH: Option<u32> = Some(0xc000_00b7);
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+const ARCH: Option<u32> = None;
+
+// Where a call's number, its language and the low and high halves of its arguments lie (both machines
+// above are little-endian).
+const NUMBER: u32 = 0;
+const LANGUAGE: u32 = 4;
+const fn low(argument: u32) -> u32 {
+    16 + 8 * argument
+}
+const fn high(argument: u32) -> u32 {
+    low(argument) + 4
+}
+
+/// Why this machine has no such filters; `None` where it has.
+pub(super) fn lack() -> Option<String> {
+    if ARCH.is_none() {
+        return Some("the list of system calls is not written for this processor".to_owned());
+    }
+    const ASK_ACTION: libc::c_ulong = 2;
+    let action = libc::SECCOMP_RET_ERRNO;
+    // SAFETY: the kernel reads one number of ours, which lives until the call returns.
+    let asked = unsafe { libc::syscall(libc::SYS_seccomp, ASK_ACTION, 0, &raw const action) };
+    match asked {
+        0 => None,
+        _ => Some(format!(
+            "this kernel has no seccomp filters: {}",
+            io::Error::last_os_error()
+        )),
+    }
+}
+
+/// The filter, as the kernel runs it for every call of the child.
+pub(super) fn program() -> Vec<sock_filter> {
+    let mut program = Program(Vec::new());
+    program.load(LANGUAGE);
+    program.when_not(ARCH.unwrap_or_default(), libc::SECCOMP_RET_KILL_PROCESS);
+    program.load(NUMBER);
+    program.when_above(NEWEST, refusal(libc::ENOSYS));
+    // Its flags lie in memory, which no filter can see; libraries go back to `clone`.
+    program.when(libc::SYS_clone3, refusal(libc::ENOSYS));
+    for call in REFUSED.iter().flat_map(|(_, calls)| *calls) {
+        program.when(*call, refusal(libc::EPERM));
+    }
+    // Threads are made by `clone` too.
+    program.when_then(libc::SYS_clone, |then| {
+        then.load(low(0));
+        then.unless_bit(libc::CLONE_THREAD as u32, refusal(libc::EPERM));
+    });
+    // The leash cannot be slipped.
+    program.when_then(libc::SYS_prctl, |then| {
+        then.load(low(0));
+        then.when(libc::PR_SET_PDEATHSIG.into(), refusal(libc::EPERM));
+    });
+    // Limits may be read, not set.
+    program.when_then(libc::SYS_prlimit64, |then| {
+        for half in [low(2), high(2)] {
+            then.load(half);
+            then.when_not(0, refusal(libc::EPERM));
+        }
+    });
+    program.end(libc::SECCOMP_RET_ALLOW);
+    program.0
+}
+
+fn refusal(errno: i32) -> u32 {
+    libc::SECCOMP_RET_ERRNO | errno as u32
+}
+
+/// Enters the filter, for good. Async-signal-safe.
+pub(super) fn enter(program: &[sock_filter]) -> io::Result<()> {
+    let filter = libc::sock_fprog {
+        len: program.len() as u16,
+        filter: program.as_ptr().cast_mut(),
+    };
+    // SAFETY: the kernel reads the program, which outlives the call, and does not write it.
+    let entered = unsafe {
+        libc::syscall(
+            libc::SYS_seccomp,
+            libc::c_ulong::from(libc::SECCOMP_SET_MODE_FILTER),
+            0,
+            &raw const filter,
+        )
+    };
+    match entered {
+        0 => Ok(()),
+        _ => Err(io::Error::last_os_error()),
+    }
+}
+
+/// A filter in the making. Every answer stands right behind its question, so that jumps are short.
+struct Program(Vec<sock_filter>);
+
+impl Program {
+    fn put(&mut self, code: u32, value: u32, if_true: u8, if_false: u8) {
+        self.0.push(sock_filter {
+            code: code as u16,
+            jt: if_true,
+            jf: if_false,
+            k: value,
+        });
+    }
+
+    fn load(&mut self, at: u32) {
+        self.put(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, at, 0, 0);
+    }
+
+    fn end(&mut self, answer: u32) {
+        self.put(libc::BPF_RET | libc::BPF_K, answer, 0, 0);
+    }
+
+    fn when(&mut self, value: c_long, answer: u32) {
+        let equal = libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K;
+        self.put(equal, value as u32, 0, 1);
+        self.end(answer);
+    }
+
+    fn when_not(&mut self, value: u32, answer: u32) {
+        let equal = libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K;
+        self.put(equal, value, 1, 0);
+        self.end(answer);
+    }
+
+    fn when_above(&mut self, value: u32, answer: u32) {
+        let greater = libc::BPF_JMP | libc::BPF_JGT | libc::BPF_K;
+        self.put(greater, value, 0, 1);
+        self.end(answer);
+    }
+
+    fn unless_bit(&mut self, bit: u32, answer: u32) {
+        let any_bit = libc::BPF_JMP | libc::BPF_JSET | libc::BPF_K;
+        self.put(any_bit, bit, 1, 0);
+        self.end(answer);
+    }
+
+    /// Looks closer at one call; what the look does not refuse is allowed.
+    fn when_then(&mut self, call: c_long, look: impl FnOnce(&mut Program)) {
+        let mut then = Program(Vec::new());
+        look(&mut then);
+        then.end(libc::SECCOMP_RET_ALLOW);
+        let equal = libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K;
+        self.put(equal, call as u32, 0, then.0.len() as u8);
+        self.0.append(&mut then.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs the filter as the kernel would.
+    fn answer(number: c_long, arguments: [u64; 3]) -> u32 {
+        let mut call = vec![number as u32, ARCH.unwrap_or_default(), 0, 0];
+        call.extend(
+            arguments
+                .iter()
+                .flat_map(|a| [*a as u32, (*a >> 32) as u32]),
+        );
+        run(&call)
+    }
+
+    fn run(call: &[u32]) -> u32 {
+        let program = program();
+        let (mut at, mut loaded) = (0, 0);
+        loop {
+            let step = &program[at];
+            let code = u32::from(step.code);
+            at += 1;
+            let yes = match code & 0x07 {
+                libc::BPF_LD => {
+                    loaded = call[step.k as usize / 4];
+                    continue;
+                }
+                libc::BPF_RET => return step.k,
+                _ => match code & 0xf0 {
+                    libc::BPF_JEQ => loaded == step.k,
+                    libc::BPF_JGT => loaded > step.k,
+                    _ => loaded & step.k != 0,
+                },
+            };
+            at += usize::from(if yes { step.jt } else { step.jf });
+        }
+    }
+
+    const YES: u32 = libc::SECCOMP_RET_ALLOW;
+
+    #[test]
+    fn every_listed_call_is_refused_and_what_a_decoder_lives_on_is_not() {
+        for call in REFUSED.iter().flat_map(|(_, calls)| *calls) {
+            assert_eq!(answer(*call, [0; 3]), refusal(libc::EPERM), "{call}");
+        }
+        for call in [
+            libc::SYS_read,
+            libc::SYS_mmap,
+            libc::SYS_futex,
+            libc::SYS_execve,
+            libc::SYS_get_mempolicy,
+            libc::SYS_tgkill,
+            libc::SYS_madvise,
+        ] {
+            assert_eq!(answer(call, [0; 3]), YES, "{call}");
+        }
+    }
+
+    #[test]
+    fn a_thread_is_no_process() {
+        let thread = (libc::CLONE_VM | libc::CLONE_THREAD) as u64;
+        assert_eq!(answer(libc::SYS_clone, [thread, 0, 0]), YES);
+        let process = libc::SIGCHLD as u64;
+        assert_eq!(
+            answer(libc::SYS_clone, [process, 0, 0]),
+            refusal(libc::EPERM)
+        );
+        assert_eq!(answer(libc::SYS_clone3, [0; 3]), refusal(libc::ENOSYS));
+    }
+
+    #[test]
+    fn limits_may_be_read_and_not_set_nor_the_leash_slipped() {
+        assert_eq!(answer(libc::SYS_prlimit64, [0, 7, 0]), YES);
+        for new in [1, 1 << 40] {
+            let set = answer(libc::SYS_prlimit64, [0, 7, new]);
+            assert_eq!(set, refusal(libc::EPERM));
+        }
+        let slip = libc::PR_SET_PDEATHSIG as u64;
+        assert_eq!(answer(libc::SYS_prctl, [slip, 0, 0]), refusal(libc::EPERM));
+        assert_eq!(
+            answer(libc::SYS_prctl, [libc::PR_SET_NAME as u64, 0, 0]),
+            YES
+        );
+    }
+
+    #[test]
+    fn calls_of_another_language_kill_and_those_of_tomorrow_are_unknown() {
+        let of_i386 = [libc::SYS_read as u32, 0x4000_0003, 0, 0, 0, 0, 0, 0, 0, 0];
+        assert_eq!(run(&of_i386), libc::SECCOMP_RET_KILL_PROCESS);
+        let unknown = refusal(libc::ENOSYS);
+        assert_eq!(answer(c_long::from(NEWEST) + 1, [0; 3]), unknown);
+        assert_eq!(answer(libc::SYS_socket | 0x4000_0000, [0; 3]), unknown);
+    }
+}
