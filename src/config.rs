@@ -36,6 +36,14 @@ pub struct Config {
     /// The largest upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,
+    /// Room on the disk that uploads leave free, bytes, so that results and deletions still fit.
+    #[arg(
+        long,
+        env = "FLOCKREEL_DISK_RESERVE_BYTES",
+        default_value_t = Config::DISK_RESERVE_BYTES,
+        value_name = "N"
+    )]
+    pub disk_reserve_bytes: u64,
 }
 
 /// How media tools are found and enclosed: the same for every command that reads or writes films.
@@ -81,6 +89,9 @@ pub enum Auth {
 }
 
 impl Config {
+    /// The usual reserve on the disk.
+    pub const DISK_RESERVE_BYTES: u64 = 1 << 30;
+
     /// Whether a request without a token is refused.
     pub fn demands_tokens(&self) -> bool {
         self.auth == Auth::Required || !self.bind.ip().is_loopback()
@@ -88,15 +99,21 @@ impl Config {
 
     /// Threads that one worker may use, at least 1: the cores divided by the workers.
     pub fn threads_per_worker(&self) -> usize {
-        (cores() / self.workers).max(1)
+        threads_per_worker(self.workers)
     }
 }
 
+/// Threads that each of so many workers may use, at least 1.
+pub fn threads_per_worker(workers: NonZeroUsize) -> usize {
+    (cores() / workers).max(1)
+}
+
 /// One worker for every two cores: an analysis keeps two busy (decoder and tracking).
-fn default_workers() -> NonZeroUsize {
+pub fn default_workers() -> NonZeroUsize {
     NonZeroUsize::new(cores() / 2).unwrap_or(NonZeroUsize::MIN)
 }
 
-fn cores() -> usize {
+/// Cores that this process may use, at least 1.
+pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }

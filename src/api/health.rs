@@ -6,6 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use super::AppState;
+use crate::media::Walls;
 
 /// What the service needs, and whether it has it.
 #[derive(Debug, Serialize, ToSchema)]
@@ -14,8 +15,37 @@ pub(super) struct Readiness {
     ready: bool,
     /// Whether the database can be written.
     database: bool,
+    /// Whether files can be written.
+    blob_store: bool,
     /// The version of the media tool; null when it is missing.
     media_tool: Option<String>,
+    /// The layers of the sandbox around the media tool. One that is missing does not make the service unready:
+    /// whoever demands them all starts it with `--sandbox strict`.
+    sandbox: Vec<LayerView>,
+    /// Room for uploads.
+    disk: DiskView,
+}
+
+/// One layer of the sandbox.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct LayerView {
+    /// Its name: `leash`, `privileges`, `limits`, `files`, `network`, `signals` or `calls`.
+    name: &'static str,
+    /// Whether it stands.
+    on: bool,
+    /// Why not, where it does not.
+    lack: Option<String>,
+}
+
+/// Room on the disk.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct DiskView {
+    /// Bytes that can still be written; null where that cannot be found out.
+    room_bytes: Option<u64>,
+    /// Bytes that uploads leave free.
+    reserve_bytes: u64,
+    /// Whether there is more room than that.
+    ok: bool,
 }
 
 /// The process lives.
@@ -31,9 +61,20 @@ pub(super) async fn healthz() -> &'static str {
 ))]
 pub(super) async fn readyz(State(state): State<AppState>) -> (StatusCode, axum::Json<Readiness>) {
     let database = state.context.store.is_writable().await;
-    let media_tool = state.media_tool.as_ref().clone().ok();
+    let blobs = state.context.store.blobs().clone();
+    let files = tokio::task::spawn_blocking(move || (blobs.is_writable(), blobs.room_bytes().ok()));
+    let (blob_store, room_bytes) = files.await.unwrap_or((false, None));
+    let disk = DiskView {
+        room_bytes,
+        reserve_bytes: state.config.disk_reserve_bytes,
+        ok: room_bytes.is_some_and(|room| room > state.config.disk_reserve_bytes),
+    };
+    let (media_tool, sandbox) = match state.walls.as_ref() {
+        Ok(walls) => (Some(walls.version.clone()), LayerView::all(walls)),
+        Err(_) => (None, Vec::new()),
+    };
     let stops = state.context.draining.is_cancelled();
-    let ready = database && media_tool.is_some() && !stops;
+    let ready = database && blob_store && media_tool.is_some() && disk.ok && !stops;
     let status = match ready {
         true => StatusCode::OK,
         false => StatusCode::SERVICE_UNAVAILABLE,
@@ -41,7 +82,21 @@ pub(super) async fn readyz(State(state): State<AppState>) -> (StatusCode, axum::
     let body = Readiness {
         ready,
         database,
+        blob_store,
         media_tool,
+        sandbox,
+        disk,
     };
     (status, axum::Json(body))
+}
+
+impl LayerView {
+    fn all(walls: &Walls) -> Vec<LayerView> {
+        let views = walls.layers.iter().map(|(layer, lack)| LayerView {
+            name: layer.name(),
+            on: lack.is_none(),
+            lack: lack.clone(),
+        });
+        views.collect()
+    }
 }

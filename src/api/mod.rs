@@ -64,8 +64,8 @@ pub struct AppState {
     pub config: Arc<Config>,
     /// The store, and the way to wake the workers.
     pub context: Context,
-    /// The version of the media tool, or why there is none; asked for at the start.
-    pub media_tool: Arc<Result<String, String>>,
+    /// The media tool and the walls around it, or why there is none; asked for at the start.
+    pub walls: Arc<Result<media::Walls, String>>,
     /// How often each owner may ask.
     rates: Arc<Rates>,
 }
@@ -76,17 +76,17 @@ impl AppState {
         let store = Store::open(&config.data).await?;
         let context = Context::new(store, config.threads_per_worker());
         recover(&context).await?;
-        let tool = tokio::task::spawn_blocking(media::tool_version).await;
+        let tool = tokio::task::spawn_blocking(media::walls).await;
         let tool = tool.map_err(std::io::Error::other)?;
         match &tool {
-            Ok(version) => tracing::info!(version, "media tool found"),
+            Ok(walls) => tracing::info!(version = walls.version, "media tool found"),
             Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
         }
         Ok(AppState {
             rates: Arc::new(Rates::new(config.rate)),
             config: Arc::new(config),
             context,
-            media_tool: Arc::new(tool.map_err(|error| error.to_string())),
+            walls: Arc::new(tool.map_err(|error| error.to_string())),
         })
     }
 }

@@ -47,6 +47,7 @@ pub(super) async fn receive_with(
     wishes: &[&'static str],
 ) -> Result<(Arrival, Wishes), Problem> {
     check_headers(&request, state.config.max_upload_bytes)?;
+    check_room(state, body_bytes(&request).unwrap_or(0))?;
     let draft_name = uuid::Uuid::now_v7().to_string();
     let draft = state.context.store.blobs().draft(&draft_name);
     let draft = draft.map_err(store::Error::Io)?;
@@ -166,16 +167,26 @@ where
 /// What can be refused before the body is read.
 fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
     let headers = request.headers();
-    if headers.contains_key(header::CONTENT_ENCODING) {
-        let sentence = "a video is sent as it is, without Content-Encoding";
-        return Err(Problem::new(Code::UnsupportedMediaType, sentence));
-    }
-    let length = headers.get(header::CONTENT_LENGTH);
-    let length = length.and_then(|value| value.to_str().ok()?.parse::<u64>().ok());
-    if !is_form(request) && length.is_some_and(|bytes| bytes > limit_bytes) {
+    if !is_form(request) && body_bytes(request).is_some_and(|bytes| bytes > limit_bytes) {
         return Err(store::Error::TooLarge { limit_bytes }.into());
     }
     Ok(())
+}
+
+/// How long the body is to be, where its sender says so.
+fn body_bytes(request: &Request) -> Option<u64> {
+    let length = request.headers().get(header::CONTENT_LENGTH)?;
+    length.to_str().ok()?.parse().ok()
+}
+
+/// Whether `n_bytes` more fit on the disk besides the reserve (RELIABILITY.md, R7).
+pub(super) fn check_room(state: &AppState, n_bytes: u64) -> Result<(), Problem> {
+    let room = state.context.store.blobs().room_bytes();
+    let room = room.map_err(store::Error::Io)?;
+    match n_bytes.saturating_add(state.config.disk_reserve_bytes) > room {
+        true => Err(Code::StorageFull.into()),
+        false => Ok(()),
+    }
 }
 
 /// Whether the body is a film, or a form with one, and not a request in JSON.

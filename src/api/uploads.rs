@@ -19,7 +19,7 @@ use super::AppState;
 use super::access::Caller;
 use super::extract::Id;
 use super::problem::{Problem, ProblemBody};
-use super::receive::{PIECE, label};
+use super::receive::{PIECE, check_room, label};
 use crate::code::Code;
 use crate::jobs::admit::Arrival;
 use crate::jobs::clock::now_ms;
@@ -85,6 +85,7 @@ pub(super) async fn create_upload(
     if size_bytes.unsigned_abs() > limit_bytes {
         return Err(crate::store::Error::TooLarge { limit_bytes }.into());
     }
+    check_room(&state, size_bytes.unsigned_abs())?;
     let upload = Upload {
         id: Uuid::now_v7(),
         owner: caller.account.owner,

@@ -18,6 +18,12 @@ pub enum Error {
         /// What happened, and what to do next.
         sentence: String,
     },
+    /// `doctor` found things missing, and has said which.
+    #[error("this machine lacks what flockreel needs or wants, as told above: {n_lacks}")]
+    Lacks {
+        /// How many.
+        n_lacks: usize,
+    },
     /// A file or folder could not be read or written.
     #[error("{what}: {cause}")]
     Io {
@@ -55,7 +61,7 @@ impl Error {
             Error::Usage(_) => 2,
             Error::Work { code, .. } if is_failure_inside(*code) => 1,
             Error::Work { .. } => 2,
-            Error::Io { .. } => 1,
+            Error::Io { .. } | Error::Lacks { .. } => 1,
         }
     }
 }

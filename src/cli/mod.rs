@@ -5,6 +5,7 @@
 
 pub mod analyze;
 pub mod check_plan;
+pub mod doctor;
 pub mod error;
 pub mod fish;
 pub mod flock;
@@ -71,6 +72,8 @@ enum Command {
     Sprites(sprites::Args),
     /// Film the virtual fish: footage whose truth is known.
     Sample(sample::Args),
+    /// Say what this machine has of what flockreel needs, and what each lack means.
+    Doctor(doctor::Args),
 }
 
 /// What a command did: the one line of JSON that `--json` prints.
@@ -101,6 +104,7 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
         Command::Matrix(args) => matrix::run(args),
         Command::Sprites(args) => sprites::run(args),
         Command::Sample(args) => sample::run(args),
+        Command::Doctor(args) => doctor::run(args, json),
     }
 }
 
@@ -136,6 +140,31 @@ fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) => ExitCode::FAILURE,
     }
+}
+
+/// Refuses to start a command that takes strangers' films where the sandbox is not as demanded; what is
+/// missing otherwise is logged.
+fn check_walls() -> Result<(), Error> {
+    match media::demanded_walls() {
+        Err(error @ media::Error::SandboxIncomplete { .. }) => Err(Error::Usage(error.to_string())),
+        // That there is no ffmpeg is said where it is looked for.
+        Err(_) => Ok(()),
+        Ok(walls) => {
+            for (layer, lack) in walls.layers {
+                if let Some(reason) = lack {
+                    let (layer, meaning) = (layer.name(), layer.meaning());
+                    tracing::warn!(layer, reason, meaning, "a layer of the sandbox is missing");
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Writes lines to stdout, for commands whose answer is text.
+fn print_lines(lines: &[String]) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    lines.iter().try_for_each(|line| writeln!(out, "{line}"))
 }
 
 /// Writes one line to stderr. A closed stderr is nobody's loss: there is nowhere left to say so.

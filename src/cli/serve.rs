@@ -23,6 +23,7 @@ pub struct Args {
 /// Serves until it is told to stop.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let config = args.config;
+    super::check_walls()?;
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     let served = runtime.block_on(serve(config));
     // A job that does not let go must not hold the process: it is rescued at the next start.

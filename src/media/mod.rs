@@ -5,6 +5,7 @@
 //! within the [`Limits`], and its frames come as planar 4:2:0 at a constant rate.
 
 mod allow_list; // what ffmpeg may open and run
+mod coders; // what the installed ffmpeg can read and write
 mod container; // which of the accepted containers a file is, by its first bytes
 mod decode; // Video: footage -> frames
 mod encode; // VideoWriter: frames -> MP4, WebM, ProRes, GIF, WebP
@@ -19,6 +20,7 @@ mod sandbox; // what the child may do
 mod timeline; // presentation times -> a constant rate
 mod tools; // where the tools lie, and in which walls they work
 
+pub use coders::Coders;
 pub use decode::Video;
 pub use encode::{Coding, Quality, VideoFormat, VideoWriter};
 pub use error::Error;

@@ -108,6 +108,11 @@ pub(super) fn place(tool: Tool) -> Result<&'static Place, Error> {
     }
 }
 
+/// Where ffmpeg lies, whether or not its walls are as demanded: for questions about itself.
+pub(super) fn whole_place() -> Result<&'static Place, Error> {
+    found(Tool::Ffmpeg).map(|found| &found.place)
+}
+
 fn mode() -> Sandbox {
     SETTINGS.get().map_or(Sandbox::Auto, |media| media.sandbox)
 }
@@ -223,7 +228,7 @@ fn reach_of(path: &Path) -> Reach {
 }
 
 /// Everything that the tool says, or its loader when asked for the libraries.
-fn answer(place: &Place, question: &[&str], of_loader: bool) -> Result<String, Error> {
+pub(super) fn answer(place: &Place, question: &[&str], of_loader: bool) -> Result<String, Error> {
     let limits = Limits::default();
     let args = question.iter().map(Into::into).collect();
     let mut order = Order::new(Tool::Ffmpeg, args, &limits, 0);

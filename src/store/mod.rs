@@ -17,6 +17,7 @@ pub mod intake;
 pub mod jobs;
 pub mod libraries;
 pub mod owners;
+pub mod room;
 pub mod spill;
 pub mod sweep;
 pub mod tokens;

@@ -11,5 +11,5 @@ mod cli;
 mod common;
 mod film;
 mod jobs;
-mod media;
+pub(crate) mod media;
 mod tidy;

@@ -1,5 +1,5 @@
 //! What holds on every route: who may ask from a browser, and the headers of every answer
-//! (RELIABILITY.md, S5 and S7).
+//! (RELIABILITY.md, S5, S7 and H2).
 
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Uri, header};
@@ -39,6 +39,9 @@ const HEADERS: [(HeaderName, HeaderValue); 6] = [
     ),
 ];
 
+/// The longest address that is read, bytes: ours are a tenth of that.
+const MAX_ADDRESS_BYTES: usize = 8 << 10;
+
 /// The names under which the service may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::api) enum Names {
@@ -72,6 +75,15 @@ pub(in crate::api) async fn guard(
 
 /// The name must be one of ours. A write must come from our own page or from no page at all.
 fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
+    let address = uri.path_and_query().map_or("", |address| address.as_str());
+    if address.len() > MAX_ADDRESS_BYTES {
+        return Err(Code::AddressTooLong.into());
+    }
+    // What is packed small may unfold large, and nothing that is sent here is worth packing.
+    if headers.contains_key(header::CONTENT_ENCODING) {
+        let sentence = "a body is sent as it is, without Content-Encoding";
+        return Err(Problem::new(Code::UnsupportedMediaType, sentence));
+    }
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let host = text(header::HOST).or(uri.authority().map(|authority| authority.as_str()));
     if names == Names::Loopback && !host.is_some_and(is_loopback) {

@@ -8,6 +8,8 @@ mod footage;
 mod idempotency;
 mod jobs;
 mod one_call;
+mod limits;
+mod names;
 mod uploads;
 mod wait;
 mod walls;

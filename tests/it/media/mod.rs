@@ -1,7 +1,9 @@
 //! The gate of RELIABILITY.md from outside: good films whole, bad files with their codes, nothing
 //! else opened, nothing left behind.
 
-mod bad;
+pub(crate) mod bad;
+pub(crate) mod cage;
+pub(crate) mod corpus;
 mod good;
 mod kinds;
 mod real;

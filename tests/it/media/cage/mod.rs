@@ -1,0 +1,289 @@
+//! Promise S3: a program in ffmpeg's place tries what a film that has taken over its decoder would try.
+//! Inside all layers everything is refused; outside all of them everything is done, so that each attempt is
+//! real; and of each it is known which layers hold it alone, and what passes when one of them is missing.
+
+use std::net::{TcpListener, UdpSocket};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use flockreel::media::{Layer, Layers, Limits, Quality, Video, VideoFormat, VideoWriter};
+use flockreel::raster::{ColorSpec, Frame};
+
+use super::n_processes_about;
+use crate::common::film::Films;
+
+/// Names the folder of the attack for the tests below, which are started in processes of their own.
+const FOLDER: &str = "FLOCKREEL_ATTACK_FOLDER";
+/// The layer that is missing, for the one that outlives its parent.
+const MISSING: &str = "FLOCKREEL_ATTACK_MISSING";
+
+/// The attacking program, compiled into the folder under the names of both tools.
+pub(crate) fn compile_attack(folder: &Path) -> PathBuf {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/media/cage/attack.rs");
+    let program = folder.join("ffmpeg");
+    let done = Command::new("rustc")
+        .args(["--edition", "2024", "-C", "panic=abort", "-o"])
+        .arg(&program)
+        .arg(source)
+        .output()
+        .expect("rustc is installed");
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    for name in ["ffprobe", "other"] {
+        std::fs::copy(&program, folder.join(name)).expect("a copy");
+    }
+    program
+}
+
+/// This test program again, running one ignored test with the attack in the place of the tools.
+fn again(test: &str, folder: &Path) -> Command {
+    let mut command = Command::new(std::env::current_exe().expect("the path of this program"));
+    command
+        .args(["--exact", test, "--ignored", "--nocapture"])
+        .env("PATH", folder)
+        .env(FOLDER, folder);
+    command
+}
+
+#[test]
+fn every_attack_is_held_by_the_layers_that_are_meant_to() {
+    let films = Films::new();
+    compile_attack(films.folder());
+    let done = again("media::cage::attack_in_every_cage", films.folder())
+        .output()
+        .expect("this program");
+    let said = String::from_utf8_lossy(&done.stdout);
+    assert!(done.status.success(), "{said}");
+    println!("{said}");
+}
+
+/// One thing to try.
+struct Attempt {
+    name: &'static str,
+    target: String,
+    /// The film is written, not read: the child has a file of its own to write.
+    writes: bool,
+    /// Sets of layers that hold it: any of them is enough, all layers of a set are needed.
+    held_by: Vec<Vec<Layer>>,
+}
+
+fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
+    use Layer::{Calls, Files, Limits, Network, Privileges, Signals};
+    let path = |name: &str| folder.join(name).display().to_string();
+    let alone = |layers: &[Layer]| layers.iter().map(|&layer| vec![layer]).collect::<Vec<_>>();
+    let is_root = rustix::process::getuid().is_root();
+    let attempt = |name, target: String, held_by| Attempt {
+        name,
+        target,
+        writes: false,
+        held_by,
+    };
+    let writing = |name, target: String, held_by| Attempt {
+        writes: true,
+        ..attempt(name, target, held_by)
+    };
+    let mut traced = alone(&[Files, Network, Signals, Calls]);
+    let mut raised = alone(&[Calls]);
+    match is_root {
+        true => {
+            traced.push(vec![Privileges]);
+            raised.push(vec![Limits, Privileges]);
+        }
+        false => raised.push(vec![Limits]),
+    }
+    vec![
+        attempt("read", path("secret"), alone(&[Files])),
+        attempt("list", path(""), alone(&[Files])),
+        attempt("write", path("made"), alone(&[Files])),
+        writing("write", path("made"), alone(&[Files])),
+        writing("read", path("secret"), alone(&[Files])),
+        writing("remove", path("removable"), alone(&[Files])),
+        writing("grow", String::new(), alone(&[Limits])),
+        attempt("exec", path("other"), alone(&[Files])),
+        attempt("tcp", tcp.to_owned(), alone(&[Network, Calls])),
+        attempt("udp", udp.to_owned(), alone(&[Calls])),
+        attempt("fork", String::new(), alone(&[Calls])),
+        attempt("memory", String::new(), alone(&[Limits])),
+        attempt("trace", String::new(), traced),
+        attempt("stop", String::new(), alone(&[Signals, Calls])),
+        attempt("stop-thread", String::new(), alone(&[Signals])),
+        attempt("slip", String::new(), alone(&[Calls])),
+        attempt("raise", String::new(), raised),
+    ]
+}
+
+#[test]
+#[ignore = "started by the test above, with the attack in the place of the tools"]
+fn attack_in_every_cage() {
+    let folder = PathBuf::from(std::env::var_os(FOLDER).expect("a folder"));
+    let (tcp, udp) = (
+        TcpListener::bind("127.0.0.1:0"),
+        UdpSocket::bind("127.0.0.1:0"),
+    );
+    let (tcp, udp) = (tcp.expect("a listener"), udp.expect("a socket"));
+    let address = |of: std::io::Result<std::net::SocketAddr>| of.expect("an address").to_string();
+    let attempts = attempts(
+        &folder,
+        &address(tcp.local_addr()),
+        &address(udp.local_addr()),
+    );
+    let here = flockreel::media::walls()
+        .expect("the attack tells its version")
+        .layers;
+    let missing = here
+        .iter()
+        .filter(|(_, lack)| lack.is_some())
+        .map(|(layer, _)| *layer);
+    let here = missing.fold(Layers::ALL, Layers::without);
+    let each =
+        |change: fn(Layers, Layer) -> Layers, from| Layer::ALL.map(|layer| change(from, layer));
+    let cages = [
+        vec![Layers::NONE, Layers::ALL],
+        each(Layers::without, Layers::ALL).to_vec(),
+    ];
+    let cages = [cages.concat(), each(Layers::with, Layers::NONE).to_vec()].concat();
+    for attempt in attempts {
+        for &layers in &cages {
+            let layers = layers.and(here);
+            let held = attempt
+                .held_by
+                .iter()
+                .any(|set| set.iter().all(|&layer| layers.has(layer)));
+            let verdict = attempt.make(&folder, layers);
+            let names: Vec<_> = Layer::ALL
+                .iter()
+                .filter(|&&l| layers.has(l))
+                .map(|l| l.name())
+                .collect();
+            assert_eq!(
+                verdict.contains("ATTACK DONE"),
+                !held,
+                "{} {} in {names:?}: {verdict}",
+                attempt.name,
+                attempt.target
+            );
+        }
+        println!("{}: held by any of {:?}", attempt.name, attempt.held_by);
+    }
+}
+
+impl Attempt {
+    /// What became of it in these layers.
+    fn make(&self, folder: &Path, layers: Layers) -> String {
+        std::fs::write(folder.join("secret"), "of another").expect("a file");
+        std::fs::write(folder.join("removable"), "of another").expect("a file");
+        std::fs::remove_file(folder.join("made")).ok();
+        let limits = Limits {
+            layers,
+            max_output_bytes: 1 << 20,
+            ..Limits::default()
+        };
+        let order = format!("ATTACK {} {}\n", self.name, self.target);
+        match self.writes {
+            true => write(&folder.join("film.mp4"), &order, &limits),
+            false => read(&folder.join("film"), &order, &limits),
+        }
+    }
+}
+
+fn read(film: &Path, order: &str, limits: &Limits) -> String {
+    std::fs::write(
+        film,
+        [b"\0\0\0\x10ftypisom\0\0\0\0\n", order.as_bytes()].concat(),
+    )
+    .expect("a film");
+    Video::open(film, limits)
+        .expect_err("an attack is no film")
+        .to_string()
+}
+
+fn write(film: &Path, order: &str, limits: &Limits) -> String {
+    let format = VideoFormat {
+        width: 64,
+        height: 64,
+        fps: 25.0,
+        color: ColorSpec::default(),
+    };
+    let mut frame = Frame::new(64, 64, format.color);
+    frame.planes[..order.len()].copy_from_slice(order.as_bytes());
+    let mut writer = VideoWriter::create_with(film, &format, Quality::default(), limits)
+        .expect("the attack starts");
+    let written = writer.write(&frame).and_then(|()| writer.finish());
+    written.expect_err("an attack writes no film").to_string()
+}
+
+#[test]
+fn nothing_outlives_its_parent_but_where_leash_or_calls_are_missing() {
+    let films = Films::new();
+    compile_attack(films.folder());
+    let film = films.write("film", b"\0\0\0\x10ftypisom\0\0\0\0\nATTACK outlive \n");
+    let name = film.display().to_string();
+    for (missing, outlives) in [
+        ("none", false),
+        ("limits", false),
+        ("leash", true),
+        ("calls", true),
+    ] {
+        let mut parent = again("media::cage::start_what_outlives", films.folder())
+            .env(MISSING, missing)
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .expect("this program");
+        wait_until(|| n_processes_about(&name) > 0);
+        // It takes off the leash as soon as it runs.
+        std::thread::sleep(Duration::from_millis(300));
+        parent.kill().expect("a process of ours");
+        parent.wait().expect("a process of ours");
+        match outlives {
+            false => wait_until(|| n_processes_about(&name) == 0),
+            true => std::thread::sleep(Duration::from_millis(300)),
+        }
+        assert_eq!(n_processes_about(&name) > 0, outlives, "without {missing}");
+        end_all(&name);
+    }
+}
+
+#[test]
+#[ignore = "started by the test above, with the attack in the place of the tools"]
+fn start_what_outlives() {
+    let folder = PathBuf::from(std::env::var_os(FOLDER).expect("a folder"));
+    let missing = std::env::var(MISSING).expect("a layer");
+    let missing = Layer::ALL.into_iter().find(|layer| layer.name() == missing);
+    let layers = missing.map_or(Layers::ALL, |layer| Layers::ALL.without(layer));
+    let limits = Limits {
+        layers,
+        ..Limits::default()
+    };
+    println!("{:?}", Video::open(&folder.join("film"), &limits).map(drop));
+}
+
+fn wait_until(condition: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < Duration::from_secs(10), "waited in vain");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Ends the processes that have `text` among their arguments; they are this test's own.
+fn end_all(text: &str) {
+    for entry in std::fs::read_dir("/proc")
+        .expect("a Linux machine")
+        .flatten()
+    {
+        let arguments = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();
+        let id = entry
+            .file_name()
+            .to_str()
+            .and_then(|name| name.parse().ok());
+        if String::from_utf8_lossy(&arguments).contains(text)
+            && let Some(process) = id.and_then(rustix::process::Pid::from_raw)
+        {
+            rustix::process::kill_process(process, rustix::process::Signal::KILL).ok();
+        }
+    }
+}

@@ -1,0 +1,348 @@
+//! More than a hundred bad and odd films, made on the spot (RELIABILITY.md, S1): each with the codes that it
+//! may be refused with. What is damaged at a random place may also be read to its end, and says so here.
+
+use std::path::PathBuf;
+
+use flockreel::code::Code;
+
+use super::bad::PLAYLISTS;
+use crate::common::film::Films;
+
+/// One file and what may become of it.
+pub(crate) struct Case {
+    pub(crate) path: PathBuf,
+    /// The codes that it may be refused with.
+    pub(crate) codes: Vec<Code>,
+    /// Whether it may be read to its end.
+    pub(crate) may_be_good: bool,
+}
+
+/// Codes of a damaged file.
+const DAMAGED: [Code; 5] = [
+    Code::Truncated,
+    Code::NotAVideo,
+    Code::NoVideoStream,
+    Code::CodecNotAllowed,
+    Code::DecoderCrashed,
+];
+
+/// The files in the making.
+struct Corpus<'a> {
+    films: &'a Films,
+    cases: Vec<Case>,
+}
+
+/// Makes every file.
+pub(crate) fn corpus(films: &Films) -> Vec<Case> {
+    let cases = Vec::new();
+    let mut corpus = Corpus { films, cases };
+    corpus.cut_and_flipped();
+    corpus.of_other_kinds();
+    corpus.of_texts_and_junk();
+    corpus.of_odd_films();
+    corpus.of_lying_headers();
+    corpus.cases
+}
+
+impl Corpus<'_> {
+    fn refused(&mut self, path: PathBuf, codes: &[Code]) {
+        let codes = codes.to_vec();
+        self.cases.push(Case {
+            path,
+            codes,
+            may_be_good: false,
+        });
+    }
+
+    fn good(&mut self, path: PathBuf) {
+        self.damaged(path, &[]);
+    }
+
+    /// Read to its end, or refused with one of the codes.
+    fn damaged(&mut self, path: PathBuf, codes: &[Code]) {
+        self.refused(path, codes);
+        self.cases.last_mut().unwrap().may_be_good = true;
+    }
+
+    fn film(&self, n_frames: usize, args: &str) -> PathBuf {
+        self.films.test_picture("64x48", n_frames, args)
+    }
+
+    fn cut_and_flipped(&mut self) {
+        let h264 = "-c:v libx264 -g 10 -pix_fmt yuv420p";
+        for (args, name, n_cuts, n_flips) in [
+            (&*format!("{h264} -movflags +faststart"), "front.mp4", 11, 8),
+            (h264, "back.mp4", 4, 2),
+            (h264, "film.mkv", 6, 6),
+            ("-c:v mjpeg -pix_fmt yuvj420p", "film.avi", 4, 3),
+            ("-c:v wmv2", "film.asf", 3, 2),
+            (h264, "film.ts", 4, 4),
+        ] {
+            let film = self.film(40, &format!("{args} {name}"));
+            let bytes = std::fs::read(&film).unwrap();
+            self.good(film);
+            for k in 1..=n_cuts {
+                let cut = &bytes[..bytes.len() * k / (n_cuts + 1)];
+                let path = self.films.write(&format!("cut{k}.{name}"), cut);
+                // A transport stream has no end that could be missing.
+                match name {
+                    "film.ts" => self.damaged(path, &DAMAGED),
+                    _ => self.refused(path, &DAMAGED),
+                }
+            }
+            for k in 0..n_flips {
+                let mut flipped = bytes.clone();
+                for j in 0..20 {
+                    let at = (k * 7919 + j * 104_729 + 40) % (bytes.len() - 40) + 40;
+                    flipped[at] ^= 1 << (j % 8);
+                }
+                let path = self.films.write(&format!("flip{k}.{name}"), flipped);
+                self.damaged(path, &[&DAMAGED[..], &LIES[..]].concat());
+            }
+            let mut holed = bytes;
+            let (from, to) = (holed.len() / 2, holed.len() / 2 + holed.len() / 8);
+            holed[from..to].fill(0);
+            let path = self.films.write(&format!("hole.{name}"), holed);
+            self.damaged(path, &DAMAGED);
+        }
+    }
+
+    fn of_other_kinds(&mut self) {
+        for (args, name, code) in [
+            ("-c:v flv", "film.flv", Code::ContainerNotAllowed),
+            ("-c:v libtheora", "film.ogv", Code::ContainerNotAllowed),
+            ("-c:v mpeg2video", "film.mpg", Code::ContainerNotAllowed),
+            ("-c:v libvpx -f ivf", "film.ivf", Code::ContainerNotAllowed),
+            ("-pix_fmt yuv420p", "film.y4m", Code::ContainerNotAllowed),
+            (
+                "-c:v magicyuv -pix_fmt yuv420p",
+                "magic.avi",
+                Code::CodecNotAllowed,
+            ),
+            (
+                "-c:v huffyuv -pix_fmt yuv422p",
+                "huff.mkv",
+                Code::CodecNotAllowed,
+            ),
+            ("-c:v qtrle", "rle.mov", Code::CodecNotAllowed),
+            ("-c:v png", "pictures.mov", Code::CodecNotAllowed),
+            ("-c:v flv", "sorenson.mkv", Code::CodecNotAllowed),
+            ("-c:v libtheora", "theora.mkv", Code::CodecNotAllowed),
+            (
+                "-c:v utvideo -pix_fmt yuv420p",
+                "ut.avi",
+                Code::CodecNotAllowed,
+            ),
+            ("-c:v mpeg1video", "one.mkv", Code::CodecNotAllowed),
+            ("-c:v gif", "film.gif", Code::NotAVideo),
+            ("-c:v libwebp -loop 0", "film.webp", Code::NotAVideo),
+        ] {
+            let film = self.film(10, &format!("{args} {name}"));
+            self.refused(film, &[code]);
+        }
+        for name in ["still.png", "still.jpg", "still.bmp", "still.tiff"] {
+            let film = self.film(1, name);
+            self.refused(film, &[Code::NotAVideo]);
+        }
+        for name in ["tone.wav", "tone.m4a", "tone.mka", "tone.flac", "tone.mp3"] {
+            let sound = self
+                .films
+                .run(&format!("-f lavfi -i sine=duration=1 {name}"));
+            self.refused(sound, &[Code::NoVideoStream]);
+        }
+        self.films
+            .write("words.srt", "1\n00:00:01,000 --> 00:00:02,000\nHello.\n");
+        let titles = self.films.run("-i words.srt -c:s srt titles.mkv");
+        self.refused(titles, &[Code::NoVideoStream]);
+        let cover = self.films.run(
+            "-i tone.m4a -i still.jpg -map 0 -map 1 -c:a copy -c:v copy -disposition:v:0 attached_pic \
+             cover.m4a",
+        );
+        self.refused(cover, &[Code::NoVideoStream]);
+    }
+
+    fn of_texts_and_junk(&mut self) {
+        let texts = [
+            "",
+            "x",
+            "Dear reader,\n",
+            "<html><script>alert(1)</script></html>",
+            "concat:front.mp4|back.mp4",
+            "subfile,,start,0,end,0,,:front.mp4",
+            "#!/bin/sh\nexit\n",
+            "%PDF-1.7\n",
+        ];
+        for (k, text) in texts.iter().chain(&PLAYLISTS).enumerate() {
+            let path = self.films.write(&format!("text{k}.mp4"), text);
+            self.refused(path, &[Code::NotAVideo]);
+        }
+        let heads: [&[u8]; 3] = [
+            b"\0\0\0\x10ftypisom\0\0\0\0\n",
+            b"\x1a\x45\xdf\xa3\n",
+            b"RIFF\x10\0\0\0AVI \n",
+        ];
+        for (k, text) in PLAYLISTS.iter().enumerate() {
+            let dressed = [heads[k % 3], text.as_bytes()].concat();
+            let path = self.films.write(&format!("dressed{k}.mp4"), dressed);
+            self.refused(path, &DAMAGED);
+        }
+        let noise = (0..20_000u32).map(|k| (k.wrapping_mul(2_654_435_761) >> 13) as u8);
+        let archive = [b"PK\x03\x04\x14\0\0\0\x08\0".as_slice(), &[0; 4000]].concat();
+        for (name, bytes) in [
+            ("zeros", vec![0; 20_000]),
+            ("ones", vec![0xff; 20_000]),
+            ("syncs", vec![0x47; 20_000]),
+            ("noise", noise.collect()),
+            ("zip", archive),
+            ("gzip", [b"\x1f\x8b\x08\0".as_slice(), &[0; 4000]].concat()),
+        ] {
+            let path = self.films.write(&format!("{name}.mp4"), bytes);
+            self.refused(
+                path,
+                &[Code::NotAVideo, Code::NoVideoStream, Code::Truncated],
+            );
+        }
+    }
+
+    fn of_odd_films(&mut self) {
+        let h264 = "-c:v libx264 -pix_fmt yuv420p";
+        let key = "00112233445566778899aabbccddeeff";
+        let locked = format!(
+            "{h264} -encryption_scheme cenc-aes-ctr -encryption_key {key} -encryption_kid {key} locked.mp4"
+        );
+        let many = format!("{} -c:v mpeg4 many.mkv", "-map 0:v ".repeat(33));
+        for (n_frames, args, codes) in [
+            (10, locked.as_str(), &[Code::Encrypted][..]),
+            (3, &many, &[Code::TooManyStreams]),
+            (1, "-c:v mpeg4 single.mp4", &[Code::TooFewFrames]),
+            (
+                30,
+                "-vf settb=1/1001,setpts=N -r 1001 -c:v mpeg4 fast.mp4",
+                &[Code::TooFast],
+            ),
+            (
+                3,
+                "-vf setpts=N*1800/TB -fps_mode vfr -c:v mpeg4 long.mkv",
+                &[Code::TooLong],
+            ),
+            (10, "-vf scale=1:1 -c:v ffv1 dot.mkv", &[Code::TooFewPixels]),
+            (
+                10,
+                "-vf scale=640:2 -c:v ffv1 line.mkv",
+                &[Code::TooFewPixels],
+            ),
+            (
+                3,
+                "-vf scale=8208:64 -c:v mpeg4 wide.mkv",
+                &[Code::TooManyPixels],
+            ),
+            (
+                3,
+                "-vf scale=4096:2176 -c:v mjpeg -q:v 30 large.avi",
+                &[Code::TooManyPixels],
+            ),
+            (
+                10,
+                "-vf setsar=1000/1 -c:v mpeg4 stretched.mkv",
+                &[Code::TooManyPixels],
+            ),
+            (
+                10,
+                "-vf setsar=1/250 -c:v mpeg4 tall.mkv",
+                &[Code::TooManyPixels],
+            ),
+        ] {
+            let film = self.film(n_frames, args);
+            self.refused(film, codes);
+        }
+        for args in [
+            "-vf setsar=2/1 -c:v mpeg4 double.mkv",
+            "-vf scale=8192:64 -c:v mpeg4 -q:v 9 widest.mkv",
+            "-c:v mpeg4 -metadata:s:v:0 rotate=90 turned.mp4",
+            "-vf setpts=N*N*0.01/TB -fps_mode vfr -c:v mpeg4 slowing.mkv",
+            "-vf select='not(mod(floor(n/3),2))' -fps_mode vfr -c:v mpeg4 stutter.mkv",
+        ] {
+            let film = self.film(20, args);
+            self.good(film);
+        }
+        // Nothing but a header.
+        let none = self
+            .films
+            .run("-f lavfi -i nullsrc=size=64x48:rate=25:duration=0 -c:v mpeg4 none.mkv");
+        self.refused(
+            none,
+            &[
+                Code::TooFewFrames,
+                Code::Truncated,
+                Code::NotAVideo,
+                Code::NoVideoStream,
+            ],
+        );
+    }
+
+    fn of_lying_headers(&mut self) {
+        let film = std::fs::read(self.films.path("front.mp4")).unwrap();
+        let at = |name: &[u8]| film.windows(4).position(|w| w == name).unwrap();
+        let patched = |at: usize, bytes: &[u8]| {
+            let mut lie = film.clone();
+            lie[at..at + bytes.len()].copy_from_slice(bytes);
+            lie
+        };
+        // Where each thing stands in its box, counted from the box's name.
+        let lies = [
+            (
+                "moov-size",
+                patched(at(b"moov") - 4, &[0x7f, 0xff, 0xff, 0xff]),
+            ),
+            (
+                "mdat-size",
+                patched(at(b"mdat") - 4, &[0x7f, 0xff, 0xff, 0xff]),
+            ),
+            (
+                "samples",
+                patched(at(b"stsz") + 12, &[0x7f, 0xff, 0xff, 0xff]),
+            ),
+            ("no-samples", patched(at(b"stsz") + 12, &[0; 4])),
+            ("times", patched(at(b"stts") + 8, &[0x0f, 0xff, 0xff, 0xff])),
+            ("slow", patched(at(b"stts") + 16, &[0x7f, 0xff, 0xff, 0xff])),
+            (
+                "sides",
+                patched(at(b"avc1") + 28, &[0xff, 0xff, 0xff, 0xff]),
+            ),
+            ("scale", patched(at(b"mdhd") + 16, &[0, 0, 0, 1])),
+            (
+                "chunks",
+                patched(at(b"stco") + 12, &[0xff, 0xff, 0xff, 0xf0]),
+            ),
+        ];
+        for (name, bytes) in lies {
+            let path = self.films.write(&format!("{name}.mp4"), bytes);
+            self.damaged(path, &[&DAMAGED[..], &LIES[..]].concat());
+        }
+        let boxed = |name: &[u8], inside: &[u8]| {
+            [&((inside.len() + 8) as u32).to_be_bytes(), name, inside].concat()
+        };
+        // A header packed so that it claims to unfold to two gigabytes.
+        let unfolds = [&[0x7f, 0xff, 0xff, 0xff], &[0x78, 0x9c][..], &[0; 64]].concat();
+        let bomb = [boxed(b"dcom", b"zlib"), boxed(b"cmvd", &unfolds)].concat();
+        let bomb = boxed(b"moov", &boxed(b"cmov", &bomb));
+        let endless = [b"\0\0\0\x01mdat".as_slice(), &[0xff; 8], &[0; 400]].concat();
+        let ebml = b"\x1a\x45\xdf\xa3\x01\xff\xff\xff\xff\xff\xff\xfe\x42\x82".to_vec();
+        for (name, bytes) in [("bomb", bomb), ("endless", endless), ("ebml", ebml)] {
+            let path = self.films.write(&format!("{name}.mp4"), bytes);
+            self.refused(path, &DAMAGED);
+        }
+    }
+}
+
+/// What a header may lie about so that a limit catches it.
+const LIES: [Code; 8] = [
+    Code::TooManyPixels,
+    Code::TooFewPixels,
+    Code::TooManyFrames,
+    Code::TooFewFrames,
+    Code::TooLong,
+    Code::TooFast,
+    Code::MemoryLimit,
+    Code::Encrypted,
+];
