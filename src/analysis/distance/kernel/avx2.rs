@@ -58,12 +58,7 @@ fn sad_6x2(a: [&Block; 6], b: [&Block; 2]) -> [[u32; 2]; 6] {
         }
     }
     let two_rows = |k: usize| {
-        let [a, b, c, d] = totals([
-            sums[k][0],
-            sums[k][1],
-            sums[k + 1][0],
-            sums[k + 1][1],
-        ]);
+        let [a, b, c, d] = totals([sums[k][0], sums[k][1], sums[k + 1][0], sums[k + 1][1]]);
         [[a, b], [c, d]]
     };
     let [[first, second], [third, fourth], [fifth, sixth]] =
