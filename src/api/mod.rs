@@ -73,8 +73,8 @@ pub struct AppState {
 impl AppState {
     /// Opens the data folder, mends what a crash left, and looks for the media tool.
     pub async fn open(config: Config) -> Result<AppState, store::Error> {
-        let store = Store::open(&config.data).await?;
-        let context = Context::new(store, config.threads_per_worker());
+        let store = Store::open(config.storage.clone()).await?;
+        let context = Context::new(store, config.crew.threads_per_worker());
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::tool_version).await;
         let tool = tool.map_err(std::io::Error::other)?;

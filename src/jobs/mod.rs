@@ -40,8 +40,8 @@ pub use attempt::{Attempt, Product};
 pub use error::Error;
 pub use listener::{Listener, Stages};
 
-use crate::store::Store;
 use crate::store::jobs::{Kind, Lease};
+use crate::store::{self, Store};
 
 /// What workers share: smaller than the API's state.
 #[derive(Clone)]
@@ -59,6 +59,12 @@ pub struct Context {
 }
 
 impl Context {
+    /// The time that leases are given and ended by: of all who share the queue, not of this machine alone.
+    pub async fn now_ms(&self) -> Result<i64, store::Error> {
+        let shared = self.store.clock_ms().await?;
+        Ok(shared.unwrap_or_else(clock::now_ms))
+    }
+
     /// The usual lease, over a store.
     pub fn new(store: Store, threads: usize) -> Context {
         Context {

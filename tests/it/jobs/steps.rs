@@ -49,7 +49,7 @@ async fn a_job_that_is_done_has_its_files_in_place() {
         .await;
     assert_eq!(step.unwrap(), Step::Done(job));
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
-    assert_eq!(app.n_folders("libraries"), 1);
+    assert_eq!(app.n_folders("libraries").await, 1);
     app.assert_sound().await;
 }
 
@@ -76,10 +76,10 @@ async fn a_worker_that_was_given_up_throws_its_output_away() {
         product(attempt, footage)
     });
     assert_eq!(step.await.unwrap(), Step::Lost(job));
-    assert_eq!(app.n_folders("libraries"), 0);
+    assert_eq!(app.n_folders("libraries").await, 0);
     tell.send(()).unwrap();
     assert_eq!(app.ended_job(&json!(job)).await["state"], "done");
-    assert_eq!(app.n_folders("libraries"), 1);
+    assert_eq!(app.n_folders("libraries").await, 1);
     app.assert_sound().await;
 }
 
