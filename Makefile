@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit truth-test page-test arm-test docs deny bench accuracy papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race truth-test page-test arm-test docs deny bench accuracy papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,7 +16,7 @@ help: ## list the commands
 run: build ## install what is missing, build, start the service and its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit truth-test page-test ## install what the tests need and run them all
+test: unit scale-test truth-test page-test ## install what the tests need and run them all
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,7 +26,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit truth-test page-test docs deny ## everything that CI checks
+check: fmt clippy unit scale-test truth-test page-test docs deny ## everything that CI checks
 	@echo "all checks passed"
 
 fmt: ## the formatting
@@ -38,6 +38,16 @@ clippy: target/vendor ## the lints, warnings as errors
 unit: target/vendor ## the tests in Rust
 	@scripts/system-packages.sh test
 	$(CARGO) test --locked
+
+# Store, queue and API once more, as they are, on the other engine; and what needs several machines.
+SCALE_TESTS = $(CARGO) test --locked --lib store:: && $(CARGO) test --locked --lib -- --ignored store:: && \
+	$(CARGO) test --locked --test it -- jobs:: api:: && $(CARGO) test --locked --test it -- --ignored scale::
+scale-test: target/vendor ## the service on a PostgreSQL and an S3 store that are started for it, with workers that are killed
+	@scripts/with-servers.sh sh -c '$(SCALE_TESTS)'
+
+race: target/vendor ## eight processes race for 2000 jobs, on SQLite and on PostgreSQL
+	FLOCKREEL_RACE_JOBS=2000 $(CARGO) test --locked --test it -- --nocapture jobs::races
+	FLOCKREEL_RACE_JOBS=2000 scripts/with-servers.sh $(CARGO) test --locked --test it -- --nocapture jobs::races
 
 # The program that the tests built, here and below: `cargo build` would build the dependencies anew, without the tests' features.
 truth-test: target/vendor ## a flock's ground truth, read by the field's own tools

@@ -2,7 +2,7 @@
 # Installs the Debian packages that flockreel needs, and only those that are missing.
 # The same list for `make`, the Dockerfile and CI, so that they cannot drift apart.
 #
-#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | truth-test | page-test | arm-test
+#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test | truth-test | page-test | arm-test
 #
 # Says what it does. Uses sudo when it is not root. Ends with 1 when something is still missing.
 set -eu
@@ -18,6 +18,8 @@ health    curl      curl
 test      cc        gcc libc6-dev
 test      ffmpeg    ffmpeg
 test      ffprobe   ffmpeg
+scale-test initdb   postgresql
+scale-test python3  python3-venv
 truth-test python3  python3-venv
 truth-test ffmpeg   ffmpeg
 page-test python3   python3-venv
@@ -34,6 +36,8 @@ has() {
     case $1 in
         # Debian splits the module that makes virtual environments off the interpreter.
         python3) command -v python3 >/dev/null && python3 -c 'import ensurepip, venv' 2>/dev/null ;;
+        # Debian keeps a server's own programs out of the way, one folder a version.
+        initdb) ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 ;;
         *) command -v "$1" >/dev/null ;;
     esac
 }

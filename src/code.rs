@@ -68,6 +68,7 @@ codes! {
     MalformedRequest "malformed_request" "The request cannot be read."
     UnsupportedMediaType "unsupported_media_type" "The body is of a type that is not taken here."
     TooLarge "too_large" "The body is larger than the limit."
+    HeadTooLarge "head_too_large" "The head of the request is larger than the limit."
     AddressTooLong "address_too_long" "The address is longer than the limit."
     BodyTimeout "body_timeout" "The body came too slowly."
     BodyCutOff "body_cut_off" "The body ended before it was complete."

@@ -3,7 +3,8 @@
 
 use std::net::SocketAddr;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
@@ -16,17 +17,12 @@ pub struct Config {
     /// Who needs a token: `auto` demands one off loopback, `required` from everybody.
     #[arg(long, env = "FLOCKREEL_AUTH", default_value = "auto")]
     pub auth: Auth,
-    /// The folder that holds the database and all files.
-    #[arg(
-        long,
-        env = "FLOCKREEL_DATA",
-        default_value = "data",
-        value_name = "DIR"
-    )]
-    pub data: PathBuf,
-    /// How many jobs run at once; the cores are shared among them.
-    #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
-    pub workers: NonZeroUsize,
+    /// Where rows and files are kept.
+    #[command(flatten)]
+    pub storage: Storage,
+    /// Who runs the jobs.
+    #[command(flatten)]
+    pub crew: Crew,
     /// Do not fill an empty data folder with a sample.
     #[arg(long, env = "FLOCKREEL_NO_SAMPLE")]
     pub no_sample: bool,
@@ -79,6 +75,71 @@ pub enum Sandbox {
     Strict,
 }
 
+/// Where rows and files are kept.
+#[derive(Args, Clone, Debug)]
+pub struct Storage {
+    /// The folder of this machine for what is under way; for the database and all files too, unless they are elsewhere.
+    #[arg(
+        long,
+        global = true,
+        env = "FLOCKREEL_DATA",
+        default_value = "data",
+        value_name = "DIR"
+    )]
+    pub data: PathBuf,
+    /// The database, made if absent: sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME; a file in the data folder unless given.
+    #[arg(
+        long,
+        global = true,
+        env = "FLOCKREEL_DATABASE",
+        hide_env_values = true,
+        value_name = "URL"
+    )]
+    pub database: Option<Database>,
+    /// The files: a folder, or s3://BUCKET/PREFIX with the usual AWS_* variables; in the data folder unless given.
+    #[arg(long, global = true, env = "FLOCKREEL_STORE", value_name = "DIR|URL")]
+    pub store: Option<Files>,
+}
+
+/// Who runs the jobs of a process.
+#[derive(Args, Clone, Debug)]
+pub struct Crew {
+    /// How many jobs run at once; the cores are shared among them.
+    #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
+    pub workers: NonZeroUsize,
+    /// How long one job may take, seconds; then it fails with `time_limit`.
+    #[arg(
+        long,
+        env = "FLOCKREEL_JOB_TIME_S",
+        default_value_t = Crew::JOB_TIME_S,
+        value_name = "N"
+    )]
+    pub job_time_s: u64,
+}
+
+/// Where the rows are.
+#[derive(Clone, PartialEq, Eq)]
+pub enum Database {
+    /// In a file that the processes of one machine share.
+    Sqlite(PathBuf),
+    /// On a server that any number of machines share, by its address.
+    Postgres(String),
+}
+
+/// Where the files are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Files {
+    /// In a folder of this machine.
+    Folder(PathBuf),
+    /// In a bucket of an S3-compatible store.
+    Bucket {
+        /// The bucket.
+        name: String,
+        /// What the names of all our files in it begin with; may be empty.
+        prefix: String,
+    },
+}
+
 /// Who needs a token (RELIABILITY.md, S6).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Auth {
@@ -96,6 +157,11 @@ impl Config {
     pub fn demands_tokens(&self) -> bool {
         self.auth == Auth::Required || !self.bind.ip().is_loopback()
     }
+}
+
+impl Crew {
+    /// The usual budget of a job: an hour of footage takes a few hours on a small machine.
+    pub const JOB_TIME_S: u64 = 6 * 3600;
 
     /// Threads that one worker may use, at least 1: the cores divided by the workers.
     pub fn threads_per_worker(&self) -> usize {
@@ -106,6 +172,72 @@ impl Config {
 /// Threads that each of so many workers may use, at least 1.
 pub fn threads_per_worker(workers: NonZeroUsize) -> usize {
     (cores() / workers).max(1)
+}
+
+impl Storage {
+    /// Where the rows are.
+    pub fn database(&self) -> Database {
+        let in_folder = || Database::Sqlite(self.data.join("flockreel.db"));
+        self.database.clone().unwrap_or_else(in_folder)
+    }
+}
+
+/// All in one folder.
+impl<P: AsRef<Path> + ?Sized> From<&P> for Storage {
+    fn from(data: &P) -> Storage {
+        Storage {
+            data: data.as_ref().to_owned(),
+            database: None,
+            store: None,
+        }
+    }
+}
+
+impl FromStr for Database {
+    type Err = String;
+
+    fn from_str(url: &str) -> Result<Database, String> {
+        match url.split_once(':') {
+            Some(("sqlite", path)) if !path.is_empty() => {
+                let path = path.strip_prefix("//").unwrap_or(path);
+                Ok(Database::Sqlite(PathBuf::from(path)))
+            }
+            Some(("postgres" | "postgresql", _)) => Ok(Database::Postgres(url.to_owned())),
+            _ => Err("a database is sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME".to_owned()),
+        }
+    }
+}
+
+impl FromStr for Files {
+    type Err = String;
+
+    fn from_str(place: &str) -> Result<Files, String> {
+        let Some(bucket) = place.strip_prefix("s3://") else {
+            let is_url = place.contains("://");
+            let wrong = || "a store is a folder or s3://BUCKET/PREFIX".to_owned();
+            return (!is_url)
+                .then(|| Files::Folder(place.into()))
+                .ok_or_else(wrong);
+        };
+        let (name, prefix) = bucket.split_once('/').unwrap_or((bucket, ""));
+        match name.is_empty() {
+            true => Err("the bucket has no name: s3://BUCKET/PREFIX".to_owned()),
+            false => Ok(Files::Bucket {
+                name: name.to_owned(),
+                prefix: prefix.trim_matches('/').to_owned(),
+            }),
+        }
+    }
+}
+
+/// Without what may be a password.
+impl std::fmt::Debug for Database {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Database::Sqlite(path) => write!(f, "sqlite:{}", path.display()),
+            Database::Postgres(_) => write!(f, "postgres://..."),
+        }
+    }
 }
 
 /// One worker for every two cores: an analysis keeps two busy (decoder and tracking).

@@ -73,8 +73,9 @@ pub struct AppState {
 impl AppState {
     /// Opens the data folder, mends what a crash left, and looks for the media tool.
     pub async fn open(config: Config) -> Result<AppState, store::Error> {
-        let store = Store::open(&config.data).await?;
-        let context = Context::new(store, config.threads_per_worker());
+        let store = Store::open(config.storage.clone()).await?;
+        let mut context = Context::new(store, config.crew.threads_per_worker());
+        context.budget = Duration::from_secs(config.crew.job_time_s);
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::walls).await;
         let tool = tool.map_err(std::io::Error::other)?;

@@ -154,6 +154,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::MalformedRequest | Code::BodyCutOff => StatusCode::BAD_REQUEST,
         Code::UnsupportedMediaType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
         Code::TooLarge => StatusCode::PAYLOAD_TOO_LARGE,
+        Code::HeadTooLarge => StatusCode::REQUEST_HEADER_FIELDS_TOO_LARGE,
         Code::AddressTooLong => StatusCode::URI_TOO_LONG,
         Code::BodyTimeout => StatusCode::REQUEST_TIMEOUT,
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,

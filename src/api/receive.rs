@@ -166,11 +166,15 @@ where
 
 /// What can be refused before the body is read.
 fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
-    let headers = request.headers();
-    if !is_form(request) && body_bytes(request).is_some_and(|bytes| bytes > limit_bytes) {
-        return Err(store::Error::TooLarge { limit_bytes }.into());
+    let most = match is_form(request) {
+        // A background and wishes besides, and what parts them.
+        true => limit_bytes.saturating_add(MAX_BACKGROUND_BYTES + (4 << 20)),
+        false => limit_bytes,
+    };
+    match body_bytes(request).is_some_and(|bytes| bytes > most) {
+        true => Err(store::Error::TooLarge { limit_bytes }.into()),
+        false => Ok(()),
     }
-    Ok(())
 }
 
 /// How long the body is to be, where its sender says so.

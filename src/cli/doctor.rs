@@ -1,26 +1,20 @@
 //! `flockreel doctor`: what this machine has of what flockreel needs, and what each lack means in plain
 //! words (RELIABILITY.md, "The gate": what is missing is said). Exit 0 when nothing is, else 1.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::{Value, json};
 
 use super::{Error, Summary};
-use crate::config::{self, Config};
+use crate::config::{self, Config, Storage};
 use crate::cpu::Level;
 use crate::media::{self, Coders};
 
 /// Arguments of `doctor`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that the service keeps its data in.
-    #[arg(
-        long,
-        env = "FLOCKREEL_DATA",
-        default_value = "data",
-        value_name = "DIR"
-    )]
-    data: PathBuf,
+    #[command(flatten)]
+    storage: Storage,
 }
 
 /// One thing that was looked at.
@@ -39,7 +33,7 @@ pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
     tools(&mut findings);
     walls(&mut findings);
     machine(&mut findings);
-    findings.push(disk(&args.data));
+    findings.push(disk(&args.storage.data));
     let n_lacks = findings.iter().filter(|f| f.lack.is_some()).count();
     let lines: Vec<String> = match json {
         true => vec![as_json(&findings).to_string()],

@@ -15,6 +15,7 @@ pub mod sample;
 pub mod serve;
 pub mod sprites;
 pub mod token;
+pub mod worker;
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -56,6 +57,8 @@ pub struct Cli {
 enum Command {
     /// Start the service: API, page and workers in one process.
     Serve(serve::Args),
+    /// Run the jobs of a service on a further machine: workers alone.
+    Worker(worker::Args),
     /// Make, list and revoke the tokens with which the service is reached from elsewhere.
     Token(token::Args),
     /// Measure the animal in a video: footage to library.
@@ -82,7 +85,10 @@ pub struct Summary(pub Value);
 
 /// Runs the command and says how it went; never panics on a user's input.
 pub fn main(cli: Cli) -> ExitCode {
-    start_logging(cli.log.as_deref(), matches!(cli.command, Command::Serve(_)));
+    start_logging(
+        cli.log.as_deref(),
+        matches!(cli.command, Command::Serve(_) | Command::Worker(_)),
+    );
     media::set_up(&cli.media);
     match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
@@ -96,6 +102,7 @@ pub fn main(cli: Cli) -> ExitCode {
 fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
     match command {
         Command::Serve(args) => serve::run(args),
+        Command::Worker(args) => worker::run(args),
         Command::Token(args) => token::run(args, json),
         Command::Analyze(args) => analyze::run(args),
         Command::Flock(args) => flock::run(args),

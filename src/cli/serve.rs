@@ -32,7 +32,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 async fn serve(config: Config) -> Result<(), Error> {
-    let (bind, n_workers) = (config.bind, config.workers.get());
+    let (bind, n_workers) = (config.bind, config.crew.workers.get());
     let with_sample = !config.no_sample;
     refuse_open_door(&config).await?;
     let state = AppState::open(config).await.map_err(from_store)?;
@@ -67,7 +67,9 @@ async fn refuse_open_door(config: &Config) -> Result<(), Error> {
     if config.bind.ip().is_loopback() || config.auth == Auth::Required {
         return Ok(());
     }
-    let store = Store::open(&config.data).await.map_err(from_store)?;
+    let store = Store::open(config.storage.clone())
+        .await
+        .map_err(from_store)?;
     let has_tokens = store.has_tokens(now_ms()).await.map_err(from_store)?;
     store.close().await;
     match has_tokens {
@@ -87,7 +89,7 @@ async fn fill(context: Context) {
     }
 }
 
-async fn wait_for_signal() -> Result<(), Error> {
+pub(super) async fn wait_for_signal() -> Result<(), Error> {
     let listen = |kind| signal(kind).map_err(Error::io("waiting for signals"));
     let mut terminate = listen(SignalKind::terminate())?;
     let mut interrupt = listen(SignalKind::interrupt())?;

@@ -3,7 +3,6 @@
 //! token goes to stdout, once.
 
 use std::io::Write;
-use std::path::PathBuf;
 
 use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
@@ -12,6 +11,7 @@ use tokio::runtime::Runtime;
 
 use super::serve::from_store;
 use super::{Error, Summary, say};
+use crate::config::Storage;
 use crate::jobs::clock::now_ms;
 use crate::store::Store;
 use crate::store::owners::Owner;
@@ -20,15 +20,8 @@ use crate::store::tokens::{NewToken, Scope, Token};
 /// Arguments of `token`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that the service keeps its data in.
-    #[arg(
-        long,
-        global = true,
-        env = "FLOCKREEL_DATA",
-        default_value = "data",
-        value_name = "DIR"
-    )]
-    data: PathBuf,
+    #[command(flatten)]
+    storage: Storage,
     #[command(subcommand)]
     action: Action,
 }
@@ -71,7 +64,7 @@ struct CreateArgs {
 pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     runtime.block_on(async {
-        let store = Store::open_beside(&args.data).await.map_err(from_store)?;
+        let store = Store::open_beside(args.storage).await.map_err(from_store)?;
         let done = match args.action {
             Action::Create(wishes) => create(&store, wishes).await,
             Action::List => list(&store).await,

@@ -71,6 +71,8 @@ const LIBRARY: &str = "library.json";
 const POSES: &str = "poses.json";
 const BACKGROUND: &str = "background.png";
 const SPRITES: &str = "sprites.zip";
+/// The files that a library is read from; there may be others beside them.
+pub const FILES: [&str; 4] = [LIBRARY, POSES, BACKGROUND, SPRITES];
 
 /// Writes a library into a folder, which is made if need be.
 pub fn write(

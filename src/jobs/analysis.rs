@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::allotted::next_id;
-use super::{Attempt, Context, Error, Product, Stages, clock, overlay};
+use super::{Attempt, Context, Error, Product, Stages, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
 use crate::formats::distance_map::DistanceMap;
@@ -91,7 +91,7 @@ pub async fn enqueue(
         after_job: None,
         priority: 0,
     };
-    context.store.enqueue(&job, clock::now_ms()).await?;
+    context.store.enqueue(&job, context.now_ms().await?).await?;
     context.wake.notify_one();
     Ok((job_id, library_id))
 }
@@ -104,7 +104,8 @@ impl Input {
             threads: u32::try_from(attempt.threads).unwrap_or(0),
             ..Limits::default()
         };
-        let path_of = |name| attempt.blobs().path(&footage.folder, name);
+        let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND])?;
+        let path_of = |name| files.path().join(name);
         let video = Video::open(&path_of(VIDEO), &limits)?;
         let background = match footage.background_sha256.is_empty() {
             true => None,

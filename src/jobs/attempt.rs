@@ -1,17 +1,18 @@
 //! What one run of a job is given, and what it gives back.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use super::{Error, Listener};
+use crate::formats::library_dir;
 use crate::ids::{FootageId, LibraryId};
 use crate::scratch::Scratch;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Reach;
-use crate::store::{Blobs, Draft, Spill, Store, footage, libraries};
+use crate::store::{Draft, Fetched, Spill, Store, footage, libraries};
 
 /// One run of a job: where to write, how to load, whom to report to.
 pub struct Attempt<'a> {
@@ -70,19 +71,19 @@ impl<'a> Attempt<'a> {
         row.ok_or(Error::InputAbsent(id.0))
     }
 
-    /// A library's row and folder; must be called on a blocking thread.
-    pub fn library(&self, id: LibraryId) -> Result<(libraries::Library, PathBuf), Error> {
+    /// A library's row, and its files as files of this machine; must be called on a blocking thread.
+    pub fn library(&self, id: LibraryId) -> Result<(libraries::Library, Fetched), Error> {
         let row = self
             .runtime
             .block_on(self.store.library(id.0, &Reach::All))?;
         let row = row.ok_or(Error::InputAbsent(id.0))?;
-        let folder = self.blobs().folder(&row.folder);
-        Ok((row, folder))
+        let files = self.fetch(&row.folder, &library_dir::FILES)?;
+        Ok((row, files))
     }
 
-    /// The files of the store.
-    pub fn blobs(&self) -> &Blobs {
-        self.store.blobs()
+    /// Files of the store as files of this machine; must be called on a blocking thread.
+    pub fn fetch(&self, folder: &str, names: &[&str]) -> Result<Fetched, Error> {
+        Ok(self.runtime.block_on(self.store.fetch(folder, names))?)
     }
 }
 

@@ -40,6 +40,9 @@ pub enum Error {
     /// The computation panicked.
     #[error("the computation stopped unexpectedly")]
     Panicked,
+    /// It took longer than a job may.
+    #[error("the job took longer than a job may")]
+    OverTime,
     /// Somebody cancelled, or the worker drains.
     #[error("the job was cancelled")]
     Cancelled,
@@ -60,6 +63,7 @@ impl Error {
             Error::Store(error) => error.code(),
             Error::Io(error) => of_io(error),
             Error::Panicked => Code::Internal,
+            Error::OverTime => Code::TimeLimit,
             Error::Cancelled => Code::Cancelled,
         }
     }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::allotted::next_id;
-use super::{Attempt, Context, Error, Product, Stages, clock};
+use super::{Attempt, Context, Error, Product, Stages};
 use crate::fish::{Film, Params, drive};
 use crate::formats::{glb, library_dir};
 use crate::ids::{FishId, JobId, LibraryId};
@@ -60,7 +60,7 @@ pub async fn enqueue(
         after_job,
         priority: 0,
     };
-    context.store.enqueue(&job, clock::now_ms()).await?;
+    context.store.enqueue(&job, context.now_ms().await?).await?;
     context.wake.notify_one();
     Ok((job_id, fish_id))
 }
@@ -68,9 +68,9 @@ pub async fn enqueue(
 impl Input {
     /// Drives, writes the model, renders.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let (_, folder) = attempt.library(self.library_id)?;
+        let (_, files) = attempt.library(self.library_id)?;
         attempt.listener.report("loading", 0.0);
-        let library = library_dir::read(&folder, attempt.scratch())?.library;
+        let library = library_dir::read(files.path(), attempt.scratch())?.library;
         let motion = drive(&library.poses, &self.params)?;
         std::fs::write(attempt.folder().join("model.glb"), glb::write(&motion))?;
         let summary = Summary {

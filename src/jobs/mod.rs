@@ -40,8 +40,9 @@ pub use attempt::{Attempt, Product};
 pub use error::Error;
 pub use listener::{Listener, Stages};
 
-use crate::store::Store;
+use crate::config::Crew;
 use crate::store::jobs::{Kind, Lease};
+use crate::store::{self, Store};
 
 /// What workers share: smaller than the API's state.
 #[derive(Clone)]
@@ -56,9 +57,17 @@ pub struct Context {
     pub threads: usize,
     /// How long a claim holds without a heartbeat.
     pub lease: Duration,
+    /// How long one attempt at a job may take.
+    pub budget: Duration,
 }
 
 impl Context {
+    /// The time that leases are given and ended by: of all who share the queue, not of this machine alone.
+    pub async fn now_ms(&self) -> Result<i64, store::Error> {
+        let shared = self.store.clock_ms().await?;
+        Ok(shared.unwrap_or_else(clock::now_ms))
+    }
+
     /// The usual lease, over a store.
     pub fn new(store: Store, threads: usize) -> Context {
         Context {
@@ -67,6 +76,7 @@ impl Context {
             draining: CancellationToken::new(),
             threads,
             lease: Duration::from_secs(15),
+            budget: Duration::from_secs(Crew::JOB_TIME_S),
         }
     }
 }

@@ -1,14 +1,16 @@
 //! The supervisor: a pool of workers, the rescue of jobs whose workers fell silent, and the drain
 //! at the end (RELIABILITY.md, R2 and R4).
 
+use std::convert::Infallible;
 use std::time::Duration;
 
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
-use super::clock::now_ms;
 use super::worker::{Step, Worker};
 use super::{Context, clock};
+use crate::ids::JobId;
+use crate::store::{self, jobs::JobState};
 
 /// Idle workers look for jobs this often even if nobody wakes them.
 const POLL: Duration = Duration::from_secs(1);
@@ -29,6 +31,7 @@ impl Supervisor {
             tasks.spawn(work(context.clone()));
         }
         tasks.spawn(rescue(context.clone()));
+        tasks.spawn(listen(context.clone()));
         Supervisor { context, tasks }
     }
 
@@ -66,7 +69,7 @@ async fn work(context: Context) {
 
 async fn rescue(context: Context) {
     while !context.draining.is_cancelled() {
-        match context.store.rescue(now_ms()).await {
+        match rescue_silent(&context).await {
             Ok(rescued) if rescued.is_empty() => {}
             Ok(_) => context.wake.notify_one(),
             Err(error) => tracing::error!(%error, "silent workers could not be looked for"),
@@ -78,11 +81,43 @@ async fn rescue(context: Context) {
     }
 }
 
-/// Mends what a crash left, before the first worker starts: leases of the dead, drafts, strays.
-pub async fn recover(context: &Context) -> Result<(), crate::store::Error> {
-    context.store.rescue_all(clock::now_ms()).await?;
-    context.store.interrupt_all_keys().await?;
-    context.store.sweep_uploads(clock::now_ms()).await?;
+async fn rescue_silent(context: &Context) -> Result<Vec<(JobId, JobState)>, store::Error> {
+    context.store.rescue(context.now_ms().await?).await
+}
+
+/// Wakes a worker when another process has queued a job.
+async fn listen(context: Context) {
+    while !context.draining.is_cancelled() {
+        let heard = async {
+            let mut queued = context.store.listen().await?;
+            loop {
+                queued.next().await?;
+                context.wake.notify_one();
+            }
+        };
+        let lost: Result<Infallible, store::Error> = tokio::select! {
+            lost = heard => lost,
+            () = context.draining.cancelled() => return,
+        };
+        let Err(error) = lost;
+        tracing::warn!(%error, "jobs of other processes are looked for, not heard of");
+        sleep(POLL).await;
+    }
+}
+
+/// Mends what a crash left, before the first worker starts: leases of the dead, drafts, strays. Where
+/// other processes share the rows only what has run out is of the dead.
+pub async fn recover(context: &Context) -> Result<(), store::Error> {
+    let now_ms = context.now_ms().await?;
+    match context.store.is_alone() {
+        true => context.store.rescue_all(now_ms).await?,
+        false => context.store.rescue(now_ms).await?,
+    };
+    context.store.interrupt_keys(now_ms).await?;
+    if context.store.serves() {
+        context.store.sweep_uploads(clock::now_ms()).await?;
+        context.store.sweep_upload_files().await?;
+    }
     context.store.sweep(std::time::SystemTime::now()).await?;
     Ok(())
 }

@@ -81,7 +81,7 @@ impl Worker {
         let claimed = self
             .context
             .store
-            .claim(self.id, now_ms(), lease_ms)
+            .claim(self.id, self.context.now_ms().await?, lease_ms)
             .await?;
         let Some(lease) = claimed else {
             return Ok(Step::Idle);
@@ -101,18 +101,21 @@ impl Worker {
     ) -> Result<Outcome, Error> {
         let mut tick = interval(TICK.min(self.context.lease / 3));
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut last_beat = Instant::now();
+        let (start, mut last_beat) = (Instant::now(), Instant::now());
         let mut noted = listener.position();
         let mut told_to_stop = None;
         loop {
             tokio::select! {
-                joined = &mut work => return joined.unwrap_or(Err(Error::Panicked)),
+                joined = &mut work => return self.unless_late(start, joined.unwrap_or(Err(Error::Panicked))),
                 _ = tick.tick() => {}
             }
-            if self.context.draining.is_cancelled() {
+            let is_late = start.elapsed() > self.context.budget;
+            if is_late || self.context.draining.is_cancelled() {
                 listener.cancel();
-                if told_to_stop.get_or_insert_with(Instant::now).elapsed() > LET_GO {
-                    return Err(Error::Cancelled);
+                let let_go = LET_GO.min(self.context.lease);
+                if told_to_stop.get_or_insert_with(Instant::now).elapsed() > let_go {
+                    // A thread cannot be ended from outside: it runs on, and its result is thrown away.
+                    return self.unless_late(start, Err(Error::Cancelled));
                 }
             }
             let position = listener.position();
@@ -123,18 +126,36 @@ impl Worker {
         }
     }
 
+    /// Work that was told to stop because its time was up failed for that reason, whatever it says.
+    fn unless_late(
+        &self,
+        start: Instant,
+        result: Result<Outcome, Error>,
+    ) -> Result<Outcome, Error> {
+        match start.elapsed() > self.context.budget {
+            true => result.map_err(|error| {
+                tracing::warn!(%error, "a job took too long");
+                Error::OverTime
+            }),
+            false => result,
+        }
+    }
+
     async fn beat(&self, lease: &Lease, listener: &Listener, at: Position) {
-        let until_ms = now_ms() + self.lease_ms();
-        let beat = self
-            .context
-            .store
-            .heartbeat(lease, until_ms, at.stage, at.progress);
-        match beat.await {
+        match self.renew(lease, at).await {
             Ok(Beat::Held) => {}
             Ok(Beat::CancelRequested | Beat::Lost) => listener.cancel(),
             // The lease may run out; the fence keeps the books right whatever happens then.
             Err(error) => tracing::warn!(job.id = %lease.job_id, %error, "a heartbeat failed"),
         }
+    }
+
+    async fn renew(&self, lease: &Lease, at: Position) -> Result<Beat, store::Error> {
+        let until_ms = self.context.now_ms().await? + self.lease_ms();
+        let store = &self.context.store;
+        store
+            .heartbeat(lease, until_ms, at.stage, at.progress)
+            .await
     }
 
     async fn end(
@@ -150,7 +171,7 @@ impl Worker {
         };
         let (change, step) = match result {
             Ok(change) => (change, Step::Done(job)),
-            Err(error) if crate::progress::Progress::cancelled(listener) => {
+            Err(error) if was_stopped(&error, listener) => {
                 tracing::debug!(job.id = %job, %error, "the work let go");
                 if self.context.draining.is_cancelled() {
                     (store.release(lease).await?, Step::Released(job))
@@ -161,7 +182,8 @@ impl Worker {
             Err(error) if error.may_pass() && lease.attempt < MAX_ATTEMPTS => {
                 tracing::warn!(job.id = %job, %error, "the work failed, perhaps for a moment");
                 let wait_ms = BACKOFF_MS << (2 * (lease.attempt - 1));
-                let change = store.retry(lease, now_ms() + wait_ms).await?;
+                let run_at_ms = self.context.now_ms().await? + wait_ms;
+                let change = store.retry(lease, run_at_ms).await?;
                 (change, Step::Retried(job))
             }
             Err(error) => {
@@ -181,7 +203,7 @@ impl Worker {
     }
 }
 
-/// Runs the work and moves what it made into place, all on a blocking thread.
+/// Runs the work on a blocking thread, and puts what it made into place.
 fn spawn<Run>(
     context: &Context,
     lease: Lease,
@@ -192,7 +214,8 @@ where
     Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
 {
     let (store, threads, runtime) = (context.store.clone(), context.threads, Handle::current());
-    tokio::task::spawn_blocking(move || {
+    let (blobs, result_id, fence) = (store.blobs().clone(), lease.result_id, lease.fence);
+    let work = tokio::task::spawn_blocking(move || {
         let draft = store
             .blobs()
             .draft(&format!("{}.{}", lease.job_id, lease.fence))?;
@@ -203,8 +226,12 @@ where
         let attempt = Attempt::new(&store, &draft, &listener, threads, &runtime);
         let product = pool.install(|| run(&lease, &attempt))?;
         let files = store.blobs().seal(&draft)?;
-        let folder = folder_of(product.made, lease.result_id, lease.fence);
-        store.blobs().adopt(draft, &folder)?;
+        Ok::<_, Error>((draft, product, files))
+    });
+    tokio::spawn(async move {
+        let (draft, product, files) = work.await.unwrap_or(Err(Error::Panicked))?;
+        let folder = folder_of(product.made, result_id, fence);
+        blobs.adopt(draft, &folder).await?;
         Ok(Outcome {
             made: product.made,
             folder,
@@ -224,9 +251,14 @@ async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Chang
         Err(_) => store.is_folder_known(&outcome.folder).await?,
     };
     if !is_linked {
-        store.blobs().discard(&outcome.folder)?;
+        store.blobs().discard(&outcome.folder).await?;
     }
     change
+}
+
+/// Whether the work ended because somebody wanted it to, and not because it failed.
+fn was_stopped(error: &Error, listener: &Listener) -> bool {
+    crate::progress::Progress::cancelled(listener) && !matches!(error, Error::OverTime)
 }
 
 /// What a person is told: the reason, where it is one of theirs; what failed inside stays in the log.

@@ -24,6 +24,9 @@ use crate::raster::{Frame, Matrix, Range};
 /// Most frames that a child may decode without showing one.
 const MOST_SKIPPED: usize = 300;
 
+/// Pictures that may come though no packet told of them.
+const MOST_UNTOLD: usize = 64;
+
 /// In a part of so many frames there is one that others refer to: three in a row without are usual.
 const LEAST_SKIPPED: usize = 8;
 
@@ -104,8 +107,12 @@ impl Video {
         let mut stream = VideoStream::of(self, self.order(wanted))?;
         let mut frame = Frame::default();
         let mut n_shown = 0;
+        let most = wanted.most();
         while stream.read(&mut frame)? == frame.planes.len() {
             n_shown += 1;
+            if n_shown > most {
+                return Err(Error::TooManyFrames { limit: most });
+            }
             if visit(&frame).is_break() {
                 break;
             }
@@ -198,7 +205,15 @@ impl FrameSource for Video {
         let format = self.format();
         if n_packets >= LEAST_SKIPPED * n {
             let parts_per_s = n as f64 * format.fps / format.n_frames_hint as f64;
-            if self.show(&Wanted::InTime { parts_per_s }, visit)? > 0 {
+            let n_parts = n;
+            if self.show(
+                &Wanted::InTime {
+                    parts_per_s,
+                    n_parts,
+                },
+                visit,
+            )? > 0
+            {
                 return Ok(());
             }
         }
@@ -221,10 +236,19 @@ enum Wanted {
     /// Those of these numbers, counted as they are decoded.
     Numbers(Vec<usize>),
     /// The first after the middle of each of so many parts a second.
-    InTime { parts_per_s: f64 },
+    InTime { parts_per_s: f64, n_parts: usize },
 }
 
 impl Wanted {
+    /// More frames than a child that does as it is told can hand over.
+    fn most(&self) -> usize {
+        match self {
+            Wanted::All => usize::MAX,
+            Wanted::Numbers(numbers) => numbers.len(),
+            Wanted::InTime { n_parts, .. } => 2 * n_parts + MOST_UNTOLD,
+        }
+    }
+
     fn filter(&self) -> Option<String> {
         match self {
             Wanted::All => None,
@@ -232,7 +256,7 @@ impl Wanted {
                 let each: Vec<String> = numbers.iter().map(|idx| format!("eq(n,{idx})")).collect();
                 Some(format!("select='{}'", each.join("+")))
             }
-            Wanted::InTime { parts_per_s } => {
+            Wanted::InTime { parts_per_s, .. } => {
                 // A little before the middle, for times are rounded.
                 let part = |time: &str| format!("floor(({time}-start_t)*{parts_per_s}-0.499)");
                 let (this, last) = (part("t"), part("prev_selected_t"));
@@ -311,10 +335,11 @@ impl<'a> VideoStream<'a> {
             return Ok(false);
         }
         self.n_decoded += 1;
-        match self.n_decoded > self.video.limits.max_frames {
-            true => Err(Error::TooManyFrames {
-                limit: self.video.limits.max_frames,
-            }),
+        // A packet holds a picture or two; what comes besides is no film any more.
+        let plenty = 2 * self.video.probe.n_packets + MOST_UNTOLD;
+        let limit = self.video.limits.max_frames.min(plenty);
+        match self.n_decoded > limit {
+            true => Err(Error::TooManyFrames { limit }),
             false => Ok(true),
         }
     }

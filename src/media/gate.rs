@@ -101,6 +101,8 @@ fn n_cores() -> u64 {
 pub(super) struct Child {
     process: process::Child,
     group: Pid,
+    /// Its number may be another's by now.
+    reaped: bool,
     ended: OwnedFd,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
@@ -166,6 +168,7 @@ impl Child {
         Ok(Child {
             process,
             group,
+            reaped: false,
             ended,
             stdin,
             stdout,
@@ -268,6 +271,7 @@ impl Child {
             .process
             .wait()
             .map_err(Error::io("reaping the media tool"))?;
+        self.reaped = true;
         let complaint = self
             .stderr
             .take()
@@ -309,8 +313,9 @@ impl Child {
 
 impl Drop for Child {
     fn drop(&mut self) {
-        // Does nothing to a child that has been reaped already.
-        kill_and_reap(&mut self.process, self.group);
+        if !self.reaped {
+            kill_and_reap(&mut self.process, self.group);
+        }
     }
 }
 
@@ -332,13 +337,11 @@ fn command(args: &[OsString], place: &Place, lists_libraries: bool) -> process::
     command
 }
 
-/// Kills what is left of the group, then reaps the child. The order matters: until it is reaped
-/// nobody else can get its number.
+/// Kills what is left of the group, then reaps the child, which may have ended before others of its group.
+/// The order matters: until it is reaped nobody else can get its number.
 fn kill_and_reap(process: &mut process::Child, group: Pid) {
-    if let Ok(None) = process.try_wait() {
-        rustix::process::kill_process_group(group, Signal::KILL).ok();
-        process.wait().ok();
-    }
+    rustix::process::kill_process_group(group, Signal::KILL).ok();
+    process.wait().ok();
 }
 
 /// Starts a command on a thread that never ends: the kernel takes the end of the thread that

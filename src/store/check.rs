@@ -1,7 +1,9 @@
 //! The invariants of the store, verified (RELIABILITY.md, store rules, I1 to I6). Run after every
 //! test that breaks something on purpose.
 
-use super::{Error, Store, blobs};
+use sqlx::types::Uuid;
+
+use super::{BlobFile, Error, Store, sql};
 
 /// One thing that is wrong, in words that name the row or file.
 pub type Fault = String;
@@ -10,16 +12,18 @@ impl Store {
     /// Every fault found; none is what is promised. Reads and hashes every file.
     pub async fn check(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
         let mut faults = self.missing_or_altered_blobs().await?;
-        for folder in self.folders_without_row().await? {
+        for (folder, _) in self.folders_without_row().await? {
             faults.push(format!("I2: no row names the folder: {folder}"));
         }
-        for (name, sql) in RULES {
-            let found: Vec<String> = sqlx::query_scalar(*sql)
-                .bind(now_ms)
-                .fetch_all(&self.reader)
-                .await?;
-            faults.extend(found.into_iter().map(|row| format!("{name}: {row}")));
+        for (name, sql) in RULES_OF_JOBS {
+            let broken = sql::query_scalar(sql).bind(now_ms);
+            let jobs: Vec<Uuid> = broken.fetch_all(&self.reader).await?;
+            faults.extend(jobs.into_iter().map(|job| format!("{name}: {job}")));
         }
+        let broken = sql::query_scalar(WRONG_SIZES);
+        let folders: Vec<String> = broken.fetch_all(&self.reader).await?;
+        let said = |folder| format!("I6: sizes do not add up: {folder}");
+        faults.extend(folders.into_iter().map(said));
         Ok(faults)
     }
 
@@ -27,41 +31,45 @@ impl Store {
     async fn missing_or_altered_blobs(&self) -> Result<Vec<Fault>, Error> {
         let sql = "select folder, name, size_bytes, sha256 from blobs order by folder, name";
         let rows: Vec<(String, String, i64, Vec<u8>)> =
-            sqlx::query_as(sql).fetch_all(&self.reader).await?;
+            sql::query(sql).fetch_all(&self.reader).await?;
         let mut faults = Vec::new();
         for (folder, name, size_bytes, sha256) in rows {
-            match blobs::hash_file(&self.blobs.path(&folder, &name)) {
-                Ok(found) if found == (size_bytes, sha256) => {}
-                Ok(_) => faults.push(format!("I1: altered: {folder}/{name}")),
-                Err(error) => faults.push(format!("I1: {error}: {folder}/{name}")),
+            let file = BlobFile {
+                name,
+                size_bytes,
+                sha256,
+            };
+            match self.blobs.hash(&file, &folder).await {
+                Ok(found) if found == (file.size_bytes, file.sha256) => {}
+                Ok(_) => faults.push(format!("I1: altered: {folder}/{}", file.name)),
+                Err(error) => faults.push(format!("I1: {error}: {folder}/{}", file.name)),
             }
         }
         Ok(faults)
     }
 }
 
-/// Queries that return one line for each row that breaks a rule; $1 is the time.
+/// Queries that return the job of each row that breaks a rule; $1 is the time.
 /// I3 (one legal state) is held by the table's own constraints.
-const RULES: &[(&str, &str)] = &[
+const RULES_OF_JOBS: &[(&str, &str)] = &[
     (
         "I4: done without exactly one result of its fence, or a result without done",
-        "select hex(j.id) from jobs j where $1 is not null and (j.state = 'done') != ( \
+        "select j.id from jobs j where $1 is not null and (case when j.state = 'done' then 1 else 0 end) != ( \
          (select count(*) from libraries r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from flocks r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from fish r where r.job_id = j.id and r.fence = j.fence))",
     ),
     (
         "I5: a lease ended more than a minute ago",
-        "select hex(id) from jobs where state = 'running' and lease_until_ms < $1 - 60000",
+        "select id from jobs where state = 'running' and lease_until_ms < $1 - 60000",
     ),
-    (
-        "I6: sizes do not add up",
-        "select r.folder from ( \
+];
+
+/// I6: the folders whose owners' sizes differ from their files'.
+const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from footage union all \
          select folder, size_bytes from libraries union all \
          select folder, size_bytes from flocks union all \
          select folder, size_bytes from fish) r \
-         where $1 is not null and r.size_bytes != ( \
-         select coalesce(sum(b.size_bytes), -1) from blobs b where b.folder = r.folder)",
-    ),
-];
+         where r.size_bytes != ( \
+         select coalesce(sum(b.size_bytes), -1) from blobs b where b.folder = r.folder)";

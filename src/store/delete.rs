@@ -5,32 +5,32 @@
 
 use sqlx::types::Uuid;
 
-use super::{Connection, Error, Store};
+use super::{Error, Store, Transaction, sql};
 
 impl Store {
     /// Deletes a footage, its libraries and all that was made of them; false where it is not there.
     pub async fn delete_footage(&self, id: Uuid) -> Result<bool, Error> {
         let mut transaction = self.begin().await?;
-        let folder: Option<String> = sqlx::query_scalar("select folder from footage where id = $1")
+        let folder: Option<String> = sql::query_scalar("select folder from footage where id = $1")
             .bind(id)
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?;
         let Some(folder) = folder else {
             return Ok(false);
         };
-        let libraries: Vec<Uuid> = sqlx::query_scalar(
+        let libraries: Vec<Uuid> = sql::query_scalar(
             "select result_id from jobs \
-             where kind = 'analysis' and json_extract(input, '$.footage_id') = $1",
+             where kind = 'analysis' and json_extract(input, '$.footage_id') = $1 for update",
         )
         .bind(id.to_string())
-        .fetch_all(&mut *transaction)
+        .fetch_all(&mut transaction)
         .await?;
         let mut folders = vec![folder];
         for library in libraries {
             folders.extend(delete_library_rows(&mut transaction, library).await?);
         }
-        let delete = sqlx::query("delete from footage where id = $1").bind(id);
-        delete.execute(&mut *transaction).await?;
+        let delete = sql::query("delete from footage where id = $1").bind(id);
+        delete.execute(&mut transaction).await?;
         self.forget(transaction, folders).await?;
         tracing::info!(footage.id = %id, "footage deleted");
         Ok(true)
@@ -49,18 +49,22 @@ impl Store {
     /// Deletes a flock or a virtual fish; false where it is not there.
     pub async fn delete_film(&self, id: Uuid) -> Result<bool, Error> {
         let mut transaction = self.begin().await?;
+        sql::query("select 1 from jobs where result_id = $1 for update")
+            .bind(id)
+            .execute(&mut transaction)
+            .await?;
         let sql = "select folder from flocks where id = $1 union all \
                    select folder from fish where id = $1";
-        let folders: Vec<String> = sqlx::query_scalar(sql)
+        let folders: Vec<String> = sql::query_scalar(sql)
             .bind(id)
-            .fetch_all(&mut *transaction)
+            .fetch_all(&mut transaction)
             .await?;
         for sql in [
             "delete from flocks where id = $1",
             "delete from fish where id = $1",
             "delete from jobs where result_id = $1",
         ] {
-            sqlx::query(sql).bind(id).execute(&mut *transaction).await?;
+            sql::query(sql).bind(id).execute(&mut transaction).await?;
         }
         let was_there = !folders.is_empty();
         self.forget(transaction, folders).await?;
@@ -71,45 +75,50 @@ impl Store {
     /// Ends the transaction, and removes the files that nobody names any more.
     async fn forget(
         &self,
-        mut transaction: sqlx::Transaction<'static, sqlx::Sqlite>,
+        mut transaction: Transaction,
         folders: Vec<String>,
     ) -> Result<(), Error> {
         for folder in &folders {
-            let delete = sqlx::query("delete from blobs where folder = $1").bind(folder);
-            delete.execute(&mut *transaction).await?;
+            let delete = sql::query("delete from blobs where folder = $1").bind(folder);
+            delete.execute(&mut transaction).await?;
         }
         transaction.commit().await?;
-        let blobs = self.blobs.clone();
-        let discard = move || folders.iter().try_for_each(|folder| blobs.discard(folder));
-        let discarded = tokio::task::spawn_blocking(discard).await;
-        Ok(discarded.map_err(std::io::Error::other)??)
+        for folder in &folders {
+            self.blobs.discard(folder).await?;
+        }
+        Ok(())
     }
 }
 
 /// Deletes the rows of a library, there or still to be made, and of what was made of it, jobs included;
 /// returns the folders that they named.
 async fn delete_library_rows(
-    connection: &mut Connection,
+    transaction: &mut Transaction,
     library: Uuid,
 ) -> Result<Vec<String>, sqlx::Error> {
+    // The jobs first, as whoever finishes them does, so that neither waits for the other.
+    let jobs = "select 1 from jobs where result_id = $1 \
+               or kind in ('flock', 'fish') and json_extract(input, '$.library_id') = $2 for update";
+    let lock = sql::query(jobs).bind(library).bind(library.to_string());
+    lock.execute(&mut *transaction).await?;
     let sql = "select folder from libraries where id = $1 union all \
                select folder from flocks where library_id = $1 union all \
                select folder from fish where library_id = $1";
-    let folders = sqlx::query_scalar(sql)
+    let folders = sql::query_scalar(sql)
         .bind(library)
-        .fetch_all(&mut *connection)
+        .fetch_all(&mut *transaction)
         .await?;
     for sql in [
         "delete from flocks where library_id = $1",
         "delete from fish where library_id = $1",
         "delete from libraries where id = $1",
     ] {
-        let delete = sqlx::query(sql).bind(library);
-        delete.execute(&mut *connection).await?;
+        let delete = sql::query(sql).bind(library);
+        delete.execute(&mut *transaction).await?;
     }
     let sql = "delete from jobs where result_id = $1 \
                or kind in ('flock', 'fish') and json_extract(input, '$.library_id') = $2";
-    let delete = sqlx::query(sql).bind(library).bind(library.to_string());
-    delete.execute(&mut *connection).await?;
+    let delete = sql::query(sql).bind(library).bind(library.to_string());
+    delete.execute(&mut *transaction).await?;
     Ok(folders)
 }

@@ -3,6 +3,9 @@
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
+use sqlx::error::DatabaseError;
+use sqlx::sqlite::SqliteError;
+
 use crate::code::Code;
 
 /// The reasons, one variant each.
@@ -17,6 +20,12 @@ pub enum Error {
     /// A file could not be read or written.
     #[error("a file of the store failed: {0}")]
     Io(#[from] std::io::Error),
+    /// The bucket said no, or was not reached.
+    #[error("the bucket failed: {0}")]
+    Bucket(#[from] object_store::Error),
+    /// A file in place is not what was put there.
+    #[error("a file of the store has been altered: {0}")]
+    Altered(String),
     /// Another process serves the same folder.
     #[error("the data folder is in use by another flockreel: {}", .0.display())]
     InUse(PathBuf),
@@ -54,12 +63,14 @@ impl Error {
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::Io(error) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
-            Error::Sql(sqlx::Error::Database(error)) if is_sqlite_full(error.code()) => {
+            Error::Sql(sqlx::Error::Database(error)) if has_no_room(error.as_ref()) => {
                 Code::StorageFull
             }
             Error::Sql(_)
             | Error::Migrate(_)
             | Error::Io(_)
+            | Error::Bucket(_)
+            | Error::Altered(_)
             | Error::InUse(_)
             | Error::UnknownValue { .. } => Code::Internal,
         }
@@ -73,8 +84,11 @@ fn is_full(error: &std::io::Error) -> bool {
     )
 }
 
-/// SQLITE_FULL is 13, and so are the lowest eight bits of its extended forms.
-fn is_sqlite_full(code: Option<std::borrow::Cow<'_, str>>) -> bool {
-    code.and_then(|code| code.parse::<u32>().ok())
-        .is_some_and(|code| code & 0xff == 13)
+/// SQLITE_FULL is 13, and so are the lowest eight bits of its extended forms; PostgreSQL says `disk_full`.
+fn has_no_room(error: &dyn DatabaseError) -> bool {
+    let code = error.code().unwrap_or_default();
+    match error.try_downcast_ref::<SqliteError>() {
+        Some(_) => code.parse::<u32>().is_ok_and(|code| code & 0xff == 13),
+        None => code == "53100",
+    }
 }

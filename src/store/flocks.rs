@@ -5,7 +5,7 @@ use sqlx::types::Uuid;
 use super::jobs::Lease;
 use super::jobs::finish::Outcome;
 use super::owners::Reach;
-use super::{Connection, Error, Store};
+use super::{Error, Store, Transaction, sql};
 
 /// One flock as stored; its files lie in `folder`.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
@@ -38,7 +38,7 @@ impl Store {
                    from flocks r join libraries l on l.id = library_id \
                    join footage f on f.id = footage_id where r.id = $1 \
                    and ($2 is null or r.owner = $2)";
-        let row = sqlx::query_as(sql).bind(id).bind(reach.owner());
+        let row = sql::query(sql).bind(id).bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
@@ -55,7 +55,7 @@ impl Store {
                    join footage f on f.id = footage_id \
                    where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3) \
                    order by r.id desc limit $2";
-        let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        let rows = sql::query(sql).bind(before).bind(limit);
         let rows = rows.bind(reach.owner());
         Ok(rows.fetch_all(&self.reader).await?)
     }
@@ -63,13 +63,13 @@ impl Store {
 
 /// Adds the row, the job's owner's, in the transaction that finishes the job.
 pub(super) async fn insert(
-    connection: &mut Connection,
+    transaction: &mut Transaction,
     lease: &Lease,
     library_id: Uuid,
     outcome: &Outcome,
     now_ms: i64,
 ) -> Result<(), sqlx::Error> {
-    sqlx::query(
+    sql::query(
         "insert into flocks (id, job_id, fence, library_id, folder, params, summary, \
          size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
          (select owner from jobs where id = $2))",
@@ -83,7 +83,7 @@ pub(super) async fn insert(
     .bind(&outcome.summary)
     .bind(outcome.size_bytes())
     .bind(now_ms)
-    .execute(connection)
+    .execute(transaction)
     .await?;
     Ok(())
 }

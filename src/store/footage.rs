@@ -3,7 +3,7 @@
 use sqlx::types::Uuid;
 
 use super::owners::{Owner, Reach};
-use super::{BlobFile, Draft, Error, Store, blobs};
+use super::{BlobFile, Draft, Error, Store, blobs, sql};
 
 /// The name of the video's file in its folder.
 pub const VIDEO: &str = "video";
@@ -62,14 +62,14 @@ impl Store {
             return Ok(Added::Known(known));
         }
         footage.folder = format!("footage/{}", footage.id);
-        self.adopt(draft, &footage.folder).await?;
+        self.blobs.adopt(draft, &footage.folder).await?;
         match self.insert_footage(&footage, files).await {
             Ok(()) => {
                 tracing::info!(footage.id = %footage.id, size_bytes = footage.size_bytes, "footage stored");
                 Ok(Added::New(footage))
             }
             Err(error) => {
-                self.blobs.discard(&footage.folder)?;
+                self.blobs.discard(&footage.folder).await?;
                 // Two uploads of the same bytes at once: the other one came first.
                 match self.footage_of_bytes(&footage).await? {
                     Some(known) => Ok(Added::Known(known)),
@@ -82,7 +82,7 @@ impl Store {
     /// One footage, if it is there and within reach.
     pub async fn footage(&self, id: Uuid, reach: &Reach) -> Result<Option<Footage>, Error> {
         let sql = "select * from footage where id = $1 and ($2 is null or owner = $2)";
-        let row = sqlx::query_as(sql).bind(id).bind(reach.owner());
+        let row = sql::query(sql).bind(id).bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
@@ -95,7 +95,7 @@ impl Store {
     ) -> Result<Vec<Footage>, Error> {
         let sql = "select * from footage where ($1 is null or id < $1) \
                    and ($3 is null or owner = $3) order by id desc limit $2";
-        let rows = sqlx::query_as(sql).bind(before).bind(limit);
+        let rows = sql::query(sql).bind(before).bind(limit);
         let rows = rows.bind(reach.owner());
         Ok(rows.fetch_all(&self.reader).await?)
     }
@@ -103,17 +103,11 @@ impl Store {
     async fn footage_of_bytes(&self, footage: &Footage) -> Result<Option<Footage>, Error> {
         let sql = "select * from footage where sha256 = $1 and background_sha256 = $2 \
                    and owner = $3";
-        let row = sqlx::query_as(sql)
+        let row = sql::query(sql)
             .bind(&footage.sha256)
             .bind(&footage.background_sha256)
             .bind(&footage.owner);
         Ok(row.fetch_optional(&self.reader).await?)
-    }
-
-    async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
-        let (blobs, folder) = (self.blobs.clone(), folder.to_owned());
-        let adopted = tokio::task::spawn_blocking(move || blobs.adopt(draft, &folder)).await;
-        Ok(adopted.map_err(std::io::Error::other)??)
     }
 
     async fn insert_footage(
@@ -122,7 +116,7 @@ impl Store {
         files: &[BlobFile],
     ) -> Result<(), sqlx::Error> {
         let mut transaction = self.begin().await?;
-        sqlx::query(
+        sql::query(
             "insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, \
              height, fps, n_frames_hint, sample, created_ms, owner) \
              values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13)",
@@ -140,7 +134,7 @@ impl Store {
         .bind(footage.sample)
         .bind(footage.created_ms)
         .bind(&footage.owner)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         blobs::insert(&mut transaction, &footage.folder, files).await?;
         transaction.commit().await

@@ -5,10 +5,13 @@
 
 use sqlx::types::Uuid;
 
-use super::{Error, Store};
+use super::{Error, Store, sql};
 
 /// How long an answer is kept, milliseconds.
 pub const KEPT_MS: i64 = 24 * 3600 * 1000;
+
+/// A request that has held its key for longer is given up, milliseconds: an upload over a slow line may take so long.
+const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
 
 /// Where a key means what it means.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,6 +30,7 @@ pub struct Answer {
     /// SHA-256 of the body that it answers.
     pub body_sha256: Vec<u8>,
     /// HTTP status, below 500.
+    #[sqlx(try_from = "i64")]
     pub status: u16,
     /// Headers, JSON: pairs of name and value.
     pub headers: String,
@@ -57,18 +61,21 @@ impl Store {
         now_ms: i64,
     ) -> Result<Begun, Error> {
         let mut transaction = self.begin().await?;
-        sqlx::query("delete from idempotency where created_ms <= $1")
+        // Two at once: one begins, and the other one learns of it.
+        let name = format!("key {} {} {}", scope.caller, scope.route, scope.key);
+        transaction.lock(&name).await?;
+        sql::query("delete from idempotency where created_ms <= $1")
             .bind(now_ms - KEPT_MS)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
-        let known: Option<(String, Uuid, Option<Vec<u8>>)> = sqlx::query_as(
+        let known: Option<(String, Uuid, Option<Vec<u8>>)> = sql::query(
             "select state, ids, body_sha256 from idempotency \
              where caller = $1 and route = $2 and key = $3",
         )
         .bind(&scope.caller)
         .bind(&scope.route)
         .bind(&scope.key)
-        .fetch_optional(&mut *transaction)
+        .fetch_optional(&mut transaction)
         .await?;
         let ids = match known {
             Some((state, _, _)) if state == "running" => return Ok(Begun::Running),
@@ -81,9 +88,10 @@ impl Store {
             Some((_, ids, _)) => ids,
             None => Uuid::now_v7(),
         };
-        sqlx::query(
+        sql::query(
             "insert into idempotency (caller, route, key, ids, state, body_sha256, created_ms) \
-             values ($1, $2, $3, $4, 'running', $5, $6) on conflict do update set state = 'running'",
+             values ($1, $2, $3, $4, 'running', $5, $6) \
+             on conflict (caller, route, key) do update set state = 'running'",
         )
         .bind(&scope.caller)
         .bind(&scope.route)
@@ -91,14 +99,14 @@ impl Store {
         .bind(ids)
         .bind(body_sha256)
         .bind(now_ms)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         Ok(Begun::Run(ids))
     }
 
     async fn answer(&self, scope: &Scope) -> Result<Answer, Error> {
-        let row = sqlx::query_as(
+        let row = sql::query(
             "select body_sha256, status, headers, answer from idempotency \
              where caller = $1 and route = $2 and key = $3",
         );
@@ -108,7 +116,7 @@ impl Store {
 
     /// Notes the answer to the request that holds the key.
     pub async fn finish_key(&self, scope: &Scope, answer: &Answer) -> Result<(), Error> {
-        sqlx::query(
+        sql::query(
             "update idempotency set state = 'done', body_sha256 = $4, status = $5, headers = $6, \
              answer = $7 where caller = $1 and route = $2 and key = $3 and state = 'running'",
         )
@@ -116,7 +124,7 @@ impl Store {
         .bind(&scope.route)
         .bind(&scope.key)
         .bind(&answer.body_sha256)
-        .bind(answer.status)
+        .bind(i64::from(answer.status))
         .bind(&answer.headers)
         .bind(&answer.answer)
         .execute(&self.writer)
@@ -126,7 +134,7 @@ impl Store {
 
     /// Gives the key back: its request ended without an answer to keep.
     pub async fn interrupt_key(&self, scope: &Scope) -> Result<(), Error> {
-        sqlx::query(
+        sql::query(
             "update idempotency set state = 'interrupted' \
              where caller = $1 and route = $2 and key = $3 and state = 'running'",
         )
@@ -138,11 +146,20 @@ impl Store {
         Ok(())
     }
 
-    /// Gives every key back, at the start of the process: whoever held one is gone, because the store's
-    /// lock on the data folder is held.
-    pub async fn interrupt_all_keys(&self) -> Result<(), Error> {
-        let sql = "update idempotency set state = 'interrupted' where state = 'running'";
-        sqlx::query(sql).execute(&self.writer).await?;
+    /// Gives keys back whose holders are gone, at the start of the process: everyone, where the store is
+    /// this process's alone; otherwise those who have held theirs for longer than a request lasts.
+    pub async fn interrupt_keys(&self, now_ms: i64) -> Result<(), Error> {
+        let held_before_ms = match self.is_alone() {
+            true => i64::MAX,
+            false => now_ms - LONGEST_REQUEST_MS,
+        };
+        sql::query(
+            "update idempotency set state = 'interrupted' \
+             where state = 'running' and created_ms < $1",
+        )
+        .bind(held_before_ms)
+        .execute(&self.writer)
+        .await?;
         Ok(())
     }
 }
@@ -150,6 +167,7 @@ impl Store {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::fresh;
 
     fn scope() -> Scope {
         Scope {
@@ -162,7 +180,7 @@ mod tests {
     #[tokio::test]
     async fn an_answer_is_kept_for_a_day_and_not_longer() {
         let data = tempfile::tempdir().unwrap();
-        let store = Store::open(data.path()).await.unwrap();
+        let store = fresh::open(data.path()).await;
         let Begun::Run(first) = store.begin_key(&scope(), None, 0).await.unwrap() else {
             panic!("nobody had this key");
         };
@@ -182,11 +200,11 @@ mod tests {
     #[tokio::test]
     async fn an_interrupted_request_runs_again_under_its_ids_and_with_its_body() {
         let data = tempfile::tempdir().unwrap();
-        let store = Store::open(data.path()).await.unwrap();
+        let store = fresh::open(data.path()).await;
         let first = store.begin_key(&scope(), Some(&[1; 32]), 0).await.unwrap();
         let met = store.begin_key(&scope(), Some(&[1; 32]), 1).await.unwrap();
         assert_eq!(met, Begun::Running);
-        store.interrupt_all_keys().await.unwrap();
+        store.interrupt_keys(LONGEST_REQUEST_MS + 1).await.unwrap();
         let met = store.begin_key(&scope(), Some(&[2; 32]), 2).await.unwrap();
         assert_eq!(met, Begun::OtherBody);
         let met = store.begin_key(&scope(), Some(&[1; 32]), 3).await.unwrap();

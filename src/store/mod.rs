@@ -1,9 +1,8 @@
-//! What outlives the process: rows in SQLite, files in a folder (RELIABILITY.md, store and queue
-//! rules). SQL exists in this folder only, a file per table.
+//! What outlives the process: rows in a database, files in a folder (RELIABILITY.md, store and queue
+//! rules). SQL exists in this folder only, a file per table, one text for both engines (`sql`).
 //!
-//! One writer connection and a pool of readers: with one writer nobody upgrades a read snapshot, so
-//! nobody meets `database is locked`. No transaction awaits anything but SQL. Times come in as
-//! arguments, milliseconds since 1970 (UTC).
+//! No transaction awaits anything but SQL. Times come in as arguments, milliseconds since 1970 (UTC);
+//! where several machines share the database they are to be its own ([`Store::clock_ms`]).
 
 pub mod blobs;
 pub mod check;
@@ -19,78 +18,100 @@ pub mod libraries;
 pub mod owners;
 pub mod room;
 pub mod spill;
+mod sql;
 pub mod sweep;
 pub mod tokens;
 pub mod uploads;
 
 use std::fs::{File, TryLockError};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use sqlx::SqlitePool;
-use sqlx::migrate::Migrator;
-use sqlx::sqlite::{
-    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous,
-};
-
-pub use blobs::{BlobFile, Blobs, Draft};
+pub use blobs::{BlobFile, Blobs, Draft, Fetched};
 pub use error::Error;
 pub use spill::Spill;
 
-static MIGRATIONS: Migrator = sqlx::migrate!("migrations/sqlite");
-const READERS: u32 = 4;
+use crate::config::{Database, Storage};
+use sql::{Pool, Transaction};
+
+#[cfg(test)]
+mod fresh;
 
 /// The open store: cheap to clone, one per process and folder.
 #[derive(Clone)]
 pub struct Store {
-    writer: SqlitePool,
-    reader: SqlitePool,
+    writer: Pool,
+    reader: Pool,
     blobs: Blobs,
     holders: uploads::Holders,
-    /// Held while the store is open: whoever holds it knows that every other process is gone.
-    _lock: Option<Arc<File>>,
+    /// Held while the store is open: whoever holds them knows that no other process serves the same folder.
+    locks: Arc<Vec<File>>,
+    is_alone: bool,
 }
 
 impl Store {
-    /// Opens the folder, made if absent, and brings the database to this version's form. Fails with
-    /// [`Error::InUse`] when another process has it open.
-    pub async fn open(data: &Path) -> Result<Store, Error> {
-        std::fs::create_dir_all(data)?;
-        let lock = lock(data)?;
-        Store::connect(data, Some(lock)).await
+    /// Opens the store, made if absent, and brings the database to this version's form. Fails with
+    /// [`Error::InUse`] when another process serves the same data folder or file of rows.
+    pub async fn open(storage: impl Into<Storage>) -> Result<Store, Error> {
+        let storage = storage.into();
+        std::fs::create_dir_all(&storage.data)?;
+        let mut locks = vec![lock(&storage.data.join("lock"))?];
+        if let Some(Database::Sqlite(file)) = &storage.database {
+            locks.push(lock(&file.with_extension("lock"))?);
+        }
+        Store::connect(&storage, locks).await
     }
 
-    /// The same, but beside a process that has the folder open, where there is one: for rows that do
-    /// not belong to that process, as those of tokens. The database's form is that process's then.
-    pub async fn open_beside(data: &Path) -> Result<Store, Error> {
-        match Store::open(data).await {
-            Err(Error::InUse(_)) => Store::connect(data, None).await,
+    /// The same, but beside whatever process has it open: for workers, and for rows that do not belong to
+    /// that process, as those of tokens. The form of a file of rows is that process's then.
+    pub async fn open_beside(storage: impl Into<Storage>) -> Result<Store, Error> {
+        let storage = storage.into();
+        if let Database::Postgres(_) = storage.database() {
+            return Store::connect(&storage, Vec::new()).await;
+        }
+        match Store::open(storage.clone()).await {
+            Err(Error::InUse(_)) => Store::connect(&storage, Vec::new()).await,
             opened => opened,
         }
     }
 
-    async fn connect(data: &Path, lock: Option<File>) -> Result<Store, Error> {
-        let blobs = Blobs::open(data)?;
-        let options = options(data.join("flockreel.db"));
-        let writer = SqlitePoolOptions::new()
-            .max_connections(1)
-            .connect_with(options.clone())
-            .await?;
-        if lock.is_some() {
-            MIGRATIONS.run(&writer).await?;
-        }
-        let reader = SqlitePoolOptions::new()
-            .max_connections(READERS)
-            .connect_with(options.read_only(true))
-            .await?;
+    async fn connect(storage: &Storage, locks: Vec<File>) -> Result<Store, Error> {
+        let is_locked = !locks.is_empty();
+        let blobs = Blobs::open(storage).await?;
+        let (writer, reader, is_alone) = match storage.database() {
+            Database::Sqlite(file) => {
+                let [writer, reader] = Pool::open_sqlite(&file, is_locked).await?;
+                (writer, reader, is_locked)
+            }
+            Database::Postgres(url) => {
+                let pool = Pool::open_postgres(&url).await?;
+                (pool.clone(), pool, false)
+            }
+        };
         Ok(Store {
             writer,
             reader,
             blobs,
             holders: uploads::Holders::default(),
-            _lock: lock.map(Arc::new),
+            locks: Arc::new(locks),
+            is_alone,
         })
+    }
+
+    /// Whether every lease that stands was given by a process that is gone: no other can have the rows.
+    pub fn is_alone(&self) -> bool {
+        self.is_alone
+    }
+
+    /// Whether the data folder is this process's: then so are the uploads that grow in it.
+    pub fn serves(&self) -> bool {
+        !self.locks.is_empty()
+    }
+
+    /// The time by the database's clock, where processes with clocks of their own share the database.
+    pub async fn clock_ms(&self) -> Result<Option<i64>, Error> {
+        Ok(self.reader.clock_ms().await?)
     }
 
     /// The files.
@@ -111,32 +132,22 @@ impl Store {
     pub async fn close(&self) {
         self.reader.close().await;
         self.writer.close().await;
+        self.blobs.work().close();
     }
 
-    /// A write transaction that holds the writer's lock from its first statement.
-    async fn begin(&self) -> Result<sqlx::Transaction<'static, sqlx::Sqlite>, sqlx::Error> {
-        self.writer.begin_with("BEGIN IMMEDIATE").await
+    async fn begin(&self) -> Result<Transaction, sqlx::Error> {
+        self.writer.begin().await
     }
 }
 
-fn lock(data: &Path) -> Result<File, Error> {
-    let file = File::create(data.join("lock"))?;
+fn lock(path: &Path) -> Result<File, Error> {
+    let file = File::create(path)?;
     match file.try_lock() {
         Ok(()) => Ok(file),
-        Err(TryLockError::WouldBlock) => Err(Error::InUse(data.to_owned())),
+        Err(TryLockError::WouldBlock) => {
+            let folder = path.parent().unwrap_or(path);
+            Err(Error::InUse(folder.to_owned()))
+        }
         Err(TryLockError::Error(error)) => Err(error.into()),
     }
 }
-
-fn options(database: PathBuf) -> SqliteConnectOptions {
-    SqliteConnectOptions::new()
-        .filename(database)
-        .create_if_missing(true)
-        .journal_mode(SqliteJournalMode::Wal)
-        .synchronous(SqliteSynchronous::Full)
-        .foreign_keys(true)
-        .busy_timeout(Duration::from_secs(5))
-}
-
-/// Where a statement that may be part of a transaction runs.
-type Connection = SqliteConnection;

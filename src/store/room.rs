@@ -1,37 +1,45 @@
-//! Room on the disk that holds the files (RELIABILITY.md, R7): how much is left, and whether it can
-//! be written at all. A reserve is kept, so that rows can still be written and things deleted.
+//! Room on this machine's disk (RELIABILITY.md, R7): how much is left, and whether it can be written at
+//! all. A reserve is kept, so that rows can still be written and things deleted.
 
-use std::fs::File;
 use std::io;
+use std::path::PathBuf;
 
-use super::Blobs;
+use super::blobs::Blobs;
 
 impl Blobs {
-    /// Bytes that can still be written by us.
+    /// Bytes that we can still write where uploads and results grow: on the fuller one, where they grow
+    /// on two disks.
     pub fn room_bytes(&self) -> io::Result<u64> {
-        let disk = rustix::fs::statvfs(self.root())?;
-        Ok(disk.f_bavail.saturating_mul(disk.f_frsize))
+        let mut least = u64::MAX;
+        for folder in self.growing() {
+            let disk = rustix::fs::statvfs(&folder)?;
+            least = least.min(disk.f_bavail.saturating_mul(disk.f_frsize));
+        }
+        Ok(least)
     }
 
-    /// Whether a file can be made and removed again. Blocks.
+    /// Whether a folder can be made and removed again. Blocks.
     pub fn is_writable(&self) -> bool {
-        let path = self.tmp().join(".writable");
-        let made = File::create(&path).is_ok();
-        // What is not there need not be removed.
-        std::fs::remove_file(&path).is_ok() && made
+        self.draft(&uuid::Uuid::now_v7().to_string()).is_ok()
+    }
+
+    /// The folders of this machine that grow.
+    fn growing(&self) -> [PathBuf; 2] {
+        [self.uploads().to_owned(), self.tmp().to_owned()]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::Storage;
 
-    #[test]
-    fn a_usual_folder_has_room_and_can_be_written() {
+    #[tokio::test]
+    async fn a_usual_folder_has_room_and_can_be_written() {
         let data = tempfile::tempdir().unwrap();
-        let blobs = Blobs::open(data.path()).unwrap();
+        let blobs = Blobs::open(&Storage::from(data.path())).await.unwrap();
         assert!(blobs.room_bytes().unwrap() > 0 && blobs.is_writable());
-        std::fs::remove_dir(blobs.tmp()).unwrap();
+        std::fs::remove_dir_all(blobs.tmp()).unwrap();
         assert!(!blobs.is_writable());
     }
 }

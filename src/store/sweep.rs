@@ -1,7 +1,6 @@
 //! Removes what a crash left behind: drafts, and folders that no row names (RELIABILITY.md, store
 //! rules and R5).
 
-use std::fs;
 use std::time::{Duration, SystemTime};
 
 use super::{Error, Store};
@@ -12,31 +11,23 @@ const GRACE: Duration = Duration::from_secs(3600);
 /// What a sweep removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Swept {
-    /// Drafts under `tmp/`.
+    /// What processes that are gone were making.
     pub n_drafts: usize,
-    /// Folders under `blobs/` that no row named.
+    /// Folders in place that no row named.
     pub n_folders: usize,
 }
 
 impl Store {
-    /// Sweeps at the start of the process: every draft (the store's lock is held, so nobody is
-    /// writing one), and every folder that no row names and that is older than an hour.
+    /// Sweeps what processes that are gone were making, and every folder that no row names and that is
+    /// older than an hour.
     pub async fn sweep(&self, now: SystemTime) -> Result<Swept, Error> {
-        let mut swept = Swept::default();
-        for entry in fs::read_dir(self.blobs.tmp())? {
-            let path = entry?.path();
-            if path.is_dir() {
-                fs::remove_dir_all(path)?;
-            } else {
-                fs::remove_file(path)?;
-            }
-            swept.n_drafts += 1;
-        }
-        self.sweep_upload_files().await?;
-        for folder in self.folders_without_row().await? {
-            let modified = fs::metadata(self.blobs.folder(&folder))?.modified()?;
+        let mut swept = Swept {
+            n_drafts: self.blobs.work().sweep()?,
+            n_folders: 0,
+        };
+        for (folder, modified) in self.folders_without_row().await? {
             if now.duration_since(modified).is_ok_and(|age| age > GRACE) {
-                self.blobs.discard(&folder)?;
+                self.blobs.discard(&folder).await?;
                 swept.n_folders += 1;
             }
         }
@@ -50,15 +41,12 @@ impl Store {
         Ok(swept)
     }
 
-    /// The folders on disk that no row names, in no special order.
-    pub(super) async fn folders_without_row(&self) -> Result<Vec<String>, Error> {
+    /// The folders in place that no row names, each with the time of its youngest file.
+    pub(super) async fn folders_without_row(&self) -> Result<Vec<(String, SystemTime)>, Error> {
         let mut strays = Vec::new();
-        for kind in ["footage", "libraries", "flocks", "fish"] {
-            for entry in fs::read_dir(self.blobs.root().join(kind))? {
-                let folder = format!("{kind}/{}", entry?.file_name().to_string_lossy());
-                if !self.is_folder_known(&folder).await? {
-                    strays.push(folder);
-                }
+        for (folder, modified) in self.blobs.folders().await? {
+            if !self.is_folder_known(&folder).await? {
+                strays.push((folder, modified));
             }
         }
         Ok(strays)

@@ -4,8 +4,8 @@
 
 use std::collections::HashMap;
 use std::fs;
-use std::io::SeekFrom;
-use std::path::PathBuf;
+use std::io::{ErrorKind, SeekFrom};
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use sqlx::types::Uuid;
@@ -17,7 +17,7 @@ use tokio_util::sync::CancellationToken;
 use super::blobs::hash_file;
 use super::footage::VIDEO;
 use super::owners::{Owner, Reach};
-use super::{BlobFile, Draft, Error, Store};
+use super::{BlobFile, Draft, Error, Store, sql};
 
 /// How long an upload waits for its next bytes, milliseconds.
 pub const LIFE_MS: i64 = 24 * 3600 * 1000;
@@ -71,7 +71,7 @@ impl Store {
         File::create_new(self.upload_path(upload.id)).await?;
         let sql = "insert into uploads (id, name, size_bytes, expires_ms, owner) \
                    values ($1, $2, $3, $4, $5)";
-        sqlx::query(sql)
+        sql::query(sql)
             .bind(upload.id)
             .bind(&upload.name)
             .bind(upload.size_bytes)
@@ -91,7 +91,7 @@ impl Store {
     ) -> Result<Option<Upload>, Error> {
         let sql = "select * from uploads where id = $1 and expires_ms > $2 \
                    and ($3 is null or owner = $3)";
-        let row = sqlx::query_as(sql).bind(id).bind(now_ms);
+        let row = sql::query(sql).bind(id).bind(now_ms);
         let row = row.bind(reach.owner());
         Ok(row.fetch_optional(&self.reader).await?)
     }
@@ -127,7 +127,7 @@ impl Store {
     /// Notes how many bytes are safe, after they have been synced.
     pub async fn note_upload(&self, upload: &Upload) -> Result<(), Error> {
         let sql = "update uploads set offset_bytes = $2, expires_ms = $3 where id = $1";
-        let update = sqlx::query(sql).bind(upload.id).bind(upload.offset_bytes);
+        let update = sql::query(sql).bind(upload.id).bind(upload.offset_bytes);
         update.bind(upload.expires_ms).execute(&self.writer).await?;
         Ok(())
     }
@@ -138,7 +138,7 @@ impl Store {
         let made = tokio::task::spawn_blocking(move || {
             let draft = blobs.draft(&Uuid::now_v7().to_string())?;
             let video = draft.path().join(VIDEO);
-            fs::hard_link(path, &video)?;
+            link(&path, &video)?;
             let (size_bytes, sha256) = hash_file(&video)?;
             let name = VIDEO.to_owned();
             Ok((
@@ -155,7 +155,7 @@ impl Store {
 
     /// Notes the footage that the upload became; its own file goes.
     pub async fn end_upload(&self, upload: &Upload, footage: Uuid) -> Result<(), Error> {
-        let update = sqlx::query("update uploads set footage_id = $2 where id = $1");
+        let update = sql::query("update uploads set footage_id = $2 where id = $1");
         let update = update.bind(upload.id).bind(footage);
         update.execute(&self.writer).await?;
         self.remove_upload_file(upload.id)
@@ -163,7 +163,7 @@ impl Store {
 
     /// Gives an upload up, with its bytes.
     pub async fn delete_upload(&self, id: Uuid) -> Result<(), Error> {
-        let delete = sqlx::query("delete from uploads where id = $1").bind(id);
+        let delete = sql::query("delete from uploads where id = $1").bind(id);
         delete.execute(&self.writer).await?;
         self.remove_upload_file(id)
     }
@@ -172,7 +172,7 @@ impl Store {
     /// [`Store::create_upload`], which makes the file before the row: at the start, or for expired rows alone.
     pub async fn sweep_uploads(&self, now_ms: i64) -> Result<usize, Error> {
         let sql = "delete from uploads where expires_ms <= $1 returning id";
-        let expired: Vec<Uuid> = sqlx::query_scalar(sql)
+        let expired: Vec<Uuid> = sql::query_scalar(sql)
             .bind(now_ms)
             .fetch_all(&self.writer)
             .await?;
@@ -183,9 +183,9 @@ impl Store {
     }
 
     /// Removes files that no unfinished upload names: at the start of the process.
-    pub(super) async fn sweep_upload_files(&self) -> Result<(), Error> {
+    pub async fn sweep_upload_files(&self) -> Result<(), Error> {
         let sql = "select id from uploads where footage_id is null";
-        let known: Vec<Uuid> = sqlx::query_scalar(sql).fetch_all(&self.reader).await?;
+        let known: Vec<Uuid> = sql::query_scalar(sql).fetch_all(&self.reader).await?;
         for entry in fs::read_dir(self.blobs.uploads())? {
             let entry = entry?;
             let id = entry.file_name().to_string_lossy().parse::<Uuid>().ok();
@@ -205,6 +205,17 @@ impl Store {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error.into()),
             _ => Ok(()),
         }
+    }
+}
+
+/// The same file under another name; a copy where that is on another disk.
+fn link(file: &Path, name: &Path) -> std::io::Result<()> {
+    match fs::hard_link(file, name) {
+        Err(error) if error.kind() == ErrorKind::CrossesDevices => {
+            fs::copy(file, name)?;
+            fs::File::open(name)?.sync_all()
+        }
+        linked => linked,
     }
 }
 

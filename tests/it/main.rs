@@ -12,4 +12,5 @@ mod common;
 mod film;
 mod jobs;
 pub(crate) mod media;
+mod scale;
 mod tidy;

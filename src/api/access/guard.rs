@@ -42,6 +42,9 @@ const HEADERS: [(HeaderName, HeaderValue); 6] = [
 /// The longest address that is read, bytes: ours are a tenth of that.
 const MAX_ADDRESS_BYTES: usize = 8 << 10;
 
+/// The largest sum of all header fields, bytes. The server's own bound is on what it reads at once.
+const MAX_FIELDS_BYTES: usize = 32 << 10;
+
 /// The names under which the service may be asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::api) enum Names {
@@ -78,6 +81,13 @@ fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Resul
     let address = uri.path_and_query().map_or("", |address| address.as_str());
     if address.len() > MAX_ADDRESS_BYTES {
         return Err(Code::AddressTooLong.into());
+    }
+    let fields = headers.iter();
+    let n_bytes: usize = fields
+        .map(|(name, value)| name.as_str().len() + value.len())
+        .sum();
+    if n_bytes > MAX_FIELDS_BYTES {
+        return Err(Code::HeadTooLarge.into());
     }
     // What is packed small may unfold large, and nothing that is sent here is worth packing.
     if headers.contains_key(header::CONTENT_ENCODING) {

@@ -3,14 +3,9 @@
 
 mod range;
 
-use std::io::SeekFrom;
-
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Response, StatusCode, header};
 use axum::response::IntoResponse;
-use tokio::fs::File;
-use tokio::io::{AsyncReadExt, AsyncSeekExt};
-use tokio_util::io::ReaderStream;
 
 use self::range::{Wanted, wanted};
 use super::Problem;
@@ -18,9 +13,6 @@ use super::extract::Conditions;
 use crate::code::Code;
 use crate::store::Store;
 use crate::store::blobs::hex;
-
-/// Bytes read at a time: each read is a hop to the blocking pool.
-const CHUNK_BYTES: usize = 1 << 20;
 
 /// A file to be sent.
 #[derive(Clone, Debug)]
@@ -91,17 +83,8 @@ impl Download<'_> {
     }
 
     async fn bytes(&self, store: &Store, first: u64, n_bytes: u64) -> Result<Body, Problem> {
-        let open = async {
-            let mut file = File::open(store.blobs().path(self.folder, self.name)).await?;
-            file.set_max_buf_size(CHUNK_BYTES);
-            file.seek(SeekFrom::Start(first)).await?;
-            Ok(file.take(n_bytes))
-        };
-        let part = open.await.map_err(crate::store::Error::Io)?;
-        Ok(Body::from_stream(ReaderStream::with_capacity(
-            part,
-            CHUNK_BYTES,
-        )))
+        let part = store.blobs().read(self.folder, self.name, first, n_bytes);
+        Ok(Body::from_stream(part.await?))
     }
 }
 

@@ -14,7 +14,7 @@ use utoipa::ToSchema;
 
 use self::film::{Backdrop, Film, Output, Target};
 use super::allotted::next_id;
-use super::{Attempt, Context, Error, Product, Stages, clock};
+use super::{Attempt, Context, Error, Product, Stages};
 use crate::flock::composite::params::{Format, Render};
 use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, library_dir, svg};
@@ -76,7 +76,7 @@ pub async fn enqueue(
         after_job,
         priority: 0,
     };
-    context.store.enqueue(&job, clock::now_ms()).await?;
+    context.store.enqueue(&job, context.now_ms().await?).await?;
     context.wake.notify_one();
     Ok((job_id, flock_id))
 }
@@ -84,9 +84,9 @@ pub async fn enqueue(
 impl Input {
     /// Simulates, plans, renders.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let (_, folder) = attempt.library(self.library_id)?;
+        let (_, files) = attempt.library(self.library_id)?;
         attempt.listener.report("loading", 0.0);
-        let library = library_dir::read(&folder, attempt.scratch())?.library;
+        let library = library_dir::read(files.path(), attempt.scratch())?.library;
         let flock = plan_flock(&library, &self.params, attempt.listener)?;
         let folder = attempt.folder();
         std::fs::write(folder.join("flock.json"), flock_json::write(&flock))?;

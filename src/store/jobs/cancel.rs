@@ -4,7 +4,7 @@ use super::JobState;
 use super::follow::cancel_followers;
 use crate::ids::JobId;
 use crate::store::owners::Reach;
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 /// What a wish to cancel met.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,11 +23,11 @@ impl Store {
     /// Cancels a queued job at once, asks the worker of a running one to stop.
     pub async fn cancel(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
         let mut transaction = self.begin().await?;
-        let sql = "select state from jobs where id = $1 and ($2 is null or owner = $2)";
-        let state: Option<String> = sqlx::query_scalar(sql)
+        let sql = "select state from jobs where id = $1 and ($2 is null or owner = $2) for update";
+        let state: Option<String> = sql::query_scalar(sql)
             .bind(job.0)
             .bind(reach.owner())
-            .fetch_optional(&mut *transaction)
+            .fetch_optional(&mut transaction)
             .await?;
         let Some(state) = state else {
             return Ok(Cancel::Absent);
@@ -35,14 +35,14 @@ impl Store {
         let met = match JobState::from_name(&state)? {
             JobState::Queued => {
                 let sql = "update jobs set state = 'cancelled', finished_ms = $2 where id = $1";
-                let update = sqlx::query(sql).bind(job.0).bind(now_ms);
-                update.execute(&mut *transaction).await?;
+                let update = sql::query(sql).bind(job.0).bind(now_ms);
+                update.execute(&mut transaction).await?;
                 cancel_followers(&mut transaction, job.0, now_ms).await?;
                 Cancel::Cancelled
             }
             JobState::Running => {
-                let update = sqlx::query("update jobs set cancel_requested = 1 where id = $1");
-                update.bind(job.0).execute(&mut *transaction).await?;
+                let update = sql::query("update jobs set cancel_requested = true where id = $1");
+                update.bind(job.0).execute(&mut transaction).await?;
                 Cancel::Requested
             }
             ended => Cancel::Final(ended),

@@ -5,7 +5,7 @@ use sqlx::types::Uuid;
 
 use super::{Kind, Lease};
 use crate::ids::JobId;
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 impl Store {
     /// The next job whose turn it is: of the owner with the fewest running jobs; highest priority
@@ -17,7 +17,7 @@ impl Store {
         now_ms: i64,
         lease_ms: i64,
     ) -> Result<Option<Lease>, Error> {
-        let row: Option<(Uuid, String, String, Uuid, i64, i64)> = sqlx::query_as(
+        let row: Option<(Uuid, String, String, Uuid, i64, i64)> = sql::query(
             "with turns (owner, n_running, last_ms) as ( \
                  select owner, (select count(*) from jobs r \
                                 where r.owner = q.owner and r.state = 'running'), \
@@ -31,7 +31,7 @@ impl Store {
                  where j.state = 'queued' and j.run_at_ms <= $2 \
                  and (j.after_job is null \
                       or exists (select 1 from jobs a where a.id = j.after_job and a.state = 'done')) \
-                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.id limit 1) \
+                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.id limit 1 for update of j skip locked) \
              returning id, kind, input, result_id, attempt, fence",
         )
         .bind(worker)

@@ -5,7 +5,10 @@ use sqlx::types::Uuid;
 use super::Kind;
 use crate::ids::JobId;
 use crate::store::owners::Account;
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, Transaction, sql};
+
+/// What a server tells all who listen.
+const QUEUED: &str = "flockreel_jobs";
 
 /// A job to be queued.
 #[derive(Clone, Debug)]
@@ -28,14 +31,17 @@ pub struct NewJob {
 
 impl Store {
     /// Adds the job to the queue; [`Error::QuotaExceeded`] where its owner has too many queued and
-    /// running already. Counted and added in one statement, so that two at once cannot both be the last. A job
+    /// running already. Counted and added under one lock, so that two at once cannot both be the last. A job
     /// that is there already under its id, because its request comes again after a crash, is left as it is;
     /// [`Error::IdInUse`] where that one has another input.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
-        if self.is_queued_already(job).await? {
+        let mut transaction = self.begin().await?;
+        let Account { owner, quota } = &job.account;
+        transaction.lock(&format!("jobs of {}", owner.0)).await?;
+        if is_queued_already(&mut transaction, job).await? {
             return Ok(());
         }
-        let added = sqlx::query(
+        let added = sql::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
              created_ms, owner) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8 \
              where $9 is null or $9 > (select count(*) from jobs \
@@ -48,25 +54,43 @@ impl Store {
         .bind(job.after_job.map(|id| id.0))
         .bind(job.priority)
         .bind(now_ms)
-        .bind(&job.account.owner)
-        .bind(job.account.quota)
-        .execute(&self.writer)
+        .bind(owner)
+        .bind(*quota)
+        .execute(&mut transaction)
         .await?;
-        if let (0, Some(quota)) = (added.rows_affected(), job.account.quota) {
+        if let (0, Some(quota)) = (added, *quota) {
             return Err(Error::QuotaExceeded { quota });
         }
+        transaction.notify(QUEUED).await?;
+        transaction.commit().await?;
         tracing::info!(job.id = %job.job_id, job.kind = job.kind.name(), "job queued");
         Ok(())
     }
 
-    async fn is_queued_already(&self, job: &NewJob) -> Result<bool, Error> {
-        let input: Option<String> = sqlx::query_scalar("select input from jobs where id = $1")
-            .bind(job.job_id.0)
-            .fetch_optional(&self.writer)
-            .await?;
-        match input {
-            Some(input) if input != job.input => Err(Error::IdInUse(job.job_id.0)),
-            found => Ok(found.is_some()),
-        }
+    /// Hears of jobs that any process queues.
+    pub async fn listen(&self) -> Result<QueuedJobs, Error> {
+        Ok(QueuedJobs(self.reader.listen(QUEUED).await?))
+    }
+}
+
+/// Where a process hears that there are jobs, its own and those of others.
+pub struct QueuedJobs(sql::Listener);
+
+impl QueuedJobs {
+    /// Returns once a job was queued since the last call, or may have been. Never where no other process
+    /// queues jobs; an error is a lost connection, and then one listens anew.
+    pub async fn next(&mut self) -> Result<(), Error> {
+        Ok(self.0.heard().await?)
+    }
+}
+
+async fn is_queued_already(transaction: &mut Transaction, job: &NewJob) -> Result<bool, Error> {
+    let input: Option<String> = sql::query_scalar("select input from jobs where id = $1")
+        .bind(job.job_id.0)
+        .fetch_optional(transaction)
+        .await?;
+    match input {
+        Some(input) if input != job.input => Err(Error::IdInUse(job.job_id.0)),
+        found => Ok(found.is_some()),
     }
 }

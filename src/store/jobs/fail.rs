@@ -3,7 +3,7 @@
 use super::follow::{cancel_followers, fail_followers};
 use super::{Change, Lease};
 use crate::code::Code;
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 impl Store {
     /// Ends the job as failed, for a reason that another attempt would meet again.
@@ -15,7 +15,7 @@ impl Store {
         now_ms: i64,
     ) -> Result<Change, Error> {
         let mut transaction = self.begin().await?;
-        let n_rows = sqlx::query(
+        let n_rows = sql::query(
             "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
              code = $3, detail = $4, finished_ms = $5 \
              where id = $1 and fence = $2 and state = 'running'",
@@ -25,9 +25,8 @@ impl Store {
         .bind(code.name())
         .bind(detail)
         .bind(now_ms)
-        .execute(&mut *transaction)
-        .await?
-        .rows_affected();
+        .execute(&mut transaction)
+        .await?;
         if Change::of_rows(n_rows) == Change::Made {
             fail_followers(&mut transaction, lease.job_id.0, now_ms).await?;
         }
@@ -39,16 +38,15 @@ impl Store {
     /// Ends a running job as cancelled: its worker has let go of it.
     pub async fn stop(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
         let mut transaction = self.begin().await?;
-        let n_rows = sqlx::query(
+        let n_rows = sql::query(
             "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, \
              finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
         )
         .bind(lease.job_id.0)
         .bind(lease.fence)
         .bind(now_ms)
-        .execute(&mut *transaction)
-        .await?
-        .rows_affected();
+        .execute(&mut transaction)
+        .await?;
         if Change::of_rows(n_rows) == Change::Made {
             cancel_followers(&mut transaction, lease.job_id.0, now_ms).await?;
         }

@@ -4,7 +4,7 @@
 use sqlx::types::Uuid;
 
 use super::{Change, Lease};
-use crate::store::{BlobFile, Error, Store, blobs, fish, flocks, libraries};
+use crate::store::{BlobFile, Error, Store, blobs, fish, flocks, libraries, sql};
 
 /// What a finished job leaves: files already in place, and the row that names them.
 #[derive(Clone, Debug)]
@@ -42,16 +42,15 @@ impl Store {
         now_ms: i64,
     ) -> Result<Change, Error> {
         let mut transaction = self.begin().await?;
-        let n_rows = sqlx::query(
+        let n_rows = sql::query(
             "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
              progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
         )
         .bind(lease.job_id.0)
         .bind(lease.fence)
         .bind(now_ms)
-        .execute(&mut *transaction)
-        .await?
-        .rows_affected();
+        .execute(&mut transaction)
+        .await?;
         if Change::of_rows(n_rows) == Change::Lost {
             tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job finished too late");
             return Ok(Change::Lost);

@@ -4,15 +4,15 @@
 use sqlx::types::Uuid;
 
 use crate::code::Code;
-use crate::store::Connection;
+use crate::store::{Transaction, sql};
 
 /// Cancels every job that follows a cancelled one, however far.
 pub(super) async fn cancel_followers(
-    connection: &mut Connection,
+    transaction: &mut Transaction,
     job: Uuid,
     now_ms: i64,
 ) -> Result<(), sqlx::Error> {
-    sqlx::query(
+    sql::query(
         "with recursive followers (id) as ( \
              select id from jobs where after_job = $1 \
              union select j.id from jobs j join followers f on j.after_job = f.id) \
@@ -21,18 +21,18 @@ pub(super) async fn cancel_followers(
     )
     .bind(job)
     .bind(now_ms)
-    .execute(connection)
+    .execute(transaction)
     .await?;
     Ok(())
 }
 
 /// Fails every job that follows a failed one, however far.
 pub(super) async fn fail_followers(
-    connection: &mut Connection,
+    transaction: &mut Transaction,
     job: Uuid,
     now_ms: i64,
 ) -> Result<(), sqlx::Error> {
-    sqlx::query(
+    sql::query(
         "with recursive followers (id) as ( \
              select id from jobs where after_job = $1 \
              union select j.id from jobs j join followers f on j.after_job = f.id) \
@@ -43,7 +43,7 @@ pub(super) async fn fail_followers(
     .bind(now_ms)
     .bind(Code::InputFailed.name())
     .bind(Code::InputFailed.meaning())
-    .execute(connection)
+    .execute(transaction)
     .await?;
     Ok(())
 }

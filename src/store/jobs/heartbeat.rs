@@ -1,7 +1,7 @@
 //! Heartbeat: the worker is alive, its lease goes on, and this is how far it is.
 
 use super::Lease;
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 /// What a heartbeat learned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ impl Store {
         stage: &str,
         progress: f64,
     ) -> Result<Beat, Error> {
-        let cancel_requested: Option<bool> = sqlx::query_scalar(
+        let cancel_requested: Option<bool> = sql::query_scalar(
             "update jobs set lease_until_ms = $3, stage = $4, progress = $5 \
              where id = $1 and fence = $2 and state = 'running' returning cancel_requested",
         )

@@ -6,7 +6,7 @@ use super::{JobState, Kind};
 use crate::code::Code;
 use crate::ids::JobId;
 use crate::store::owners::Reach;
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 /// One job as people see it.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +58,7 @@ impl Store {
     /// One job, if it is there and within reach.
     pub async fn job(&self, id: JobId, reach: &Reach) -> Result<Option<JobRow>, Error> {
         let sql = "select * from jobs where id = $1 and ($2 is null or owner = $2)";
-        let row: Option<Row> = sqlx::query_as(sql)
+        let row: Option<Row> = sql::query(sql)
             .bind(id.0)
             .bind(reach.owner())
             .fetch_optional(&self.reader)
@@ -73,7 +73,7 @@ impl Store {
         reach: &Reach,
     ) -> Result<Option<JobRow>, Error> {
         let sql = "select * from jobs where result_id = $1 and ($2 is null or owner = $2)";
-        let row: Option<Row> = sqlx::query_as(sql)
+        let row: Option<Row> = sql::query(sql)
             .bind(result)
             .bind(reach.owner())
             .fetch_optional(&self.reader)
@@ -90,7 +90,7 @@ impl Store {
     ) -> Result<Vec<JobRow>, Error> {
         let sql = "select * from jobs where ($1 is null or id < $1) \
                    and ($3 is null or owner = $3) order by id desc limit $2";
-        let rows: Vec<Row> = sqlx::query_as(sql)
+        let rows: Vec<Row> = sql::query(sql)
             .bind(before)
             .bind(limit)
             .bind(reach.owner())

@@ -2,12 +2,12 @@
 //! (RELIABILITY.md, R4).
 
 use super::{Change, Lease};
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 impl Store {
     /// Puts the job back in the queue as if it had not been claimed, its fence apart.
     pub async fn release(&self, lease: &Lease) -> Result<Change, Error> {
-        let n_rows = sqlx::query(
+        let n_rows = sql::query(
             "update jobs set state = 'queued', worker = null, lease_until_ms = null, \
              stage = null, progress = 0, attempt = attempt - 1 \
              where id = $1 and fence = $2 and state = 'running'",
@@ -15,8 +15,7 @@ impl Store {
         .bind(lease.job_id.0)
         .bind(lease.fence)
         .execute(&self.writer)
-        .await?
-        .rows_affected();
+        .await?;
         tracing::info!(job.id = %lease.job_id, n_rows, "job released");
         Ok(Change::of_rows(n_rows))
     }

@@ -7,7 +7,7 @@ use super::JobState;
 use super::follow::{cancel_followers, fail_followers};
 use crate::code::Code;
 use crate::ids::JobId;
-use crate::store::{Connection, Error, Store};
+use crate::store::{Error, Store, Transaction, sql};
 
 /// A job that kills its worker this often is quarantined.
 const MAX_CRASHES: i64 = 2;
@@ -31,12 +31,12 @@ impl Store {
         now_ms: i64,
     ) -> Result<Vec<(JobId, JobState)>, Error> {
         let mut transaction = self.begin().await?;
-        let silent: Vec<(Uuid, i64, bool)> = sqlx::query_as(
+        let silent: Vec<(Uuid, i64, bool)> = sql::query(
             "select id, crashes + 1, cancel_requested from jobs \
-             where state = 'running' and lease_until_ms < $1 order by id",
+             where state = 'running' and lease_until_ms < $1 order by id for update skip locked",
         )
         .bind(lease_end_ms)
-        .fetch_all(&mut *transaction)
+        .fetch_all(&mut transaction)
         .await?;
         let mut rescued = Vec::with_capacity(silent.len());
         for (job, crashes, cancel_requested) in silent {
@@ -59,13 +59,13 @@ impl Store {
 }
 
 async fn settle(
-    connection: &mut Connection,
+    transaction: &mut Transaction,
     job: Uuid,
     state: JobState,
     now_ms: i64,
 ) -> Result<(), sqlx::Error> {
     let failed = state == JobState::Failed;
-    sqlx::query(
+    sql::query(
         "update jobs set state = $2, worker = null, lease_until_ms = null, crashes = crashes + 1, \
          stage = null, progress = 0, finished_ms = $3, code = $4, detail = $5 where id = $1",
     )
@@ -74,11 +74,11 @@ async fn settle(
     .bind(state.is_final().then_some(now_ms))
     .bind(failed.then_some(Code::CrashedWorker.name()))
     .bind(failed.then_some(Code::CrashedWorker.meaning()))
-    .execute(&mut *connection)
+    .execute(&mut *transaction)
     .await?;
     match state {
-        JobState::Cancelled => cancel_followers(connection, job, now_ms).await,
-        JobState::Failed => fail_followers(connection, job, now_ms).await,
+        JobState::Cancelled => cancel_followers(transaction, job, now_ms).await,
+        JobState::Failed => fail_followers(transaction, job, now_ms).await,
         _ => Ok(()),
     }
 }

@@ -1,12 +1,12 @@
 //! Retry: what failed may pass another time; the attempt counts.
 
 use super::{Change, Lease};
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 impl Store {
     /// Puts the job back in the queue, not to be claimed before `run_at_ms`.
     pub async fn retry(&self, lease: &Lease, run_at_ms: i64) -> Result<Change, Error> {
-        let n_rows = sqlx::query(
+        let n_rows = sql::query(
             "update jobs set state = 'queued', worker = null, lease_until_ms = null, \
              stage = null, progress = 0, run_at_ms = $3 \
              where id = $1 and fence = $2 and state = 'running'",
@@ -15,8 +15,7 @@ impl Store {
         .bind(lease.fence)
         .bind(run_at_ms)
         .execute(&self.writer)
-        .await?
-        .rows_affected();
+        .await?;
         tracing::warn!(job.id = %lease.job_id, lease.attempt, n_rows, "job will be retried");
         Ok(Change::of_rows(n_rows))
     }

@@ -11,6 +11,7 @@ use super::*;
 use crate::code::Code;
 use crate::store::Store;
 use crate::store::owners::{Account, Owner, Reach};
+use crate::store::{fresh, sql};
 
 const LEASE_MS: i64 = 15_000;
 
@@ -22,7 +23,7 @@ struct Queue {
 impl Queue {
     async fn open() -> Queue {
         let data = tempfile::tempdir().unwrap();
-        let store = Store::open(data.path()).await.unwrap();
+        let store = fresh::open(data.path()).await;
         Queue { store, _data: data }
     }
 
@@ -84,22 +85,26 @@ impl Queue {
 
     async fn library(&self) -> Uuid {
         let (footage, job, library) = (Uuid::now_v7(), Uuid::now_v7(), Uuid::now_v7());
-        let rows = format!(
-            "insert into footage values (x'{f}', 'local', '{f}', randomblob(32), x'', '', 0, 1, 1, 1.0, 1, 0, 0); \
-             insert into jobs (id, kind, state, input, result_id, priority, run_at_ms, created_ms, finished_ms) \
-             values (x'{j}', 'analysis', 'done', '', x'{l}', 0, 0, 0, 0); \
-             insert into libraries values (x'{l}', x'{j}', 0, '{l}', x'{f}', '{{}}', '{{}}', 0, 0, 'local');",
-            f = footage.simple(),
-            j = job.simple(),
-            l = library.simple(),
-        );
-        let rows = sqlx::raw_sql(sqlx::AssertSqlSafe(rows));
-        rows.execute(&self.store.writer).await.unwrap();
+        for sql in [
+            "insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, \
+             height, fps, n_frames_hint, sample, created_ms) \
+             values ($1, $4, $5, $6, $4, 0, 1, 1, 1.0, 1, false, 0)",
+            "insert into jobs (id, kind, state, input, result_id, priority, run_at_ms, \
+             created_ms, finished_ms) values ($2, 'analysis', 'done', '', $3, 0, 0, 0, 0)",
+            "insert into libraries (id, job_id, fence, folder, footage_id, params, summary, \
+             size_bytes, created_ms) values ($3, $2, 0, $4, $1, '{}', '{}', 0, 0)",
+        ] {
+            let insert = sql::query(sql).bind(footage).bind(job).bind(library);
+            let insert = insert.bind(library.to_string());
+            let sha256 = library.as_bytes().repeat(2);
+            let insert = insert.bind(&sha256).bind(&b""[..]);
+            insert.execute(&self.store.writer).await.unwrap();
+        }
         library
     }
 
     async fn n_fish(&self) -> i64 {
-        let count = sqlx::query_scalar("select count(*) from fish");
+        let count = sql::query_scalar("select count(*) from fish");
         count.fetch_one(&self.store.reader).await.unwrap()
     }
 }

@@ -8,7 +8,7 @@ pub mod sessions;
 use secret::{Presented, Secret};
 
 use super::owners::{Account, Owner, Reach};
-use super::{Error, Store};
+use super::{Error, Store, sql};
 
 /// How much a token may do; each may do what the ones before it may.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -84,7 +84,7 @@ impl Store {
             expires_ms: new.expires_ms,
             revoked_ms: None,
         };
-        sqlx::query(
+        sql::query(
             "insert into tokens (id, name, owner, sha256, scope, quota, created_ms, expires_ms) \
              values ($1, $2, $3, $4, $5, $6, $7, $8)",
         )
@@ -110,7 +110,7 @@ impl Store {
 
     /// Every token, the ended ones too, the oldest first.
     pub async fn list_tokens(&self) -> Result<Vec<Token>, Error> {
-        let rows: Vec<Row> = sqlx::query_as("select * from tokens order by created_ms, id")
+        let rows: Vec<Row> = sql::query("select * from tokens order by created_ms, id")
             .fetch_all(&self.reader)
             .await?;
         rows.into_iter().map(Token::try_from).collect()
@@ -119,8 +119,8 @@ impl Store {
     /// Ends a token and its sessions; false where there is none of that id that still held.
     pub async fn revoke_token(&self, id: &str, now_ms: i64) -> Result<bool, Error> {
         let sql = "update tokens set revoked_ms = $2 where id = $1 and revoked_ms is null";
-        let update = sqlx::query(sql).bind(id).bind(now_ms);
-        let n_rows = update.execute(&self.writer).await?.rows_affected();
+        let update = sql::query(sql).bind(id).bind(now_ms);
+        let n_rows = update.execute(&self.writer).await?;
         tracing::info!(token.id = id, n_rows, "token revoked");
         Ok(n_rows > 0)
     }
@@ -129,13 +129,13 @@ impl Store {
     pub async fn has_tokens(&self, now_ms: i64) -> Result<bool, Error> {
         let sql = "select exists (select 1 from tokens where revoked_ms is null \
                    and (expires_ms is null or expires_ms > $1))";
-        let known = sqlx::query_scalar(sql).bind(now_ms);
+        let known = sql::query_scalar(sql).bind(now_ms);
         Ok(known.fetch_one(&self.reader).await?)
     }
 
     /// The token that was presented, if its secret is right and it is good at that time.
     pub async fn token(&self, given: &Presented, now_ms: i64) -> Result<Option<Token>, Error> {
-        let row: Option<Row> = sqlx::query_as("select * from tokens where id = $1")
+        let row: Option<Row> = sql::query("select * from tokens where id = $1")
             .bind(&given.id)
             .fetch_optional(&self.reader)
             .await?;
@@ -211,6 +211,7 @@ impl TryFrom<Row> for Token {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::fresh;
 
     fn wanted(expires_ms: Option<i64>) -> NewToken {
         NewToken {
@@ -225,7 +226,7 @@ mod tests {
     #[tokio::test]
     async fn a_token_is_good_until_it_ends_or_is_revoked() {
         let data = tempfile::tempdir().unwrap();
-        let store = Store::open(data.path()).await.unwrap();
+        let store = fresh::open(data.path()).await;
         assert!(!store.has_tokens(0).await.unwrap());
         let (made, text) = store.add_token(&wanted(Some(100)), 0).await.unwrap();
         let given = Presented::parse(&text).unwrap();
@@ -242,7 +243,7 @@ mod tests {
     #[tokio::test]
     async fn another_secret_or_another_id_is_no_token() {
         let data = tempfile::tempdir().unwrap();
-        let store = Store::open(data.path()).await.unwrap();
+        let store = fresh::open(data.path()).await;
         let (_, first) = store.add_token(&wanted(None), 0).await.unwrap();
         let (_, second) = store.add_token(&wanted(None), 0).await.unwrap();
         let (first, second) = (

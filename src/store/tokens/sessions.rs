@@ -3,7 +3,7 @@
 
 use super::secret::{self, Secret};
 use super::{Row, Token};
-use crate::store::{Error, Store};
+use crate::store::{Error, Store, sql};
 
 impl Store {
     /// Begins a session of a token; the text given back is the cookie's value.
@@ -15,11 +15,11 @@ impl Store {
     ) -> Result<String, Error> {
         let secret = Secret::random()?;
         let mut transaction = self.begin().await?;
-        sqlx::query("delete from sessions where expires_ms <= $1")
+        sql::query("delete from sessions where expires_ms <= $1")
             .bind(now_ms)
-            .execute(&mut *transaction)
+            .execute(&mut transaction)
             .await?;
-        sqlx::query(
+        sql::query(
             "insert into sessions (sha256, token_id, created_ms, expires_ms) \
              values ($1, $2, $3, $4)",
         )
@@ -27,7 +27,7 @@ impl Store {
         .bind(token_id)
         .bind(now_ms)
         .bind(expires_ms)
-        .execute(&mut *transaction)
+        .execute(&mut transaction)
         .await?;
         transaction.commit().await?;
         tracing::info!(token.id = token_id, "session begun");
@@ -41,7 +41,7 @@ impl Store {
         cookie: &str,
         now_ms: i64,
     ) -> Result<Option<Token>, Error> {
-        let row: Option<Row> = sqlx::query_as(
+        let row: Option<Row> = sql::query(
             "select t.* from tokens t join sessions s on s.token_id = t.id \
              where s.sha256 = $1 and s.expires_ms > $2",
         )
@@ -55,7 +55,7 @@ impl Store {
 
     /// Ends a session; absence is no error.
     pub async fn end_session(&self, cookie: &str) -> Result<(), Error> {
-        sqlx::query("delete from sessions where sha256 = $1")
+        sql::query("delete from sessions where sha256 = $1")
             .bind(secret::hash(cookie).as_slice())
             .execute(&self.writer)
             .await?;

@@ -65,20 +65,27 @@ async fn assert_gone(app: &TestApp, path: &str) {
 }
 
 /// How many folders of each kind the store holds.
-fn folders(app: &TestApp) -> [usize; 4] {
-    ["footage", "libraries", "flocks", "fish"].map(|kind| app.n_folders(kind))
+async fn folders(app: &TestApp) -> [usize; 4] {
+    let mut counts = [0; 4];
+    for (count, kind) in counts
+        .iter_mut()
+        .zip(["footage", "libraries", "flocks", "fish"])
+    {
+        *count = app.n_folders(kind).await;
+    }
+    counts
 }
 
 #[tokio::test]
 async fn a_footage_goes_with_all_that_came_of_it_and_can_come_again() {
     let app = TestApp::idle().await;
     let paths = family(&app).await;
-    assert_eq!(folders(&app), [1, 1, 1, 1]);
+    assert_eq!(folders(&app).await, [1, 1, 1, 1]);
     delete(&app, &paths[0]).await;
     for path in &paths {
         assert_gone(&app, path).await;
     }
-    assert_eq!(folders(&app), [0, 0, 0, 0]);
+    assert_eq!(folders(&app).await, [0, 0, 0, 0]);
     assert_eq!(app.json("/v1/jobs").await["items"], json!([]));
     let again = app.delete(&paths[0]).send().await.unwrap();
     assert_eq!(code_of(again, 404).await, "not_found");
@@ -94,7 +101,7 @@ async fn a_library_goes_with_what_was_made_of_it_and_leaves_the_footage() {
     for path in &paths[1..] {
         assert_gone(&app, path).await;
     }
-    assert_eq!(folders(&app), [1, 0, 0, 0]);
+    assert_eq!(folders(&app).await, [1, 0, 0, 0]);
     app.json(&paths[0]).await;
     app.assert_sound().await;
 }
@@ -104,9 +111,9 @@ async fn a_flock_and_a_fish_go_alone() {
     let app = TestApp::idle().await;
     let paths = family(&app).await;
     delete(&app, &paths[2]).await;
-    assert_eq!(folders(&app), [1, 1, 0, 1]);
+    assert_eq!(folders(&app).await, [1, 1, 0, 1]);
     delete(&app, &paths[3]).await;
-    assert_eq!(folders(&app), [1, 1, 0, 0]);
+    assert_eq!(folders(&app).await, [1, 1, 0, 0]);
     let queued = app.json(&paths[4]).await;
     assert_eq!(queued["state"], "queued");
     let ahead_of_time = queued["links"]["result"].as_str().unwrap();
@@ -138,6 +145,6 @@ async fn a_running_job_lets_go_when_its_footage_is_deleted() {
     has_begun.await.unwrap();
     delete(&app, &format!("/v1/footage/{footage}")).await;
     assert!(matches!(step.await.unwrap().unwrap(), Step::Lost(_)));
-    assert_eq!(folders(&app), [0, 0, 0, 0]);
+    assert_eq!(folders(&app).await, [0, 0, 0, 0]);
     app.assert_sound().await;
 }

@@ -41,7 +41,7 @@ async fn the_same_bytes_again_are_the_same_footage() {
         .unwrap();
     let again = json_of(again, StatusCode::OK).await;
     assert_eq!(again["id"], id);
-    assert_eq!(app.n_folders("footage"), 1);
+    assert_eq!(app.n_folders("footage").await, 1);
     app.assert_sound().await;
 }
 
@@ -56,7 +56,7 @@ async fn the_same_bytes_at_the_same_time_are_one_footage() {
         ids.push(footage["id"].clone());
     }
     assert_eq!(ids, vec![ids[0].clone(); 3]);
-    assert_eq!(app.n_folders("footage"), 1);
+    assert_eq!(app.n_folders("footage").await, 1);
     app.assert_sound().await;
 }
 
@@ -79,7 +79,7 @@ async fn what_is_no_film_is_refused_and_leaves_nothing_behind() {
         let answer = app.post("/v1/footage").body(body).send().await.unwrap();
         assert_eq!(code_of(answer, 422).await, code, "{said:?}");
         assert_eq!(
-            (app.n_drafts(), app.n_folders("footage")),
+            (app.n_drafts(), app.n_folders("footage").await),
             (0, 0),
             "{said:?}"
         );
@@ -132,7 +132,7 @@ async fn a_background_of_another_size_is_refused() {
         .await
         .unwrap();
     assert_eq!(code_of(answer, 422).await, "background_size_differs");
-    assert_eq!(app.n_folders("footage"), 0);
+    assert_eq!(app.n_folders("footage").await, 0);
     app.assert_sound().await;
 }
 

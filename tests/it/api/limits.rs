@@ -38,7 +38,11 @@ fn head(method: &str, address: &str, more: &str) -> Vec<u8> {
 #[tokio::test]
 async fn heads_and_addresses_have_a_longest() {
     let app = TestApp::idle().await;
-    let large = head("GET", "/healthz", &format!("x-large: {}\r\n", "x".repeat(100_000)));
+    let large = head(
+        "GET",
+        "/healthz",
+        &format!("x-large: {}\r\n", "x".repeat(100_000)),
+    );
     assert!(exchange(&app, &[&large]).await.starts_with("HTTP/1.1 431"));
     let many: String = (0..2000).map(|k| format!("x-{k}: y\r\n")).collect();
     let many = head("GET", "/healthz", &many);
@@ -53,7 +57,10 @@ async fn heads_and_addresses_have_a_longest() {
 #[tokio::test]
 async fn a_body_that_is_announced_too_large_is_refused_before_it_comes() {
     let app = TestApp::idle().await;
-    for kind in ["application/octet-stream", "multipart/form-data; boundary=x"] {
+    for kind in [
+        "application/octet-stream",
+        "multipart/form-data; boundary=x",
+    ] {
         let more = format!("content-type: {kind}\r\ncontent-length: 99999999999999\r\n");
         let answer = exchange(&app, &[&head("POST", "/v1/footage", &more)]).await;
         assert!(answer.starts_with("HTTP/1.1 413"), "{kind}: {answer}");
@@ -79,11 +86,17 @@ async fn a_length_that_is_a_lie_leaves_nothing_behind() {
     let authority = app.address("").replace("http://", "");
     let mut connection = TcpStream::connect(&authority).await.unwrap();
     let more = head("POST", "/v1/footage", &more(TINY.len() + 1000));
-    connection.write_all(&[&more, TINY.as_slice()].concat()).await.unwrap();
+    connection
+        .write_all(&[&more, TINY.as_slice()].concat())
+        .await
+        .unwrap();
     connection.shutdown().await.unwrap();
     let mut answer = String::new();
     connection.read_to_string(&mut answer).await.unwrap();
-    assert!(answer.is_empty() || answer.contains("body_cut_off"), "{answer}");
+    assert!(
+        answer.is_empty() || answer.contains("body_cut_off"),
+        "{answer}"
+    );
     assert_eq!(app.json("/v1/footage").await["items"], json!([]));
     app.assert_sound().await;
 }
@@ -91,10 +104,20 @@ async fn a_length_that_is_a_lie_leaves_nothing_behind() {
 #[tokio::test]
 async fn a_packed_body_is_refused_on_every_route() {
     let app = TestApp::idle().await;
-    for path in ["/v1/footage", "/v1/analyses", "/v1/flocks", "/v1/fish", "/v1/uploads"] {
+    for path in [
+        "/v1/footage",
+        "/v1/analyses",
+        "/v1/flocks",
+        "/v1/fish",
+        "/v1/uploads",
+    ] {
         let packed = app.post(path).header("content-encoding", "gzip");
         let answer = packed.body(vec![0x1f, 0x8b, 8, 0]).send().await.unwrap();
-        assert_eq!(code_of(answer, 415).await, "unsupported_media_type", "{path}");
+        assert_eq!(
+            code_of(answer, 415).await,
+            "unsupported_media_type",
+            "{path}"
+        );
     }
     app.assert_sound().await;
 }
@@ -105,7 +128,9 @@ async fn a_form_of_ten_thousand_parts_is_refused_at_the_first_that_is_not_asked_
     let parts: String = (0..10_000)
         .map(|k| format!("--x\r\ncontent-disposition: form-data; name=\"f{k}\"\r\n\r\nv\r\n"))
         .collect();
-    let answer = app.post("/v1/footage").header("content-type", "multipart/form-data; boundary=x");
+    let answer = app
+        .post("/v1/footage")
+        .header("content-type", "multipart/form-data; boundary=x");
     let answer = answer.body(parts + "--x--\r\n").send().await.unwrap();
     assert_eq!(code_of(answer, 400).await, "malformed_request");
     app.assert_sound().await;

@@ -2,14 +2,15 @@
 
 mod auth;
 mod contract;
+mod corpus;
 mod deletes;
 mod downloads;
 mod footage;
 mod idempotency;
 mod jobs;
-mod one_call;
 mod limits;
 mod names;
+mod one_call;
 mod uploads;
 mod wait;
 mod walls;

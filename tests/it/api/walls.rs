@@ -307,6 +307,6 @@ async fn the_same_bytes_of_two_owners_are_two_footage() {
     assert_ne!(ids[0], ids[1]);
     app.sign_out();
     assert_eq!(app.json("/v1/footage").await["items"], json!([]));
-    assert_eq!(app.n_folders("footage"), 2);
+    assert_eq!(app.n_folders("footage").await, 2);
     app.assert_sound().await;
 }

@@ -1,6 +1,8 @@
 //! The command line from outside: exit codes, one clear sentence, nothing left behind (DESIGN.md,
 //! Command line). What it makes of a film is tested in `film`.
 
+mod doctor;
+
 use std::process::{Command, Output};
 
 use crate::common::film::Films;

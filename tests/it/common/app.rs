@@ -1,6 +1,5 @@
 //! The real service, router and all, on a port and a data folder of its own.
 
-use std::path::Path;
 use std::time::Duration;
 
 use clap::Parser;
@@ -13,16 +12,17 @@ use flockreel::store::tokens::{NewToken, Scope};
 use reqwest::header::{self, HeaderMap};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use serde_json::Value;
-use tempfile::TempDir;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
+
+use super::Place;
 
 /// The service under test.
 pub(crate) struct TestApp {
     pub(crate) context: Context,
     pub(crate) client: Client,
     base: String,
-    data: TempDir,
+    place: Place,
     stop: CancellationToken,
     supervisor: Option<Supervisor>,
 }
@@ -48,9 +48,9 @@ impl TestApp {
 
     /// A service with further flags.
     pub(crate) async fn start(flags: &[&str]) -> TestApp {
-        let data = tempfile::tempdir().unwrap();
-        let folder = data.path().to_str().unwrap();
-        let flags = [&["test", "--data", folder], flags].concat();
+        let place = Place::of_tests();
+        let flags = flags.iter().map(|flag| (*flag).to_owned());
+        let flags = [vec!["test".to_owned()], place.flags(), flags.collect()].concat();
         let config = Arguments::parse_from(flags).config;
         let state = AppState::open(config).await.unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
@@ -65,10 +65,15 @@ impl TestApp {
             context,
             client: Client::new(),
             base,
-            data,
+            place,
             stop,
             supervisor: None,
         }
+    }
+
+    /// The folder that the service keeps its things in.
+    pub(crate) fn folder(&self) -> &std::path::Path {
+        self.place.folder()
     }
 
     /// The whole address of a path.
@@ -153,19 +158,21 @@ impl TestApp {
         panic!("the job did not end in two minutes");
     }
 
-    /// Files and folders under `tmp/`.
+    /// What is being made, or was left half made.
     pub(crate) fn n_drafts(&self) -> usize {
-        entries(&self.data.path().join("tmp"))
+        self.place.n_drafts()
     }
 
     /// Files of unfinished uploads.
     pub(crate) fn n_uploads(&self) -> usize {
-        entries(&self.data.path().join("uploads"))
+        self.place.n_uploads()
     }
 
     /// Folders of a kind in the store.
-    pub(crate) fn n_folders(&self, kind: &str) -> usize {
-        entries(&self.data.path().join("blobs").join(kind))
+    pub(crate) async fn n_folders(&self, kind: &str) -> usize {
+        let folders = self.context.store.blobs().folders().await.unwrap();
+        let of_kind = |(folder, _): &(String, _)| folder.split('/').next() == Some(kind);
+        folders.iter().filter(|folder| of_kind(folder)).count()
     }
 
     /// Every invariant of the store holds, nothing is half made; the workers let go.
@@ -215,8 +222,4 @@ pub(crate) fn routes(document: &Value) -> Vec<(Method, String)> {
         methods.map(move |method| (method.to_uppercase().parse().unwrap(), path.clone()))
     });
     calls.collect()
-}
-
-fn entries(folder: &Path) -> usize {
-    std::fs::read_dir(folder).unwrap().count()
 }

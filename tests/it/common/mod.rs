@@ -3,6 +3,8 @@
 pub(crate) mod app;
 pub(crate) mod clip;
 pub(crate) mod film;
+pub(crate) mod place;
 pub(crate) mod process;
 
 pub(crate) use app::TestApp;
+pub(crate) use place::Place;

@@ -1,6 +1,5 @@
 //! A server that is killed in the middle of a job, or told to stop (RELIABILITY.md, R2, R4, R5).
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use flockreel::jobs::clock::now_ms;
@@ -8,6 +7,7 @@ use flockreel::store::Store;
 use reqwest::Client;
 use serde_json::{Value, json};
 
+use crate::common::Place;
 use crate::common::clip::SWIM;
 use crate::common::process::Server;
 
@@ -44,21 +44,21 @@ async fn wait_for(server: &Server, job: &str, wanted: impl Fn(&Value) -> bool) -
     }
 }
 
-async fn assert_sound(data: &Path) {
-    let store = Store::open(data).await.unwrap();
+async fn assert_sound(place: &Place) {
+    let store = Store::open(place.storage()).await.unwrap();
     assert_eq!(store.check(now_ms()).await.unwrap(), Vec::<String>::new());
-    assert_eq!(std::fs::read_dir(data.join("tmp")).unwrap().count(), 0);
+    assert_eq!(place.n_drafts(), 0);
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
-    let data = tempfile::tempdir().unwrap();
-    let server = Server::start(data.path());
+    let place = Place::of_tests();
+    let server = Server::start(&place);
     let job = start_job(&server).await;
     wait_for(&server, &job, |job| job["state"] == "running").await;
     server.kill();
 
-    let server = Server::start(data.path());
+    let server = Server::start(&place);
     let ended = wait_for(&server, &job, |job| !job["finished_at"].is_null()).await;
     assert_eq!(
         (&ended["state"], &ended["attempt"]),
@@ -68,21 +68,21 @@ async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
     let libraries = get(&server, "/v1/libraries").await;
     assert_eq!(libraries["items"].as_array().unwrap().len(), 1);
     assert_eq!(server.terminate(), Some(0));
-    assert_sound(data.path()).await;
+    assert_sound(&place).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_told_to_stop_gives_its_job_back_unused() {
-    let data = tempfile::tempdir().unwrap();
-    let server = Server::start(data.path());
+    let place = Place::of_tests();
+    let server = Server::start(&place);
     let job = start_job(&server).await;
     wait_for(&server, &job, |job| job["state"] == "running").await;
     let start = Instant::now();
     assert_eq!(server.terminate(), Some(0));
     assert!(start.elapsed() < Duration::from_secs(20));
-    assert_sound(data.path()).await;
+    assert_sound(&place).await;
 
-    let server = Server::start(data.path());
+    let server = Server::start(&place);
     let ended = wait_for(&server, &job, |job| !job["finished_at"].is_null()).await;
     assert_eq!(
         (&ended["state"], &ended["attempt"]),
@@ -90,5 +90,5 @@ async fn a_server_told_to_stop_gives_its_job_back_unused() {
         "{ended}"
     );
     assert_eq!(server.terminate(), Some(0));
-    assert_sound(data.path()).await;
+    assert_sound(&place).await;
 }

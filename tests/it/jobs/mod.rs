@@ -1,7 +1,8 @@
-//! The life of jobs: stepped by hand, run by a real pool, and under a killed server.
+//! The life of jobs: stepped by hand, run by a real pool, under a killed server, and raced for.
 
-mod kills;
 mod full_disk;
+mod kills;
 mod life_cycle;
 mod poison;
+mod races;
 mod steps;

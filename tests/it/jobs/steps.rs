@@ -1,6 +1,11 @@
 //! The worker, one step at a time, with other work in the place of the real one: no sleeping, no
 //! video.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use flockreel::code::Code;
 use flockreel::ids::JobId;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{Attempt, Error, Product};
@@ -49,7 +54,7 @@ async fn a_job_that_is_done_has_its_files_in_place() {
         .await;
     assert_eq!(step.unwrap(), Step::Done(job));
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
-    assert_eq!(app.n_folders("libraries"), 1);
+    assert_eq!(app.n_folders("libraries").await, 1);
     app.assert_sound().await;
 }
 
@@ -76,10 +81,10 @@ async fn a_worker_that_was_given_up_throws_its_output_away() {
         product(attempt, footage)
     });
     assert_eq!(step.await.unwrap(), Step::Lost(job));
-    assert_eq!(app.n_folders("libraries"), 0);
+    assert_eq!(app.n_folders("libraries").await, 0);
     tell.send(()).unwrap();
     assert_eq!(app.ended_job(&json!(job)).await["state"], "done");
-    assert_eq!(app.n_folders("libraries"), 1);
+    assert_eq!(app.n_folders("libraries").await, 1);
     app.assert_sound().await;
 }
 
@@ -138,6 +143,42 @@ async fn a_panic_fails_its_own_job_alone() {
     );
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
     app.assert_sound().await;
+}
+
+/// A worker whose jobs have next to no time, and notice soon.
+fn hurried(app: &TestApp) -> Worker {
+    let mut context = app.context.clone();
+    context.budget = Duration::from_millis(300);
+    context.lease = Duration::from_millis(900);
+    Worker::new(context)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_takes_too_long_is_told_to_stop_and_fails() {
+    let (app, job, _) = with_job().await;
+    let step = hurried(&app)
+        .step_by(|_, attempt| wait_until_cancelled(attempt))
+        .await;
+    assert_eq!(step.unwrap(), Step::Failed(job, Code::TimeLimit));
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_spins_and_does_not_listen_fails_all_the_same() {
+    let (app, job, footage) = with_job().await;
+    let ends = Arc::new(AtomicBool::new(false));
+    let end = ends.clone();
+    let spin = move |_: &_, attempt: &Attempt| {
+        while !end.load(Ordering::Relaxed) {
+            std::thread::yield_now();
+        }
+        product(attempt, footage)
+    };
+    let step = hurried(&app).step_by(spin).await;
+    assert_eq!(step.unwrap(), Step::Failed(job, Code::TimeLimit));
+    ends.store(true, Ordering::Relaxed);
+    let worker = Worker::new(app.context.clone());
+    assert_eq!(worker.step().await.unwrap(), Step::Idle);
 }
 
 #[tokio::test]

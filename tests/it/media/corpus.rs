@@ -228,22 +228,22 @@ impl Corpus<'_> {
             (10, "-vf scale=1:1 -c:v ffv1 dot.mkv", &[Code::TooFewPixels]),
             (
                 10,
-                "-vf scale=640:2 -c:v ffv1 line.mkv",
+                "-vf scale=640:2,setsar=1 -c:v ffv1 line.mkv",
                 &[Code::TooFewPixels],
             ),
             (
                 3,
-                "-vf scale=8208:64 -c:v mpeg4 wide.mkv",
+                "-vf scale=8208:64,setsar=1 -c:v ffv1 wide.mkv",
                 &[Code::TooManyPixels],
             ),
             (
                 3,
-                "-vf scale=4096:2176 -c:v mjpeg -q:v 30 large.avi",
+                "-vf scale=4096:2176,setsar=1 -c:v mjpeg -q:v 30 large.avi",
                 &[Code::TooManyPixels],
             ),
             (
                 10,
-                "-vf setsar=1000/1 -c:v mpeg4 stretched.mkv",
+                "-vf setsar=sar=1000/1:max=1000 -c:v mpeg4 stretched.mkv",
                 &[Code::TooManyPixels],
             ),
             (
@@ -257,7 +257,7 @@ impl Corpus<'_> {
         }
         for args in [
             "-vf setsar=2/1 -c:v mpeg4 double.mkv",
-            "-vf scale=8192:64 -c:v mpeg4 -q:v 9 widest.mkv",
+            "-vf scale=8192:64,setsar=1 -c:v ffv1 widest.mkv",
             "-c:v mpeg4 -metadata:s:v:0 rotate=90 turned.mp4",
             "-vf setpts=N*N*0.01/TB -fps_mode vfr -c:v mpeg4 slowing.mkv",
             "-vf select='not(mod(floor(n/3),2))' -fps_mode vfr -c:v mpeg4 stutter.mkv",

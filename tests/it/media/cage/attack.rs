@@ -13,6 +13,7 @@ use std::time::Duration;
 unsafe extern "C" {
     fn fork() -> c_int;
     fn pause() -> c_int;
+    fn close(fd: c_int) -> c_int;
     fn getppid() -> c_int;
     fn kill(process: c_int, signal: c_int) -> c_int;
     fn mmap(at: *mut c_void, n: usize, may: c_int, how: c_int, fd: c_int, from: i64)
@@ -128,6 +129,10 @@ fn fork_many(n: usize) -> Result<(), String> {
     for k in 0..n {
         match unsafe { fork() } {
             0 => loop {
+                // What it holds of its parent's would keep the reader waiting.
+                for fd in 0..3 {
+                    unsafe { close(fd) };
+                }
                 unsafe { pause() };
             },
             -1 => return Err(format!("after {k}: {}", Error::last_os_error())),

@@ -57,7 +57,8 @@ fn every_attack_is_held_by_the_layers_that_are_meant_to() {
         .output()
         .expect("this program");
     let said = String::from_utf8_lossy(&done.stdout);
-    assert!(done.status.success(), "{said}");
+    let complaint = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}{complaint}");
     println!("{said}");
 }
 

@@ -1,0 +1,59 @@
+//! `flockreel worker`: workers without API and page, on as many machines as there are jobs for, beside a
+//! service on the same PostgreSQL and the same files (RELIABILITY.md, R2 to R4). The queue is all that they
+//! and the service say to each other.
+
+use std::time::Duration;
+
+use tokio::runtime::Runtime;
+
+use super::serve::{from_store, wait_for_signal};
+use super::{Error, Summary, say};
+use crate::config::{Crew, Database, Storage};
+use crate::jobs::Context;
+use crate::jobs::supervisor::{Supervisor, recover};
+use crate::media;
+use crate::store::Store;
+
+/// Arguments of `worker`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    storage: Storage,
+    #[command(flatten)]
+    crew: Crew,
+}
+
+/// Works until it is told to stop.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    let worked = runtime.block_on(work(args));
+    // A job that does not let go must not hold the process: another worker rescues it.
+    runtime.shutdown_background();
+    worked.map(|()| None)
+}
+
+async fn work(args: Args) -> Result<(), Error> {
+    if let Database::Sqlite(file) = args.storage.database() {
+        return Err(Error::Usage(format!(
+            "workers beside a service need a database that processes share: \
+             --database postgres://... instead of: {}",
+            file.display()
+        )));
+    }
+    super::check_walls()?;
+    media::tool_version().map_err(|error| Error::work(error.code(), &error))?;
+    let (n_workers, threads) = (args.crew.workers.get(), args.crew.threads_per_worker());
+    let store = Store::open_beside(args.storage).await.map_err(from_store)?;
+    let mut context = Context::new(store, threads);
+    context.budget = Duration::from_secs(args.crew.job_time_s);
+    recover(&context).await.map_err(from_store)?;
+    let supervisor = Supervisor::start(context.clone(), n_workers);
+    say(&format!(
+        "flockreel: waiting for jobs, workers: {n_workers}"
+    ));
+    wait_for_signal().await?;
+    tracing::info!("stopping");
+    supervisor.drain().await;
+    context.store.close().await;
+    Ok(())
+}

@@ -1,0 +1,130 @@
+//! Files in a bucket of an S3-compatible store, whose address and keys are in the usual `AWS_*` variables
+//! (ECOSYSTEM.md 3). What is written in parts has parts of one size, and what cannot be finished is
+//! taken back; a part that a crash leaves costs money until the bucket's own rules remove it.
+
+use std::collections::HashMap;
+use std::io;
+use std::path::Path as FilePath;
+use std::sync::Arc;
+use std::time::SystemTime;
+
+use bytes::Bytes;
+use futures_util::stream::{BoxStream, StreamExt, TryStreamExt, try_unfold};
+use object_store::aws::AmazonS3Builder;
+use object_store::buffered::BufWriter;
+use object_store::path::Path;
+use object_store::{ClientOptions, ObjectMeta, ObjectStore, ObjectStoreExt};
+use tokio::fs::File;
+use tokio::io::{AsyncWriteExt, BufReader};
+
+use crate::store::Error;
+
+/// Every part but the last: more than the least that any store takes, and of one size as some want it.
+const PART_BYTES: usize = 16 << 20;
+/// Bytes asked for at a time: no request lasts as long as the one who downloads is slow.
+const PIECE_BYTES: u64 = 4 << 20;
+
+/// A bucket, and where in it our files begin.
+#[derive(Clone, Debug)]
+pub(super) struct Bucket {
+    store: Arc<dyn ObjectStore>,
+    prefix: String,
+}
+
+impl Bucket {
+    /// Fails where the bucket cannot be listed.
+    pub(super) async fn open(name: &str, prefix: &str) -> Result<Bucket, Error> {
+        let builder = AmazonS3Builder::from_env().with_bucket_name(name);
+        // Whoever gives an address without encryption means it.
+        let options = ClientOptions::new().with_allow_http(true);
+        let store = builder.with_client_options(options).build()?;
+        let bucket = Bucket {
+            store: Arc::new(store),
+            prefix: prefix.trim_matches('/').to_owned(),
+        };
+        let mut objects = bucket.store.list(Some(&bucket.path("footage")));
+        objects.try_next().await?;
+        drop(objects);
+        Ok(bucket)
+    }
+
+    pub(super) async fn put(&self, draft: &FilePath, folder: &str) -> Result<(), Error> {
+        let mut entries = tokio::fs::read_dir(draft).await?;
+        while let Some(entry) = entries.next_entry().await? {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let path = self.path(&format!("{folder}/{name}"));
+            let writer = BufWriter::with_capacity(self.store.clone(), path, PART_BYTES);
+            let mut writer = writer.with_max_concurrency(2);
+            if let Err(error) = copy(&entry.path(), &mut writer).await {
+                writer.abort().await?;
+                return Err(error.into());
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) async fn discard(&self, folder: &str) -> Result<(), Error> {
+        let objects = self.store.list(Some(&self.path(folder)));
+        let places = objects.map_ok(|object| object.location).boxed();
+        let deleted = self.store.delete_stream(places);
+        Ok(deleted.try_for_each(async |_| Ok(())).await?)
+    }
+
+    pub(super) fn read(
+        &self,
+        folder: &str,
+        name: &str,
+        first: u64,
+        n_bytes: u64,
+    ) -> BoxStream<'static, io::Result<Bytes>> {
+        let (store, path) = (self.store.clone(), self.path(&format!("{folder}/{name}")));
+        let end = first + n_bytes;
+        try_unfold(first, move |at| {
+            let (store, path) = (store.clone(), path.clone());
+            async move {
+                let until = end.min(at + PIECE_BYTES);
+                if at == until {
+                    return Ok(None);
+                }
+                let piece = store.get_range(&path, at..until).await;
+                Ok(Some((piece.map_err(io::Error::from)?, until)))
+            }
+        })
+        .boxed()
+    }
+
+    pub(super) async fn folders(&self) -> Result<Vec<(String, SystemTime)>, Error> {
+        let prefix = (!self.prefix.is_empty()).then(|| Path::from(self.prefix.as_str()));
+        let mut objects = self.store.list(prefix.as_ref());
+        let mut youngest: HashMap<String, SystemTime> = HashMap::new();
+        while let Some(object) = objects.try_next().await? {
+            let Some(folder) = self.folder_of(&object) else {
+                continue;
+            };
+            let modified = SystemTime::from(object.last_modified);
+            let known = youngest.entry(folder).or_insert(modified);
+            *known = modified.max(*known);
+        }
+        let mut folders: Vec<_> = youngest.into_iter().collect();
+        folders.sort();
+        Ok(folders)
+    }
+
+    /// The folder of an object: of ours, kind and name come before the file's own name.
+    fn folder_of(&self, object: &ObjectMeta) -> Option<String> {
+        let path = object.location.as_ref().strip_prefix(&self.prefix)?;
+        let (folder, _name) = path.trim_start_matches('/').rsplit_once('/')?;
+        let (kind, _) = folder.split_once('/')?;
+        super::KINDS.contains(&kind).then(|| folder.to_owned())
+    }
+
+    fn path(&self, within: &str) -> Path {
+        Path::from(format!("{}/{within}", self.prefix))
+    }
+}
+
+async fn copy(file: &FilePath, writer: &mut BufWriter) -> io::Result<()> {
+    let mut reader = BufReader::with_capacity(1 << 20, File::open(file).await?);
+    tokio::io::copy_buf(&mut reader, writer).await?;
+    writer.shutdown().await
+}

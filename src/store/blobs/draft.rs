@@ -1,0 +1,154 @@
+//! What a process is making: folders under one of its own, which it locks while it lives. Several processes
+//! may share a disk, and whoever finds such a folder unlocked knows that its process is gone and sweeps it
+//! (RELIABILITY.md, R5).
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use sqlx::types::Uuid;
+
+/// Where the processes of a machine make what they make.
+#[derive(Debug)]
+pub(in crate::store) struct Workplace {
+    tmp: PathBuf,
+    /// This process's folder, made when it is first needed, and the lock on it.
+    own: Mutex<Option<(PathBuf, File)>>,
+}
+
+/// A folder in the making; removed with all it holds unless it is moved into place.
+#[derive(Debug)]
+pub struct Draft {
+    path: PathBuf,
+    kept: bool,
+}
+
+impl Workplace {
+    pub(super) fn open(tmp: &Path) -> io::Result<Workplace> {
+        fs::create_dir_all(tmp)?;
+        Ok(Workplace {
+            tmp: tmp.to_owned(),
+            own: Mutex::new(None),
+        })
+    }
+
+    /// The folder that all of them make things in.
+    pub(super) fn folder(&self) -> &Path {
+        &self.tmp
+    }
+
+    pub(super) fn draft(&self, name: &str) -> io::Result<Draft> {
+        let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
+        let (folder, _lock) = match own.take() {
+            Some(own) => own,
+            None => make_own(&self.tmp)?,
+        };
+        let path = folder.join(name);
+        let made = fs::create_dir(&path);
+        *own = Some((folder, _lock));
+        made?;
+        Ok(Draft { path, kept: false })
+    }
+
+    /// Removes what processes left that are gone; returns how many.
+    pub(in crate::store) fn sweep(&self) -> io::Result<usize> {
+        let mut n_swept = 0;
+        for entry in fs::read_dir(&self.tmp)? {
+            let path = entry?.path();
+            if !path.is_dir() {
+                fs::remove_file(path)?;
+                n_swept += 1;
+            } else if let Ok(folder) = File::open(&path)
+                && folder.try_lock().is_ok()
+            {
+                fs::remove_dir_all(path)?;
+                n_swept += 1;
+            }
+        }
+        Ok(n_swept)
+    }
+
+    /// Leaves nothing behind, unless something is still being made.
+    pub(in crate::store) fn close(&self) {
+        let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((folder, _)) = own.as_ref()
+            && fs::remove_dir(folder).is_ok()
+        {
+            *own = None;
+        }
+    }
+}
+
+/// Another process may sweep the folder before it is locked: then it is made anew.
+fn make_own(tmp: &Path) -> io::Result<(PathBuf, File)> {
+    loop {
+        let path = tmp.join(Uuid::now_v7().to_string());
+        fs::create_dir(&path)?;
+        let Ok(folder) = File::open(&path) else {
+            continue;
+        };
+        folder.lock()?;
+        if path.is_dir() {
+            return Ok((path, folder));
+        }
+    }
+}
+
+impl Draft {
+    /// Where to write.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Moves it into place, from where it is not removed.
+    pub(super) fn move_to(mut self, place: &Path) -> io::Result<()> {
+        fs::rename(&self.path, place)?;
+        self.kept = true;
+        Ok(())
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if !self.kept
+            && let Err(error) = fs::remove_dir_all(&self.path)
+        {
+            tracing::warn!(%error, "a draft could not be removed; the next start sweeps it");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn n_entries(folder: &Path) -> usize {
+        fs::read_dir(folder).unwrap().count()
+    }
+
+    #[test]
+    fn a_draft_that_is_not_adopted_leaves_nothing_behind() {
+        let tmp = tempfile::tempdir().unwrap();
+        let work = Workplace::open(tmp.path()).unwrap();
+        let draft = work.draft("x").unwrap();
+        fs::write(draft.path().join("video"), b"abc").unwrap();
+        drop(draft);
+        work.close();
+        assert_eq!(n_entries(tmp.path()), 0);
+    }
+
+    #[test]
+    fn a_sweep_takes_what_the_dead_left_and_nothing_of_the_living() {
+        let tmp = tempfile::tempdir().unwrap();
+        let living = Workplace::open(tmp.path()).unwrap();
+        let draft = living.draft("x").unwrap();
+        let dead = Workplace::open(tmp.path()).unwrap();
+        std::mem::forget(dead.draft("y").unwrap());
+        assert_eq!(dead.sweep().unwrap(), 0);
+        drop(dead);
+        assert_eq!(n_entries(tmp.path()), 2);
+        assert_eq!(living.sweep().unwrap(), 1);
+        assert!(draft.path().is_dir());
+    }
+}

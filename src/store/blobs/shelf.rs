@@ -1,0 +1,91 @@
+//! Files in a folder of this machine: a draft is renamed into place, and names outlive a power cut once
+//! their folder is synced. Read by large pieces, for each read is a hop to the blocking pool.
+
+use std::fs::{self, File};
+use std::io::{self, SeekFrom};
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use bytes::Bytes;
+use futures_util::StreamExt;
+use futures_util::stream::BoxStream;
+use tokio::io::{AsyncReadExt, AsyncSeekExt};
+use tokio::task::spawn_blocking;
+use tokio_util::io::ReaderStream;
+
+use super::{Draft, KINDS};
+use crate::store::Error;
+
+/// Bytes read at a time.
+const PIECE_BYTES: usize = 1 << 20;
+
+/// The folder, and one in it for each kind.
+#[derive(Clone, Debug)]
+pub(super) struct Shelf {
+    root: PathBuf,
+}
+
+impl Shelf {
+    pub(super) fn open(root: &Path) -> io::Result<Shelf> {
+        for kind in KINDS {
+            fs::create_dir_all(root.join(kind))?;
+        }
+        sync_folder(root)?;
+        Ok(Shelf {
+            root: root.to_owned(),
+        })
+    }
+
+    pub(super) fn folder(&self, folder: &str) -> PathBuf {
+        self.root.join(folder)
+    }
+
+    pub(super) async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
+        let (place, root) = (self.folder(folder), self.root.clone());
+        let adopt = move || {
+            sync_folder(draft.path())?;
+            draft.move_to(&place)?;
+            sync_folder(place.parent().unwrap_or(&root))
+        };
+        Ok(spawn_blocking(adopt).await.map_err(io::Error::other)??)
+    }
+
+    pub(super) async fn discard(&self, folder: &str) -> Result<(), Error> {
+        let place = self.folder(folder);
+        let discard = move || match fs::remove_dir_all(place) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        };
+        Ok(spawn_blocking(discard).await.map_err(io::Error::other)??)
+    }
+
+    pub(super) async fn read(
+        &self,
+        folder: &str,
+        name: &str,
+        first: u64,
+        n_bytes: u64,
+    ) -> Result<BoxStream<'static, io::Result<Bytes>>, Error> {
+        let mut file = tokio::fs::File::open(self.folder(folder).join(name)).await?;
+        file.set_max_buf_size(PIECE_BYTES);
+        file.seek(SeekFrom::Start(first)).await?;
+        Ok(ReaderStream::with_capacity(file.take(n_bytes), PIECE_BYTES).boxed())
+    }
+
+    pub(super) fn folders(&self) -> io::Result<Vec<(String, SystemTime)>> {
+        let mut folders = Vec::new();
+        for kind in KINDS {
+            for entry in fs::read_dir(self.root.join(kind))? {
+                let entry = entry?;
+                let name = entry.file_name().to_string_lossy().into_owned();
+                folders.push((format!("{kind}/{name}"), entry.metadata()?.modified()?));
+            }
+        }
+        Ok(folders)
+    }
+}
+
+/// Makes the names in a folder outlive a power cut.
+pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
+    File::open(path)?.sync_all()
+}

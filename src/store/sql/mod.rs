@@ -1,0 +1,246 @@
+//! One SQL text for both engines (RELIABILITY.md, store and queue rules): SQLite, in one file of one machine,
+//! and PostgreSQL, which any number of machines share. The rest of the store does not notice which is there.
+//!
+//! `$n` parameters, `returning`, `on conflict` and common table expressions mean the same on both. Row locks
+//! are PostgreSQL's alone: SQLite's one writer holds all rows anyway, so its text goes without them.
+
+mod pool;
+mod value;
+
+use std::borrow::Cow;
+
+use sqlx::postgres::PgRow;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{AssertSqlSafe, Decode, FromRow, Postgres, Sqlite, Type};
+
+use pool::On;
+pub(super) use pool::{Listener, Pool, Transaction};
+use value::{Value, arguments};
+
+/// The clauses that SQLite does not know, the longest first.
+const ROW_LOCKS: [&str; 3] = [
+    " for update of j skip locked",
+    " for update skip locked",
+    " for update",
+];
+
+/// A statement with its parameters.
+pub(super) struct Query {
+    sql: &'static str,
+    values: Vec<Value>,
+}
+
+/// A statement whose rows have one column.
+pub(super) struct ScalarQuery(Query);
+
+/// A statement with its parameters; $1 is bound first.
+pub(super) fn query(sql: &'static str) -> Query {
+    Query {
+        sql,
+        values: Vec::new(),
+    }
+}
+
+/// The same for rows of one column.
+pub(super) fn query_scalar(sql: &'static str) -> ScalarQuery {
+    ScalarQuery(query(sql))
+}
+
+/// What can be made of a row of either engine.
+pub(super) trait Row:
+    for<'r> FromRow<'r, SqliteRow> + for<'r> FromRow<'r, PgRow> + Send + Unpin
+{
+}
+
+impl<T> Row for T where T: for<'r> FromRow<'r, SqliteRow> + for<'r> FromRow<'r, PgRow> + Send + Unpin
+{}
+
+/// What can be made of a value of either engine.
+pub(super) trait Column:
+    for<'r> Decode<'r, Sqlite>
+    + Type<Sqlite>
+    + for<'r> Decode<'r, Postgres>
+    + Type<Postgres>
+    + Send
+    + Unpin
+{
+}
+
+impl<T> Column for T where
+    T: for<'r> Decode<'r, Sqlite>
+        + Type<Sqlite>
+        + for<'r> Decode<'r, Postgres>
+        + Type<Postgres>
+        + Send
+        + Unpin
+{
+}
+
+/// Runs a query where it is to run, as the engine that is there wants it.
+macro_rules! run {
+    ($query:expr, $on:expr, $prepare:path, |$at:ident, $statement:ident| $run:expr) => {{
+        let Query { sql, values } = $query;
+        match $on.into() {
+            On::SqlitePool($at) => {
+                let sql = AssertSqlSafe(without_row_locks(sql));
+                let $statement = $prepare(sql, arguments::<Sqlite>(values)?);
+                $run
+            }
+            On::Sqlite($at) => {
+                let sql = AssertSqlSafe(without_row_locks(sql));
+                let $statement = $prepare(sql, arguments::<Sqlite>(values)?);
+                $run
+            }
+            On::PostgresPool($at) => {
+                let $statement = $prepare(sql, arguments::<Postgres>(values)?);
+                $run
+            }
+            On::Postgres($at) => {
+                let $statement = $prepare(sql, arguments::<Postgres>(values)?);
+                $run
+            }
+        }
+    }};
+}
+
+impl Query {
+    /// The next parameter.
+    pub(super) fn bind(mut self, value: impl Into<Value>) -> Query {
+        self.values.push(value.into());
+        self
+    }
+
+    /// Runs it and says how many rows were changed.
+    pub(super) async fn execute<'a>(self, on: impl Into<On<'a>>) -> Result<u64, sqlx::Error> {
+        run!(self, on, sqlx::query_with, |at, statement| {
+            Ok(statement.execute(at).await?.rows_affected())
+        })
+    }
+
+    /// The one row.
+    pub(super) async fn fetch_one<'a, T: Row>(
+        self,
+        on: impl Into<On<'a>>,
+    ) -> Result<T, sqlx::Error> {
+        run!(self, on, sqlx::query_as_with, |at, statement| {
+            statement.fetch_one(at).await
+        })
+    }
+
+    /// The first row, if there is one.
+    pub(super) async fn fetch_optional<'a, T: Row>(
+        self,
+        on: impl Into<On<'a>>,
+    ) -> Result<Option<T>, sqlx::Error> {
+        run!(self, on, sqlx::query_as_with, |at, statement| {
+            statement.fetch_optional(at).await
+        })
+    }
+
+    /// Every row.
+    pub(super) async fn fetch_all<'a, T: Row>(
+        self,
+        on: impl Into<On<'a>>,
+    ) -> Result<Vec<T>, sqlx::Error> {
+        run!(self, on, sqlx::query_as_with, |at, statement| {
+            statement.fetch_all(at).await
+        })
+    }
+}
+
+impl ScalarQuery {
+    /// The next parameter.
+    pub(super) fn bind(self, value: impl Into<Value>) -> ScalarQuery {
+        ScalarQuery(self.0.bind(value))
+    }
+
+    /// The one row's value.
+    pub(super) async fn fetch_one<'a, T: Column>(
+        self,
+        on: impl Into<On<'a>>,
+    ) -> Result<T, sqlx::Error> {
+        let (value,) = self.0.fetch_one(on).await?;
+        Ok(value)
+    }
+
+    /// The first row's value, if there is one.
+    pub(super) async fn fetch_optional<'a, T: Column>(
+        self,
+        on: impl Into<On<'a>>,
+    ) -> Result<Option<T>, sqlx::Error> {
+        let row: Option<(T,)> = self.0.fetch_optional(on).await?;
+        Ok(row.map(|(value,)| value))
+    }
+
+    /// Every row's value.
+    pub(super) async fn fetch_all<'a, T: Column>(
+        self,
+        on: impl Into<On<'a>>,
+    ) -> Result<Vec<T>, sqlx::Error> {
+        let rows: Vec<(T,)> = self.0.fetch_all(on).await?;
+        Ok(rows.into_iter().map(|(value,)| value).collect())
+    }
+}
+
+fn without_row_locks(sql: &'static str) -> String {
+    let without = |sql: Cow<'static, str>, clause: &&str| match sql.contains(*clause) {
+        true => Cow::Owned(sql.replace(*clause, "")),
+        false => sql,
+    };
+    ROW_LOCKS
+        .iter()
+        .fold(Cow::Borrowed(sql), without)
+        .into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::{Pool, query, without_row_locks};
+
+    /// Every table and column.
+    async fn columns(pool: &Pool, sql: &'static str) -> BTreeSet<(String, String)> {
+        let rows: Vec<(String, String)> = query(sql).fetch_all(pool).await.unwrap();
+        let ours = |(table, _): &(String, String)| !table.starts_with("_sqlx");
+        rows.into_iter().filter(ours).collect()
+    }
+
+    #[tokio::test]
+    #[ignore = "needs PostgreSQL: make scale-test"]
+    async fn both_engines_have_the_same_tables_and_columns() {
+        let data = tempfile::tempdir().unwrap();
+        let [_, sqlite] = Pool::open_sqlite(&data.path().join("rows.db"), true)
+            .await
+            .unwrap();
+        let of_sqlite = columns(
+            &sqlite,
+            "select m.name, c.name from sqlite_master m, pragma_table_info(m.name) c \
+             where m.type = 'table'",
+        );
+        let postgres = crate::store::fresh::open(data.path()).await.reader;
+        assert!(matches!(postgres, Pool::Postgres(_)));
+        let of_postgres = columns(
+            &postgres,
+            "select cast(table_name as text), cast(column_name as text) \
+             from information_schema.columns where table_schema = current_schema()",
+        );
+        let of_sqlite = of_sqlite.await;
+        assert!(of_sqlite.len() > 50);
+        assert_eq!(of_sqlite, of_postgres.await);
+    }
+
+    #[test]
+    fn the_one_writer_needs_no_row_locks() {
+        let of = without_row_locks;
+        assert_eq!(of("select 1 from jobs for update"), "select 1 from jobs");
+        assert_eq!(
+            of("(select 1 from jobs j limit 1 for update of j skip locked) returning id"),
+            "(select 1 from jobs j limit 1) returning id"
+        );
+        assert_eq!(
+            of("update jobs set state = $1"),
+            "update jobs set state = $1"
+        );
+    }
+}

@@ -1,0 +1,216 @@
+//! Connections to whichever engine is there, and how each is opened.
+//!
+//! SQLite has one writer connection beside a pool of readers: with one writer nobody upgrades a read
+//! snapshot, so nobody meets `database is locked`. PostgreSQL locks rows, and where a rule is about more than
+//! the rows it changes, a name ([`Transaction::lock`]).
+
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Duration;
+
+use sqlx::migrate::{MigrateDatabase, Migrator};
+use sqlx::postgres::{PgConnectOptions, PgConnection, PgListener, PgPoolOptions};
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous,
+};
+use sqlx::{PgPool, Postgres, Sqlite, SqlitePool};
+
+use super::{query, query_scalar};
+use crate::store::Error;
+
+static FOR_SQLITE: Migrator = sqlx::migrate!("migrations/sqlite");
+static FOR_POSTGRES: Migrator = sqlx::migrate!("migrations/postgres");
+const SQLITE_READERS: u32 = 4;
+/// Connections of one process: many processes share what a server allows, usually 100.
+const POSTGRES_CONNECTIONS: u32 = 8;
+
+const NO_SUCH_DATABASE: &str = "3D000";
+const DATABASE_IS_THERE: &str = "42P04";
+
+/// Connections of one kind.
+#[derive(Clone, Debug)]
+pub(in crate::store) enum Pool {
+    Sqlite(SqlitePool),
+    Postgres(PgPool),
+}
+
+/// What changes together or not at all; undone when dropped before its end.
+pub(in crate::store) enum Transaction {
+    Sqlite(sqlx::Transaction<'static, Sqlite>),
+    Postgres(sqlx::Transaction<'static, Postgres>),
+}
+
+/// Hears what other processes notify of; on SQLite there is nobody to hear.
+pub(in crate::store) struct Listener(Option<Box<PgListener>>);
+
+/// Where a statement runs: on any connection, or in a transaction.
+pub(in crate::store) enum On<'a> {
+    SqlitePool(&'a SqlitePool),
+    Sqlite(&'a mut SqliteConnection),
+    PostgresPool(&'a PgPool),
+    Postgres(&'a mut PgConnection),
+}
+
+impl Pool {
+    /// The writer and the readers of a file, made if absent, and brought to this version's form
+    /// where `migrates`.
+    pub(in crate::store) async fn open_sqlite(
+        file: &Path,
+        migrates: bool,
+    ) -> Result<[Pool; 2], Error> {
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .create_if_missing(true)
+            .journal_mode(SqliteJournalMode::Wal)
+            .synchronous(SqliteSynchronous::Full)
+            .foreign_keys(true)
+            .busy_timeout(Duration::from_secs(5));
+        let writer = SqlitePoolOptions::new()
+            .max_connections(1)
+            .connect_with(options.clone())
+            .await?;
+        if migrates {
+            FOR_SQLITE.run(&writer).await?;
+        }
+        let readers = SqlitePoolOptions::new()
+            .max_connections(SQLITE_READERS)
+            .connect_with(options.read_only(true))
+            .await?;
+        Ok([Pool::Sqlite(writer), Pool::Sqlite(readers)])
+    }
+
+    /// The connections to a server, brought to this version's form; processes that start at once wait
+    /// for one another.
+    pub(in crate::store) async fn open_postgres(url: &str) -> Result<Pool, Error> {
+        let options = PgConnectOptions::from_str(url)?.application_name("flockreel");
+        let pool = PgPoolOptions::new().max_connections(POSTGRES_CONNECTIONS);
+        let pool = match pool.clone().connect_with(options.clone()).await {
+            Err(sqlx::Error::Database(error))
+                if error.code().as_deref() == Some(NO_SUCH_DATABASE) =>
+            {
+                create(url).await?;
+                pool.connect_with(options).await?
+            }
+            opened => opened?,
+        };
+        FOR_POSTGRES.run(&pool).await?;
+        Ok(Pool::Postgres(pool))
+    }
+
+    /// A transaction for writing: on SQLite it holds the writer's lock from its first statement.
+    pub(in crate::store) async fn begin(&self) -> Result<Transaction, sqlx::Error> {
+        Ok(match self {
+            Pool::Sqlite(pool) => Transaction::Sqlite(pool.begin_with("BEGIN IMMEDIATE").await?),
+            Pool::Postgres(pool) => Transaction::Postgres(pool.begin().await?),
+        })
+    }
+
+    /// The time by the database's clock, milliseconds since 1970, where processes with clocks of their
+    /// own share the database.
+    pub(in crate::store) async fn clock_ms(&self) -> Result<Option<i64>, sqlx::Error> {
+        match self {
+            Pool::Sqlite(_) => Ok(None),
+            Pool::Postgres(_) => {
+                let sql = "select cast(extract(epoch from clock_timestamp()) * 1000 as bigint)";
+                Ok(Some(query_scalar(sql).fetch_one(self).await?))
+            }
+        }
+    }
+
+    /// Hears what other processes notify of under a name.
+    pub(in crate::store) async fn listen(&self, name: &str) -> Result<Listener, sqlx::Error> {
+        let Pool::Postgres(pool) = self else {
+            return Ok(Listener(None));
+        };
+        let mut listener = PgListener::connect_with(pool).await?;
+        listener.listen(name).await?;
+        Ok(Listener(Some(Box::new(listener))))
+    }
+
+    /// Closes the connections in order.
+    pub(in crate::store) async fn close(&self) {
+        match self {
+            Pool::Sqlite(pool) => pool.close().await,
+            Pool::Postgres(pool) => pool.close().await,
+        }
+    }
+}
+
+/// Makes the database; another process may have done so meanwhile.
+async fn create(url: &str) -> Result<(), sqlx::Error> {
+    match Postgres::create_database(url).await {
+        Err(sqlx::Error::Database(error)) if error.code().as_deref() == Some(DATABASE_IS_THERE) => {
+            Ok(())
+        }
+        made => made,
+    }
+}
+
+impl Listener {
+    /// Returns once something was notified of.
+    pub(in crate::store) async fn heard(&mut self) -> Result<(), sqlx::Error> {
+        match &mut self.0 {
+            Some(listener) => listener.recv().await.map(drop),
+            None => std::future::pending().await,
+        }
+    }
+}
+
+impl Transaction {
+    /// Until the end nobody else passes the lock of that name: for rules about rows that are not there
+    /// yet, or about how many there are. On SQLite a transaction is alone anyway.
+    pub(in crate::store) async fn lock(&mut self, name: &str) -> Result<(), sqlx::Error> {
+        if let Transaction::Postgres(_) = self {
+            query("select pg_advisory_xact_lock(hashtextextended($1, 0))")
+                .bind(name)
+                .execute(self)
+                .await?;
+        }
+        Ok(())
+    }
+
+    /// Tells those who listen to a name, once the transaction has ended well.
+    pub(in crate::store) async fn notify(&mut self, name: &str) -> Result<(), sqlx::Error> {
+        if let Transaction::Postgres(_) = self {
+            query("select pg_notify($1, '')")
+                .bind(name)
+                .execute(self)
+                .await?;
+        }
+        Ok(())
+    }
+
+    /// Ends it; its changes stay.
+    pub(in crate::store) async fn commit(self) -> Result<(), sqlx::Error> {
+        match self {
+            Transaction::Sqlite(transaction) => transaction.commit().await,
+            Transaction::Postgres(transaction) => transaction.commit().await,
+        }
+    }
+
+    /// Ends it without a trace.
+    pub(in crate::store) async fn rollback(self) -> Result<(), sqlx::Error> {
+        match self {
+            Transaction::Sqlite(transaction) => transaction.rollback().await,
+            Transaction::Postgres(transaction) => transaction.rollback().await,
+        }
+    }
+}
+
+impl<'a> From<&'a Pool> for On<'a> {
+    fn from(pool: &'a Pool) -> On<'a> {
+        match pool {
+            Pool::Sqlite(pool) => On::SqlitePool(pool),
+            Pool::Postgres(pool) => On::PostgresPool(pool),
+        }
+    }
+}
+
+impl<'a> From<&'a mut Transaction> for On<'a> {
+    fn from(transaction: &'a mut Transaction) -> On<'a> {
+        match transaction {
+            Transaction::Sqlite(transaction) => On::Sqlite(transaction),
+            Transaction::Postgres(transaction) => On::Postgres(transaction),
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Every bad film of the corpus, sent to the service (RELIABILITY.md, S1): a stable code, never an answer of
+//! the 500s, nothing stuck, nothing left; what is taken in spite of its damage ends as a job with a code.
+
+use std::time::{Duration, Instant};
+
+use flockreel::code::Code;
+use serde_json::{Value, json};
+
+use crate::common::TestApp;
+use crate::common::film::Films;
+use crate::media::corpus::{Case, corpus};
+
+/// The longest that any answer may take.
+const LONGEST: Duration = Duration::from_secs(30);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_bad_film_is_answered_with_its_code() {
+    let films = Films::new();
+    let cases = corpus(&films);
+    let app = TestApp::working().await;
+    let (mut faults, mut taken) = (Vec::new(), Vec::new());
+    for case in &cases {
+        let start = Instant::now();
+        let film = std::fs::read(&case.path).unwrap();
+        let answer = app.post("/v1/footage").body(film).send().await.unwrap();
+        let status = answer.status().as_u16();
+        let said: Value = answer.json().await.unwrap();
+        if start.elapsed() > LONGEST || !is_expected(case, status, &said) {
+            faults.push(format!("{}: {status} {said}", case.path.display()));
+        }
+        if status == 201 {
+            taken.push(said["id"].clone());
+        }
+    }
+    assert_eq!(faults, Vec::<String>::new());
+    let mut jobs = Vec::new();
+    for footage in taken {
+        let accepted = app
+            .accept("/v1/analyses", json!({"footage_id": footage}))
+            .await;
+        jobs.push(accepted["job_id"].clone());
+    }
+    for id in jobs {
+        let job = app.ended_job(&id).await;
+        let code = job["error"]["code"].as_str().unwrap_or("none");
+        assert!(!["internal", "crashed_worker"].contains(&code), "{job}");
+    }
+    app.assert_sound().await;
+}
+
+/// Damage further inside is found when the film is decoded, so it may be taken first.
+fn is_expected(case: &Case, status: u16, said: &Value) -> bool {
+    let code = said["code"].as_str().and_then(Code::from_name);
+    match status {
+        200 | 201 => case.may_be_good || case.codes.contains(&Code::Truncated),
+        422 => code.is_some_and(|code| case.codes.contains(&code)),
+        _ => false,
+    }
+}

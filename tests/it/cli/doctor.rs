@@ -1,0 +1,106 @@
+//! `doctor` says what this machine has, and `--sandbox strict` refuses to start where a layer is missing
+//! (RELIABILITY.md, "The gate"): a kernel without Landlock is had by answering its call as such a kernel would.
+
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use super::flockreel;
+use crate::common::film::Films;
+use crate::media::cage::compile_attack;
+
+/// The program on a kernel without Landlock.
+fn without_landlock(films: &Films, args: &[&str]) -> Output {
+    let attack = compile_attack(films.folder());
+    Command::new(attack)
+        .arg("--without-landlock")
+        .arg(env!("CARGO_BIN_EXE_flockreel"))
+        .args(args)
+        .current_dir(films.folder())
+        .output()
+        .expect("the program starts")
+}
+
+fn findings(done: &Output) -> Value {
+    let text = String::from_utf8_lossy(&done.stdout);
+    serde_json::from_str(&text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+fn finding<'a>(all: &'a Value, name: &str) -> &'a Value {
+    let mut findings = all["findings"].as_array().unwrap().iter();
+    let found = findings.find(|finding| finding["name"] == name);
+    found.unwrap_or_else(|| panic!("{name} is not among them: {all}"))
+}
+
+#[test]
+fn the_doctor_tells_every_layer_and_ends_with_1_where_something_is_missing() {
+    let films = Films::new();
+    let done = flockreel(&films, "doctor --json");
+    let here = findings(&done);
+    assert_eq!(done.status.code(), Some(i32::from(here["ok"] != true)));
+    let version = finding(&here, "ffmpeg")["found"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    assert!(version.starts_with("ffmpeg version "), "{version}");
+    for name in [
+        "codecs",
+        "vectors",
+        "cores",
+        "disk",
+        "sandbox.limits",
+        "sandbox.calls",
+    ] {
+        finding(&here, name);
+    }
+
+    let done = without_landlock(&films, &["--json", "doctor"]);
+    assert_eq!(done.status.code(), Some(1));
+    let lacking = findings(&done);
+    for name in ["sandbox.files", "sandbox.network", "sandbox.signals"] {
+        let finding = finding(&lacking, name);
+        assert_eq!(finding["ok"], false, "{finding}");
+        assert!(finding["meaning"].is_string(), "{finding}");
+    }
+    assert_eq!(finding(&lacking, "sandbox.limits")["ok"], true);
+
+    let done = flockreel(&films, "doctor --ffmpeg nowhere --json");
+    assert_eq!(done.status.code(), Some(1));
+    assert_eq!(finding(&findings(&done), "ffmpeg")["ok"], false);
+}
+
+#[test]
+fn a_strict_service_does_not_start_where_a_layer_is_missing() {
+    let films = Films::new();
+    let args = [
+        "serve",
+        "--no-sample",
+        "--bind",
+        "127.0.0.1:0",
+        "--sandbox",
+        "strict",
+    ];
+    let done = without_landlock(&films, &args);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(2), "{said}");
+    let sentence = said.lines().last().unwrap();
+    assert!(
+        sentence.contains("--sandbox strict") && sentence.contains("files"),
+        "{sentence}"
+    );
+}
+
+#[test]
+fn a_kernel_without_landlock_makes_films_all_the_same() {
+    let films = Films::new();
+    let sample = [
+        "sample", "-o", "film.mp4", "--frames", "5", "--size", "64x64",
+    ];
+    let done = without_landlock(&films, &sample);
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    assert!(films.path("film.mp4").is_file());
+}

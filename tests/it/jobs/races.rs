@@ -1,0 +1,149 @@
+//! Many processes that claim from one queue at once (RELIABILITY.md, R10). The processes are this test
+//! program, started anew; `FLOCKREEL_RACE_JOBS` says how many jobs they race for.
+
+use std::process::{Command, Stdio};
+
+use flockreel::ids::JobId;
+use flockreel::store::Store;
+use flockreel::store::footage::{Added, Footage, VIDEO};
+use flockreel::store::jobs::enqueue::NewJob;
+use flockreel::store::jobs::finish::{Made, Outcome};
+use flockreel::store::jobs::{Change, JobState, Kind};
+use flockreel::store::owners::{Account, Owner, Reach};
+use uuid::Uuid;
+
+use crate::common::Place;
+
+const N_PROCESSES: usize = 8;
+const LEASE_MS: i64 = 600_000;
+
+fn n_jobs() -> usize {
+    let wanted = std::env::var("FLOCKREEL_RACE_JOBS").ok();
+    wanted.map_or(400, |n| n.parse().unwrap())
+}
+
+fn job(kind: Kind) -> NewJob {
+    NewJob {
+        job_id: JobId(Uuid::now_v7()),
+        account: Account::local(),
+        kind,
+        input: "{}".into(),
+        result_id: Uuid::now_v7(),
+        after_job: None,
+        priority: 0,
+    }
+}
+
+/// Something that was made of nothing.
+fn outcome(made: Made, result: Uuid) -> Outcome {
+    Outcome {
+        made,
+        folder: format!("{result}"),
+        files: Vec::new(),
+        params: "{}".into(),
+        summary: "{}".into(),
+    }
+}
+
+/// A library, so that there is something to make fish of.
+async fn library(store: &Store) -> Uuid {
+    let draft = store.blobs().draft("film").unwrap();
+    std::fs::write(draft.path().join(VIDEO), b"film").unwrap();
+    let files = store.blobs().seal(&draft).unwrap();
+    let footage = Footage {
+        id: Uuid::now_v7(),
+        owner: Owner::local(),
+        folder: String::new(),
+        sha256: files[0].sha256.clone(),
+        background_sha256: Vec::new(),
+        name: "film".into(),
+        size_bytes: 4,
+        width: 1,
+        height: 1,
+        fps: 1.0,
+        n_frames_hint: 1,
+        sample: false,
+        created_ms: 0,
+    };
+    let added = store.add_footage(footage, draft, &files).await.unwrap();
+    let (Added::New(footage) | Added::Known(footage)) = added;
+    store.enqueue(&job(Kind::Analysis), 0).await.unwrap();
+    let lease = store.claim(Uuid::now_v7(), 0, LEASE_MS).await;
+    let lease = lease.unwrap().unwrap();
+    let made = outcome(Made::Library(footage.id), lease.result_id);
+    assert_eq!(store.finish(&lease, &made, 0).await.unwrap(), Change::Made);
+    lease.result_id
+}
+
+#[tokio::test]
+async fn processes_that_race_for_jobs_do_each_of_them_once() {
+    let place = Place::of_tests();
+    let store = Store::open(place.storage()).await.unwrap();
+    let library = library(&store).await;
+    let mut jobs = Vec::new();
+    for _ in 0..n_jobs() {
+        let job = job(Kind::Fish);
+        store.enqueue(&job, 0).await.unwrap();
+        jobs.push(job.job_id);
+    }
+    let begun = std::time::Instant::now();
+    let racers: Vec<_> = (0..N_PROCESSES)
+        .map(|_| racer(&place, library).spawn().unwrap())
+        .collect();
+    let mut n_done = 0;
+    for racer in racers {
+        let ended = racer.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stdout).into_owned();
+        assert!(ended.status.success(), "{said}");
+        let count = said.split("done: ").nth(1).unwrap();
+        n_done += count
+            .split_whitespace()
+            .next()
+            .unwrap()
+            .parse::<usize>()
+            .unwrap();
+    }
+    println!(
+        "{} jobs: {:.1} s",
+        jobs.len(),
+        begun.elapsed().as_secs_f64()
+    );
+    assert_eq!(n_done, jobs.len());
+    for job in jobs {
+        let row = store.job(job, &Reach::All).await.unwrap().unwrap();
+        assert_eq!((row.state, row.attempt), (JobState::Done, 1));
+        let made = store.fish(row.result_id, &Reach::All).await.unwrap();
+        assert_eq!(made.unwrap().job_id, job.0);
+    }
+}
+
+fn racer(place: &Place, library: Uuid) -> Command {
+    let mut racer = Command::new(std::env::current_exe().unwrap());
+    racer
+        .args([
+            "--exact",
+            "jobs::races::one_of_those_that_race",
+            "--ignored",
+        ])
+        .arg("--nocapture")
+        .env("FLOCKREEL_RACE_FOR", library.to_string())
+        .env("FLOCKREEL_RACE_PLACE", place.flags().join(" "))
+        .stdout(Stdio::piped());
+    racer
+}
+
+#[tokio::test]
+#[ignore = "a process of the race above, which starts it"]
+async fn one_of_those_that_race() {
+    let of = |name: &str| std::env::var(name).unwrap();
+    let library = of("FLOCKREEL_RACE_FOR").parse().unwrap();
+    let storage = Place::storage_of(of("FLOCKREEL_RACE_PLACE").split(' '));
+    let store = Store::open_beside(storage).await.unwrap();
+    let mut n_done = 0;
+    while let Some(lease) = store.claim(Uuid::now_v7(), 1, LEASE_MS).await.unwrap() {
+        let made = outcome(Made::Fish(library), lease.result_id);
+        assert_eq!(store.finish(&lease, &made, 1).await.unwrap(), Change::Made);
+        n_done += 1;
+    }
+    println!("done: {n_done} ");
+}

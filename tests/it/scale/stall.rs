@@ -1,0 +1,76 @@
+//! A worker that is stopped for longer than its lease and then goes on (RELIABILITY.md, R3).
+
+use std::time::{Duration, Instant};
+
+use flockreel::analysis::Params;
+use flockreel::ids::FootageId;
+use flockreel::jobs::clock::now_ms;
+use flockreel::jobs::{Context, analysis};
+use flockreel::store::Store;
+use flockreel::store::jobs::JobState;
+use flockreel::store::owners::{Account, Reach};
+use rustix::process::Signal;
+
+use super::machines::admitted;
+use crate::common::Place;
+use crate::common::process::WorkerProcess;
+
+async fn wait_until(what: &str, mut is_so: impl AsyncFnMut() -> bool) {
+    let begun = Instant::now();
+    while !is_so().await {
+        assert!(begun.elapsed() < Duration::from_secs(120), "never: {what}");
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+}
+
+#[tokio::test]
+#[ignore = "needs PostgreSQL and a bucket: make scale-test"]
+async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
+    let place = Place::shared();
+    let store = Store::open(place.storage()).await.unwrap();
+    let context = Context::new(store.clone(), 1);
+    let footage_id = FootageId(admitted(&store).await);
+    let input = analysis::Input {
+        footage_id,
+        params: Params::default(),
+    };
+    let account = Account::local();
+    let (job, library) = analysis::enqueue(&context, &input, &account).await.unwrap();
+
+    let elsewhere = place.elsewhere();
+    let stalled = WorkerProcess::start(&elsewhere);
+    wait_until("it claims", async || stalled.has_said("job claimed")).await;
+    stalled.signal(Signal::STOP);
+    let fresh = WorkerProcess::start(&place.elsewhere());
+    let row = async || store.job(job, &Reach::All).await.unwrap().unwrap();
+    wait_until("another finishes", async || {
+        row().await.state == JobState::Done
+    })
+    .await;
+    let finished = row().await;
+    let kept = store.library(library.0, &Reach::All).await.unwrap();
+
+    stalled.signal(Signal::CONT);
+    let lets_go = async || {
+        ["job stopped", "job finished too late", "job failed"]
+            .iter()
+            .any(|words| stalled.has_said(words))
+    };
+    wait_until("the stalled one lets go", lets_go).await;
+    let said = stalled.said();
+    assert!(!said.contains("job done"), "{said}");
+    assert_eq!(stalled.terminate(), Some(0));
+    assert_eq!(fresh.terminate(), Some(0));
+
+    assert_eq!(row().await, finished);
+    let folder = &kept.as_ref().unwrap().folder;
+    assert!(finished.attempt == 2 && folder.ends_with(".2"), "{folder}");
+    assert_eq!(store.library(library.0, &Reach::All).await.unwrap(), kept);
+    assert_eq!(
+        store.blobs().folders().await.unwrap().len(),
+        2,
+        "a footage and a library"
+    );
+    assert_eq!(elsewhere.n_drafts(), 0);
+    assert_eq!(store.check(now_ms()).await.unwrap(), Vec::<String>::new());
+}
