@@ -16,6 +16,7 @@ use super::limits::Limits;
 use super::probe::{Probe, Turn, is_rgb, probe};
 use super::timeline::Timeline;
 use super::tools::Tool;
+use super::wanted::{MOST_UNTOLD, Wanted};
 use crate::footage::{
     FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
 };
@@ -23,9 +24,6 @@ use crate::raster::{Frame, Matrix, Range};
 
 /// Most frames that a child may decode without showing one.
 const MOST_SKIPPED: usize = 300;
-
-/// Pictures that may come though no packet told of them.
-const MOST_UNTOLD: usize = 64;
 
 /// In a part of so many frames there is one that others refer to: three in a row without are usual.
 const LEAST_SKIPPED: usize = 8;
@@ -114,8 +112,13 @@ impl Video {
                 return Err(Error::TooManyFrames { limit: most });
             }
             if visit(&frame).is_break() {
-                break;
+                return Ok(n_shown);
             }
+        }
+        // Without a frame another way is tried, which then says why.
+        match wanted {
+            Wanted::InTime { .. } => {}
+            _ => stream.check_end()?,
         }
         Ok(n_shown)
     }
@@ -229,45 +232,6 @@ impl FrameSource for Video {
     }
 }
 
-/// Which frames a child hands over.
-enum Wanted {
-    /// Every one.
-    All,
-    /// Those of these numbers, counted as they are decoded.
-    Numbers(Vec<usize>),
-    /// The first after the middle of each of so many parts a second.
-    InTime { parts_per_s: f64, n_parts: usize },
-}
-
-impl Wanted {
-    /// More frames than a child that does as it is told can hand over.
-    fn most(&self) -> usize {
-        match self {
-            Wanted::All => usize::MAX,
-            Wanted::Numbers(numbers) => numbers.len(),
-            Wanted::InTime { n_parts, .. } => 2 * n_parts + MOST_UNTOLD,
-        }
-    }
-
-    fn filter(&self) -> Option<String> {
-        match self {
-            Wanted::All => None,
-            Wanted::Numbers(numbers) => {
-                let each: Vec<String> = numbers.iter().map(|idx| format!("eq(n,{idx})")).collect();
-                Some(format!("select='{}'", each.join("+")))
-            }
-            Wanted::InTime { parts_per_s, .. } => {
-                // A little before the middle, for times are rounded.
-                let part = |time: &str| format!("floor(({time}-start_t)*{parts_per_s}-0.499)");
-                let (this, last) = (part("t"), part("prev_selected_t"));
-                Some(format!(
-                    "select='if(isnan(prev_selected_t),gte({this},0),gt({this},{last}))'"
-                ))
-            }
-        }
-    }
-}
-
 /// One reading of a video.
 struct VideoStream<'a> {
     video: &'a Video,
@@ -309,6 +273,14 @@ impl<'a> VideoStream<'a> {
             n_given: 0,
             held: Frame::default(),
         })
+    }
+
+    /// Whether the child, which has closed its output, ended well.
+    fn check_end(&mut self) -> Result<(), Error> {
+        match self.child.take() {
+            Some(child) => child.finish()?.check().map(drop),
+            None => Ok(()),
+        }
     }
 
     /// Reads the bytes of one frame; returns how many came before the child closed its output.

@@ -1,6 +1,7 @@
 //! How a media child ended, and what that means for the film (RELIABILITY.md, "Reason codes").
 
 use std::os::unix::process::ExitStatusExt;
+use std::path::PathBuf;
 use std::process::ExitStatus;
 
 use super::error::Error;
@@ -45,4 +46,13 @@ impl End {
             }),
         }
     }
+}
+
+/// What a child said, without where our files lie.
+pub(super) fn without(files: &[PathBuf], complaint: String) -> String {
+    files.iter().fold(complaint, |text, file| {
+        let path = file.to_string_lossy();
+        text.replace(&*format!("file:{path}"), "the file")
+            .replace(&*path, "the file")
+    })
 }

@@ -8,7 +8,7 @@
 use std::ffi::OsString;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{self, ChildStdin, ChildStdout, Stdio};
 use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
 use std::thread::JoinHandle;
@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::process::{Pid, PidfdFlags, Signal};
 
-use super::end::End;
+use super::end::{self, End};
 use super::error::Error;
 use super::limits::Limits;
 use super::sandbox::{self, Cage};
@@ -109,6 +109,8 @@ pub(super) struct Child {
     stderr: Option<JoinHandle<String>>,
     time_left: Duration,
     stall: Duration,
+    /// The files it was given: what it says of them is for people, who know them by other names.
+    files: Vec<PathBuf>,
 }
 
 impl Child {
@@ -175,6 +177,7 @@ impl Child {
             stderr,
             time_left: order.time,
             stall: order.stall,
+            files: [cage.input, cage.output].into_iter().flatten().collect(),
         })
     }
 
@@ -276,10 +279,8 @@ impl Child {
             .stderr
             .take()
             .map(|thread| thread.join().unwrap_or_default());
-        Ok(End {
-            status,
-            complaint: complaint.unwrap_or_default(),
-        })
+        let complaint = end::without(&self.files, complaint.unwrap_or_default());
+        Ok(End { status, complaint })
     }
 
     /// Waits until `fd` is ready, at most until `deadline` and within the time that is left.

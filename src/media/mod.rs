@@ -18,7 +18,8 @@ mod packets; // when each packet is shown
 mod probe; // what a file holds
 mod sandbox; // what the child may do
 mod timeline; // presentation times -> a constant rate
-mod tools; // where the tools lie, and in which walls they work
+mod tools;
+mod wanted; // which frames a decoder is asked for // where the tools lie, and in which walls they work
 
 pub use coders::Coders;
 pub use decode::Video;

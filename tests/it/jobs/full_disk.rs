@@ -75,7 +75,7 @@ impl Service {
             if !job["finished_at"].is_null() {
                 return job;
             }
-            assert!(start.elapsed() < Duration::from_secs(90), "{job}");
+            assert!(start.elapsed() < Duration::from_secs(240), "{job}");
             tokio::time::sleep(Duration::from_millis(50)).await;
         }
     }

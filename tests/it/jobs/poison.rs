@@ -120,8 +120,8 @@ async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
         poisoned.push((queue.analyze(film).await["job_id"].clone(), poison, code));
     }
     let swim = queue.analyze(SWIM.clone()).await;
-    let minute = Duration::from_secs(90);
-    let library = queue.ended(&swim["job_id"], minute).await;
+    let limit = Duration::from_secs(240);
+    let library = queue.ended(&swim["job_id"], limit).await;
     assert_eq!(library["state"], "done", "{library}");
     let mut flocks = Vec::new();
     for seed in 0..20 {
@@ -131,11 +131,11 @@ async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
         flocks.push(queue.post("/v1/flocks", wish.to_string().into()).await["job_id"].clone());
     }
     for flock in &flocks {
-        let job = queue.ended(flock, minute).await;
+        let job = queue.ended(flock, limit).await;
         assert_eq!(job["state"], "done", "{job}");
     }
     for (id, poison, code) in poisoned {
-        let job = queue.ended(&id, minute).await;
+        let job = queue.ended(&id, limit).await;
         assert_eq!(job["state"], "failed", "{poison}: {job}");
         assert_eq!(job["error"]["code"], code, "{poison}: {job}");
     }

@@ -89,13 +89,18 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
     };
     let mut traced = alone(&[Files, Network, Signals, Calls]);
     let mut raised = alone(&[Calls]);
-    match is_root {
-        true => {
-            traced.push(vec![Privileges]);
-            raised.push(vec![Limits, Privileges]);
-        }
-        false => raised.push(vec![Limits]),
+    if is_root {
+        traced.push(vec![Privileges]);
     }
+    // Who may raise limits at all loses that with the other powers.
+    let held = rustix::thread::capabilities(None).expect("Linux");
+    let may_raise = held
+        .effective
+        .contains(rustix::thread::CapabilitySet::SYS_RESOURCE);
+    raised.push(match may_raise {
+        true => vec![Limits, Privileges],
+        false => vec![Limits],
+    });
     vec![
         attempt("read", path("secret"), alone(&[Files])),
         attempt("list", path(""), alone(&[Files])),
