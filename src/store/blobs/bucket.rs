@@ -55,10 +55,7 @@ impl Bucket {
             let path = self.path(&format!("{folder}/{name}"));
             let writer = BufWriter::with_capacity(self.store.clone(), path, PART_BYTES);
             let mut writer = writer.with_max_concurrency(2);
-            if let Err(error) = copy(&entry.path(), &mut writer).await {
-                writer.abort().await?;
-                return Err(error.into());
-            }
+            copy(&entry.path(), &mut writer).await?;
         }
         Ok(())
     }
@@ -125,6 +122,10 @@ impl Bucket {
 
 async fn copy(file: &FilePath, writer: &mut BufWriter) -> io::Result<()> {
     let mut reader = BufReader::with_capacity(1 << 20, File::open(file).await?);
-    tokio::io::copy_buf(&mut reader, writer).await?;
+    if let Err(error) = tokio::io::copy_buf(&mut reader, writer).await {
+        // What cannot be ended is taken back by `shutdown` itself.
+        writer.abort().await?;
+        return Err(error);
+    }
     writer.shutdown().await
 }
