@@ -87,9 +87,10 @@ async fn while_the_first_request_runs_the_second_is_told_so() {
     app.assert_sound().await;
 }
 
-/// The first request as far as it came: the key taken, the job queued, no answer noted; then a start.
+/// A request of two hours ago as far as it came: the key taken, the job queued, no answer noted; then a start.
 async fn crashed_between(app: &TestApp, footage: &str) -> Value {
-    let begun = app.context.store.begin_key(&scope(), None, now_ms()).await;
+    let then_ms = now_ms() - 2 * 3600 * 1000;
+    let begun = app.context.store.begin_key(&scope(), None, then_ms).await;
     let Begun::Run(family) = begun.unwrap() else {
         panic!("nobody had this key");
     };

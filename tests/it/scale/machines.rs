@@ -72,7 +72,7 @@ impl Service {
         let footage = json_of(answer.unwrap(), StatusCode::CREATED).await;
         let (mut jobs, mut files) = (Vec::new(), Vec::new());
         for seed in 1..=2 {
-            let wish = json!({"footage_id": footage["id"], "sprites": "always"});
+            let wish = json!({"footage_id": footage["id"]});
             let analysis = self.post("/v1/analyses", wish).await;
             let library = &analysis["library_id"];
             let wish = json!({"library_id": library, "count": 3, "frames": 20, "seed": seed});
