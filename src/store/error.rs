@@ -35,6 +35,12 @@ pub enum Error {
         /// The limit.
         quota: i64,
     },
+    /// Everybody together has as many jobs queued and running as there is room for.
+    #[error("the queue is full, {room} jobs are under way: ask again when some have ended")]
+    QueueFull {
+        /// The limit.
+        room: i64,
+    },
     /// A row holds what this version does not know.
     #[error("a row of {table} cannot be read: {value}")]
     UnknownValue {
@@ -52,6 +58,7 @@ impl Error {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
+            Error::QueueFull { .. } => Code::QueueFull,
             Error::Io(error) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if is_sqlite_full(error.code()) => {

@@ -13,7 +13,7 @@ pub const KEPT_MS: i64 = 24 * 3600 * 1000;
 /// Where a key means what it means.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scope {
-    /// Who asks.
+    /// Whose what it makes will be.
     pub caller: String,
     /// What is asked for.
     pub route: String,

@@ -20,6 +20,7 @@ pub mod owners;
 pub mod spill;
 pub mod sweep;
 pub mod tokens;
+pub mod upkeep;
 pub mod uploads;
 
 use std::fs::{File, TryLockError};
@@ -90,6 +91,11 @@ impl Store {
             holders: uploads::Holders::default(),
             _lock: lock.map(Arc::new),
         })
+    }
+
+    /// Whether no other process has the folder open.
+    pub fn is_alone(&self) -> bool {
+        self._lock.is_some()
     }
 
     /// The files.

@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 use super::{Error, Store};
 
 /// A folder without a row is younger than this while its row is being made.
-const GRACE: Duration = Duration::from_secs(3600);
+pub(super) const GRACE: Duration = Duration::from_secs(3600);
 
 /// What a sweep removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

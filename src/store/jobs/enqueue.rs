@@ -24,11 +24,13 @@ pub struct NewJob {
     pub after_job: Option<JobId>,
     /// Higher runs first; 0 is usual.
     pub priority: i64,
+    /// How many jobs of everybody may be queued and running, this one included.
+    pub room: i64,
 }
 
 impl Store {
     /// Adds the job to the queue; [`Error::QuotaExceeded`] where its owner has too many queued and
-    /// running already. Counted and added in one statement, so that two at once cannot both be the last. A job
+    /// running already, [`Error::QueueFull`] where all together have. Counted and added in one statement, so that two at once cannot both be the last. A job
     /// that is there already under its id, because its request comes again after a crash, is left as it is;
     /// [`Error::IdInUse`] where that one has another input.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
@@ -38,8 +40,9 @@ impl Store {
         let added = sqlx::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
              created_ms, owner) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8 \
-             where $9 is null or $9 > (select count(*) from jobs \
-             where owner = $8 and state in ('queued', 'running'))",
+             where ($9 is null or $9 > (select count(*) from jobs \
+             where owner = $8 and state in ('queued', 'running'))) \
+             and $10 > (select count(*) from jobs where state in ('queued', 'running'))",
         )
         .bind(job.job_id.0)
         .bind(job.kind.name())
@@ -50,13 +53,25 @@ impl Store {
         .bind(now_ms)
         .bind(&job.account.owner)
         .bind(job.account.quota)
+        .bind(job.room)
         .execute(&self.writer)
         .await?;
-        if let (0, Some(quota)) = (added.rows_affected(), job.account.quota) {
-            return Err(Error::QuotaExceeded { quota });
+        if added.rows_affected() == 0 {
+            return Err(self.why_not(job).await?);
         }
         tracing::info!(job.id = %job.job_id, job.kind = job.kind.name(), "job queued");
         Ok(())
+    }
+
+    /// Why there was no room: where it is both, the owner's own doing.
+    async fn why_not(&self, job: &NewJob) -> Result<Error, Error> {
+        let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
+        let count = sqlx::query_scalar(sql).bind(&job.account.owner);
+        let n_jobs: i64 = count.fetch_one(&self.writer).await?;
+        Ok(match job.account.quota {
+            Some(quota) if quota <= n_jobs => Error::QuotaExceeded { quota },
+            _ => Error::QueueFull { room: job.room },
+        })
     }
 
     async fn is_queued_already(&self, job: &NewJob) -> Result<bool, Error> {
