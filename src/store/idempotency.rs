@@ -17,7 +17,7 @@ const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
 /// Where a key means what it means.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scope {
-    /// Who asks.
+    /// Whose what it makes will be.
     pub caller: String,
     /// What is asked for.
     pub route: String,

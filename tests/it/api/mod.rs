@@ -3,10 +3,13 @@
 mod auth;
 mod contract;
 mod deletes;
+mod docs;
 mod downloads;
+mod events;
 mod footage;
 mod idempotency;
 mod jobs;
+mod metrics;
 mod one_call;
 mod uploads;
 mod wait;

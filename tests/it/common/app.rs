@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use clap::Parser;
+use flockreel::api::server::Stop;
 use flockreel::api::{self, AppState};
 use flockreel::config::Config;
 use flockreel::jobs::Context;
@@ -59,7 +60,10 @@ impl TestApp {
         tokio::spawn(api::server::serve(
             listener,
             api::router(state),
-            stop.clone(),
+            Stop {
+                begun: stop.clone(),
+                over: stop.clone(),
+            },
         ));
         TestApp {
             context,

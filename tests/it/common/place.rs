@@ -58,6 +58,16 @@ impl Place {
         [vec!["--data".to_owned(), data], self.flags.clone()].concat()
     }
 
+    /// The data folder.
+    pub(crate) fn data(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// The flags that say what is not in the folder.
+    pub(crate) fn elsewhere_flags(&self) -> Vec<String> {
+        self.flags.clone()
+    }
+
     /// The same for a process on another machine: a folder of its own, with the same rows and files.
     pub(crate) fn elsewhere(&self) -> Place {
         Place {

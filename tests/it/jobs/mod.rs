@@ -4,3 +4,4 @@ mod kills;
 mod life_cycle;
 mod races;
 mod steps;
+mod uploads;
