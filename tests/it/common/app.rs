@@ -170,8 +170,11 @@ impl TestApp {
     /// Folders of a kind in the store.
     pub(crate) async fn n_folders(&self, kind: &str) -> usize {
         let folders = self.context.store.blobs().folders().await.unwrap();
-        let of_kind = |(folder, _): &(String, _)| folder.split('/').next() == Some(kind);
-        folders.iter().filter(|folder| of_kind(folder)).count()
+        let of_kind = |name: &str| name.split('/').next() == Some(kind);
+        folders
+            .iter()
+            .filter(|folder| of_kind(&folder.name))
+            .count()
     }
 
     /// Every invariant of the store holds, nothing is half made; the workers let go.
