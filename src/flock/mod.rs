@@ -13,6 +13,7 @@ pub mod params;
 pub mod placement;
 pub mod plan;
 pub mod quality;
+mod rotation;
 mod seam;
 #[cfg(test)]
 pub(crate) mod synthetic;

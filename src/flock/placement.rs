@@ -8,12 +8,11 @@ use super::individual::{BoidTrack, Fade, rounded};
 use super::lens::Lens;
 use super::motion::FrameMotion;
 use super::params::{Params, Position};
+use super::rotation;
 use crate::geometry::angle::mirrored_rad;
 use crate::geometry::wrap_rad;
 use crate::library::{Library, View};
 
-/// Time constant of the rotation.
-const ROTATION_S: f64 = 0.1;
 /// Time constant with which an individual is drawn to its boid.
 const LEASH_S: f64 = 0.5;
 /// The leash's length.
@@ -246,24 +245,26 @@ impl Stage<'_> {
         if self.library.poses.view == View::Top {
             return boid.heading_rad.clone();
         }
-        let keep = libm::exp(-1.0 / (ROTATION_S * self.library.poses.fps));
-        let mut rotation = match before {
-            Some(before) => wrap_rad(before.heading_rad - self.source_heading(before.state)),
-            None => self.rotation(shown[0], boid.heading_rad[0]),
-        };
+        let stiffness = rotation::stiffness(self.library.poses.fps);
         let mut last = before.map(|before| (before.state, before.heading_rad));
         let mut headings: Vec<f64> = Vec::with_capacity(shown.len());
-        for (t, &state) in shown.iter().enumerate() {
-            if let Some((before, heading)) = last
-                && is_jump(before, state)
-            {
-                rotation = self.rotation(state, heading);
-            }
-            let wanted = self.rotation(state, boid.heading_rad[t]);
-            rotation = wanted + keep * (rotation - wanted);
-            let heading = rounded(wrap_rad(self.source_heading(state) + rotation), 5);
-            headings.push(heading);
-            last = Some((state, heading));
+        for run in shown.chunk_by(|&before, &after| !is_jump(before, after)) {
+            let anchor = last.map(|(before, heading)| match is_jump(before, run[0]) {
+                true => self.rotation(run[0], heading),
+                false => wrap_rad(heading - self.source_heading(before)),
+            });
+            let goals = &boid.heading_rad[headings.len()..];
+            let wanted: Vec<f64> = run
+                .iter()
+                .zip(goals)
+                .map(|(&state, &goal)| self.rotation(state, goal))
+                .collect();
+            let settled = rotation::settled(&wanted, anchor, stiffness);
+            let of_run = run.iter().zip(settled);
+            headings.extend(of_run.map(|(&state, rotation)| {
+                rounded(wrap_rad(self.source_heading(state) + rotation), 5)
+            }));
+            last = run.last().copied().zip(headings.last().copied());
         }
         headings
     }

@@ -30,6 +30,7 @@ const BLANK: Block = Block([0; BLOCK]);
 pub(super) struct GroupMemory {
     pub(super) blocks: Vec<Block>,
     sums: Vec<u32>,
+    filled: Vec<u64>,
     packed: Vec<u8>,
 }
 
@@ -47,6 +48,16 @@ impl GroupMemory {
         for (sum, block) in self.sums.iter_mut().zip(&self.blocks) {
             *sum = block.0.iter().map(|&byte| u32::from(byte)).sum();
         }
+        self.mark_filled();
+    }
+
+    fn mark_filled(&mut self) {
+        let bits = |sums: &[u32]| {
+            let each = (0..).zip(sums);
+            each.fold(0, |bits, (k, &sum)| bits | u64::from(sum > 0) << k)
+        };
+        self.filled.clear();
+        self.filled.extend(self.sums.chunks(GROUP).map(bits));
     }
 
     /// What is in it, as a group of so many sprites.
@@ -55,6 +66,7 @@ impl GroupMemory {
             n_sprites,
             blocks: &self.blocks,
             sums: &self.sums,
+            filled: &self.filled,
         }
     }
 
@@ -74,6 +86,7 @@ impl GroupMemory {
     pub(super) fn have_back(&mut self, sums: &[u32], at: u64, scratch: &dyn Scratch) {
         self.clear(sums.len());
         self.sums.copy_from_slice(sums);
+        self.mark_filled();
         let n_packed = sums.iter().filter(|&&sum| sum > 0).count();
         self.packed.resize(n_packed * BLOCK, 0);
         scratch.get(at, &mut self.packed);
@@ -95,6 +108,7 @@ pub(super) struct Group<'a> {
     /// Block 0 of each sprite, then block 1 of each.
     blocks: &'a [Block],
     sums: &'a [u32],
+    filled: &'a [u64],
 }
 
 impl<'a> Group<'a> {
@@ -106,6 +120,12 @@ impl<'a> Group<'a> {
     /// One block of one of the 48 sprites.
     pub(super) fn block(&self, block: usize, sprite: usize) -> &'a Block {
         &self.blocks[block * GROUP + sprite]
+    }
+
+    /// Which of the 48 sprites have anything in that block: bit k is sprite k.
+    #[inline]
+    pub(super) fn filled(&self, block: usize) -> u64 {
+        self.filled[block]
     }
 
     /// What the bytes of that block add up to.

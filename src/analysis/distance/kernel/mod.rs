@@ -77,11 +77,14 @@ impl Tile<'_> {
         [block, row, column]: [usize; 3],
         sums: &mut SadTile,
     ) -> bool {
-        let a: [u32; R] = std::array::from_fn(|r| self.rows.sum(block, row + r));
-        let b: [u32; C] = std::array::from_fn(|c| self.columns.sum(block, column + c));
-        if a != [0; R] && b != [0; C] {
+        let filled = |group: Group<'_>, first: usize, n: usize| {
+            group.filled(block) >> first & ((1 << n) - 1) != 0
+        };
+        if filled(self.rows, row, R) && filled(self.columns, column, C) {
             return false;
         }
+        let a: [u32; R] = std::array::from_fn(|r| self.rows.sum(block, row + r));
+        let b: [u32; C] = std::array::from_fn(|c| self.columns.sum(block, column + c));
         for (r, a) in a.into_iter().enumerate() {
             for (c, b) in b.into_iter().enumerate() {
                 sums[row + r][column + c] += u64::from(a + b);

@@ -17,10 +17,11 @@ pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile
     }
 }
 
-/// The sum over a block of |a - b|.
+/// The sum over a block of |a - b|, by sixteen: so the compiler finds the instruction for it.
 pub(in crate::analysis::distance) fn sad_block(a: &Block, b: &Block) -> u64 {
-    let differences = a.0.iter().zip(&b.0).map(|(a, b)| u32::from(a.abs_diff(*b)));
-    u64::from(differences.sum::<u32>())
+    let sixteens = a.0.as_chunks::<16>().0.iter().zip(b.0.as_chunks::<16>().0);
+    let sums = sixteens.map(|(a, b)| (0..16).map(|k| u32::from(a[k].abs_diff(b[k]))).sum::<u32>());
+    u64::from(sums.sum::<u32>())
 }
 
 /// The sums of |a - b| over a row of values and each of many.

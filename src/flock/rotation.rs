@@ -1,0 +1,100 @@
+//! A rotation that follows what is wanted slowly, and without delay (ALGORITHMS.md 8, shown heading).
+//!
+//! A low-pass that looks back alone lags behind whoever turns, and the lag is error. This one looks both
+//! ways: it minimizes sum (r_t - wanted_t)^2 + stiffness * sum (r_t - r_(t-1))^2, whose answer to an impulse falls
+//! by a constant factor a frame on either side, and which a tridiagonal system gives at once.
+
+/// Of an oscillation of this period in seconds, times 2 pi, half is left, as of one that passed a one-sided
+/// low-pass with the 0.1 s of ALGORITHMS.md 8.
+const HALVED_S: f64 = 0.1 / 1.732_050_807_568_877_2;
+
+/// How much a step from frame to frame counts against a distance from what is wanted.
+pub(super) fn stiffness(fps: f64) -> f64 {
+    let falls_by = libm::exp(-1.0 / (HALVED_S * fps));
+    falls_by / ((1.0 - falls_by) * (1.0 - falls_by))
+}
+
+/// The rotations of frames in succession, of which `before` came before the first.
+pub(super) fn settled(wanted_rad: &[f64], before: Option<f64>, stiffness: f64) -> Vec<f64> {
+    let n = wanted_rad.len();
+    // Thomas's algorithm: what each equation leaves of the next unknown, and its right side.
+    let mut next = Vec::with_capacity(n);
+    let mut settled: Vec<f64> = Vec::with_capacity(n);
+    for (t, &wanted) in wanted_rad.iter().enumerate() {
+        let last = match t {
+            0 => before.map(|before| (0.0, before)),
+            t => Some((next[t - 1], settled[t - 1])),
+        };
+        let (ahead, right) = (if t + 1 < n { stiffness } else { 0.0 }, wanted);
+        let (diagonal, right) = match last {
+            None => (1.0 + ahead, right),
+            Some((left_over, value)) => (
+                1.0 + ahead + stiffness * (1.0 - left_over),
+                right + stiffness * value,
+            ),
+        };
+        next.push(ahead / diagonal);
+        settled.push(right / diagonal);
+    }
+    for t in (1..n).rev() {
+        settled[t - 1] += next[t - 1] * settled[t];
+    }
+    settled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_wanted_all_the_while_is_kept_and_an_end_before_draws_the_first_frames() {
+        let still = settled(&[0.1; 20], None, stiffness(30.0));
+        assert!(still.iter().all(|r| (r - 0.1).abs() < 1e-12), "{still:?}");
+        let drawn = settled(&[0.1; 20], Some(-0.1), stiffness(30.0));
+        assert!(drawn.is_sorted() && drawn[0] < 0.08, "{drawn:?}");
+        assert!(drawn[0] > -0.1 && drawn[19] > 0.0999, "{drawn:?}");
+    }
+
+    #[test]
+    fn it_is_the_least_of_what_it_minimizes() {
+        let wanted: Vec<f64> = (0..30).map(|t| libm::sin(f64::from(t * t))).collect();
+        let (before, stiffness) = (0.3, 2.5);
+        let cost = |r: &[f64]| {
+            let off: f64 = r.iter().zip(&wanted).map(|(r, w)| (r - w) * (r - w)).sum();
+            let earlier = std::iter::once(&before).chain(r);
+            let steps: f64 = earlier.zip(r).map(|(a, b)| (a - b) * (a - b)).sum();
+            off + stiffness * steps
+        };
+        let found = settled(&wanted, Some(before), stiffness);
+        for t in 0..30 {
+            for by in [-1e-3, 1e-3] {
+                let mut other = found.clone();
+                other[t] += by;
+                assert!(cost(&found) < cost(&other), "frame {t}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_turn_is_followed_without_delay() {
+        let turning: Vec<f64> = (0..90).map(|t| f64::from(t) * 0.01).collect();
+        let found = settled(&turning, None, stiffness(30.0));
+        for t in 20..70 {
+            assert!(
+                (found[t] - turning[t]).abs() < 1e-4,
+                "frame {t}: {}",
+                found[t]
+            );
+        }
+    }
+
+    #[test]
+    fn half_is_left_of_an_oscillation_of_the_period_named() {
+        let fps = 240.0;
+        let wave = |t: usize| libm::sin(t as f64 / (HALVED_S * fps));
+        let wanted: Vec<f64> = (0..2000).map(wave).collect();
+        let found = settled(&wanted, None, stiffness(fps));
+        let highest = found[500..1500].iter().fold(0.0, |a: f64, b| a.max(*b));
+        assert!((highest - 0.5).abs() < 0.01, "{highest}");
+    }
+}
