@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race truth-test page-test arm-test docs deny bench accuracy papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race truth-test page-test contract-test soak arm-test docs deny bench accuracy papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,7 +16,7 @@ help: ## list the commands
 run: build ## install what is missing, build, start the service and its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit scale-test truth-test page-test ## install what the tests need and run them all
+test: unit scale-test truth-test page-test contract-test ## install what the tests need and run them all
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,7 +26,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit scale-test truth-test page-test docs deny ## everything that CI checks
+check: fmt clippy unit scale-test truth-test page-test contract-test docs deny ## everything that CI checks
 	@echo "all checks passed"
 
 fmt: ## the formatting
@@ -58,6 +58,13 @@ page-test: vendor ## the page in a browser, against a really started service
 	$(CARGO) test --locked --no-run
 	@scripts/page-tests.sh $(DEBUG)
 
+contract-test: target/vendor ## the API against its own description, by schemathesis
+	$(CARGO) test --locked --no-run
+	@scripts/contract-tests.sh $(DEBUG)
+
+soak: target/vendor ## two hundred kills while films are uploaded
+	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads
+
 # Not part of `check`: an emulated processor takes half an hour. ARM_TESTS=analysis::distance runs the kernels' alone.
 ARM = aarch64-unknown-linux-gnu
 ARM_TESTS ?=
@@ -82,6 +89,8 @@ deny: ## licences, bans and sources of the dependencies, offline
 bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
 	@target/bench-venv/bin/python -c "import numpy, scipy, cv2, faiss, mesa, networkx" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless faiss-cpu mesa networkx
+	@scripts/system-packages.sh bench
+	python3 bench/service.py $(RELEASE)
 	-target/bench-venv/bin/python bench/analyze.py $(RELEASE)
 	python3 bench/run.py $(RELEASE)
 	target/bench-venv/bin/python bench/distance.py

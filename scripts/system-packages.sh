@@ -2,7 +2,7 @@
 # Installs the Debian packages that flockreel needs, and only those that are missing.
 # The same list for `make`, the Dockerfile and CI, so that they cannot drift apart.
 #
-#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test | truth-test | page-test | arm-test
+#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test | truth-test | page-test | contract-test | bench | arm-test
 #
 # Says what it does. Uses sudo when it is not root. Ends with 1 when something is still missing.
 set -eu
@@ -23,6 +23,11 @@ scale-test python3  python3-venv
 truth-test python3  python3-venv
 truth-test ffmpeg   ffmpeg
 page-test python3   python3-venv
+contract-test python3 python3-venv
+contract-test ffmpeg  ffmpeg
+bench     wrk       wrk
+bench     nginx     nginx-light
+bench     curl      curl
 page-test chromium  chromium
 arm-test  aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
 arm-test  /usr/aarch64-linux-gnu/lib/libc.so.6 libc6-dev-arm64-cross

@@ -1,8 +1,8 @@
-//! Every stable error code: its name, and one line of meaning. The same in the API, on the command
+//! Every stable error code: its name, one line of meaning, one of advice. The same in the API, on the command
 //! line, in the database and in the docs. A code is never renamed and never means something else.
 
 macro_rules! codes {
-    ($($variant:ident $name:literal $meaning:literal)*) => {
+    ($($variant:ident $name:literal $meaning:literal $advice:literal)*) => {
         /// A stable reason; see [`Code::meaning`] for each one's sense.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Code { $(#[doc = $meaning] $variant,)* }
@@ -21,6 +21,11 @@ macro_rules! codes {
                 match self { $(Code::$variant => $meaning,)* }
             }
 
+            /// What to do about it, a sentence for whoever met it.
+            pub fn advice(self) -> &'static str {
+                match self { $(Code::$variant => $advice,)* }
+            }
+
             /// The code of a name, if there is one.
             pub fn from_name(name: &str) -> Option<Code> {
                 match name { $($name => Some(Code::$variant),)* _ => None }
@@ -32,60 +37,113 @@ macro_rules! codes {
 codes! {
     // The file (RELIABILITY.md, the gate).
     NotAVideo "not_a_video" "The file is not a video that can be read."
+        "Send the film itself, as MP4, MOV, MKV, WebM, AVI, MPEG-TS or ASF; neither a picture nor a playlist."
     ContainerNotAllowed "container_not_allowed" "The container format is not among those accepted."
+        "Convert it, for example with `ffmpeg -i film -c copy film.mp4`."
     CodecNotAllowed "codec_not_allowed" "The video codec is not among those accepted."
+        "Encode it anew, for example with `ffmpeg -i film -c:v libx264 film.mp4`."
     TooManyPixels "too_many_pixels" "The picture is larger than the limit."
+        "Scale it down, for example with `ffmpeg -i film -vf scale=1920:-2 film.mp4`."
     TooFewPixels "too_few_pixels" "The picture is smaller than the limit."
+        "Film larger: each side wants at least the pixels that the sentence names."
     TooManyFrames "too_many_frames" "The footage has more frames than the limit."
+        "Send a shorter piece of it."
     TooManyStreams "too_many_streams" "The file holds more streams than the limit."
+        "Send the picture alone, for example with `ffmpeg -i film -map 0:v:0 -c copy film.mp4`."
     TooLong "too_long" "The footage lasts longer than the limit."
+        "Send a shorter piece of it."
     TooFast "too_fast" "The frame rate is above the limit."
+        "Send it at fewer frames a second, for example with `ffmpeg -i film -r 60 film.mp4`."
     Truncated "truncated" "The file is cut off or damaged inside."
+        "Copy the file from the camera again, and see whether it plays to its end."
     Encrypted "encrypted" "The video is encrypted."
+        "Send it without copy protection."
     NoVideoStream "no_video_stream" "The file holds no video stream."
+        "See whether the file holds more than sound."
     TooFewFrames "too_few_frames" "The footage has too few frames to analyze."
+        "Film longer: half a minute or more makes a lively flock."
     TimeLimit "time_limit" "The work took longer than its time limit."
+        "Try a shorter or smaller film, or fewer individuals and frames."
     MemoryLimit "memory_limit" "The work needed more memory than its limit."
+        "Try a shorter or smaller film, or fewer individuals and frames."
     DecoderCrashed "decoder_crashed" "The video decoder or encoder stopped unexpectedly."
+        "Encode the film anew and try again; if it comes back, tell whoever runs the service."
     StorageFull "storage_full" "There is no room left to store the result."
+        "Delete what is no longer needed, or ask whoever runs the service for room; then try again."
     // The analysis (ALGORITHMS.md 2.9).
     NothingMoves "nothing_moves" "Nothing moves before the background."
+        "Film an animal that moves about, before a background that it stands out from."
     BackgroundNotStatic "background_not_static" "The background moves: the camera must stand still."
+        "Put the camera on a tripod, and keep light and focus fixed."
     SeveralAnimals "several_animals" "More than one animal moves in the footage."
+        "Film one animal alone, without its mirror image."
     AnimalTooSmall "animal_too_small" "The animal is too small in the picture."
+        "Film from nearer by, or with more pixels."
     BackgroundSizeDiffers "background_size_differs" "The background image has another size than the footage."
+        "Send a background of the film's own width and height, or none."
     // The flock.
     NoTransitions "no_transitions" "The library has too few moments that look alike: film longer."
+        "Film longer, so that the animal comes by the same places and poses again."
     // Anything.
     InputFailed "input_failed" "The job whose result this one needs ended without a result."
+        "Look at that job's own error, mend it there, and ask again."
     CrashedWorker "crashed_worker" "The work crashed its worker twice and is not tried again."
+        "Try other parameters or another film, and tell whoever runs the service."
     InvalidParams "invalid_params" "A parameter is unknown, malformed or out of its range."
+        "The sentence names what is wrong; the API's description has every range and default."
     Cancelled "cancelled" "The work was cancelled."
+        "Ask again if it is wanted after all."
     // The door.
     NotFound "not_found" "There is nothing at this address."
+        "Check the id: it may have been deleted, or belong to somebody else."
     NotReady "not_ready" "The result is not there yet: its job has not finished."
+        "Wait for the job that the sentence names, with its events or with `Prefer: wait=60`."
     MethodNotAllowed "method_not_allowed" "The address does not take this method."
+        "The answer's `Allow` header and the API's description name the methods that it takes."
     MalformedRequest "malformed_request" "The request cannot be read."
+        "The sentence says where reading stopped; compare with the API's description."
     UnsupportedMediaType "unsupported_media_type" "The body is of a type that is not taken here."
+        "Set `Content-Type` to what the API's description names, and send no `Content-Encoding`."
     TooLarge "too_large" "The body is larger than the limit."
+        "Send less; for films the limit is the service's `--max-upload-bytes`."
     HeadTooLarge "head_too_large" "The head of the request is larger than the limit."
+        "Send fewer or shorter header fields: 32 KiB together."
     AddressTooLong "address_too_long" "The address is longer than the limit."
+        "Send a shorter address: 8 KiB at most."
     BodyTimeout "body_timeout" "The body came too slowly."
+        "Send again over a better network, or in pieces by `/v1/uploads`."
     BodyCutOff "body_cut_off" "The body ended before it was complete."
+        "Send it again; `/v1/uploads` goes on where a cut was."
     RangeNotSatisfiable "range_not_satisfiable" "The file is shorter than the range asked for."
+        "`Content-Range` in the answer has the file's size."
     AlreadyFinished "already_finished" "The job has ended and cannot be cancelled."
+        "Nothing needs to be done; delete its result if it is not wanted."
     IdempotencyKeyReused "idempotency_key_reused" "The Idempotency-Key was used before, with another body."
+        "Make a new key for a new request."
     RequestInProgress "request_in_progress" "The request with this Idempotency-Key is still under way."
+        "Wait as long as `Retry-After` says, then send the same again."
     OffsetDiffers "offset_differs" "The upload stands elsewhere: ask where, and go on from there."
+        "Ask with HEAD for `Upload-Offset`, and go on from there."
     ChecksumMismatch "checksum_mismatch" "The bytes do not have the checksum that came with them."
+        "Send the piece again."
     TusVersionNotSupported "tus_version_not_supported" "Tus-Resumable must be 1.0.0."
+        "Send `Tus-Resumable: 1.0.0` with every request to `/v1/uploads`."
     Unauthenticated "unauthenticated" "A valid token is needed: none was given, or it is wrong, expired or revoked."
+        "Send `Authorization: Bearer TOKEN`, or sign in on the page; `flockreel token create` makes tokens."
     ScopeTooSmall "scope_too_small" "The token may not do this."
+        "Use a token of a larger scope: read, write, admin."
     QuotaExceeded "quota_exceeded" "There are as many jobs under way as the token may have."
+        "Wait for a job to end, or cancel one."
+    QueueFull "queue_full" "There are as many jobs under way as the service has room for."
+        "Wait as long as `Retry-After` says, and ask again; what was uploaded is kept."
     RateLimited "rate_limited" "Too many requests in a short time: ask again soon."
+        "Wait as long as `Retry-After` says; follow jobs by `/v1/events` rather than by asking often."
     CrossSite "cross_site" "Another site may not ask for this."
+        "Use the service's own page under its own name, or a program that sends no `Origin`."
     Stopping "stopping" "The service is stopping: ask again soon."
+        "Ask again as soon as it is up: what was accepted is kept."
     Internal "internal" "Something failed inside flockreel."
+        "Try again; if it comes back, tell whoever runs the service the `x-request-id` of the answer."
 }
 
 impl std::fmt::Display for Code {

@@ -29,6 +29,13 @@ pub struct Config {
     /// Requests a second that each owner of a token may make, four seconds' at once; 0 for any number.
     #[arg(long, env = "FLOCKREEL_RATE", default_value_t = 200, value_name = "N")]
     pub rate: u32,
+    /// How many jobs of everybody may be queued or running at once.
+    #[arg(long, env = "FLOCKREEL_MAX_QUEUED", default_value_t = 10_000, value_name = "N",
+        value_parser = clap::value_parser!(i64).range(0..))]
+    pub max_queued: i64,
+    /// Another address, where /metrics alone is answered, to whoever reaches it.
+    #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
+    pub metrics_bind: Option<SocketAddr>,
     /// The largest upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,

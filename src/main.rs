@@ -2,9 +2,6 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use flockreel::cli::Cli;
-
 fn main() -> ExitCode {
-    flockreel::cli::main(Cli::parse())
+    flockreel::cli::main(&std::env::args_os().collect::<Vec<_>>())
 }

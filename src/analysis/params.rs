@@ -9,6 +9,7 @@ use crate::library::{Animal, View};
 
 /// Parameters of an analysis; all have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = AnalysisParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// From where the animal is seen; guessed when absent.

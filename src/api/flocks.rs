@@ -1,18 +1,15 @@
 //! Flocks: made of a library, as a job.
 
-use std::ops::RangeInclusive;
-
 use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
 use axum::http::{Response, StatusCode};
-use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::{Caller, signed};
+use super::access::Caller;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::footage::admit;
@@ -21,17 +18,15 @@ use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody};
 use super::receive::{is_film, receive_with};
 use super::timestamp::rfc3339;
-use crate::code::Code;
 use crate::flock::Params;
 use crate::formats::params;
 use crate::ids::{FlockId, FootageId, JobId, LibraryId};
 use crate::jobs::analysis;
-use crate::jobs::clock::now_ms;
 use crate::jobs::flock::{Input, Summary, enqueue};
 use crate::store::flocks::Flock;
 use crate::store::footage::Added;
 
-const FILES: Files = &[
+pub(super) const FILES: Files = &[
     ("flock.json", "application/json"),
     ("frames.zip", "application/zip"),
     ("ground-truth.zip", "application/zip"),
@@ -54,39 +49,6 @@ pub(super) struct FlockRequest {
     #[serde(flatten)]
     #[schema(value_type = Params)]
     params: Map<String, Value>,
-}
-
-/// How long a link may hold, seconds.
-const LINK_S: RangeInclusive<i64> = 60..=604_800;
-
-/// To which file, and for how long.
-#[derive(Debug, Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-pub(super) struct LinkRequest {
-    /// One of the flock's files.
-    #[serde(default = "video")]
-    #[schema(default = "video.mp4")]
-    file: String,
-    /// Seconds, 60..=604800 (a week).
-    #[serde(default = "an_hour")]
-    #[schema(minimum = 60, maximum = 604_800, default = 3600)]
-    expires_s: i64,
-}
-
-/// A link that needs no token.
-#[derive(Debug, Serialize, ToSchema)]
-pub(super) struct LinkView {
-    /// The path with its signature, on this host.
-    url: String,
-    expires_at: String,
-}
-
-fn video() -> String {
-    "video.mp4".to_owned()
-}
-
-fn an_hour() -> i64 {
-    3600
 }
 
 /// The job, and the flock that it will make.
@@ -278,33 +240,6 @@ pub(super) async fn get_flock_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-/// Make a link to a file of a flock that needs no token and ends by itself.
-#[utoipa::path(post, path = "/v1/flocks/{id}/links", params(("id" = Uuid, Path)),
-    request_body = LinkRequest, responses(
-    (status = 201, body = LinkView),
-    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
-))]
-pub(super) async fn create_flock_link(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    Json(request): Json<LinkRequest>,
-) -> Result<Response<Body>, Problem> {
-    let flock = find(&state, &caller, id).await?;
-    let (name, _) = find_file(FILES, &request.file)?;
-    if !LINK_S.contains(&request.expires_s) {
-        let sentence = format!("expires_s must lie in 60..=604800: {}", request.expires_s);
-        return Err(Problem::new(Code::InvalidParams, sentence));
-    }
-    let expires_s = now_ms() / 1000 + request.expires_s;
-    let key = state.context.store.signing_key().await?;
-    let view = LinkView {
-        url: signed(&key, &format!("/v1/flocks/{}/{name}", flock.id), expires_s),
-        expires_at: rfc3339(expires_s * 1000),
-    };
-    Ok((StatusCode::CREATED, axum::Json(view)).into_response())
-}
-
 /// The name under which a file is saved.
 fn label_of(name: &str, id: Uuid) -> String {
     match name {
@@ -316,7 +251,7 @@ fn label_of(name: &str, id: Uuid) -> String {
     }
 }
 
-async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Flock, Problem> {
+pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Flock, Problem> {
     match state.context.store.flock(id, &caller.reach).await? {
         Some(flock) => Ok(flock),
         None => Err(absent_result(state, caller, id).await?),

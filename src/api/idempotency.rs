@@ -1,6 +1,6 @@
 //! Idempotency-Key on every POST that makes something (RELIABILITY.md, store and queue rules): the same
 //! key with the same body gets the same answer again, with another body 422, and 409 while the first
-//! still runs. Kept for a day, for each caller and route by itself; a 5xx is never kept.
+//! still runs. Kept for a day, for each owner and route by itself; a 5xx is never kept.
 //!
 //! A JSON body is read and hashed before the request runs; others are hashed on their way to the disk.
 
@@ -18,16 +18,22 @@ use futures_util::Stream;
 use futures_util::stream::{StreamExt, poll_fn};
 use sha2::{Digest, Sha256};
 
+use super::access::Caller;
 use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::code::Code;
 use crate::jobs::allotted;
 use crate::jobs::clock::now_ms;
 use crate::store::Store;
-use crate::store::blobs::hex;
 use crate::store::idempotency::{Answer, Begun, Scope};
 
 /// The routes that make something.
-pub(super) const ROUTES: [&str; 4] = ["/v1/footage", "/v1/analyses", "/v1/flocks", "/v1/fish"];
+pub(super) const ROUTES: [&str; 5] = [
+    "/v1/footage",
+    "/v1/analyses",
+    "/v1/flocks",
+    "/v1/fish",
+    "/v1/uploads",
+];
 /// The header that carries the key.
 pub(super) const KEY: &str = "idempotency-key";
 const REPLAYED: HeaderName = HeaderName::from_static("idempotent-replayed");
@@ -35,12 +41,17 @@ const MAX_KEY_BYTES: usize = 255;
 /// What may come after the end of a form.
 const MAX_EPILOGUE_BYTES: usize = 64 << 10;
 /// The headers that belong to an answer; all others are set anew.
-const KEPT: [HeaderName; 4] = [
+const KEPT: [HeaderName; 7] = [
     header::CONTENT_TYPE,
     header::LOCATION,
     header::LINK,
     header::RETRY_AFTER,
+    HeaderName::from_static("upload-offset"),
+    HeaderName::from_static("upload-length"),
+    HeaderName::from_static("upload-expires"),
 ];
+/// The headers that say what is asked for, as the body does elsewhere.
+const ASKED: [&str; 2] = ["upload-length", "upload-metadata"];
 
 /// Answers a request with a key that was answered before; runs and keeps any other.
 pub(super) async fn run_once(
@@ -69,6 +80,10 @@ async fn run_keyed(
     let (parts, body) = request.into_parts();
     let mut hasher = Sha256::new();
     hasher.update(parts.uri.query().unwrap_or_default());
+    for value in ASKED.iter().filter_map(|name| parts.headers.get(*name)) {
+        hasher.update(value);
+        hasher.update(b"\n");
+    }
     let (tally, known) = if is_json(&parts.headers) {
         let too_large = |_| Problem::from(Code::TooLarge);
         let bytes = to_bytes(body, MAX_JSON_BYTES).await.map_err(too_large)?;
@@ -227,24 +242,12 @@ fn scope_of(request: &Request, key: &HeaderValue) -> Result<Scope, Problem> {
         let sentence = "an Idempotency-Key has 1 to 255 visible characters";
         return Err(Problem::new(Code::MalformedRequest, sentence));
     }
+    let caller = request.extensions().get::<Caller>();
     Ok(Scope {
-        caller: caller_of(request.headers()),
+        caller: caller.map_or_else(String::new, |caller| caller.account.owner.0.clone()),
         route: request.uri().path().to_owned(),
         key: key.to_owned(),
     })
-}
-
-/// Who asks, by what he proves it with, hashed; empty where nobody has to.
-fn caller_of(headers: &HeaderMap) -> String {
-    let proofs = [header::AUTHORIZATION, header::COOKIE];
-    let proofs: Vec<&[u8]> = proofs
-        .iter()
-        .filter_map(|name| Some(headers.get(name)?.as_bytes()))
-        .collect();
-    match proofs.is_empty() {
-        true => String::new(),
-        false => hex(&Sha256::digest(proofs.join(&b'\n'))),
-    }
 }
 
 fn is_json(headers: &HeaderMap) -> bool {

@@ -17,11 +17,11 @@ mod analyses;
 mod fish;
 mod flocks;
 mod footage;
-mod health;
 mod jobs;
 mod libraries;
-mod openapi;
-mod page;
+mod links;
+mod page; // the page, the pages about the API
+mod seen; // health, metrics, ids of requests
 mod uploads;
 
 use std::sync::Arc;
@@ -33,17 +33,20 @@ use axum::response::{IntoResponse, Response};
 use axum::{Router, middleware};
 use tokio_util::sync::CancellationToken;
 use tower_http::catch_panic::CatchPanicLayer;
-use tower_http::request_id::{MakeRequestUuid, PropagateRequestIdLayer, SetRequestIdLayer};
 use tower_http::timeout::RequestBodyTimeoutLayer;
-use tower_http::trace::TraceLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 pub use access::signed;
 pub use problem::Problem;
+pub use seen::metrics::metrics_router;
 
 use access::{Names, Rates, authenticate, guard, session};
+use page::{docs, openapi};
+use seen::metrics::Metrics;
+use seen::observe::{Requests, observe};
+use seen::{health, metrics};
 
 use crate::code::Code;
 use crate::config::Config;
@@ -68,6 +71,10 @@ pub struct AppState {
     pub walls: Arc<Result<media::Walls, String>>,
     /// How often each owner may ask.
     rates: Arc<Rates>,
+    /// What is counted of requests.
+    requests: Requests,
+    /// What is told of everything.
+    metrics: Metrics,
 }
 
 impl AppState {
@@ -76,6 +83,7 @@ impl AppState {
         let store = Store::open(config.storage.clone()).await?;
         let mut context = Context::new(store, config.crew.threads_per_worker());
         context.budget = Duration::from_secs(config.crew.job_time_s);
+        context.max_queued = config.max_queued;
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::walls).await;
         let tool = tool.map_err(std::io::Error::other)?;
@@ -83,7 +91,10 @@ impl AppState {
             Ok(walls) => tracing::info!(version = walls.version, "media tool found"),
             Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
         }
+        let requests = Requests::default();
         Ok(AppState {
+            metrics: Metrics::new(&context.meters, &requests),
+            requests,
             rates: Arc::new(Rates::new(config.rate)),
             config: Arc::new(config),
             context,
@@ -97,12 +108,14 @@ pub fn router(state: AppState) -> Router {
     let (routes, mut document) = table().split_for_parts();
     openapi::add_headers(&mut document);
     let stop = state.context.draining.clone();
+    let requests = state.requests.clone();
     let names = match state.config.demands_tokens() {
         true => Names::Any,
         false => Names::Loopback,
     };
     routes
         .merge(openapi::route(&document))
+        .merge(docs::routes())
         .merge(page::routes())
         .fallback(|| async { Problem::from(Code::NotFound) })
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
@@ -122,9 +135,7 @@ pub fn router(state: AppState) -> Router {
         .layer(CatchPanicLayer::custom(panicked))
         .layer(middleware::from_fn_with_state(stop, refuse_while_stopping))
         .layer(middleware::from_fn_with_state(names, guard))
-        .layer(PropagateRequestIdLayer::x_request_id())
-        .layer(TraceLayer::new_for_http())
-        .layer(SetRequestIdLayer::x_request_id(MakeRequestUuid))
+        .layer(middleware::from_fn_with_state(requests, observe))
 }
 
 /// Every route with its entry in the OpenAPI document.
@@ -146,16 +157,18 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
         .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
-        .routes(routes!(flocks::create_flock_link))
+        .routes(routes!(links::create_flock_link))
         .routes(routes!(fish::create_fish, fish::list_fish))
         .routes(routes!(fish::get_fish, fish::delete_fish))
         .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
-        .routes(routes!(jobs::get_job_events))
+        .routes(routes!(jobs::events::get_job_events))
+        .routes(routes!(jobs::events::get_events))
         .routes(routes!(session::begin_session, session::end_session))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))
+        .routes(routes!(metrics::get_metrics))
 }
 
 /// Nothing new is begun once the service stops; what is there can still be read.

@@ -108,6 +108,7 @@ impl IntoResponse for Problem {
                 | Code::StorageFull
                 | Code::RequestInProgress
                 | Code::QuotaExceeded
+                | Code::QueueFull
                 | Code::RateLimited
         ) {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
@@ -167,7 +168,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,
         Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
         Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
-        Code::Stopping => StatusCode::SERVICE_UNAVAILABLE,
+        Code::Stopping | Code::QueueFull => StatusCode::SERVICE_UNAVAILABLE,
         Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
     }
 }

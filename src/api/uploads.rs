@@ -22,6 +22,7 @@ use super::problem::{Problem, ProblemBody};
 use super::receive::{PIECE, check_room, label};
 use crate::code::Code;
 use crate::jobs::admit::Arrival;
+use crate::jobs::allotted::next_id;
 use crate::jobs::clock::now_ms;
 use crate::store::footage::Added;
 use crate::store::owners::Reach;
@@ -87,7 +88,7 @@ pub(super) async fn create_upload(
     }
     check_room(&state, size_bytes.unsigned_abs())?;
     let upload = Upload {
-        id: Uuid::now_v7(),
+        id: next_id(),
         owner: caller.account.owner,
         name: label(&file_name(headers)?),
         size_bytes,
@@ -97,9 +98,14 @@ pub(super) async fn create_upload(
     };
     let store = &state.context.store;
     store.sweep_uploads(now_ms()).await?;
-    store.create_upload(&upload).await?;
     let location = [(header::LOCATION, format!("/v1/uploads/{}", upload.id))];
     let hold = store.hold_upload(upload.id).await;
+    // A request that comes again under its key after a crash goes on with what it made then.
+    let reach = Reach::Of(upload.owner.clone());
+    if let Some(upload) = store.upload(upload.id, &reach, now_ms()).await? {
+        return Ok((StatusCode::CREATED, location, standing(&upload)).into_response());
+    }
+    store.create_upload(&upload).await?;
     let upload = match is_piece(headers) {
         true => take(&state, &hold, upload, request).await?,
         false => upload,

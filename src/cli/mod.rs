@@ -4,11 +4,15 @@
 //! stdout (`token` prints to stdout without it too). Exit codes: 0; 2 for bad usage or input; 1 for a failure inside.
 
 pub mod analyze;
+pub mod backup;
+pub mod check;
 pub mod check_plan;
+pub mod config_file;
 pub mod doctor;
 pub mod error;
 pub mod fish;
 pub mod flock;
+pub mod gc;
 pub mod matrix;
 pub mod progress;
 pub mod sample;
@@ -17,12 +21,13 @@ pub mod sprites;
 pub mod token;
 pub mod worker;
 
+use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::{Parser, Subcommand};
+use clap::{Parser, Subcommand, ValueEnum};
 use serde_json::Value;
 use tracing_subscriber::EnvFilter;
 
@@ -47,9 +52,31 @@ pub struct Cli {
     log: Option<String>,
     #[command(flatten)]
     media: config::Media,
+    /// How log lines are written: for people, or a JSON object a line.
+    #[arg(
+        long,
+        global = true,
+        env = "FLOCKREEL_LOG_FORMAT",
+        default_value = "text",
+        value_name = "FORMAT"
+    )]
+    log_format: LogFormat,
+    /// A file of settings (TOML), each called as its flag: `max-upload-bytes = 1000000`. Flags win over
+    /// environment variables, those over the file, that over the defaults.
+    #[arg(long, global = true, env = "FLOCKREEL_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
     /// What to do.
     #[command(subcommand)]
     command: Command,
+}
+
+/// How log lines are written.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// A JSON object a line, with the ids of the request and the job that it belongs to.
+    Json,
 }
 
 /// The commands, in the order in which a newcomer meets them.
@@ -61,6 +88,12 @@ enum Command {
     Worker(worker::Args),
     /// Make, list and revoke the tokens with which the service is reached from elsewhere.
     Token(token::Args),
+    /// Verify that the data folder is sound: every file has its row and its hash, every job one legal state.
+    Check(check::Args),
+    /// Remove what nobody refers to any more: leftovers of crashes, uploads that were given up.
+    Gc(gc::Args),
+    /// Copy the data folder, beside a running service too; `serve --data` on the copy restores it.
+    Backup(backup::Args),
     /// Measure the animal in a video: footage to library.
     Analyze(analyze::Args),
     /// Make a flock out of a library, as a video.
@@ -84,11 +117,16 @@ enum Command {
 pub struct Summary(pub Value);
 
 /// Runs the command and says how it went; never panics on a user's input.
-pub fn main(cli: Cli) -> ExitCode {
-    start_logging(
-        cli.log.as_deref(),
-        matches!(cli.command, Command::Serve(_) | Command::Worker(_)),
-    );
+pub fn main(arguments: &[OsString]) -> ExitCode {
+    let cli = match config_file::parse(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            say(&format!("flockreel: {error}"));
+            return ExitCode::from(error.exit_code());
+        }
+    };
+    let serves = matches!(cli.command, Command::Serve(_) | Command::Worker(_));
+    start_logging(cli.log.as_deref(), cli.log_format, serves);
     media::set_up(&cli.media);
     match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
@@ -104,6 +142,9 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
         Command::Serve(args) => serve::run(args),
         Command::Worker(args) => worker::run(args),
         Command::Token(args) => token::run(args, json),
+        Command::Check(args) => check::run(args),
+        Command::Gc(args) => gc::run(args, json),
+        Command::Backup(args) => backup::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Flock(args) => flock::run(args),
         Command::CheckPlan(args) => check_plan::run(args),
@@ -129,14 +170,21 @@ fn scratch_beside(output: &Path) -> Arc<dyn Scratch> {
 }
 
 /// Logs go to stderr: everything worth knowing of a service, only warnings of the other commands.
-fn start_logging(filter: Option<&str>, serves: bool) {
+fn start_logging(filter: Option<&str>, format: LogFormat, serves: bool) {
     let default = if serves { "info" } else { "warn" };
-    tracing_subscriber::fmt()
+    let lines = tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::new(filter.unwrap_or(default)))
         .with_writer(std::io::stderr)
         .with_ansi(std::io::stderr().is_terminal())
-        .with_target(false)
-        .init();
+        .with_target(false);
+    match format {
+        LogFormat::Text => lines.init(),
+        LogFormat::Json => lines
+            .json()
+            .flatten_event(true)
+            .with_span_list(false)
+            .init(),
+    }
 }
 
 fn print(json: bool, summary: &Option<Summary>) -> ExitCode {

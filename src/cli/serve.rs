@@ -1,11 +1,13 @@
 //! `flockreel serve`: API, page and workers in one process (RELIABILITY.md, R4 for its end).
 
+use std::net::SocketAddr;
+
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{SignalKind, signal};
-use tokio_util::sync::CancellationToken;
 
 use super::{Error, Summary, say};
+use crate::api::server::Stop;
 use crate::api::{self, AppState};
 use crate::config::{Auth, Config};
 use crate::jobs::clock::now_ms;
@@ -36,15 +38,24 @@ async fn serve(config: Config) -> Result<(), Error> {
     let with_sample = !config.no_sample;
     refuse_open_door(&config).await?;
     let state = AppState::open(config).await.map_err(from_store)?;
-    let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
-    let listener = TcpListener::bind(bind).await.map_err(cannot)?;
-    let address = listener.local_addr().map_err(cannot)?;
+    let (listener, address) = listen(bind).await?;
+    let metrics = match state.config.metrics_bind {
+        Some(bind) => Some(listen(bind).await?),
+        None => None,
+    };
     let context = state.context.clone();
     let supervisor = Supervisor::start(context.clone(), n_workers);
     if with_sample {
         tokio::spawn(fill(context.clone()));
     }
-    let stop = CancellationToken::new();
+    let stop = Stop::default();
+    if let Some((listener, address)) = metrics {
+        let router = api::metrics_router(state.clone());
+        tokio::spawn(api::server::serve(listener, router, stop.clone()));
+        say(&format!(
+            "flockreel: the metrics are at http://{address}/metrics"
+        ));
+    }
     let server = tokio::spawn(api::server::serve(
         listener,
         api::router(state),
@@ -53,13 +64,24 @@ async fn serve(config: Config) -> Result<(), Error> {
     say(&format!("flockreel: the page is at http://{address}/"));
     wait_for_signal().await?;
     tracing::info!("stopping");
-    stop.cancel();
-    let (served, ()) = tokio::join!(server, supervisor.drain());
+    stop.begun.cancel();
+    let drained = async {
+        supervisor.drain().await;
+        stop.over.cancel();
+    };
+    let (served, ()) = tokio::join!(server, drained);
     if let Err(error) = served {
         tracing::error!(%error, "the server ended unexpectedly");
     }
     context.store.close().await;
     Ok(())
+}
+
+async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
+    let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
+    let listener = TcpListener::bind(bind).await.map_err(cannot)?;
+    let address = listener.local_addr().map_err(cannot)?;
+    Ok((listener, address))
 }
 
 /// Beyond this machine nobody is answered without a token: where none is good, nobody could be.

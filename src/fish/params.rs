@@ -7,6 +7,7 @@ use crate::library::Animal;
 
 /// Parameters of the virtual fish; all have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FishParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Its colors.

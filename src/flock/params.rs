@@ -10,6 +10,7 @@ use super::composite::params::Render;
 
 /// Parameters of a flock; all have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FlockParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Individuals, 1..=2000.

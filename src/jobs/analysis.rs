@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::allotted::next_id;
+use super::decoding::Counted;
 use super::{Attempt, Context, Error, Product, Stages, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
@@ -42,6 +43,7 @@ pub struct Input {
 
 /// What is worth knowing of a library at a glance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = LibrarySummary)]
 pub struct Summary {
     /// Frames a second.
     pub fps: f64,
@@ -90,6 +92,7 @@ pub async fn enqueue(
         result_id: library_id.0,
         after_job: None,
         priority: 0,
+        room: context.max_queued,
     };
     context.store.enqueue(&job, context.now_ms().await?).await?;
     context.wake.notify_one();
@@ -114,7 +117,8 @@ impl Input {
         let level = cpu::Level::detect();
         let progress = attempt.listener;
         let (background, scratch) = (background.as_ref(), attempt.scratch());
-        let library = analyze(&video, background, &self.params, level, &scratch, progress)?;
+        let film = Counted::new(&video, progress);
+        let library = analyze(&film, background, &self.params, level, &scratch, progress)?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
             &video,

@@ -32,6 +32,7 @@ pub struct Input {
 
 /// What is worth knowing of a virtual fish at a glance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FishSummary)]
 pub struct Summary {
     /// Frames a second.
     pub fps: f64,
@@ -59,6 +60,7 @@ pub async fn enqueue(
         result_id: fish_id.0,
         after_job,
         priority: 0,
+        room: context.max_queued,
     };
     context.store.enqueue(&job, context.now_ms().await?).await?;
     context.wake.notify_one();

@@ -1,8 +1,9 @@
 //! Between a job's computation and its worker: the computation reports and asks whether to go on,
-//! the worker reads and cancels. Cheap on both sides; the worker decides how often rows are written.
+//! the worker reads and cancels, and at the end learns how long each stage took. Cheap on both sides; the worker decides how often rows are written.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use crate::progress::Progress;
 
@@ -25,6 +26,16 @@ pub struct Listener {
     stages: Stages,
     cancelled: AtomicBool,
     position: Mutex<Position>,
+    times: Mutex<Times>,
+}
+
+/// How long each stage took so far, and since when the one under way goes on.
+#[derive(Debug)]
+struct Times {
+    past: Vec<(&'static str, Duration)>,
+    since: Instant,
+    n_decoded: u64,
+    decoding: Duration,
 }
 
 impl Listener {
@@ -36,6 +47,12 @@ impl Listener {
             position: Mutex::new(Position {
                 stage: "starting",
                 progress: 0.0,
+            }),
+            times: Mutex::new(Times {
+                past: Vec::new(),
+                since: Instant::now(),
+                n_decoded: 0,
+                decoding: Duration::ZERO,
             }),
         }
     }
@@ -54,6 +71,36 @@ impl Listener {
             .unwrap_or_else(|broken| broken.into_inner())
     }
 
+    /// How long each stage took so far: those of the table, the one under way last.
+    pub fn stage_times(&self) -> Vec<(&'static str, Duration)> {
+        let under_way = self.position().stage;
+        let times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut all = times.past.clone();
+        add(&mut all, under_way, times.since.elapsed());
+        all.retain(|(stage, _)| self.stages.iter().any(|(name, _)| name == stage));
+        all
+    }
+
+    /// Notes frames that were decoded in a time.
+    pub fn count_decoded(&self, n_frames: u64, took: Duration) {
+        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        times.n_decoded += n_frames;
+        times.decoding += took;
+    }
+
+    /// Frames decoded, and the time that took.
+    pub fn decoded(&self) -> (u64, Duration) {
+        let times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        (times.n_decoded, times.decoding)
+    }
+
+    fn end_stage(&self, stage: &'static str) {
+        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        let took = times.since.elapsed();
+        add(&mut times.past, stage, took);
+        times.since = Instant::now();
+    }
+
     /// The share of the whole at a point of a stage; nothing for a stage that is not in the table.
     fn overall(&self, stage: &str, fraction: f64) -> Option<f64> {
         let at = self.stages.iter().position(|(name, _)| *name == stage)?;
@@ -69,12 +116,22 @@ impl Progress for Listener {
             .position
             .lock()
             .unwrap_or_else(|broken| broken.into_inner());
+        if position.stage != stage {
+            self.end_stage(position.stage);
+        }
         position.stage = stage;
         position.progress = position.progress.max(overall.unwrap_or(0.0)).min(1.0);
     }
 
     fn cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+fn add(times: &mut Vec<(&'static str, Duration)>, stage: &'static str, took: Duration) {
+    match times.iter_mut().find(|(known, _)| *known == stage) {
+        Some((_, sum)) => *sum += took,
+        None => times.push((stage, took)),
     }
 }
 
@@ -93,5 +150,20 @@ mod tests {
         assert_eq!(after("tracking", 0.5), 0.625);
         assert_eq!(after("background", 0.0), 0.625);
         assert_eq!(after("a stage of no table", 1.0), 0.625);
+    }
+
+    #[test]
+    fn a_stage_has_the_time_until_the_next_and_all_of_its_parts() {
+        let listener = Listener::new(&[("background", 0.25), ("tracking", 0.75)]);
+        let pause = || std::thread::sleep(Duration::from_millis(20));
+        for stage in ["background", "tracking", "background", "of no table"] {
+            listener.report(stage, 0.0);
+            pause();
+        }
+        let times = listener.stage_times();
+        let names: Vec<_> = times.iter().map(|(stage, _)| *stage).collect();
+        assert_eq!(names, ["background", "tracking"]);
+        assert!(times[0].1 >= Duration::from_millis(40), "{times:?}");
+        assert!(times[1].1 >= Duration::from_millis(20), "{times:?}");
     }
 }

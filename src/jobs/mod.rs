@@ -15,6 +15,10 @@ pub mod attempt; // what one run of a job is given
 
 pub mod listener; // progress out, cancellation in
 
+pub mod meters; // what is counted
+
+mod decoding; // a film that counts its frames
+
 // What jobs do.
 pub mod admit; // received bytes -> footage
 
@@ -39,6 +43,7 @@ use tokio_util::sync::CancellationToken;
 pub use attempt::{Attempt, Product};
 pub use error::Error;
 pub use listener::{Listener, Stages};
+pub use meters::Meters;
 
 use crate::config::Crew;
 use crate::store::jobs::{Kind, Lease};
@@ -59,6 +64,10 @@ pub struct Context {
     pub lease: Duration,
     /// How long one attempt at a job may take.
     pub budget: Duration,
+    /// How many jobs of everybody may be queued or running at once.
+    pub max_queued: i64,
+    /// What is counted of the jobs of this process.
+    pub meters: Meters,
 }
 
 impl Context {
@@ -77,6 +86,8 @@ impl Context {
             threads,
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(Crew::JOB_TIME_S),
+            max_queued: i64::MAX,
+            meters: Meters::default(),
         }
     }
 }

@@ -109,11 +109,12 @@ async fn listen(context: Context) {
 /// other processes share the rows only what has run out is of the dead.
 pub async fn recover(context: &Context) -> Result<(), store::Error> {
     let now_ms = context.now_ms().await?;
-    match context.store.is_alone() {
-        true => context.store.rescue_all(now_ms).await?,
-        false => context.store.rescue(now_ms).await?,
-    };
-    context.store.interrupt_keys(now_ms).await?;
+    if context.store.is_alone() {
+        context.store.rescue_all(now_ms).await?;
+        context.store.interrupt_all_keys().await?;
+    } else {
+        context.store.rescue(now_ms).await?;
+    }
     if context.store.serves() {
         context.store.sweep_uploads(clock::now_ms()).await?;
         context.store.sweep_upload_files().await?;

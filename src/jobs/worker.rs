@@ -10,6 +10,7 @@ use std::time::Duration;
 use tokio::runtime::Handle;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, MissedTickBehavior, interval};
+use tracing::{Instrument, Span};
 use uuid::Uuid;
 
 use super::attempt::folder_of;
@@ -86,10 +87,25 @@ impl Worker {
         let Some(lease) = claimed else {
             return Ok(Step::Idle);
         };
+        let span = tracing::info_span!(
+            "job",
+            job.id = %lease.job_id,
+            job.kind = lease.kind.name(),
+            attempt = lease.attempt
+        );
+        self.attempt(lease, run).instrument(span).await
+    }
+
+    async fn attempt<Run>(&self, lease: Lease, run: Run) -> Result<Step, store::Error>
+    where
+        Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
+    {
         let listener = Arc::new(Listener::new(stages(lease.kind)));
         let work = spawn(&self.context, lease.clone(), listener.clone(), run);
         let result = self.beat_until_done(&lease, &listener, work).await;
-        self.end(&lease, &listener, result).await
+        let step = self.end(&lease, &listener, result).await?;
+        self.context.meters.count(lease.kind, &step, &listener);
+        Ok(step)
     }
 
     /// Keeps the lease, notes progress, and passes on the wish to stop, until the work ends.
@@ -215,7 +231,9 @@ where
 {
     let (store, threads, runtime) = (context.store.clone(), context.threads, Handle::current());
     let (blobs, result_id, fence) = (store.blobs().clone(), lease.result_id, lease.fence);
+    let span = Span::current();
     let work = tokio::task::spawn_blocking(move || {
+        let _within = span.enter();
         let draft = store
             .blobs()
             .draft(&format!("{}.{}", lease.job_id, lease.fence))?;

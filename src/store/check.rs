@@ -1,19 +1,38 @@
 //! The invariants of the store, verified (RELIABILITY.md, store rules, I1 to I6). Run after every
-//! test that breaks something on purpose.
+//! test that breaks something on purpose, and by `flockreel check`.
+
+use std::fs;
+use std::time::{Duration, SystemTime};
 
 use sqlx::types::Uuid;
 
+use super::sweep::GRACE;
 use super::{BlobFile, Error, Store, sql};
 
 /// One thing that is wrong, in words that name the row or file.
 pub type Fault = String;
 
 impl Store {
-    /// Every fault found; none is what is promised. Reads and hashes every file.
+    /// Every fault found where nothing was broken; none is what is promised. Reads and hashes every file.
     pub async fn check(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
-        let mut faults = self.missing_or_altered_blobs().await?;
-        for (folder, _) in self.folders_without_row().await? {
-            faults.push(format!("I2: no row names the folder: {folder}"));
+        self.check_strays_from(Duration::ZERO, now_ms).await
+    }
+
+    /// The same where something may have been broken off, or is under way: a folder whose row is not there
+    /// (yet) is no fault for an hour.
+    pub async fn check_after_crash(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
+        self.check_strays_from(GRACE, now_ms).await
+    }
+
+    async fn check_strays_from(&self, age: Duration, now_ms: i64) -> Result<Vec<Fault>, Error> {
+        let mut faults = self.broken_rows().await?;
+        faults.extend(self.missing_or_altered_blobs().await?);
+        faults.extend(self.short_uploads().await?);
+        for folder in self.folders_without_row().await? {
+            let is_old = SystemTime::now().duration_since(folder.modified);
+            if is_old.is_ok_and(|found| found >= age) {
+                faults.push(format!("I2: no row names the folder: {}", folder.name));
+            }
         }
         for (name, sql) in RULES_OF_JOBS {
             let broken = sql::query_scalar(sql).bind(now_ms);
@@ -25,6 +44,40 @@ impl Store {
         let said = |folder| format!("I6: sizes do not add up: {folder}");
         faults.extend(folders.into_iter().map(said));
         Ok(faults)
+    }
+
+    /// I3: the database itself is whole, and its rows refer to rows that are there.
+    async fn broken_rows(&self) -> Result<Vec<Fault>, Error> {
+        if !self.reader.is_file() {
+            // A server sees to that itself.
+            return Ok(Vec::new());
+        }
+        let sql = "select * from pragma_integrity_check";
+        let said: Vec<String> = sql::query_scalar(sql).fetch_all(&self.reader).await?;
+        let sql = "select distinct \"table\" from pragma_foreign_key_check";
+        let lost: Vec<String> = sql::query_scalar(sql).fetch_all(&self.reader).await?;
+        let broken = said.into_iter().filter(|line| line != "ok");
+        let broken = broken.map(|line| format!("I3: the database is broken: {line}"));
+        let lost = lost.into_iter();
+        let lost = lost.map(|table| format!("I3: rows refer to rows that are not there: {table}"));
+        Ok(broken.chain(lost).collect())
+    }
+
+    /// I1: of an upload under way all bytes are there that its sender was told are safe. Where other
+    /// machines have the rows too, theirs cannot be looked at.
+    async fn short_uploads(&self) -> Result<Vec<Fault>, Error> {
+        if !self.reader.is_file() {
+            return Ok(Vec::new());
+        }
+        let sql = "select id, offset_bytes from uploads where footage_id is null order by id";
+        let rows: Vec<(Uuid, i64)> = sql::query(sql).fetch_all(&self.reader).await?;
+        let rows = rows.into_iter().filter(|(id, offset_bytes)| {
+            let file = fs::metadata(self.upload_path(*id));
+            file.map_or(0, |file| file.len()) < offset_bytes.unsigned_abs()
+        });
+        Ok(rows
+            .map(|(id, _)| format!("I1: too short: uploads/{id}"))
+            .collect())
     }
 
     /// I1: each row's file exists, with its size and hash.
@@ -50,7 +103,7 @@ impl Store {
 }
 
 /// Queries that return the job of each row that breaks a rule; $1 is the time.
-/// I3 (one legal state) is held by the table's own constraints.
+/// That a job has one legal state (I3) is held by the table's own constraints.
 const RULES_OF_JOBS: &[(&str, &str)] = &[
     (
         "I4: done without exactly one result of its fence, or a result without done",

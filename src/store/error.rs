@@ -26,6 +26,9 @@ pub enum Error {
     /// A file in place is not what was put there.
     #[error("a file of the store has been altered: {0}")]
     Altered(String),
+    /// What is done with a file of rows was asked of a server.
+    #[error("the rows are on a server: copy them with its own tools")]
+    RowsElsewhere,
     /// Another process serves the same folder.
     #[error("the data folder is in use by another flockreel: {}", .0.display())]
     InUse(PathBuf),
@@ -44,6 +47,12 @@ pub enum Error {
         /// The limit.
         quota: i64,
     },
+    /// Everybody together has as many jobs queued and running as there is room for.
+    #[error("the queue is full, {room} jobs are under way: ask again when some have ended")]
+    QueueFull {
+        /// The limit.
+        room: i64,
+    },
     /// A row holds what this version does not know.
     #[error("a row of {table} cannot be read: {value}")]
     UnknownValue {
@@ -61,6 +70,7 @@ impl Error {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
+            Error::QueueFull { .. } => Code::QueueFull,
             Error::Io(error) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if has_no_room(error.as_ref()) => {
@@ -72,6 +82,7 @@ impl Error {
             | Error::Bucket(_)
             | Error::Altered(_)
             | Error::InUse(_)
+            | Error::RowsElsewhere
             | Error::UnknownValue { .. } => Code::Internal,
         }
     }

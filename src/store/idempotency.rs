@@ -10,13 +10,14 @@ use super::{Error, Store, sql};
 /// How long an answer is kept, milliseconds.
 pub const KEPT_MS: i64 = 24 * 3600 * 1000;
 
-/// A request that has held its key for longer is given up, milliseconds: an upload over a slow line may take so long.
+/// Where other processes may have died with keys of theirs: who has held one for longer has, milliseconds. An
+/// upload over a slow line may take so long.
 const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
 
 /// Where a key means what it means.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scope {
-    /// Who asks.
+    /// Whose what it makes will be.
     pub caller: String,
     /// What is asked for.
     pub route: String,
@@ -68,8 +69,8 @@ impl Store {
             .bind(now_ms - KEPT_MS)
             .execute(&mut transaction)
             .await?;
-        let known: Option<(String, Uuid, Option<Vec<u8>>)> = sql::query(
-            "select state, ids, body_sha256 from idempotency \
+        let known: Option<(String, Uuid, Option<Vec<u8>>, i64)> = sql::query(
+            "select state, ids, body_sha256, created_ms from idempotency \
              where caller = $1 and route = $2 and key = $3",
         )
         .bind(&scope.caller)
@@ -78,20 +79,25 @@ impl Store {
         .fetch_optional(&mut transaction)
         .await?;
         let ids = match known {
-            Some((state, _, _)) if state == "running" => return Ok(Begun::Running),
-            Some((state, _, _)) if state == "done" => {
+            Some((state, _, _, since_ms))
+                if state == "running" && !self.is_over(since_ms, now_ms) =>
+            {
+                return Ok(Begun::Running);
+            }
+            Some((state, ..)) if state == "done" => {
                 return Ok(Begun::Done(self.answer(scope).await?));
             }
-            Some((_, _, Some(then))) if body_sha256.is_some_and(|now| now != then) => {
+            Some((_, _, Some(then), _)) if body_sha256.is_some_and(|now| now != then) => {
                 return Ok(Begun::OtherBody);
             }
-            Some((_, ids, _)) => ids,
+            Some((_, ids, ..)) => ids,
             None => Uuid::now_v7(),
         };
         sql::query(
             "insert into idempotency (caller, route, key, ids, state, body_sha256, created_ms) \
              values ($1, $2, $3, $4, 'running', $5, $6) \
-             on conflict (caller, route, key) do update set state = 'running'",
+             on conflict (caller, route, key) do update \
+             set state = 'running', created_ms = excluded.created_ms",
         )
         .bind(&scope.caller)
         .bind(&scope.route)
@@ -103,6 +109,11 @@ impl Store {
         .await?;
         transaction.commit().await?;
         Ok(Begun::Run(ids))
+    }
+
+    /// Whether a request that has been running since then is not any more.
+    fn is_over(&self, since_ms: i64, now_ms: i64) -> bool {
+        !self.is_alone() && since_ms < now_ms - LONGEST_REQUEST_MS
     }
 
     async fn answer(&self, scope: &Scope) -> Result<Answer, Error> {
@@ -146,20 +157,11 @@ impl Store {
         Ok(())
     }
 
-    /// Gives keys back whose holders are gone, at the start of the process: everyone, where the store is
-    /// this process's alone; otherwise those who have held theirs for longer than a request lasts.
-    pub async fn interrupt_keys(&self, now_ms: i64) -> Result<(), Error> {
-        let held_before_ms = match self.is_alone() {
-            true => i64::MAX,
-            false => now_ms - LONGEST_REQUEST_MS,
-        };
-        sql::query(
-            "update idempotency set state = 'interrupted' \
-             where state = 'running' and created_ms < $1",
-        )
-        .bind(held_before_ms)
-        .execute(&self.writer)
-        .await?;
+    /// Gives every key back, at the start of the process: whoever held one is gone, because the store is
+    /// this process's alone.
+    pub async fn interrupt_all_keys(&self) -> Result<(), Error> {
+        let sql = "update idempotency set state = 'interrupted' where state = 'running'";
+        sql::query(sql).execute(&self.writer).await?;
         Ok(())
     }
 }
@@ -204,7 +206,7 @@ mod tests {
         let first = store.begin_key(&scope(), Some(&[1; 32]), 0).await.unwrap();
         let met = store.begin_key(&scope(), Some(&[1; 32]), 1).await.unwrap();
         assert_eq!(met, Begun::Running);
-        store.interrupt_keys(LONGEST_REQUEST_MS + 1).await.unwrap();
+        store.interrupt_all_keys().await.unwrap();
         let met = store.begin_key(&scope(), Some(&[2; 32]), 2).await.unwrap();
         assert_eq!(met, Begun::OtherBody);
         let met = store.begin_key(&scope(), Some(&[1; 32]), 3).await.unwrap();

@@ -21,6 +21,7 @@ pub mod spill;
 mod sql;
 pub mod sweep;
 pub mod tokens;
+pub mod upkeep;
 pub mod uploads;
 
 use std::fs::{File, TryLockError};

@@ -1,6 +1,10 @@
 //! Whose things are whose (RELIABILITY.md, S6): every row that people make has one owner, and every
 //! question names whose rows it is about, so that a query without the wall does not compile.
 
+use sqlx::types::Uuid;
+
+use super::{Error, Store, sql};
+
 /// Who has a thing: the owner that a token names, or the local one.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, sqlx::Type)]
 #[sqlx(transparent)]
@@ -10,6 +14,14 @@ impl Owner {
     /// Whoever asks on the machine itself without a token, and the program itself.
     pub fn local() -> Owner {
         Owner("local".to_owned())
+    }
+}
+
+impl Store {
+    /// Whose a flock is, for whoever holds a link to it.
+    pub async fn owner_of_flock(&self, id: Uuid) -> Result<Option<Owner>, Error> {
+        let owner = sql::query_scalar("select owner from flocks where id = $1").bind(id);
+        Ok(owner.fetch_optional(&self.reader).await?)
     }
 }
 

@@ -3,10 +3,11 @@
 
 use std::time::{Duration, SystemTime};
 
+use super::blobs::Folder;
 use super::{Error, Store};
 
 /// A folder without a row is younger than this while its row is being made.
-const GRACE: Duration = Duration::from_secs(3600);
+pub(super) const GRACE: Duration = Duration::from_secs(3600);
 
 /// What a sweep removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,11 +26,9 @@ impl Store {
             n_drafts: self.blobs.work().sweep()?,
             n_folders: 0,
         };
-        for (folder, modified) in self.folders_without_row().await? {
-            if now.duration_since(modified).is_ok_and(|age| age > GRACE) {
-                self.blobs.discard(&folder).await?;
-                swept.n_folders += 1;
-            }
+        for folder in self.old_strays(now).await? {
+            self.blobs.discard(&folder.name).await?;
+            swept.n_folders += 1;
         }
         if swept != Swept::default() {
             tracing::warn!(
@@ -41,12 +40,20 @@ impl Store {
         Ok(swept)
     }
 
-    /// The folders in place that no row names, each with the time of its youngest file.
-    pub(super) async fn folders_without_row(&self) -> Result<Vec<(String, SystemTime)>, Error> {
+    /// The folders that no row has named for an hour.
+    pub(super) async fn old_strays(&self, now: SystemTime) -> Result<Vec<Folder>, Error> {
+        let mut strays = self.folders_without_row().await?;
+        let is_old = |age: Duration| age > GRACE;
+        strays.retain(|stray| now.duration_since(stray.modified).is_ok_and(is_old));
+        Ok(strays)
+    }
+
+    /// The folders in place that no row names.
+    pub(super) async fn folders_without_row(&self) -> Result<Vec<Folder>, Error> {
         let mut strays = Vec::new();
-        for (folder, modified) in self.blobs.folders().await? {
-            if !self.is_folder_known(&folder).await? {
-                strays.push((folder, modified));
+        for folder in self.blobs.folders().await? {
+            if !self.is_folder_known(&folder.name).await? {
+                strays.push(folder);
             }
         }
         Ok(strays)

@@ -196,7 +196,7 @@ impl Store {
         Ok(())
     }
 
-    fn upload_path(&self, id: Uuid) -> PathBuf {
+    pub(super) fn upload_path(&self, id: Uuid) -> PathBuf {
         self.blobs.uploads().join(id.to_string())
     }
 

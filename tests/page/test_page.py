@@ -150,3 +150,31 @@ def test_a_service_that_asks_who_is_there_is_signed_in_to_and_out_of(page, close
     page.get_by_role("button", name="Sign out").click()
     expect(page.get_by_label("Token")).to_be_focused()
     expect(page.locator("#library")).to_be_hidden()
+
+
+def test_the_api_is_described_and_can_be_tried_under_the_policy_of_all_pages(page, filled_service):
+    page.goto(filled_service + "/docs")
+    call = page.locator(".opblock", has_text="/readyz").first
+    expect(call).to_be_visible()
+    call.locator(".opblock-summary-control").click()
+    call.get_by_role("button", name="Try it out").click()
+    call.get_by_role("button", name="Execute").click()
+    expect(call.locator(".live-responses-table")).to_contain_text('"ready": true')
+    page.goto(filled_service + "/docs/errors#nothing_moves")
+    expect(page.locator("#nothing_moves + dd")).to_have_text("Nothing moves before the background.")
+
+
+def test_all_tabs_follow_their_jobs_by_one_stream(browser, filled_service):
+    context = browser.new_context()
+    tabs = [context.new_page(), context.new_page()]
+    for number, tab in enumerate(tabs):
+        tab.goto(filled_service)
+        tab.get_by_role("spinbutton", name="Individuals").fill(str(3 + number))
+        tab.get_by_role("spinbutton", name="Frames").fill("40")
+        tab.get_by_role("button", name="Make the flock").click()
+    for number, tab in enumerate(tabs):
+        expect(tab.locator("#stage-title")).to_have_text(f"A flock of {3 + number}", timeout=LONG_MS)
+    context.close()
+    metrics = fetch(filled_service + "/metrics").decode()
+    streams = re.findall(r'requests_total\{route="([^"]*/events)",method="GET",status="200"\} (\d+)', metrics)
+    assert [route for route, _ in streams] == ["/v1/events"], streams

@@ -2,11 +2,12 @@
 //! its handler (RELIABILITY.md, S6). On loopback a request without a token is the local owner's, unless
 //! tokens are demanded. What a handler may see and to whom it charges comes from its [`Caller`] alone.
 
+use std::net::{IpAddr, Ipv4Addr};
 use std::time::Instant;
 
 use axum::extract::{FromRequestParts, Request, State};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, HeaderName, Method, header};
+use axum::http::{HeaderMap, HeaderName, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
@@ -27,6 +28,32 @@ pub(in crate::api) struct Caller {
     /// Whose what it makes will be.
     pub account: Account,
     scope: Scope,
+    proof: Proof,
+}
+
+/// With what a caller showed who asks: it is asked for again while an answer goes on.
+#[derive(Clone)]
+enum Proof {
+    /// Nothing: on the machine itself.
+    Nothing,
+    /// A signed link.
+    Link,
+    /// A token.
+    Token(Presented),
+    /// A browser's cookie.
+    Cookie(String),
+}
+
+impl std::fmt::Debug for Proof {
+    /// Its kind alone: secrets do not get into logs.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Proof::Nothing => "nothing",
+            Proof::Link => "link",
+            Proof::Token(_) => "token",
+            Proof::Cookie(_) => "cookie",
+        })
+    }
 }
 
 impl Caller {
@@ -36,27 +63,49 @@ impl Caller {
             reach: Reach::Of(Owner::local()),
             account: Account::local(),
             scope: Scope::Write,
+            proof: Proof::Nothing,
         }
     }
 
-    /// Whoever holds a signed link: `link` lets it no further than its path.
-    pub(super) fn of_link() -> Caller {
+    /// Whoever holds a signed link, which `link` lets no further than its path: what is there belongs to
+    /// that owner, and nothing else is in reach.
+    pub(super) fn of_link(owner: Owner) -> Caller {
         Caller {
-            reach: Reach::All,
+            reach: Reach::Of(owner),
             account: Account {
                 owner: Owner("link".to_owned()),
                 quota: Some(0),
             },
             scope: Scope::Read,
+            proof: Proof::Link,
         }
     }
 
-    fn of(token: &Token) -> Caller {
+    fn of(token: &Token, proof: Proof) -> Caller {
         Caller {
             reach: token.reach(),
             account: token.account(),
             scope: token.scope,
+            proof,
         }
+    }
+
+    /// Whether the caller may see how the service does: whoever is on the machine itself without a token,
+    /// and administrators.
+    pub(in crate::api) fn runs_the_service(&self) -> bool {
+        matches!(self.proof, Proof::Nothing) || self.scope == Scope::Admin
+    }
+
+    /// Whether the caller would be let in again: the token has neither ended nor been revoked, nobody
+    /// signed out.
+    pub(in crate::api) async fn is_still_good(&self, state: &AppState) -> bool {
+        let store = &state.context.store;
+        let token = match &self.proof {
+            Proof::Nothing | Proof::Link => return true,
+            Proof::Token(given) => store.token(given, now_ms()).await,
+            Proof::Cookie(cookie) => store.token_of_session(cookie, now_ms()).await,
+        };
+        matches!(token, Ok(Some(_)))
     }
 }
 
@@ -72,17 +121,32 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
     }
 }
 
-/// Finds the caller of every request that is not open to all.
+/// The address at the other end of the connection: a proxy's, where there is one.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::api) struct Peer(pub IpAddr);
+
+/// Finds the caller of every request that is not open to all. Refusals are counted for each address.
 pub(in crate::api) async fn authenticate(
     State(state): State<AppState>,
     request: Request,
     next: Next,
 ) -> Response {
+    let peer = request.extensions().get::<Peer>().copied();
+    let answer = let_in(&state, request, next).await;
+    let Peer(peer) = peer.unwrap_or(Peer(Ipv4Addr::UNSPECIFIED.into()));
+    let is_refused = answer.status() == StatusCode::UNAUTHORIZED;
+    match is_refused && !state.rates.take_refusal(peer, Instant::now()) {
+        true => Problem::from(Code::RateLimited).into_response(),
+        false => answer,
+    }
+}
+
+async fn let_in(state: &AppState, request: Request, next: Next) -> Response {
     if is_open(request.uri().path()) {
         return next.run(request).await;
     }
     let (mut parts, body) = request.into_parts();
-    match caller(&state, &parts).await {
+    match caller(state, &parts).await {
         Ok(caller) if !state.rates.take(&caller.account, Instant::now()) => {
             Problem::from(Code::RateLimited).into_response()
         }
@@ -97,7 +161,14 @@ pub(in crate::api) async fn authenticate(
 /// What holds nobody's data: the page, its description, the probes, and the way to sign in. Everything
 /// that is not named here needs a caller.
 fn is_open(path: &str) -> bool {
-    let exact = ["/", "/healthz", "/readyz", "/openapi.json", "/v1/session"];
+    let exact = [
+        "/",
+        "/docs",
+        "/healthz",
+        "/readyz",
+        "/openapi.json",
+        "/v1/session",
+    ];
     let below = ["/static/", "/vendor/", "/docs/"];
     exact.contains(&path) || below.iter().any(|start| path.starts_with(start))
 }
@@ -105,7 +176,10 @@ fn is_open(path: &str) -> bool {
 async fn caller(state: &AppState, parts: &Parts) -> Result<Caller, Problem> {
     let (method, headers) = (&parts.method, &parts.headers);
     let caller = match bearer(headers) {
-        Some(text) => Caller::of(&token(state, text).await?),
+        Some(text) => {
+            let (token, given) = presented(state, text).await?;
+            Caller::of(&token, Proof::Token(given))
+        }
         None => match of_browser(state, parts).await? {
             Some(caller) => caller,
             None if state.config.demands_tokens() => return Err(Code::Unauthenticated.into()),
@@ -128,10 +202,14 @@ async fn of_browser(state: &AppState, parts: &Parts) -> Result<Option<Caller>, P
 
 /// The good token of this text, or 401.
 pub(super) async fn token(state: &AppState, text: &str) -> Result<Token, Problem> {
+    presented(state, text).await.map(|(token, _)| token)
+}
+
+async fn presented(state: &AppState, text: &str) -> Result<(Token, Presented), Problem> {
     let refused = || Problem::from(Code::Unauthenticated);
     let given = Presented::parse(text).ok_or_else(refused)?;
     let token = state.context.store.token(&given, now_ms()).await?;
-    token.ok_or_else(refused)
+    Ok((token.ok_or_else(refused)?, given))
 }
 
 /// The caller that a browser's cookie stands for. A write must say that it comes from our own page: a
@@ -153,7 +231,7 @@ async fn of_session(
     if !method.is_safe() && !says_from_where {
         return Err(Code::CrossSite.into());
     }
-    Ok(Some(Caller::of(&token)))
+    Ok(Some(Caller::of(&token, Proof::Cookie(cookie.to_owned()))))
 }
 
 /// The text after `Bearer`; another scheme is a proxy's affair.

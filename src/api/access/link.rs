@@ -3,6 +3,7 @@
 //! covers the path and the end; the key is this data folder's own.
 
 use axum::http::{Method, Uri};
+use uuid::Uuid;
 
 use super::Caller;
 use crate::api::{AppState, Problem};
@@ -30,7 +31,20 @@ pub(super) async fn caller_of_link(
     }
     let key = state.context.store.signing_key().await?;
     let wanted = signature(&key, uri.path(), expires_s);
-    Ok(is_same(given.as_bytes(), wanted.as_bytes()).then(Caller::of_link))
+    if !is_same(given.as_bytes(), wanted.as_bytes()) {
+        return Ok(None);
+    }
+    let Some(flock) = flock_of(uri.path()) else {
+        return Ok(None);
+    };
+    let owner = state.context.store.owner_of_flock(flock).await?;
+    Ok(owner.map(Caller::of_link))
+}
+
+/// The flock whose file the path is.
+fn flock_of(path: &str) -> Option<Uuid> {
+    let (id, _) = path.strip_prefix("/v1/flocks/")?.split_once('/')?;
+    id.parse().ok()
 }
 
 fn signature(key: &[u8], path: &str, expires_s: i64) -> String {

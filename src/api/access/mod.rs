@@ -8,7 +8,7 @@ mod link;
 mod rate;
 pub(super) mod session;
 
-pub(super) use auth::{Caller, authenticate};
+pub(super) use auth::{Caller, Peer, authenticate};
 pub(super) use guard::{Names, guard};
 pub use link::signed;
 pub(super) use rate::Rates;

@@ -1,8 +1,11 @@
 //! How often one owner may ask (RELIABILITY.md, H5): a bucket for each, filled at a steady rate, emptied by
 //! one for every request, so that one program in a loop does not slow everybody's page. By owner, never by
-//! address: many sit behind one address, and a header that names another is anybody's to write.
+//! address: many sit behind one address, and a header that names another is anybody's to write. Only those who
+//! are nobody, because they are refused with 401, are counted by the address that they really come from.
 
 use std::collections::HashMap;
+use std::hash::Hash;
+use std::net::{IpAddr, Ipv6Addr};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -13,13 +16,20 @@ const BURST_S: f64 = 4.0;
 /// Buckets kept; the full ones are forgotten beyond.
 const MAX_BUCKETS: usize = 10_000;
 
-/// The buckets of all owners.
+/// How many requests an address may make in vain at once, and a second.
+const REFUSALS: (f64, f64) = (30.0, 1.0);
+
+/// The buckets of all owners, and of those who are nobody.
 #[derive(Debug)]
 pub(in crate::api) struct Rates {
     /// Requests a second, 0 for any number.
     per_s: f64,
-    buckets: Mutex<HashMap<Owner, Bucket>>,
+    of_owners: Buckets<Owner>,
+    of_strangers: Buckets<IpAddr>,
 }
+
+#[derive(Debug)]
+struct Buckets<Key>(Mutex<HashMap<Key, Bucket>>);
 
 #[derive(Clone, Copy, Debug)]
 struct Bucket {
@@ -32,7 +42,8 @@ impl Rates {
     pub(in crate::api) fn new(per_s: u32) -> Rates {
         Rates {
             per_s: f64::from(per_s),
-            buckets: Mutex::default(),
+            of_owners: Buckets(Mutex::default()),
+            of_strangers: Buckets(Mutex::default()),
         }
     }
 
@@ -42,20 +53,36 @@ impl Rates {
         if self.per_s == 0.0 || account.quota.is_none() {
             return true;
         }
-        let owner = &account.owner;
         let full = self.per_s * BURST_S;
+        self.of_owners.take(&account.owner, (full, self.per_s), now)
+    }
+
+    /// Takes one refusal out of the bucket of an address; false where it is empty. A good token is good
+    /// from there all the same.
+    pub(super) fn take_refusal(&self, peer: IpAddr, now: Instant) -> bool {
+        // Whoever has one address of IPv6 has all of its network.
+        let network = match peer {
+            IpAddr::V4(_) => peer,
+            IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into(),
+        };
+        self.of_strangers.take(&network, REFUSALS, now)
+    }
+}
+
+impl<Key: Clone + Eq + Hash> Buckets<Key> {
+    fn take(&self, key: &Key, (full, per_s): (f64, f64), now: Instant) -> bool {
         let filled = |bucket: &Bucket| {
             let passed_s = now.saturating_duration_since(bucket.at).as_secs_f64();
-            full.min(bucket.n_left + passed_s * self.per_s)
+            full.min(bucket.n_left + passed_s * per_s)
         };
-        let mut buckets = self.buckets.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if buckets.len() >= MAX_BUCKETS {
             buckets.retain(|_, bucket| filled(bucket) < full);
         }
-        let n_left = buckets.get(owner).map_or(full, filled);
+        let n_left = buckets.get(key).map_or(full, filled);
         let taken = n_left >= 1.0;
         let n_left = if taken { n_left - 1.0 } else { n_left };
-        buckets.insert(owner.clone(), Bucket { n_left, at: now });
+        buckets.insert(key.clone(), Bucket { n_left, at: now });
         taken
     }
 }
@@ -99,5 +126,20 @@ mod tests {
         assert!((0..1000).all(|_| Rates::new(0).take(&bounded, now)));
         let rates = Rates::new(1);
         assert!((0..1000).all(|_| rates.take(&local, now)));
+    }
+
+    #[test]
+    fn an_address_is_refused_thirty_times_and_then_once_a_second() {
+        let (rates, start) = (Rates::new(0), Instant::now());
+        let n_taken = |peer: &str, after_s: u64| {
+            let now = start + Duration::from_secs(after_s);
+            let peer = peer.parse().unwrap();
+            (0..100).filter(|_| rates.take_refusal(peer, now)).count()
+        };
+        assert_eq!(n_taken("192.0.2.1", 0), 30);
+        assert_eq!(n_taken("192.0.2.1", 5), 5);
+        assert_eq!(n_taken("192.0.2.2", 5), 30);
+        assert_eq!(n_taken("2001:db8::1", 5), 30);
+        assert_eq!(n_taken("2001:db8::2", 5), 0, "the same network");
     }
 }

@@ -1,16 +1,13 @@
-//! Jobs: their state, their events, the wish to cancel them; and what other nouns say of jobs.
+//! Jobs: their state, the wish to cancel them; and what other nouns say of jobs.
+
+pub(super) mod events; // the same, as they happen
 
 pub(super) mod wait; // Prefer: wait=N
-
-use std::convert::Infallible;
-use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, Response, StatusCode, header};
 use axum::response::IntoResponse;
-use axum::response::sse::{Event, KeepAlive, Sse};
-use futures_util::stream::{Stream, unfold};
 use serde::Serialize;
 use utoipa::ToSchema;
 use uuid::Uuid;
@@ -29,9 +26,6 @@ use crate::jobs::clock::now_ms;
 use crate::store::jobs::cancel::Cancel;
 use crate::store::jobs::read::JobRow;
 use crate::store::jobs::{JobState, Kind};
-
-/// How often a stream of events looks at its job: as often as workers note progress.
-const LOOK: Duration = Duration::from_millis(500);
 
 /// A unit of queued work.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
@@ -138,54 +132,6 @@ pub(super) async fn cancel_job(
     };
     let job = find(&state, &caller, JobId(id)).await?;
     Ok((status, axum::Json(job)).into_response())
-}
-
-/// The job's states as server-sent events named `job`, until the last one.
-#[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = Uuid, Path)), responses(
-    (status = 200, content_type = "text/event-stream", body = JobView),
-    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
-))]
-pub(super) async fn get_job_events(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    let job = find(&state, &caller, JobId(id)).await?;
-    let events = Sse::new(events(state, caller, job)).keep_alive(KeepAlive::default());
-    // A proxy that gathers answers would hold events back.
-    Ok(([("x-accel-buffering", "no")], events).into_response())
-}
-
-/// The first state at once, then each that differs from the one before.
-fn events(
-    state: AppState,
-    caller: Caller,
-    first: JobView,
-) -> impl Stream<Item = Result<Event, Infallible>> {
-    let start = (state, caller, None, Some(first));
-    unfold(start, async |(state, caller, last, first)| {
-        let job = match first {
-            Some(first) => first,
-            None => next_change(&state, &caller, last.as_ref()?).await?,
-        };
-        let event = Event::default().event("job").json_data(&job).ok()?;
-        Some((Ok(event), (state, caller, Some(job), None)))
-    })
-}
-
-/// Waits for another state; none after a final one, or when the service stops.
-async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Option<JobView> {
-    while !is_final(last) && !state.context.draining.is_cancelled() {
-        tokio::select! {
-            () = tokio::time::sleep(LOOK) => {}
-            () = state.context.draining.cancelled() => {}
-        }
-        let job = find(state, caller, last.id).await.ok()?;
-        if job != *last {
-            return Some(job);
-        }
-    }
-    None
 }
 
 async fn find(state: &AppState, caller: &Caller, id: JobId) -> Result<JobView, Problem> {

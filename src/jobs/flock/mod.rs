@@ -46,6 +46,7 @@ pub struct Input {
 
 /// What is worth knowing of a flock at a glance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[schema(as = FlockSummary)]
 pub struct Summary {
     /// Frames a second.
     pub fps: f64,
@@ -75,6 +76,7 @@ pub async fn enqueue(
         result_id: flock_id.0,
         after_job,
         priority: 0,
+        room: context.max_queued,
     };
     context.store.enqueue(&job, context.now_ms().await?).await?;
     context.wake.notify_one();

@@ -2,7 +2,7 @@
 //! (ECOSYSTEM.md 3). What is written in parts has parts of one size, and what cannot be finished is
 //! taken back; a part that a crash leaves costs money until the bucket's own rules remove it.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::io;
 use std::path::Path as FilePath;
 use std::sync::Arc;
@@ -17,6 +17,7 @@ use object_store::{ClientOptions, ObjectMeta, ObjectStore, ObjectStoreExt};
 use tokio::fs::File;
 use tokio::io::{AsyncWriteExt, BufReader};
 
+use super::Folder;
 use crate::store::Error;
 
 /// Every part but the last: more than the least that any store takes, and of one size as some want it.
@@ -55,10 +56,7 @@ impl Bucket {
             let path = self.path(&format!("{folder}/{name}"));
             let writer = BufWriter::with_capacity(self.store.clone(), path, PART_BYTES);
             let mut writer = writer.with_max_concurrency(2);
-            if let Err(error) = copy(&entry.path(), &mut writer).await {
-                writer.abort().await?;
-                return Err(error.into());
-            }
+            copy(&entry.path(), &mut writer).await?;
         }
         Ok(())
     }
@@ -93,21 +91,24 @@ impl Bucket {
         .boxed()
     }
 
-    pub(super) async fn folders(&self) -> Result<Vec<(String, SystemTime)>, Error> {
+    pub(super) async fn folders(&self) -> Result<Vec<Folder>, Error> {
         let prefix = (!self.prefix.is_empty()).then(|| Path::from(self.prefix.as_str()));
         let mut objects = self.store.list(prefix.as_ref());
-        let mut youngest: HashMap<String, SystemTime> = HashMap::new();
+        let mut folders: BTreeMap<String, Folder> = BTreeMap::new();
         while let Some(object) = objects.try_next().await? {
-            let Some(folder) = self.folder_of(&object) else {
+            let Some(name) = self.folder_of(&object) else {
                 continue;
             };
             let modified = SystemTime::from(object.last_modified);
-            let known = youngest.entry(folder).or_insert(modified);
-            *known = modified.max(*known);
+            let folder = folders.entry(name.clone()).or_insert(Folder {
+                name,
+                modified,
+                n_bytes: 0,
+            });
+            folder.modified = modified.max(folder.modified);
+            folder.n_bytes += object.size;
         }
-        let mut folders: Vec<_> = youngest.into_iter().collect();
-        folders.sort();
-        Ok(folders)
+        Ok(folders.into_values().collect())
     }
 
     /// The folder of an object: of ours, kind and name come before the file's own name.
@@ -125,6 +126,10 @@ impl Bucket {
 
 async fn copy(file: &FilePath, writer: &mut BufWriter) -> io::Result<()> {
     let mut reader = BufReader::with_capacity(1 << 20, File::open(file).await?);
-    tokio::io::copy_buf(&mut reader, writer).await?;
+    if let Err(error) = tokio::io::copy_buf(&mut reader, writer).await {
+        // What cannot be ended is taken back by `shutdown` itself.
+        writer.abort().await?;
+        return Err(error);
+    }
     writer.shutdown().await
 }

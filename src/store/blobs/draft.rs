@@ -9,6 +9,8 @@ use std::sync::{Mutex, PoisonError};
 
 use sqlx::types::Uuid;
 
+use super::shelf::size_of;
+
 /// Where the processes of a machine make what they make.
 #[derive(Debug)]
 pub(in crate::store) struct Workplace {
@@ -53,20 +55,35 @@ impl Workplace {
 
     /// Removes what processes left that are gone; returns how many.
     pub(in crate::store) fn sweep(&self) -> io::Result<usize> {
-        let mut n_swept = 0;
-        for entry in fs::read_dir(&self.tmp)? {
-            let path = entry?.path();
-            if !path.is_dir() {
-                fs::remove_file(path)?;
-                n_swept += 1;
-            } else if let Ok(folder) = File::open(&path)
-                && folder.try_lock().is_ok()
-            {
-                fs::remove_dir_all(path)?;
-                n_swept += 1;
+        let left = self.left()?;
+        for (path, _lock) in &left {
+            match path.is_dir() {
+                true => fs::remove_dir_all(path)?,
+                false => fs::remove_file(path)?,
             }
         }
-        Ok(n_swept)
+        Ok(left.len())
+    }
+
+    /// How many processes left something that are gone, and its bytes.
+    pub(in crate::store) fn n_left(&self) -> io::Result<(usize, u64)> {
+        let left = self.left()?;
+        let sizes = left.iter().map(|(path, _lock)| size_of(path));
+        Ok((left.len(), sizes.sum::<io::Result<u64>>()?))
+    }
+
+    /// What processes left that are gone, locked.
+    fn left(&self) -> io::Result<Vec<(PathBuf, File)>> {
+        let mut left = Vec::new();
+        for entry in fs::read_dir(&self.tmp)? {
+            let path = entry?.path();
+            if let Ok(folder) = File::open(&path)
+                && folder.try_lock().is_ok()
+            {
+                left.push((path, folder));
+            }
+        }
+        Ok(left)
     }
 
     /// Leaves nothing behind, unless something is still being made.

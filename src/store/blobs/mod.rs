@@ -59,6 +59,17 @@ enum Place {
     Bucket(Bucket),
 }
 
+/// A folder in place.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Folder {
+    /// Its kind and its own name.
+    pub name: String,
+    /// When the youngest of its files was put there.
+    pub modified: SystemTime,
+    /// Size of all its files, bytes.
+    pub n_bytes: u64,
+}
+
 /// Files as files of this machine, until dropped.
 #[derive(Debug)]
 pub struct Fetched {
@@ -145,13 +156,23 @@ impl Blobs {
 
     /// Size and SHA-256 of a file in place, read to its end.
     pub async fn hash(&self, file: &BlobFile, folder: &str) -> Result<(i64, Vec<u8>), Error> {
-        let n_bytes = file.size_bytes.unsigned_abs();
-        let bytes = self.read(folder, &file.name, 0, n_bytes).await?;
-        Ok(write_and_hash(bytes, &mut tokio::io::sink()).await?)
+        self.copy(file, folder, &mut tokio::io::sink()).await
     }
 
-    /// Every folder in place, with the time of its youngest file, in no special order.
-    pub async fn folders(&self) -> Result<Vec<(String, SystemTime)>, Error> {
+    /// Writes a file in place to somewhere else; size and SHA-256 of what was written.
+    pub async fn copy(
+        &self,
+        file: &BlobFile,
+        folder: &str,
+        to: &mut (impl AsyncWrite + Unpin),
+    ) -> Result<(i64, Vec<u8>), Error> {
+        let n_bytes = file.size_bytes.unsigned_abs();
+        let bytes = self.read(folder, &file.name, 0, n_bytes).await?;
+        Ok(write_and_hash(bytes, to).await?)
+    }
+
+    /// Every folder in place, in no special order.
+    pub async fn folders(&self) -> Result<Vec<Folder>, Error> {
         match &self.place {
             Place::Shelf(shelf) => Ok(shelf.folders()?),
             Place::Bucket(bucket) => bucket.folders().await,

@@ -4,7 +4,6 @@
 use std::fs::{self, File};
 use std::io::{self, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
 
 use bytes::Bytes;
 use futures_util::StreamExt;
@@ -13,7 +12,7 @@ use tokio::io::{AsyncReadExt, AsyncSeekExt};
 use tokio::task::spawn_blocking;
 use tokio_util::io::ReaderStream;
 
-use super::{Draft, KINDS};
+use super::{Draft, Folder, KINDS};
 use crate::store::Error;
 
 /// Bytes read at a time.
@@ -72,17 +71,41 @@ impl Shelf {
         Ok(ReaderStream::with_capacity(file.take(n_bytes), PIECE_BYTES).boxed())
     }
 
-    pub(super) fn folders(&self) -> io::Result<Vec<(String, SystemTime)>> {
+    pub(super) fn folders(&self) -> io::Result<Vec<Folder>> {
         let mut folders = Vec::new();
         for kind in KINDS {
             for entry in fs::read_dir(self.root.join(kind))? {
                 let entry = entry?;
+                // It may be deleted meanwhile.
+                let Ok(about) = entry.metadata() else {
+                    continue;
+                };
                 let name = entry.file_name().to_string_lossy().into_owned();
-                folders.push((format!("{kind}/{name}"), entry.metadata()?.modified()?));
+                folders.push(Folder {
+                    name: format!("{kind}/{name}"),
+                    modified: about.modified()?,
+                    n_bytes: size_of(&entry.path())?,
+                });
             }
         }
         Ok(folders)
     }
+}
+
+/// Bytes of a file, or of all files below a folder; of what is gone already, none.
+pub(super) fn size_of(path: &Path) -> io::Result<u64> {
+    let about = match fs::symlink_metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
+        about => about?,
+    };
+    if !about.is_dir() {
+        return Ok(about.len());
+    }
+    let mut n_bytes = 0;
+    for entry in fs::read_dir(path)? {
+        n_bytes += size_of(&entry?.path())?;
+    }
+    Ok(n_bytes)
 }
 
 /// Makes the names in a folder outlive a power cut.

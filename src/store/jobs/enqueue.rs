@@ -27,25 +27,28 @@ pub struct NewJob {
     pub after_job: Option<JobId>,
     /// Higher runs first; 0 is usual.
     pub priority: i64,
+    /// How many jobs of everybody may be queued and running, this one included.
+    pub room: i64,
 }
 
 impl Store {
     /// Adds the job to the queue; [`Error::QuotaExceeded`] where its owner has too many queued and
-    /// running already. Counted and added under one lock, so that two at once cannot both be the last. A job
+    /// running already, [`Error::QueueFull`] where all together have. Counted and added under one lock, so that
+    /// two at once cannot both be the last. A job
     /// that is there already under its id, because its request comes again after a crash, is left as it is;
     /// [`Error::IdInUse`] where that one has another input.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
         let mut transaction = self.begin().await?;
-        let Account { owner, quota } = &job.account;
-        transaction.lock(&format!("jobs of {}", owner.0)).await?;
+        transaction.lock("queue").await?;
         if is_queued_already(&mut transaction, job).await? {
             return Ok(());
         }
         let added = sql::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
              created_ms, owner) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8 \
-             where $9 is null or $9 > (select count(*) from jobs \
-             where owner = $8 and state in ('queued', 'running'))",
+             where ($9 is null or $9 > (select count(*) from jobs \
+             where owner = $8 and state in ('queued', 'running'))) \
+             and $10 > (select count(*) from jobs where state in ('queued', 'running'))",
         )
         .bind(job.job_id.0)
         .bind(job.kind.name())
@@ -54,12 +57,13 @@ impl Store {
         .bind(job.after_job.map(|id| id.0))
         .bind(job.priority)
         .bind(now_ms)
-        .bind(owner)
-        .bind(*quota)
+        .bind(&job.account.owner)
+        .bind(job.account.quota)
+        .bind(job.room)
         .execute(&mut transaction)
         .await?;
-        if let (0, Some(quota)) = (added, *quota) {
-            return Err(Error::QuotaExceeded { quota });
+        if added == 0 {
+            return Err(why_not(&mut transaction, job).await?);
         }
         transaction.notify(QUEUED).await?;
         transaction.commit().await?;
@@ -82,6 +86,17 @@ impl QueuedJobs {
     pub async fn next(&mut self) -> Result<(), Error> {
         Ok(self.0.heard().await?)
     }
+}
+
+/// Why there was no room: where it is both, the owner's own doing.
+async fn why_not(transaction: &mut Transaction, job: &NewJob) -> Result<Error, Error> {
+    let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
+    let count = sql::query_scalar(sql).bind(&job.account.owner);
+    let n_jobs: i64 = count.fetch_one(transaction).await?;
+    Ok(match job.account.quota {
+        Some(quota) if quota <= n_jobs => Error::QuotaExceeded { quota },
+        _ => Error::QueueFull { room: job.room },
+    })
 }
 
 async fn is_queued_already(transaction: &mut Transaction, job: &NewJob) -> Result<bool, Error> {

@@ -12,6 +12,7 @@
 //! A job's row is never deleted by the queue: the history is what users ask for.
 
 pub mod cancel;
+pub mod changes;
 pub mod claim;
 pub mod enqueue;
 pub mod fail;
@@ -84,6 +85,9 @@ pub enum Change {
 }
 
 impl Kind {
+    /// Every kind.
+    pub const ALL: [Kind; 3] = [Kind::Analysis, Kind::Flock, Kind::Fish];
+
     /// The name in the database and the API.
     pub fn name(self) -> &'static str {
         match self {
@@ -93,14 +97,22 @@ impl Kind {
         }
     }
 
-    fn from_name(name: &str) -> Result<Kind, Error> {
-        let kinds = [Kind::Analysis, Kind::Flock, Kind::Fish];
-        let found = kinds.into_iter().find(|kind| kind.name() == name);
+    pub(super) fn from_name(name: &str) -> Result<Kind, Error> {
+        let found = Kind::ALL.into_iter().find(|kind| kind.name() == name);
         found.ok_or_else(|| unknown(name))
     }
 }
 
 impl JobState {
+    /// Every state.
+    pub const ALL: [JobState; 5] = [
+        JobState::Queued,
+        JobState::Running,
+        JobState::Done,
+        JobState::Failed,
+        JobState::Cancelled,
+    ];
+
     /// The name in the database and the API.
     pub fn name(self) -> &'static str {
         match self {
@@ -120,10 +132,8 @@ impl JobState {
         }
     }
 
-    fn from_name(name: &str) -> Result<JobState, Error> {
-        use JobState::{Cancelled, Done, Failed, Queued, Running};
-        let states = [Queued, Running, Done, Failed, Cancelled];
-        let found = states.into_iter().find(|state| state.name() == name);
+    pub(super) fn from_name(name: &str) -> Result<JobState, Error> {
+        let found = JobState::ALL.into_iter().find(|state| state.name() == name);
         found.ok_or_else(|| unknown(name))
     }
 }

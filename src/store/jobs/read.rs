@@ -38,7 +38,7 @@ pub struct JobRow {
 }
 
 #[derive(sqlx::FromRow)]
-struct Row {
+pub(super) struct Row {
     id: Uuid,
     kind: String,
     state: String,

@@ -51,6 +51,7 @@ impl Queue {
             result_id: Uuid::now_v7(),
             after_job,
             priority,
+            room: 1_000,
         };
         self.store.enqueue(&job, 0).await?;
         Ok(job_id)

@@ -58,13 +58,7 @@ impl Pool {
         file: &Path,
         migrates: bool,
     ) -> Result<[Pool; 2], Error> {
-        let options = SqliteConnectOptions::new()
-            .filename(file)
-            .create_if_missing(true)
-            .journal_mode(SqliteJournalMode::Wal)
-            .synchronous(SqliteSynchronous::Full)
-            .foreign_keys(true)
-            .busy_timeout(Duration::from_secs(5));
+        let options = options(file);
         let writer = SqlitePoolOptions::new()
             .max_connections(1)
             .connect_with(options.clone())
@@ -95,6 +89,25 @@ impl Pool {
         };
         FOR_POSTGRES.run(&pool).await?;
         Ok(Pool::Postgres(pool))
+    }
+
+    /// Whether the rows are in a file of this machine.
+    pub(in crate::store) fn is_file(&self) -> bool {
+        matches!(self, Pool::Sqlite(_))
+    }
+
+    /// Copies the rows, as they are at one time, into a file, and opens it. Of rows on a server
+    /// [`Error::RowsElsewhere`].
+    pub(in crate::store) async fn copy_to(&self, file: &Path) -> Result<Pool, Error> {
+        if !self.is_file() {
+            return Err(Error::RowsElsewhere);
+        }
+        query("vacuum into $1")
+            .bind(file.to_string_lossy().into_owned())
+            .execute(self)
+            .await?;
+        let pool = SqlitePoolOptions::new().max_connections(1);
+        Ok(Pool::Sqlite(pool.connect_with(options(file)).await?))
     }
 
     /// A transaction for writing: on SQLite it holds the writer's lock from its first statement.
@@ -134,6 +147,16 @@ impl Pool {
             Pool::Postgres(pool) => pool.close().await,
         }
     }
+}
+
+fn options(file: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(file)
+        .create_if_missing(true)
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .foreign_keys(true)
+        .busy_timeout(Duration::from_secs(5))
 }
 
 /// Makes the database; another process may have done so meanwhile.

@@ -24,7 +24,8 @@ fn cookie_of(answer: &Response) -> String {
 async fn without_a_good_token_nothing_but_the_page_is_answered() {
     let app = demanding().await;
     let good = app.token(Scope::Read, 1).await;
-    let wrong = format!("{}x", &good[..good.len() - 1]);
+    let other = if good.ends_with('x') { 'y' } else { 'x' };
+    let wrong = format!("{}{other}", &good[..good.len() - 1]);
     for token in [None, Some("frl_a_b"), Some(wrong.as_str())] {
         for path in ["/v1/jobs", "/v1/footage", "/nowhere"] {
             let request = app.get(path);
@@ -203,5 +204,40 @@ async fn a_token_that_asks_too_often_is_told_to_come_back_and_others_are_answere
     assert!(refused.headers().contains_key("retry-after"));
     assert_eq!(code_of(refused, 429).await, "rate_limited");
     assert_eq!(ask(&other).await.status(), 200);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn guesses_are_limited_and_a_good_token_is_good_meanwhile() {
+    let app = demanding().await;
+    let good = app.token(Scope::Read, 1).await;
+    let guess = async || {
+        let guess = app.post("/v1/session").json(&json!({"token": "frl_a_b"}));
+        guess.send().await.unwrap()
+    };
+    let mut answers = Vec::new();
+    for _ in 0..60 {
+        answers.push(guess().await.status().as_u16());
+    }
+    assert_eq!(answers[..20], [401; 20]);
+    let refused = guess().await;
+    assert!(refused.headers().contains_key("retry-after"));
+    assert_eq!(code_of(refused, 429).await, "rate_limited");
+    let answer = app.get("/v1/jobs").bearer_auth(&good).send().await;
+    assert_eq!(answer.unwrap().status(), 200);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_full_queue_is_told_to_everybody_with_the_time_to_come_back() {
+    let app = TestApp::start(&["--max-queued", "1"]).await;
+    let body = json!({"footage_id": app.upload(&TINY).await});
+    let first = app.accept("/v1/analyses", body.clone()).await;
+    let answer = app.post("/v1/analyses").json(&body).send().await.unwrap();
+    assert!(answer.headers().contains_key("retry-after"));
+    assert_eq!(code_of(answer, 503).await, "queue_full");
+    let path = format!("/v1/jobs/{}", first["job_id"].as_str().unwrap());
+    assert_eq!(app.delete(&path).send().await.unwrap().status(), 200);
+    app.accept("/v1/analyses", body).await;
     app.assert_sound().await;
 }

@@ -71,9 +71,17 @@ async fn a_body_that_is_wrong_is_told_what_is_wrong() {
 async fn nothing_served_runs_as_a_page_of_others() {
     let app = TestApp::idle().await;
     let id = app.upload(&TINY).await;
-    let mut asked: Vec<(Method, String)> = ["/", "/static/js/main.js", "/nowhere", "/openapi.json"]
-        .map(|path| (Method::GET, path.to_owned()))
-        .into();
+    let mut asked: Vec<(Method, String)> = [
+        "/",
+        "/docs",
+        "/docs/errors",
+        "/docs/swagger-ui.css",
+        "/static/js/main.js",
+        "/nowhere",
+        "/openapi.json",
+    ]
+    .map(|path| (Method::GET, path.to_owned()))
+    .into();
     for (method, path) in routes(&app.json("/openapi.json").await) {
         asked.push((method, path.replace("{id}", &id)));
     }
@@ -155,5 +163,23 @@ async fn the_document_names_every_call() {
         let entry = &document["paths"][path][method.as_str().to_lowercase()];
         assert!(entry.is_object(), "{method} {path}");
     }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn the_document_has_one_meaning_for_every_name() {
+    let app = TestApp::idle().await;
+    let schemas = app.json("/openapi.json").await["components"]["schemas"].clone();
+    for (name, field) in [
+        ("AnalysisParams", "clip_frames"),
+        ("FlockParams", "count"),
+        ("FishParams", "palette"),
+        ("LibrarySummary", "n_transitions"),
+        ("FlockSummary", "seed"),
+        ("FishSummary", "visible_frames"),
+    ] {
+        assert!(schemas[name]["properties"][field].is_object(), "{name}");
+    }
+    assert!(schemas["Params"].is_null() && schemas["Summary"].is_null());
     app.assert_sound().await;
 }

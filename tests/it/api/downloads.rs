@@ -72,3 +72,77 @@ async fn what_the_client_has_is_not_sent_again() {
     assert_eq!(stale.bytes().await.unwrap(), *TINY);
     app.assert_sound().await;
 }
+
+#[tokio::test]
+async fn what_is_no_plain_range_of_a_get_is_answered_with_the_whole() {
+    let app = TestApp::idle().await;
+    let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
+    for range in [
+        "bytes=0-1,5-6",
+        "bytes=5-2",
+        "bytes=x-",
+        "lines=0-1",
+        "bytes=0-1;",
+    ] {
+        let answer = app.get(&path).header("range", range).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{range}");
+        assert!(!answer.headers().contains_key("content-range"), "{range}");
+        assert_eq!(answer.bytes().await.unwrap(), *TINY, "{range}");
+    }
+    let head = app
+        .head(&path)
+        .header("range", "bytes=0-1")
+        .send()
+        .await
+        .unwrap();
+    assert_eq!(head.status(), StatusCode::OK);
+    let size = TINY.len().to_string();
+    assert_eq!(head.headers()["content-length"], size.as_str());
+    for nothing in ["bytes=-0", "bytes=99999999999999999999-"] {
+        let answer = app
+            .get(&path)
+            .header("range", nothing)
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(
+            code_of(answer, 416).await,
+            "range_not_satisfiable",
+            "{nothing}"
+        );
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_tag_among_others_or_a_weak_one_is_known_but_no_weak_one_joins_parts() {
+    let app = TestApp::idle().await;
+    let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
+    let head = app.head(&path).send().await.unwrap();
+    let etag = head.headers()["etag"].to_str().unwrap().to_owned();
+    for known in [
+        format!("\"x\", {etag}"),
+        format!("W/{etag}"),
+        "*".to_owned(),
+    ] {
+        for request in [app.get(&path), app.head(&path)] {
+            let request = request.header("range", "bytes=0-1");
+            let answer = request
+                .header("if-none-match", &known)
+                .send()
+                .await
+                .unwrap();
+            assert_eq!(answer.status(), StatusCode::NOT_MODIFIED, "{known}");
+            assert_eq!(answer.headers()["etag"], etag.as_str(), "{known}");
+        }
+    }
+    for stale in [
+        format!("W/{etag}"),
+        "Sat, 21 Nov 2026 09:30:00 GMT".to_owned(),
+    ] {
+        let request = app.get(&path).header("range", "bytes=0-1");
+        let answer = request.header("if-range", &stale).send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::OK, "{stale}");
+    }
+    app.assert_sound().await;
+}

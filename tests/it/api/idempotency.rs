@@ -5,7 +5,8 @@ use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::recover;
 use flockreel::jobs::{allotted, analysis};
 use flockreel::store::idempotency::{Begun, Scope};
-use flockreel::store::owners::Account;
+use flockreel::store::owners::{Account, Owner};
+use flockreel::store::tokens::{NewToken, Scope as TokenScope};
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 
@@ -20,7 +21,7 @@ async fn analyze(app: &TestApp, body: &Value) -> Response {
 
 fn scope() -> Scope {
     Scope {
-        caller: String::new(),
+        caller: Owner::local().0,
         route: "/v1/analyses".into(),
         key: "k-1".into(),
     }
@@ -87,9 +88,10 @@ async fn while_the_first_request_runs_the_second_is_told_so() {
     app.assert_sound().await;
 }
 
-/// The first request as far as it came: the key taken, the job queued, no answer noted; then a start.
+/// A request of two hours ago as far as it came: the key taken, the job queued, no answer noted; then a start.
 async fn crashed_between(app: &TestApp, footage: &str) -> Value {
-    let begun = app.context.store.begin_key(&scope(), None, now_ms()).await;
+    let then_ms = now_ms() - 2 * 3600 * 1000;
+    let begun = app.context.store.begin_key(&scope(), None, then_ms).await;
     let Begun::Run(family) = begun.unwrap() else {
         panic!("nobody had this key");
     };
@@ -126,5 +128,67 @@ async fn a_key_of_before_a_crash_does_not_serve_another_request() {
     let other = analyze(&app, &other).await;
     assert_eq!(code_of(other, 422).await, "idempotency_key_reused");
     assert_eq!(n_jobs(&app).await, 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_key_is_its_owners_whatever_the_token() {
+    let mut app = TestApp::start(&["--auth", "required"]).await;
+    let first = app.token(TokenScope::Write, 9).await;
+    let owner = Owner(first.split('_').nth(1).unwrap().to_owned());
+    let second = NewToken {
+        name: "another".to_owned(),
+        owner: Some(owner),
+        scope: TokenScope::Write,
+        quota: 9,
+        expires_ms: None,
+    };
+    let second = app
+        .context
+        .store
+        .add_token(&second, now_ms())
+        .await
+        .unwrap()
+        .1;
+    app.sign_in(&first);
+    let body = json!({"footage_id": app.upload(&TINY).await});
+    let made = json_of(analyze(&app, &body).await, StatusCode::ACCEPTED).await;
+    app.sign_in(&second);
+    let again = analyze(&app, &body).await;
+    assert_eq!(again.headers()["idempotent-replayed"], "true");
+    assert_eq!(json_of(again, StatusCode::ACCEPTED).await, made);
+    let stranger = app.token(TokenScope::Write, 9).await;
+    app.sign_in(&stranger);
+    assert_eq!(
+        code_of(analyze(&app, &body).await, 422).await,
+        "invalid_params"
+    );
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn an_upload_is_begun_once_and_another_length_is_another_request() {
+    let app = TestApp::idle().await;
+    let begin = async |size_bytes: usize| {
+        let request = app.post("/v1/uploads").header("idempotency-key", "k-3");
+        let request = request.header("tus-resumable", "1.0.0");
+        request
+            .header("upload-length", size_bytes)
+            .send()
+            .await
+            .unwrap()
+    };
+    let first = begin(9).await;
+    assert_eq!(first.status(), StatusCode::CREATED);
+    let again = begin(9).await;
+    assert_eq!(again.headers()["idempotent-replayed"], "true");
+    for name in ["location", "upload-offset", "upload-expires"] {
+        assert_eq!(again.headers()[name], first.headers()[name], "{name}");
+    }
+    assert_eq!(
+        code_of(begin(10).await, 422).await,
+        "idempotency_key_reused"
+    );
+    assert_eq!(app.n_uploads(), 1);
     app.assert_sound().await;
 }

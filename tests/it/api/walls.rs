@@ -58,6 +58,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("DELETE", "/v1/fish/{id}", Path("fish")),
         ("DELETE", "/v1/libraries/{id}", Path("libraries")),
         ("DELETE", "/v1/footage/{id}", Path("footage")),
+        ("GET", "/v1/events", Nothing), // endless, of the caller's own: tests/it/api/events.rs
         ("POST", "/v1/footage", Nothing),
         ("POST", "/v1/uploads", Nothing),
         ("OPTIONS", "/v1/uploads", Nothing),
@@ -65,6 +66,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("DELETE", "/v1/session", Nothing),
         ("GET", "/healthz", Nothing),
         ("GET", "/readyz", Nothing),
+        ("GET", "/metrics", Nothing), // of everybody, for those who run the service: tests/it/api/metrics.rs
     ]
 }
 

@@ -2,10 +2,12 @@
 //! Command line). What it makes of a film is tested in `film`.
 
 mod doctor;
+mod upkeep;
 
 use std::process::{Command, Output};
 
 use crate::common::film::Films;
+use crate::common::process::Server;
 
 fn flockreel(films: &Films, args: &str) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flockreel"))
@@ -98,5 +100,36 @@ fn beyond_this_machine_nothing_is_served_without_a_token() {
         flockreel(&films, serve).status.code(),
         Some(2),
         "a revoked token opens nothing"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_log_in_json_names_the_request_and_never_a_signature() {
+    let data = tempfile::tempdir().expect("a temporary folder");
+    let flags = ["--log-format", "json", "--metrics-bind", "127.0.0.1:0"];
+    let server = Server::start_with(data.path(), &flags);
+    let url = format!("{}/v1/jobs?limit=1&signature=secret", server.base);
+    let ask = reqwest::Client::new()
+        .get(url)
+        .header("x-request-id", "lab-1");
+    assert_eq!(ask.send().await.expect("an answer").status(), 422);
+    let log = server.terminate_and_read();
+    assert!(!log.contains("secret"), "{log}");
+    let (_, metrics) = log
+        .split_once("the metrics are at http://127.0.0.1:")
+        .expect(&log);
+    assert!(!metrics.starts_with('0'), "{log}");
+    let lines = log
+        .lines()
+        .filter_map(|line| serde_json::from_str(line).ok());
+    let lines: Vec<serde_json::Value> = lines.collect();
+    let answered = lines
+        .iter()
+        .find(|line| line["message"] == "request answered");
+    let answered = answered.unwrap_or_else(|| panic!("{log}"));
+    assert_eq!(answered["span"]["request_id"], "lab-1", "{answered}");
+    assert_eq!(
+        (&answered["route"], &answered["status"]),
+        (&"/v1/jobs".into(), &422.into())
     );
 }

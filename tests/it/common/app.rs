@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use clap::Parser;
+use flockreel::api::server::Stop;
 use flockreel::api::{self, AppState};
 use flockreel::config::Config;
 use flockreel::jobs::Context;
@@ -59,7 +60,10 @@ impl TestApp {
         tokio::spawn(api::server::serve(
             listener,
             api::router(state),
-            stop.clone(),
+            Stop {
+                begun: stop.clone(),
+                over: stop.clone(),
+            },
         ));
         TestApp {
             context,
@@ -73,7 +77,7 @@ impl TestApp {
 
     /// The folder that the service keeps its things in.
     pub(crate) fn folder(&self) -> &std::path::Path {
-        self.place.folder()
+        self.place.data()
     }
 
     /// The whole address of a path.
@@ -171,8 +175,11 @@ impl TestApp {
     /// Folders of a kind in the store.
     pub(crate) async fn n_folders(&self, kind: &str) -> usize {
         let folders = self.context.store.blobs().folders().await.unwrap();
-        let of_kind = |(folder, _): &(String, _)| folder.split('/').next() == Some(kind);
-        folders.iter().filter(|folder| of_kind(folder)).count()
+        let of_kind = |name: &str| name.split('/').next() == Some(kind);
+        folders
+            .iter()
+            .filter(|folder| of_kind(&folder.name))
+            .count()
     }
 
     /// Every invariant of the store holds, nothing is half made; the workers let go.

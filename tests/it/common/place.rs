@@ -58,6 +58,16 @@ impl Place {
         [vec!["--data".to_owned(), data], self.flags.clone()].concat()
     }
 
+    /// The data folder.
+    pub(crate) fn data(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// The flags that say what is not in the folder.
+    pub(crate) fn elsewhere_flags(&self) -> Vec<String> {
+        self.flags.clone()
+    }
+
     /// The same for a process on another machine: a folder of its own, with the same rows and files.
     pub(crate) fn elsewhere(&self) -> Place {
         Place {
@@ -74,11 +84,6 @@ impl Place {
     /// What such flags say.
     pub(crate) fn storage_of<'a>(flags: impl Iterator<Item = &'a str>) -> Storage {
         Arguments::parse_from(["test"].into_iter().chain(flags)).storage
-    }
-
-    /// The folder of this machine.
-    pub(crate) fn folder(&self) -> &Path {
-        self.folder.path()
     }
 
     /// What processes are making, or left half made.

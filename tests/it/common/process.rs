@@ -1,12 +1,17 @@
 //! The service as a process of its own, for tests that kill it.
 
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 
+use flockreel::store::blobs::hex;
 use rustix::process::{Pid, Signal, kill_process};
+use sha2::{Digest, Sha256};
 
 use super::Place;
+use super::clip::TINY;
 
 /// A running `flockreel worker`, and what it has said.
 pub(crate) struct WorkerProcess {
@@ -69,36 +74,53 @@ impl Drop for WorkerProcess {
 /// A running `flockreel serve` without a sample.
 pub(crate) struct Server {
     child: Child,
+    log: JoinHandle<String>,
     pub(crate) base: String,
 }
 
 impl Server {
-    /// Starts it over its things and waits for its address.
-    pub(crate) fn start(place: &Place) -> Server {
-        Server::start_with(place, &[])
+    /// Starts it over a data folder and waits for its address.
+    pub(crate) fn start(data: &Path) -> Server {
+        Server::start_with(data, &[])
+    }
+
+    /// The same over a place of any kind.
+    pub(crate) fn start_at(place: &Place) -> Server {
+        let flags = place.elsewhere_flags();
+        let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
+        Server::start_with(place.data(), &flags)
     }
 
     /// The same with further flags.
-    pub(crate) fn start_with(place: &Place, flags: &[&str]) -> Server {
+    pub(crate) fn start_with(data: &Path, flags: &[&str]) -> Server {
+        Server::start_in(data, flags, &[])
+    }
+
+    /// The same with variables of its environment.
+    pub(crate) fn start_in(data: &Path, flags: &[&str], variables: &[(&str, &str)]) -> Server {
         let mut child = Command::new(env!("CARGO_BIN_EXE_flockreel"))
-            .args(["serve", "--no-sample", "--bind", "127.0.0.1:0"])
-            .args(place.flags())
+            .args(["serve", "--no-sample", "--bind", "127.0.0.1:0", "--data"])
+            .arg(data)
             .args(flags)
+            .envs(variables.iter().copied())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
         let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+        let mut log = String::new();
         let base = lines.by_ref().find_map(|line| {
             let line = line.unwrap();
+            log = format!("{log}{line}\n");
             let (_, address) = line.split_once("the page is at ")?;
             Some(address.trim_end_matches('/').to_owned())
         });
+        let base = base.unwrap_or_else(|| panic!("no address was given:\n{log}"));
         // What it says later must not block it.
-        std::thread::spawn(move || lines.for_each(drop));
-        Server {
-            child,
-            base: base.expect("the server ended before it gave its address"),
-        }
+        let log = std::thread::spawn(move || {
+            let lines = lines.map_while(Result::ok);
+            lines.fold(log, |log, line| format!("{log}{line}\n"))
+        });
+        Server { child, log, base }
     }
 
     /// SIGKILL.
@@ -107,9 +129,27 @@ impl Server {
         self.child.wait().unwrap();
     }
 
+    /// SIGTERM, and no waiting.
+    pub(crate) fn tell_to_stop(&self) {
+        kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
+    }
+
     /// SIGTERM; returns the exit code.
     pub(crate) fn terminate(mut self) -> Option<i32> {
-        kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
+        self.tell_to_stop();
+        self.child.wait().unwrap().code()
+    }
+
+    /// SIGTERM; returns what it said.
+    pub(crate) fn terminate_and_read(mut self) -> String {
+        self.tell_to_stop();
+        self.child.wait().unwrap();
+        let log = std::mem::replace(&mut self.log, std::thread::spawn(String::new));
+        log.join().unwrap()
+    }
+
+    /// Waits for its end; returns the exit code.
+    pub(crate) fn wait(mut self) -> Option<i32> {
         self.child.wait().unwrap().code()
     }
 }
@@ -120,4 +160,27 @@ impl Drop for Server {
         self.child.kill().ok();
         self.child.wait().ok();
     }
+}
+
+/// A film of its own: the tiny picture, and a box after its last one that no player reads.
+pub(crate) fn numbered_film(number: usize) -> Vec<u8> {
+    let text = format!("film {number:08}");
+    let n_bytes = u32::try_from(text.len() + 8).unwrap().to_be_bytes();
+    [&TINY[..], &n_bytes, b"free", text.as_bytes()].concat()
+}
+
+/// SHA-256, hexadecimal.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// The command lines of all processes that name the folder.
+pub(crate) fn processes_of(folder: &Path) -> Vec<String> {
+    let folder = folder.to_str().unwrap();
+    let entries = std::fs::read_dir("/proc").unwrap().flatten();
+    let lines = entries.filter_map(|entry| {
+        let line = std::fs::read(entry.path().join("cmdline")).ok()?;
+        Some(String::from_utf8_lossy(&line).replace('\0', " "))
+    });
+    lines.filter(|line| line.contains(folder)).collect()
 }

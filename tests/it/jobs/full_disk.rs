@@ -112,12 +112,12 @@ impl Service {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     let place = Place::local();
-    let Some(disk) = SmallDisk::over(place.folder(), "48m") else {
+    let Some(disk) = SmallDisk::over(place.data(), "48m") else {
         println!("skipped: no small disk can be mounted here, that takes root");
         return;
     };
     let reserve = (8 << 20).to_string();
-    let server = Server::start_with(&place, &["--disk-reserve-bytes", &reserve]);
+    let server = Server::start_with(place.data(), &["--disk-reserve-bytes", &reserve]);
     let client = Client::new();
     let service = Service { server, client };
     let swim: Value = service.upload(&SWIM).await.json().await.unwrap();

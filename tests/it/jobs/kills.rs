@@ -3,13 +3,21 @@
 use std::time::{Duration, Instant};
 
 use flockreel::jobs::clock::now_ms;
+use flockreel::random::unit;
 use flockreel::store::Store;
-use reqwest::Client;
+use flockreel::store::jobs::JobState;
+use flockreel::store::owners::Reach;
+use futures_util::StreamExt;
+use futures_util::stream::once;
+use reqwest::{Client, StatusCode};
 use serde_json::{Value, json};
+use tokio::sync::oneshot;
+use tokio::task::JoinHandle;
 
 use crate::common::Place;
+use crate::common::app::code_of;
 use crate::common::clip::SWIM;
-use crate::common::process::Server;
+use crate::common::process::{Server, numbered_film, processes_of};
 
 async fn get(server: &Server, path: &str) -> Value {
     let answer = Client::new()
@@ -53,12 +61,12 @@ async fn assert_sound(place: &Place) {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
     let place = Place::of_tests();
-    let server = Server::start(&place);
+    let server = Server::start_at(&place);
     let job = start_job(&server).await;
     wait_for(&server, &job, |job| job["state"] == "running").await;
     server.kill();
 
-    let server = Server::start(&place);
+    let server = Server::start_at(&place);
     let ended = wait_for(&server, &job, |job| !job["finished_at"].is_null()).await;
     assert_eq!(
         (&ended["state"], &ended["attempt"]),
@@ -74,7 +82,7 @@ async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_told_to_stop_gives_its_job_back_unused() {
     let place = Place::of_tests();
-    let server = Server::start(&place);
+    let server = Server::start_at(&place);
     let job = start_job(&server).await;
     wait_for(&server, &job, |job| job["state"] == "running").await;
     let start = Instant::now();
@@ -82,7 +90,7 @@ async fn a_server_told_to_stop_gives_its_job_back_unused() {
     assert!(start.elapsed() < Duration::from_secs(20));
     assert_sound(&place).await;
 
-    let server = Server::start(&place);
+    let server = Server::start_at(&place);
     let ended = wait_for(&server, &job, |job| !job["finished_at"].is_null()).await;
     assert_eq!(
         (&ended["state"], &ended["attempt"]),
@@ -91,4 +99,115 @@ async fn a_server_told_to_stop_gives_its_job_back_unused() {
     );
     assert_eq!(server.terminate(), Some(0));
     assert_sound(&place).await;
+}
+
+/// The tags, which are hashes, of what a done analysis left.
+async fn result_of(server: &Server, job: &Value) -> Vec<String> {
+    let library = job["links"]["result"].as_str().unwrap();
+    let mut tags = Vec::new();
+    for file in [
+        "library.json",
+        "poses.json",
+        "background.png",
+        "sprites.zip",
+        "overlay.mp4",
+    ] {
+        let url = format!("{}{library}/{file}", server.base);
+        let answer = Client::new().head(url).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{file}");
+        tags.push(answer.headers()["etag"].to_str().unwrap().to_owned());
+    }
+    tags
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed() {
+    let place = Place::of_tests();
+    let mut server = Server::start_at(&place);
+    let mut jobs = Vec::new();
+    for _ in 0..3 {
+        jobs.push(start_job(&server).await);
+    }
+    for kill in 0..3 {
+        tokio::time::sleep(Duration::from_secs_f64(0.1 + 0.9 * unit(6, &[kill]))).await;
+        server.kill();
+        server = Server::start_at(&place);
+    }
+    let mut done = Vec::new();
+    for job in &jobs {
+        let ended = wait_for(&server, job, |job| !job["finished_at"].is_null()).await;
+        match ended["state"].as_str().unwrap() {
+            "done" => done.push(ended),
+            // Whoever is met by two kills is not tried again.
+            _ => assert_eq!(ended["error"]["code"], "crashed_worker", "{ended}"),
+        }
+    }
+    let uncrashed = start_job(&server).await;
+    let uncrashed = wait_for(&server, &uncrashed, |job| !job["finished_at"].is_null()).await;
+    assert_eq!(uncrashed["attempt"], 1);
+    let wanted = result_of(&server, &uncrashed).await;
+    assert!(!done.is_empty(), "three kills cannot meet three jobs twice");
+    for job in &done {
+        assert_eq!(result_of(&server, job).await, wanted, "{job}");
+    }
+    let libraries = get(&server, "/v1/libraries").await;
+    assert_eq!(libraries["items"].as_array().unwrap().len(), done.len() + 1);
+    assert_eq!(server.terminate(), Some(0));
+    assert_eq!(processes_of(place.data()), Vec::<String>::new());
+    let store = Store::open(place.storage()).await.unwrap();
+    assert_eq!(
+        store.check_after_crash(now_ms()).await.unwrap(),
+        Vec::<String>::new()
+    );
+}
+
+/// A film that is sent in two halves, the second when told to.
+fn slow_upload(server: &Server) -> (oneshot::Sender<()>, JoinHandle<StatusCode>) {
+    let (go_on, told) = oneshot::channel::<()>();
+    let film = numbered_film(1);
+    let (first, second) = film.split_at(film.len() / 2);
+    let (first, second) = (first.to_vec(), second.to_vec());
+    let rest = async move {
+        told.await.ok();
+        Ok(second)
+    };
+    let halves = once(async move { Ok::<_, std::io::Error>(first) }).chain(once(rest));
+    let sent = Client::new()
+        .post(format!("{}/v1/footage", server.base))
+        .body(reqwest::Body::wrap_stream(halves))
+        .send();
+    (
+        go_on,
+        tokio::spawn(async move { sent.await.unwrap().status() }),
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_told_to_stop_refuses_what_is_new_and_ends_what_is_under_way() {
+    let place = Place::of_tests();
+    let server = Server::start_at(&place);
+    let (go_on, upload) = slow_upload(&server);
+    let job = start_job(&server).await;
+    wait_for(&server, &job, |job| job["state"] == "running").await;
+    let start = Instant::now();
+    server.tell_to_stop();
+    tokio::time::sleep(Duration::from_millis(300)).await;
+    let sent = Client::new().post(format!("{}/v1/footage", server.base));
+    let refused = sent.body(numbered_film(2)).send().await.unwrap();
+    assert_eq!(refused.headers()["retry-after"], "5");
+    assert_eq!(code_of(refused, 503).await, "stopping");
+    go_on.send(()).unwrap();
+    assert_eq!(upload.await.unwrap(), 201);
+    assert_eq!(server.wait(), Some(0));
+    assert!(
+        start.elapsed() < Duration::from_secs(20),
+        "{:?}",
+        start.elapsed()
+    );
+    assert_eq!(processes_of(place.data()), Vec::<String>::new());
+    assert_sound(&place).await;
+    let store = Store::open(place.storage()).await.unwrap();
+    let id = job.rsplit('/').next().unwrap().parse().unwrap();
+    let row = store.job(id, &Reach::All).await.unwrap().unwrap();
+    assert_eq!((row.state, row.attempt), (JobState::Queued, 0));
 }

@@ -6,3 +6,4 @@ mod life_cycle;
 mod poison;
 mod races;
 mod steps;
+mod uploads;

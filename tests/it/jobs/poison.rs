@@ -100,7 +100,7 @@ impl Queue {
 #[tokio::test(flavor = "multi_thread")]
 async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
     let place = Place::local();
-    let wrapper = poisoned_ffmpeg(place.folder());
+    let wrapper = poisoned_ffmpeg(place.data());
     // The script starts other programs, which the sandbox would not let it.
     let flags = [
         "--sandbox",
@@ -110,7 +110,7 @@ async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
         "--ffmpeg",
         wrapper.to_str().unwrap(),
     ];
-    let server = Server::start_with(&place, &flags);
+    let server = Server::start_with(place.data(), &flags);
     let client = Client::new();
     let queue = Queue { server, client };
     let mut poisoned = Vec::new();

@@ -31,6 +31,7 @@ fn job(kind: Kind) -> NewJob {
         result_id: Uuid::now_v7(),
         after_job: None,
         priority: 0,
+        room: i64::MAX,
     }
 }
 

@@ -72,7 +72,7 @@ impl Service {
         let footage = json_of(answer.unwrap(), StatusCode::CREATED).await;
         let (mut jobs, mut files) = (Vec::new(), Vec::new());
         for seed in 1..=2 {
-            let wish = json!({"footage_id": footage["id"], "sprites": "always"});
+            let wish = json!({"footage_id": footage["id"]});
             let analysis = self.post("/v1/analyses", wish).await;
             let library = &analysis["library_id"];
             let wish = json!({"library_id": library, "count": 3, "frames": 20, "seed": seed});
@@ -127,7 +127,7 @@ impl Service {
 /// What a run that nobody disturbs makes, on one machine.
 async fn undisturbed() -> Vec<Vec<u8>> {
     let place = Place::local();
-    let server = Server::start(&place);
+    let server = Server::start_at(&place);
     let service = Service::of(&server);
     let (jobs, files) = service.queue_everything().await;
     service.wait_for(&jobs).await;
@@ -156,7 +156,7 @@ async fn at_work(workers: &[WorkerProcess]) -> usize {
 async fn a_worker_killed_in_the_middle_changes_no_result() {
     let expected = undisturbed().await;
     let place = Place::shared();
-    let server = Server::start(&place);
+    let server = Server::start_at(&place);
     let machines = [place.elsewhere(), place.elsewhere()];
     let mut workers: Vec<_> = machines.iter().map(WorkerProcess::start).collect();
     let service = Service::of(&server);

@@ -1,6 +1,10 @@
 //! The page: files of `static/`, and of the vendored libraries, inside the program (read from disk in
 //! a debug build), each with the hash of its content as its tag.
 
+pub(super) mod docs; // what can be read of the API
+
+pub(super) mod openapi; // its description, for programs
+
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Path;
@@ -9,7 +13,7 @@ use axum::response::IntoResponse;
 use axum::routing::get;
 use rust_embed::{EmbeddedFile, RustEmbed};
 
-use super::{AppState, Problem};
+use crate::api::{AppState, Problem};
 use crate::store::blobs::hex;
 
 #[derive(RustEmbed)]
@@ -42,24 +46,35 @@ async fn get_file<Files: RustEmbed>(
 
 fn answer<Files: RustEmbed>(path: &str, headers: &HeaderMap) -> Result<Response<Body>, Problem> {
     let file = Files::get(path).ok_or_else(Problem::not_found)?;
-    let etag = etag(&file);
+    let media_type = [(header::CONTENT_TYPE, media_type(path))];
+    Ok(tagged(headers, &etag(&file), || {
+        (media_type, file.data.into_owned()).into_response()
+    }))
+}
+
+/// The answer with its tag, or 304 where the browser has it already.
+pub(super) fn tagged(
+    headers: &HeaderMap,
+    etag: &str,
+    answer: impl FnOnce() -> Response<Body>,
+) -> Response<Body> {
     let known = headers.get(header::IF_NONE_MATCH);
+    let is_known = known.is_some_and(|tag| tag.as_bytes() == etag.as_bytes());
     let tags = [
-        (header::ETAG, etag.clone()),
+        (header::ETAG, etag.to_owned()),
         (header::CACHE_CONTROL, "no-cache".to_owned()),
     ];
-    if known.is_some_and(|tag| tag.as_bytes() == etag.as_bytes()) {
-        return Ok((StatusCode::NOT_MODIFIED, tags).into_response());
+    match is_known {
+        true => (StatusCode::NOT_MODIFIED, tags).into_response(),
+        false => (tags, answer()).into_response(),
     }
-    let media_type = [(header::CONTENT_TYPE, media_type(path))];
-    Ok((tags, media_type, file.data.into_owned()).into_response())
 }
 
 fn etag(file: &EmbeddedFile) -> String {
     format!("\"{}\"", hex(&file.metadata.sha256_hash()))
 }
 
-fn media_type(path: &str) -> &'static str {
+pub(super) fn media_type(path: &str) -> &'static str {
     match path.rsplit('.').next().unwrap_or_default() {
         "html" => "text/html; charset=utf-8",
         "css" => "text/css; charset=utf-8",

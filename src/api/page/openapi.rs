@@ -9,7 +9,7 @@ use utoipa::openapi::schema::{ObjectBuilder, Type};
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::openapi::{OpenApi, RefOr, Required};
 
-use super::{AppState, idempotency};
+use crate::api::{AppState, idempotency};
 
 /// The frame of the document; the routes add themselves.
 #[derive(utoipa::OpenApi)]
@@ -21,10 +21,10 @@ use super::{AppState, idempotency};
     modifiers(&Schemes),
     security((), ("token" = []), ("session" = [])),
 )]
-pub(super) struct Document;
+pub(in crate::api) struct Document;
 
 /// The headers that whole groups of calls take.
-pub(super) fn add_headers(document: &mut OpenApi) {
+pub(in crate::api) fn add_headers(document: &mut OpenApi) {
     for (path, item) in &mut document.paths.paths {
         if let Some(post) = item
             .post
@@ -80,7 +80,7 @@ impl Modify for Schemes {
 }
 
 /// /openapi.json.
-pub(super) fn route(document: &utoipa::openapi::OpenApi) -> Router<AppState> {
+pub(in crate::api) fn route(document: &utoipa::openapi::OpenApi) -> Router<AppState> {
     let text = document.to_json().unwrap_or_default();
     let answer = move || async move { ([(header::CONTENT_TYPE, "application/json")], text) };
     Router::new().route("/openapi.json", get(answer))

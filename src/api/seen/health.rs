@@ -5,12 +5,12 @@ use axum::http::StatusCode;
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use super::AppState;
+use crate::api::AppState;
 use crate::media::Walls;
 
 /// What the service needs, and whether it has it.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct Readiness {
+pub(in crate::api) struct Readiness {
     /// Whether all below is well.
     ready: bool,
     /// Whether the database can be written.
@@ -50,7 +50,7 @@ pub(super) struct DiskView {
 
 /// The process lives.
 #[utoipa::path(get, path = "/healthz", security(()), responses((status = 200, body = str)))]
-pub(super) async fn healthz() -> &'static str {
+pub(in crate::api) async fn healthz() -> &'static str {
     "ok\n"
 }
 
@@ -59,7 +59,9 @@ pub(super) async fn healthz() -> &'static str {
     (status = 200, body = Readiness),
     (status = 503, body = Readiness),
 ))]
-pub(super) async fn readyz(State(state): State<AppState>) -> (StatusCode, axum::Json<Readiness>) {
+pub(in crate::api) async fn readyz(
+    State(state): State<AppState>,
+) -> (StatusCode, axum::Json<Readiness>) {
     let database = state.context.store.is_writable().await;
     let blobs = state.context.store.blobs().clone();
     let files = tokio::task::spawn_blocking(move || (blobs.is_writable(), blobs.room_bytes().ok()));

@@ -1,0 +1,186 @@
+"""How fast the service is beside the usual tools, in one run on one machine (RELIABILITY.md, H5).
+
+    python3 bench/service.py target/release/flockreel [FILM]
+
+Upload of 1 GiB over loopback against cp and fsync to the same disk, with the memory that it added; small JSON
+answers a second, and the slow ones, idle and while analyses keep the workers busy; a film in ranges against nginx.
+FILM is what is analyzed meanwhile; without one the program films its own. Wants wrk, nginx and curl.
+"""
+
+import hashlib
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.request
+from pathlib import Path
+
+GIB = 1 << 30
+WRK_S = 8
+
+
+def main(program, film=None):
+    with tempfile.TemporaryDirectory(dir=os.environ.get("BENCH_DIR")) as folder:
+        folder = Path(folder)
+        if film is None:
+            film = folder / "film.mp4"
+            subprocess.run([program, "sample", "-o", film, "--frames", "600"], check=True, stderr=subprocess.DEVNULL)
+        service, address = start(program, folder / "data")
+        try:
+            footage = upload_speed(service, address, film, folder)
+            json_speed(address, film)
+            range_speed(address, footage, folder)
+        finally:
+            service.terminate()
+            service.wait(timeout=60)
+
+
+def start(program, data):
+    port = free_port()
+    arguments = [program, "serve", "--bind", f"127.0.0.1:{port}", "--data", data, "--no-sample", "--log", "warn"]
+    service = subprocess.Popen(arguments, stdin=subprocess.DEVNULL)
+    address = f"http://127.0.0.1:{port}"
+    for _ in range(100):
+        try:
+            urllib.request.urlopen(f"{address}/healthz", timeout=1).close()
+            return service, address
+        except OSError:
+            time.sleep(0.1)
+    raise TimeoutError("the service did not answer")
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def upload_speed(service, address, film, folder):
+    """A film with a box of a GiB after its last one, which no player reads."""
+    large = folder / "large.mp4"
+    small = Path(film).read_bytes()
+    with large.open("wb") as out:
+        out.write(small + (1).to_bytes(4, "big") + b"free" + (GIB + 16).to_bytes(8, "big"))
+        block = os.urandom(1 << 20)
+        for index in range(1024):
+            out.write(hashlib.sha256(index.to_bytes(4, "big")).digest() + block[32:])
+    os.sync()
+    copied_s = min(timed(lambda: copy(large, folder / "copy")) for _ in range(3))
+    Path(f"/proc/{service.pid}/clear_refs").write_text("5")
+    before = memory_mb(service.pid, "VmRSS")
+    took, answer = [], None
+    for run in range(3):
+        with large.open("r+b") as out:  # the same bytes again would cost nothing
+            out.seek(-1, os.SEEK_END)
+            out.write(bytes([run]))
+        start = time.monotonic()
+        command = ["curl", "-sS", "-X", "POST", "-H", "Content-Type: video/mp4", "-T", large, f"{address}/v1/footage"]
+        answer = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+        took.append(time.monotonic() - start)
+    added = memory_mb(service.pid, "VmHWM") - before
+    uploaded_s = min(took)
+    line("upload of 1 GiB", f"{uploaded_s:.2f} s, cp and fsync {copied_s:.2f} s: {100 * copied_s / uploaded_s:.0f} % of its rate")
+    line("memory that it added", f"{added:.1f} MB")
+    return answer
+
+
+def copy(source, target):
+    subprocess.run(["cp", source, target], check=True)
+    with target.open("rb") as file:
+        os.fsync(file.fileno())
+
+
+def timed(work):
+    start = time.monotonic()
+    work()
+    return time.monotonic() - start
+
+
+def memory_mb(pid, field):
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(re.search(rf"{field}:\s+(\d+) kB", status)[1]) / 1024
+
+
+def json_speed(address, film):
+    footage = post(f"{address}/v1/footage", Path(film).read_bytes(), "video/mp4")
+    url = f"{address}/v1/footage/{footage['id']}"
+    rate, p99_ms = wrk(url)
+    line("small JSON, idle", f"{rate:.0f} requests/s, p99 {p99_ms:.1f} ms")
+    stop = threading.Event()
+    working = threading.Thread(target=keep_busy, args=(address, footage["id"], stop))
+    working.start()
+    time.sleep(1)
+    rate, p99_ms = wrk(url)
+    stop.set()
+    working.join()
+    line("small JSON, while analyses run", f"{rate:.0f} requests/s, p99 {p99_ms:.1f} ms")
+
+
+def keep_busy(address, footage_id, stop):
+    while not stop.is_set():
+        job = post(f"{address}/v1/analyses", {"footage_id": footage_id})["job_id"]
+        while not json.load(urllib.request.urlopen(f"{address}/v1/jobs/{job}"))["finished_at"] and not stop.is_set():
+            time.sleep(0.2)
+    urllib.request.urlopen(urllib.request.Request(f"{address}/v1/jobs/{job}", method="DELETE")).close()
+
+
+def range_speed(address, footage, folder):
+    ours = f"{address}/v1/footage/{footage['id']}/file"
+    port = free_port()
+    [blob] = (folder / "data/blobs/footage").glob(f"{footage['id']}*/video")
+    (folder / "www").mkdir()
+    (folder / "www/video").symlink_to(blob)
+    config = folder / "nginx.conf"
+    config.write_text(
+        f"worker_processes 1; daemon off; pid {folder}/nginx.pid; error_log stderr crit; events {{}}\n"
+        f"http {{ access_log off; sendfile on; client_body_temp_path {folder}/b; proxy_temp_path {folder}/p;\n"
+        f"fastcgi_temp_path {folder}/f; uwsgi_temp_path {folder}/u; scgi_temp_path {folder}/s;\n"
+        f"server {{ listen 127.0.0.1:{port}; location / {{ root {folder}/www; }} }} }}\n"
+    )
+    folder.chmod(0o755)
+    command = ["nginx", "-e", "stderr", "-c", config, "-g", "user root;"]
+    nginx = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+    try:
+        time.sleep(0.5)
+        theirs = f"http://127.0.0.1:{port}/video"
+        rates = {url: max(mb_per_s(url) for _ in range(3)) for url in (ours, theirs)}
+    finally:
+        nginx.terminate()
+        nginx.wait()
+    line("a film in ranges of 8 MiB", f"{rates[ours]:.0f} MB/s, nginx {rates[theirs]:.0f} MB/s: {100 * rates[ours] / rates[theirs]:.0f} %")
+
+
+def wrk(url, *more):
+    command = ["wrk", "-t1", "-c16", f"-d{WRK_S}s", "--latency", *more, url]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "Non-2xx" not in said, said
+    rate = float(re.search(r"Requests/sec:\s+([\d.]+)", said)[1])
+    value, unit = re.search(r"99%\s+([\d.]+)(us|ms|s)", said).groups()
+    return rate, float(value) * {"us": 0.001, "ms": 1, "s": 1000}[unit]
+
+
+def mb_per_s(url):
+    command = ["wrk", "-t1", "-c4", "-d4s", "-H", "Range: bytes=1048576-9437183", url]
+    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    value, unit = re.search(r"Transfer/sec:\s+([\d.]+)(KB|MB|GB)", said).groups()
+    return float(value) * {"KB": 1 / 1024, "MB": 1, "GB": 1024}[unit]
+
+
+def post(url, body, media_type="application/json"):
+    data = body if isinstance(body, bytes) else json.dumps(body).encode()
+    request = urllib.request.Request(url, data, {"Content-Type": media_type})
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def line(what, said):
+    print(f"{what:32} {said}", flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

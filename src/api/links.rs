@@ -1,0 +1,81 @@
+//! Links to a file of a flock that need no token and end by themselves (RELIABILITY.md, S6): to show a film to
+//! somebody else, or to open it in another program. How they are signed and checked is `access/link`.
+
+use std::ops::RangeInclusive;
+
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{Response, StatusCode};
+use axum::response::IntoResponse;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::AppState;
+use super::access::{Caller, signed};
+use super::download::find as find_file;
+use super::extract::{Id, Json};
+use super::flocks::{FILES, find};
+use super::problem::{Problem, ProblemBody};
+use super::timestamp::rfc3339;
+use crate::code::Code;
+use crate::jobs::clock::now_ms;
+
+/// How long a link may hold, seconds.
+const LINK_S: RangeInclusive<i64> = 60..=604_800;
+
+/// To which file, and for how long.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LinkRequest {
+    /// One of the flock's files.
+    #[serde(default = "video")]
+    #[schema(default = "video.mp4")]
+    file: String,
+    /// Seconds, 60..=604800 (a week).
+    #[serde(default = "an_hour")]
+    #[schema(minimum = 60, maximum = 604_800, default = 3600)]
+    expires_s: i64,
+}
+
+/// A link that needs no token.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct LinkView {
+    /// The path with its signature, on this host.
+    url: String,
+    expires_at: String,
+}
+
+fn video() -> String {
+    "video.mp4".to_owned()
+}
+
+fn an_hour() -> i64 {
+    3600
+}
+
+/// Make a link to a file of a flock that needs no token and ends by itself.
+#[utoipa::path(post, path = "/v1/flocks/{id}/links", params(("id" = Uuid, Path)),
+    request_body = LinkRequest, responses(
+    (status = 201, body = LinkView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn create_flock_link(
+    State(state): State<AppState>,
+    caller: Caller,
+    Id(id): Id,
+    Json(request): Json<LinkRequest>,
+) -> Result<Response<Body>, Problem> {
+    let flock = find(&state, &caller, id).await?;
+    let (name, _) = find_file(FILES, &request.file)?;
+    if !LINK_S.contains(&request.expires_s) {
+        let sentence = format!("expires_s must lie in 60..=604800: {}", request.expires_s);
+        return Err(Problem::new(Code::InvalidParams, sentence));
+    }
+    let expires_s = now_ms() / 1000 + request.expires_s;
+    let key = state.context.store.signing_key().await?;
+    let view = LinkView {
+        url: signed(&key, &format!("/v1/flocks/{}/{name}", flock.id), expires_s),
+        expires_at: rfc3339(expires_s * 1000),
+    };
+    Ok((StatusCode::CREATED, axum::Json(view)).into_response())
+}

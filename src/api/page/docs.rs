@@ -1,0 +1,134 @@
+//! The API described for people: `/docs` draws the OpenAPI document (Swagger UI, its files inside the
+//! program), `/docs/errors` explains every code, where the `type` of every problem points (RFC 9457; ECOSYSTEM.md,
+//! API). Both hold to the policy of all pages: nothing from elsewhere, nothing inline (RELIABILITY.md, S5).
+
+use std::borrow::Cow;
+use std::sync::{Arc, LazyLock};
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::Path;
+use axum::http::{HeaderMap, Response, header};
+use axum::response::{Html, IntoResponse};
+use axum::routing::get;
+use sha2::{Digest, Sha256};
+use utoipa_swagger_ui::Config;
+
+use super::{media_type, tagged};
+use crate::api::problem::status_of;
+use crate::api::{AppState, Problem};
+use crate::code::Code;
+use crate::store::blobs::hex;
+
+/// What of Swagger UI the page loads; the rest of it is not served.
+const FILES: [&str; 2] = ["swagger-ui.css", "swagger-ui-bundle.js"];
+
+static ERRORS: LazyLock<String> = LazyLock::new(errors);
+static LOADED: LazyLock<Vec<Loaded>> = LazyLock::new(|| FILES.iter().filter_map(load).collect());
+
+/// A file of Swagger UI.
+struct Loaded {
+    name: &'static str,
+    bytes: Cow<'static, [u8]>,
+    etag: String,
+}
+
+/// `/docs`, `/docs/errors`, and what they load.
+pub(in crate::api) fn routes() -> Router<AppState> {
+    Router::new()
+        .route("/docs", get(|| async { Html(description()) }))
+        .route("/docs/errors", get(|| async { Html(ERRORS.as_str()) }))
+        .route("/docs/{file}", get(get_file))
+}
+
+async fn get_file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response<Body>, Problem> {
+    let file = LOADED.iter().find(|file| file.name == name);
+    let file = file.ok_or_else(Problem::not_found)?;
+    let media_type = [(header::CONTENT_TYPE, media_type(file.name))];
+    Ok(tagged(&headers, &file.etag, || {
+        (media_type, file.bytes.clone().into_owned()).into_response()
+    }))
+}
+
+fn load(name: &&'static str) -> Option<Loaded> {
+    let file = utoipa_swagger_ui::serve(name, Arc::new(Config::default()));
+    let bytes = file.ok()??.bytes.into_owned();
+    let etag = format!("\"{}\"", hex(&Sha256::digest(&bytes)));
+    Some(Loaded {
+        name,
+        bytes: Cow::Owned(bytes),
+        etag,
+    })
+}
+
+fn description() -> String {
+    let head = "<link rel=\"stylesheet\" href=\"/docs/swagger-ui.css\">\n\
+        <script defer src=\"/docs/swagger-ui-bundle.js\"></script>\n\
+        <script type=\"module\" src=\"/static/js/docs.js\"></script>";
+    let body = "<div class=\"docs\"><p>The same as data: <a href=\"/openapi.json\">openapi.json</a>. \
+        What can go wrong: <a href=\"/docs/errors\">the errors</a>. <a href=\"/\">The page</a>.</p></div>\n\
+        <div class=\"api\" id=\"api\"></div>\n<noscript><p>To draw it takes JavaScript.</p></noscript>";
+    page("The API", head, body)
+}
+
+fn errors() -> String {
+    let entries: String = Code::ALL.iter().map(|&code| entry(code)).collect();
+    let body = format!(
+        "<div class=\"docs\"><h1>What can go wrong</h1>\n<p>Every answer that is not a success is \
+         <code>application/problem+json</code> (RFC 9457) with a stable <code>code</code>; so is the <code>error</code> \
+         of a job that failed. A code is never renamed. <a href=\"/docs\">The API</a>.</p>\n<dl>\n{entries}</dl></div>"
+    );
+    page("Errors", "", &body)
+}
+
+fn entry(code: Code) -> String {
+    format!(
+        "<dt id=\"{code}\"><a href=\"#{code}\"><code>{code}</code></a> <small>{}</small></dt>\n\
+         <dd>{}</dd>\n<dd class=\"soft\">{}</dd>\n",
+        status_of(code),
+        marked(code.meaning()),
+        marked(code.advice()),
+    )
+}
+
+/// Text as HTML; what stands between backticks is program text.
+fn marked(text: &str) -> String {
+    let text = text.replace('&', "&amp;").replace('<', "&lt;");
+    let parts = text.split('`').enumerate();
+    let marked = parts.map(|(idx, part)| match idx % 2 {
+        0 => part.to_owned(),
+        _ => format!("<code>{part}</code>"),
+    });
+    marked.collect()
+}
+
+fn page(title: &str, head: &str, body: &str) -> String {
+    let styles: String = ["tokens", "base", "docs"]
+        .map(|name| format!("<link rel=\"stylesheet\" href=\"/static/css/{name}.css\">\n"))
+        .concat();
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title} · flockreel</title>\n<link rel=\"icon\" href=\"/static/icon.svg\">\n{styles}{head}\n</head>\n\
+         <body><main>\n{body}\n</main></body>\n</html>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_becomes_html_and_program_text_is_marked() {
+        assert_eq!(marked("a < b & `c`."), "a &lt; b &amp; <code>c</code>.");
+    }
+
+    #[test]
+    fn the_files_of_the_description_are_inside_the_program() {
+        let sizes: Vec<_> = LOADED.iter().map(|file| file.bytes.len()).collect();
+        assert!(
+            sizes.len() == 2 && sizes.iter().all(|&n_bytes| n_bytes > 50_000),
+            "{sizes:?}"
+        );
+    }
+}

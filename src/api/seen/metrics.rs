@@ -1,0 +1,143 @@
+//! `/metrics`, in the text form that Prometheus reads (ECOSYSTEM.md, seen from outside): what this process counted,
+//! and what the store holds when it is asked. It tells of everybody's work, so beyond this machine it wants an
+//! administrator's token, or a listener of its own (`--metrics-bind`) that a firewall can keep.
+
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::State;
+use axum::http::{HeaderValue, Response, header};
+use axum::middleware;
+use axum::response::IntoResponse;
+use axum::routing::get;
+use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::encoding::text::encode;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::info::Info;
+use prometheus_client::registry::{Registry, Unit};
+
+use super::observe::Requests;
+use crate::api::AppState;
+use crate::api::access::{Caller, Names, guard};
+use crate::api::problem::{Problem, ProblemBody};
+use crate::code::Code;
+use crate::jobs::Meters;
+use crate::jobs::clock::now_ms;
+use crate::store::jobs::{JobState, Kind};
+use crate::store::upkeep::census::Census;
+
+const MEDIA_TYPE: HeaderValue =
+    HeaderValue::from_static("application/openmetrics-text; version=1.0.0; charset=utf-8");
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Jobs {
+    kind: &'static str,
+    state: &'static str,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Stored {
+    noun: &'static str,
+}
+
+/// Everything that is told; cheap to clone.
+#[derive(Clone)]
+pub(in crate::api) struct Metrics {
+    registry: Arc<Registry>,
+    jobs: Family<Jobs, Gauge>,
+    oldest_queued: Gauge,
+    stored: Family<Stored, Gauge>,
+}
+
+impl Metrics {
+    /// Over what is counted elsewhere in the process.
+    pub(in crate::api) fn new(meters: &Meters, requests: &Requests) -> Metrics {
+        let mut registry = Registry::default();
+        let (jobs, stored) = (Family::default(), Family::default());
+        let oldest_queued = Gauge::default();
+        let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
+        registry.register("flockreel_build", "What is running", version);
+        registry.register("flockreel_jobs", "Jobs, by kind and state", jobs.clone());
+        registry.register_with_unit(
+            "flockreel_queue_oldest",
+            "How long the job that is queued longest has waited",
+            Unit::Seconds,
+            oldest_queued.clone(),
+        );
+        registry.register_with_unit(
+            "flockreel_stored",
+            "What is stored, by what it is",
+            Unit::Bytes,
+            stored.clone(),
+        );
+        meters.register(&mut registry);
+        requests.register(&mut registry);
+        let registry = Arc::new(registry);
+        Metrics {
+            registry,
+            jobs,
+            oldest_queued,
+            stored,
+        }
+    }
+
+    fn note(&self, census: &Census, now_ms: i64) {
+        for (kind, state) in Kind::ALL
+            .into_iter()
+            .flat_map(|kind| JobState::ALL.map(|state| (kind, state)))
+        {
+            let counts = census.jobs.iter();
+            let count = counts.filter(|(k, s, _)| (*k, *s) == (kind, state));
+            let labels = Jobs {
+                kind: kind.name(),
+                state: state.name(),
+            };
+            let n_jobs = count.map(|(_, _, n_jobs)| n_jobs).sum();
+            self.jobs.get_or_create(&labels).set(n_jobs);
+        }
+        let waited_ms = census.oldest_queued_ms.map_or(0, |ms| now_ms - ms);
+        self.oldest_queued.set(waited_ms.max(0) / 1000);
+        for &(noun, n_bytes) in &census.stored_bytes {
+            self.stored.get_or_create(&Stored { noun }).set(n_bytes);
+        }
+    }
+}
+
+/// What the service does and holds, for Prometheus (OpenMetrics text). Without a token on the machine itself;
+/// elsewhere with one of the scope `admin`, or by the listener of `--metrics-bind`.
+#[utoipa::path(get, path = "/metrics", responses(
+    (status = 200, content_type = "application/openmetrics-text", body = str),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(in crate::api) async fn get_metrics(
+    State(state): State<AppState>,
+    caller: Caller,
+) -> Result<Response<Body>, Problem> {
+    match caller.runs_the_service() {
+        true => text(&state).await,
+        false => Err(Code::ScopeTooSmall.into()),
+    }
+}
+
+/// The metrics alone, for a listener of their own: whoever reaches it may read them.
+pub fn metrics_router(state: AppState) -> Router {
+    let answer = async |State(state): State<AppState>| text(&state).await;
+    Router::new()
+        .route("/metrics", get(answer))
+        .fallback(|| async { Problem::from(Code::NotFound) })
+        .with_state(state)
+        .layer(middleware::from_fn_with_state(Names::Any, guard))
+}
+
+async fn text(state: &AppState) -> Result<Response<Body>, Problem> {
+    let census = state.context.store.census().await?;
+    state.metrics.note(&census, now_ms());
+    let mut text = String::new();
+    encode(&mut text, &state.metrics.registry).map_err(|error| {
+        tracing::error!(%error, "the metrics could not be written");
+        Code::Internal
+    })?;
+    Ok(([(header::CONTENT_TYPE, MEDIA_TYPE)], text).into_response())
+}

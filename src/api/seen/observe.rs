@@ -1,0 +1,180 @@
+//! What is seen of every request from outside (ECOSYSTEM.md, seen from outside): an id that its log lines and its
+//! answer bear, one line when it was answered, and its count and time by route and status. The query of an
+//! address is never logged: the signature of a link stands there.
+
+use std::time::{Duration, Instant};
+
+use axum::extract::{MatchedPath, Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method};
+use axum::middleware::Next;
+use axum::response::Response;
+use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
+use prometheus_client::metrics::gauge::Gauge;
+use prometheus_client::metrics::histogram::Histogram;
+use prometheus_client::registry::Registry;
+use tracing::Instrument;
+use uuid::Uuid;
+
+const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
+/// A sender's own id is kept where it is this short and plain.
+const MAX_ID_BYTES: usize = 64;
+/// From a probe to a film that was waited for, seconds until the head of the answer.
+const ANSWER_S: [f64; 12] = [
+    0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 300.0,
+];
+const METHODS: [Method; 7] = [
+    Method::GET,
+    Method::HEAD,
+    Method::POST,
+    Method::PATCH,
+    Method::PUT,
+    Method::DELETE,
+    Method::OPTIONS,
+];
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Answered {
+    /// The template, so that no id becomes a label.
+    route: String,
+    method: &'static str,
+    status: u16,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Route {
+    route: String,
+}
+
+/// The counters of requests; cheap to clone.
+#[derive(Clone)]
+pub(in crate::api) struct Requests {
+    answered: Family<Answered, Counter>,
+    times: Family<Route, Histogram, fn() -> Histogram>,
+    under_way: Gauge,
+}
+
+impl Default for Requests {
+    fn default() -> Requests {
+        Requests {
+            answered: Family::default(),
+            times: Family::new_with_constructor(|| Histogram::new(ANSWER_S)),
+            under_way: Gauge::default(),
+        }
+    }
+}
+
+impl Requests {
+    /// Names the counters in a registry.
+    pub(in crate::api) fn register(&self, registry: &mut Registry) {
+        registry.register(
+            "flockreel_http_requests",
+            "Requests answered, by the template of their route",
+            self.answered.clone(),
+        );
+        registry.register(
+            "flockreel_http_request_seconds",
+            "Time until the head of the answer",
+            self.times.clone(),
+        );
+        registry.register(
+            "flockreel_http_requests_under_way",
+            "Requests whose answer has not begun",
+            self.under_way.clone(),
+        );
+    }
+
+    fn count(&self, route: &str, method: &Method, answer: &Response, took: Duration) {
+        let route = route.to_owned();
+        let method = METHODS.iter().find(|known| *known == method);
+        let answered = Answered {
+            route: route.clone(),
+            method: method.map_or("other", Method::as_str),
+            status: answer.status().as_u16(),
+        };
+        self.answered.get_or_create(&answered).inc();
+        let times = self.times.get_or_create(&Route { route });
+        times.observe(took.as_secs_f64());
+    }
+}
+
+/// Counted for as long as it is there: a sender who hangs up drops it.
+struct UnderWay(Gauge);
+
+impl Drop for UnderWay {
+    fn drop(&mut self) {
+        self.0.dec();
+    }
+}
+
+/// Gives the request its id, and sees it through.
+pub(in crate::api) async fn observe(
+    State(requests): State<Requests>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let start = Instant::now();
+    let id = id_of(request.headers());
+    let method = request.method().clone();
+    let matched = request.extensions().get::<MatchedPath>().cloned();
+    let route = matched.as_ref().map_or("unmatched", MatchedPath::as_str);
+    let path = request.uri().path();
+    let span = tracing::info_span!("request", request_id = id, %method, path);
+    requests.under_way.inc();
+    let under_way = UnderWay(requests.under_way.clone());
+    let mut answer = next.run(request).instrument(span.clone()).await;
+    drop(under_way);
+    let took = start.elapsed();
+    requests.count(route, &method, &answer, took);
+    span.in_scope(|| log(route, answer.status().as_u16(), took));
+    if let Ok(id) = HeaderValue::from_str(&id) {
+        answer.headers_mut().insert(REQUEST_ID, id);
+    }
+    answer
+}
+
+/// One line; those that come by themselves every few seconds, and the page's files, only on demand.
+fn log(route: &str, status: u16, took: Duration) {
+    let duration_ms = took.as_secs_f64() * 1000.0;
+    let is_frequent = ["/healthz", "/readyz", "/metrics"].contains(&route)
+        || ["/static/", "/vendor/"]
+            .iter()
+            .any(|start| route.starts_with(start));
+    match is_frequent {
+        true => tracing::debug!(route, status, duration_ms, "request answered"),
+        false => tracing::info!(route, status, duration_ms, "request answered"),
+    }
+}
+
+/// The sender's own id, if it can stand in a log, or a fresh one.
+fn id_of(headers: &HeaderMap) -> String {
+    let given = headers.get(REQUEST_ID).and_then(|id| id.to_str().ok());
+    let is_plain = |id: &&str| {
+        (1..=MAX_ID_BYTES).contains(&id.len())
+            && id
+                .bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte))
+    };
+    let given = given.filter(is_plain).map(str::to_owned);
+    given.unwrap_or_else(|| Uuid::now_v7().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_id_that_could_forge_a_line_is_replaced() {
+        let of = |id: &'static str| {
+            id_of(&HeaderMap::from_iter([(
+                REQUEST_ID,
+                HeaderValue::from_static(id),
+            )]))
+        };
+        assert_eq!(of("a-1_b.c"), "a-1_b.c");
+        for odd in ["", "a b", "a\"b", "id=1"] {
+            assert_eq!(of(odd).len(), 36, "{odd}");
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! `flockreel backup DIR`: a copy of the data folder, beside a running service too (RELIABILITY.md, R11). It is
+//! restored by starting on it: `flockreel serve --data DIR`.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+use tokio::runtime::Runtime;
+
+use super::check::existing;
+use super::serve::from_store;
+use super::{Error, Summary, say};
+use crate::config::{Database, Storage};
+
+/// Arguments of `backup`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Where the copy goes: a folder that is not there yet.
+    #[arg(value_name = "DIR")]
+    target: PathBuf,
+    #[command(flatten)]
+    storage: Storage,
+}
+
+/// Copies; what was begun and not ended lies beside as `DIR.partial`.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    if args.target.file_name().is_none() || args.target.exists() {
+        let sentence = format!(
+            "a backup wants a folder of its own: {}",
+            args.target.display()
+        );
+        return Err(Error::Usage(sentence));
+    }
+    if let Database::Postgres(_) = args.storage.database() {
+        let sentence = "rows on a server are copied with its own tools (pg_dump), files in a bucket with those of the \
+                        bucket: first the rows, then the files";
+        return Err(Error::Usage(sentence.to_owned()));
+    }
+    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    let copied = runtime.block_on(async {
+        let store = existing(args.storage).await?;
+        let copied = store.back_up(&args.target).await.map_err(from_store);
+        store.close().await;
+        copied
+    })?;
+    say(&format!("flockreel: files copied: {}", copied.n_files));
+    let (n_files, n_bytes) = (copied.n_files, copied.n_bytes);
+    Ok(Some(Summary(json!({"files": n_files, "bytes": n_bytes}))))
+}

@@ -1,0 +1,67 @@
+//! `flockreel check`: the invariants I1 to I6 of the data folder (RELIABILITY.md), beside a running service too.
+//! Every file is read and hashed. Exit status 0 where all is well, 1 with one line for each fault.
+
+use std::time::Duration;
+
+use serde_json::json;
+use tokio::runtime::Runtime;
+
+use super::serve::from_store;
+use super::{Error, Summary, say};
+use crate::code::Code;
+use crate::config::{Database, Storage};
+use crate::jobs::clock::now_ms;
+use crate::store::check::Fault;
+use crate::store::{self, Store};
+
+/// A fault that is not there a moment later was something under way.
+const MOMENT: Duration = Duration::from_secs(2);
+
+/// Arguments of `check`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    storage: Storage,
+}
+
+/// Verifies, and names every fault on stderr.
+pub fn run(args: Args) -> Result<Option<Summary>, Error> {
+    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    let faults = runtime.block_on(async {
+        let store = existing(args.storage).await?;
+        let faults = faults(&store).await.map_err(from_store);
+        store.close().await;
+        faults
+    })?;
+    for fault in &faults {
+        say(&format!("flockreel: {fault}"));
+    }
+    match faults.len() {
+        0 => Ok(Some(Summary(json!({"faults": []})))),
+        n_faults => Err(Error::Work {
+            code: Code::Internal,
+            sentence: format!("the data folder has faults: {n_faults}"),
+        }),
+    }
+}
+
+/// A store that must be there: a name mistyped makes no new one.
+pub(super) async fn existing(storage: Storage) -> Result<Store, Error> {
+    if let Database::Sqlite(file) = storage.database()
+        && !file.is_file()
+    {
+        let data = storage.data.display();
+        return Err(Error::Usage(format!("no data folder: {data}")));
+    }
+    Store::open_beside(storage).await.map_err(from_store)
+}
+
+async fn faults(store: &Store) -> Result<Vec<Fault>, store::Error> {
+    let mut faults = store.check_after_crash(now_ms()).await?;
+    if !faults.is_empty() && !store.is_alone() {
+        tokio::time::sleep(MOMENT).await;
+        let still = store.check_after_crash(now_ms()).await?;
+        faults.retain(|fault| still.contains(fault));
+    }
+    Ok(faults)
+}

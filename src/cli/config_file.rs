@@ -1,0 +1,209 @@
+//! Settings from a file (ECOSYSTEM.md, config): flags win over environment variables, those over the file of
+//! `--config`, that over the defaults. One definition: a setting is an option that has an environment variable,
+//! and the file replaces its default, so that `--help` shows what holds.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
+use toml::{Table, Value};
+
+use super::{Cli, Error};
+
+/// The environment variable that names the file.
+const VARIABLE: &str = "FLOCKREEL_CONFIG";
+/// The one setting that a file cannot have: which file.
+const CONFIG: &str = "config";
+
+/// Values by the ids of their options.
+type Settings = BTreeMap<String, String>;
+
+/// Reads the arguments over the file that they name, if they name one. Where the arguments themselves are
+/// wrong, or ask for help, clap says so and ends the program.
+pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
+    let file = named_in(arguments).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
+    let command = match file {
+        Some(file) => with_defaults(Cli::command(), &read(&file)?),
+        None => Cli::command(),
+    };
+    let matches = command.get_matches_from(arguments);
+    Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit()))
+}
+
+/// The file of `--config FILE` or `--config=FILE`, the last one given.
+fn named_in(arguments: &[OsString]) -> Option<PathBuf> {
+    let flags = arguments
+        .iter()
+        .enumerate()
+        .take_while(|(_, flag)| *flag != "--");
+    let named = flags.filter_map(|(idx, flag)| match flag.to_str()? {
+        "--config" => arguments.get(idx + 1).map(PathBuf::from),
+        flag => flag.strip_prefix("--config=").map(PathBuf::from),
+    });
+    named.last()
+}
+
+fn read(file: &Path) -> Result<Settings, Error> {
+    let wrong = |what: &str| Error::Usage(format!("{what}: {}", file.display()));
+    let text = std::fs::read_to_string(file);
+    let text = text.map_err(|error| wrong(&format!("the settings cannot be read: {error}")))?;
+    let table: Table = (text.parse()).map_err(|error: toml::de::Error| {
+        let line = text[..error.span().map_or(0, |span| span.start)]
+            .matches('\n')
+            .count()
+            + 1;
+        wrong(&format!("line {line} is no TOML: {}", error.message()))
+    })?;
+    let known = settings_of(&Cli::command());
+    let mut settings = Settings::new();
+    for (key, value) in table {
+        let id = key.replace('-', "_");
+        let Some((flag, is_switch)) = known.get(&id) else {
+            return Err(wrong(&format!("no setting is called {key}, in")));
+        };
+        let text = text_of(&value, *is_switch);
+        let text =
+            text.ok_or_else(|| wrong(&format!("the value of {key} is of a wrong kind, in")))?;
+        check(flag, &text, *is_switch).map_err(|why| wrong(&format!("{key}: {why}, in")))?;
+        settings.insert(id, text);
+    }
+    Ok(settings)
+}
+
+/// Every option that has an environment variable: its flag, and whether it is one without a value.
+fn settings_of(command: &Command) -> BTreeMap<String, (String, bool)> {
+    let mut known = BTreeMap::new();
+    for command in command.get_subcommands() {
+        known.extend(settings_of(command));
+    }
+    for option in command.get_arguments() {
+        let id = option.get_id().as_str();
+        if let (Some(_), Some(flag)) = (option.get_env(), option.get_long())
+            && id != CONFIG
+        {
+            let is_switch = matches!(option.get_action(), ArgAction::SetTrue);
+            known.insert(id.to_owned(), (flag.to_owned(), is_switch));
+        }
+    }
+    known
+}
+
+fn text_of(value: &Value, is_switch: bool) -> Option<String> {
+    match value {
+        Value::Boolean(on) => is_switch.then(|| on.to_string()),
+        Value::String(text) if !is_switch => Some(text.clone()),
+        Value::Integer(number) if !is_switch => Some(number.to_string()),
+        _ => None,
+    }
+}
+
+/// Whether `serve` would take the value as a flag; the reason in one line where it would not.
+fn check(flag: &str, text: &str, is_switch: bool) -> Result<(), String> {
+    let given = match (is_switch, text) {
+        (false, _) => vec![format!("--{flag}={text}")],
+        (true, "true") => vec![format!("--{flag}")],
+        (true, _) => Vec::new(),
+    };
+    let arguments = ["flockreel", "serve"].into_iter().map(str::to_owned);
+    let taken = Cli::command().try_get_matches_from(arguments.chain(given));
+    let Err(error) = taken else {
+        return Ok(());
+    };
+    let sentence = error.to_string();
+    let line = sentence.lines().next().unwrap_or_default();
+    Err(line.trim_start_matches("error: ").to_owned())
+}
+
+/// The command with the file's values in the place of its settings' defaults, subcommands too.
+fn with_defaults(command: Command, settings: &Settings) -> Command {
+    command
+        .mut_args(|option| {
+            let value = settings.get(option.get_id().as_str());
+            match value.filter(|_| option.get_env().is_some()) {
+                Some(value) => option.default_value(value.clone()),
+                None => option,
+            }
+        })
+        .mut_subcommands(|command| with_defaults(command, settings))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_is_found_among_the_arguments() {
+        let of = |line: &str| {
+            let arguments: Vec<OsString> = line.split(' ').map(OsString::from).collect();
+            named_in(&arguments)
+        };
+        assert_eq!(of("flockreel serve --config a.toml"), Some("a.toml".into()));
+        assert_eq!(
+            of("flockreel --config=b --config=c serve"),
+            Some("c".into())
+        );
+        assert_eq!(of("flockreel analyze -- --config=b"), None);
+        assert_eq!(of("flockreel serve --config"), None);
+    }
+
+    #[test]
+    fn a_value_in_the_file_replaces_the_default_and_a_flag_the_value() {
+        let settings = Settings::from([
+            ("rate".to_owned(), "7".to_owned()),
+            ("no_sample".to_owned(), "true".to_owned()),
+        ]);
+        let of = |line: &str| {
+            let command = with_defaults(Cli::command(), &settings);
+            let matches = command.try_get_matches_from(line.split(' ')).unwrap();
+            let (_, serve) = matches.subcommand().unwrap();
+            (
+                *serve.get_one::<u32>("rate").unwrap(),
+                serve.get_flag("no_sample"),
+            )
+        };
+        assert_eq!(of("flockreel serve"), (7, true));
+        assert_eq!(of("flockreel serve --rate 9"), (9, true));
+        let mut command = with_defaults(Cli::command(), &settings);
+        let serve = command.find_subcommand_mut("serve").unwrap();
+        assert!(
+            serve
+                .render_long_help()
+                .to_string()
+                .contains("[default: 7]")
+        );
+    }
+
+    #[test]
+    fn what_is_wrong_in_the_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("flockreel.toml");
+        let said = |text: &str| {
+            std::fs::write(&file, text).unwrap();
+            read(&file)
+                .err()
+                .map_or_else(String::new, |error| error.to_string())
+        };
+        assert_eq!(
+            said("bind = '127.0.0.1:1'\nmax-upload-bytes = 5\nno_sample = false"),
+            ""
+        );
+        for (text, start) in [
+            ("speed = 1", "no setting is called speed, in: "),
+            ("config = 'b'", "no setting is called config"),
+            (
+                "rate = 'many'",
+                "rate: invalid value 'many' for '--rate <N>'",
+            ),
+            ("auth = 'never'", "auth: invalid value 'never'"),
+            ("rate = 1.5", "the value of rate is of a wrong kind"),
+            (
+                "no_sample = 'yes'",
+                "the value of no_sample is of a wrong kind",
+            ),
+            ("bind = '127.0.0.1:1'\nrate = ", "line 2 is no TOML"),
+        ] {
+            assert!(said(text).starts_with(start), "{}", said(text));
+        }
+    }
+}

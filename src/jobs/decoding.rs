@@ -1,0 +1,61 @@
+//! A film that counts the frames it gives and the time that they took, for the meters.
+
+use std::time::{Duration, Instant};
+
+use super::Listener;
+use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
+use crate::raster::Frame;
+
+/// A film whose reading is counted.
+pub(super) struct Counted<'a, S> {
+    source: &'a S,
+    listener: &'a Listener,
+}
+
+impl<'a, S: FrameSource> Counted<'a, S> {
+    pub(super) fn new(source: &'a S, listener: &'a Listener) -> Counted<'a, S> {
+        Counted { source, listener }
+    }
+}
+
+impl<S: FrameSource> FrameSource for Counted<'_, S> {
+    fn format(&self) -> FootageFormat {
+        self.source.format()
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(CountedStream {
+            stream: self.source.open()?,
+            listener: self.listener,
+            n_frames: 0,
+            took: Duration::ZERO,
+        }))
+    }
+
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        self.source.spread(n, visit)
+    }
+}
+
+struct CountedStream<'a> {
+    stream: Box<dyn FrameStream + 'a>,
+    listener: &'a Listener,
+    n_frames: u64,
+    took: Duration,
+}
+
+impl FrameStream for CountedStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        let start = Instant::now();
+        let next = self.stream.next_frame(frame);
+        self.took += start.elapsed();
+        self.n_frames += u64::from(matches!(next, Ok(Some(_))));
+        next
+    }
+}
+
+impl Drop for CountedStream<'_> {
+    fn drop(&mut self) {
+        self.listener.count_decoded(self.n_frames, self.took);
+    }
+}

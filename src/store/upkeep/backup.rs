@@ -1,0 +1,162 @@
+//! A copy of the data folder, or of a file of rows with the files elsewhere, while the service writes to it (RELIABILITY.md, R11): the database by VACUUM
+//! INTO, never as a file, and every file that its rows name, which never change once they are there.
+//!
+//! What is deleted between the two is in the copy's rows without its file; then the rows are copied again. A
+//! job that runs is queued in the copy, its attempt not counted: its worker is not in the copy.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use sqlx::types::Uuid;
+
+use crate::store::sql::{self, Pool};
+use crate::store::{BlobFile, Error, Store};
+
+/// How often the rows are copied again because something was deleted meanwhile.
+const MAX_ROUNDS: usize = 20;
+const DATABASE: &str = "flockreel.db";
+
+/// What was copied.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Copied {
+    /// Files that rows name, and uploads under way.
+    pub n_files: usize,
+    /// Their bytes.
+    pub n_bytes: u64,
+}
+
+impl Store {
+    /// Copies everything into `target`, which must not be there: it appears when it is whole.
+    pub async fn back_up(&self, target: &Path) -> Result<Copied, Error> {
+        let partial = beside(target);
+        fs::create_dir_all(&partial)?;
+        let mut copied = Copied::default();
+        for _ in 0..MAX_ROUNDS {
+            let snapshot = self.copy_rows(&partial.join(DATABASE)).await?;
+            let is_whole = self.copy_files(&snapshot, &partial, &mut copied).await?;
+            if is_whole {
+                forget_workers(&snapshot).await?;
+                snapshot.close().await;
+                return publish(&partial, target)
+                    .map(|()| copied)
+                    .map_err(Error::Io);
+            }
+            snapshot.close().await;
+        }
+        let sentence = "files are deleted faster than they can be copied: try again";
+        Err(Error::Io(io::Error::other(sentence)))
+    }
+
+    async fn copy_rows(&self, database: &Path) -> Result<Pool, Error> {
+        if database.exists() {
+            fs::remove_file(database)?;
+        }
+        self.writer.copy_to(database).await
+    }
+
+    /// Copies what the snapshot's rows name; false where something of it is gone already.
+    async fn copy_files(
+        &self,
+        snapshot: &Pool,
+        partial: &Path,
+        copied: &mut Copied,
+    ) -> Result<bool, Error> {
+        let sql = "select folder, name, size_bytes, sha256 from blobs order by folder, name";
+        let rows: Vec<(String, String, i64, Vec<u8>)> = sql::query(sql).fetch_all(snapshot).await?;
+        for (folder, name, size_bytes, sha256) in rows {
+            let place = partial.join("blobs").join(&folder);
+            let file = BlobFile {
+                name,
+                size_bytes,
+                sha256,
+            };
+            if place.join(&file.name).exists() {
+                continue;
+            }
+            if !self.copy(&folder, &file, &place).await? {
+                return Ok(false);
+            }
+            copied.n_files += 1;
+            copied.n_bytes += size_bytes.unsigned_abs();
+        }
+        let sql = "select id, offset_bytes from uploads where footage_id is null order by id";
+        let uploads: Vec<(Uuid, i64)> = sql::query(sql).fetch_all(snapshot).await?;
+        for (id, offset_bytes) in uploads {
+            let to = partial.join("uploads");
+            let Some(n_bytes) = copy_start(&self.upload_path(id), &to, offset_bytes)? else {
+                return Ok(false);
+            };
+            copied.n_files += 1;
+            copied.n_bytes += n_bytes;
+        }
+        Ok(true)
+    }
+
+    /// Copies one file and checks on the way that it is what its row says; false where it is gone.
+    async fn copy(&self, folder: &str, file: &BlobFile, to: &Path) -> Result<bool, Error> {
+        fs::create_dir_all(to)?;
+        let mut target = tokio::fs::File::create(to.join(&file.name)).await?;
+        match self.blobs.copy(file, folder, &mut target).await {
+            Err(Error::Io(error)) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+            Ok(found) if found == (file.size_bytes, file.sha256.clone()) => {}
+            Ok(_) => {
+                let name = &file.name;
+                let sentence = format!("a stored file is broken, run `check`: {folder}/{name}");
+                return Err(io::Error::other(sentence).into());
+            }
+            Err(error) => return Err(error),
+        }
+        target.sync_all().await?;
+        Ok(true)
+    }
+}
+
+/// The folder in which the copy is made.
+fn beside(target: &Path) -> PathBuf {
+    let mut name = target.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    target.with_file_name(name)
+}
+
+/// Copies the bytes of an upload that are safe; those after them may be changing. None where it is gone.
+fn copy_start(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64>> {
+    let source = match File::open(from) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        source => source?,
+    };
+    fs::create_dir_all(folder)?;
+    let mut target = File::create(folder.join(from.file_name().unwrap_or_default()))?;
+    let n_copied = io::copy(&mut source.take(n_bytes.unsigned_abs()), &mut target)?;
+    target.sync_all()?;
+    Ok((n_copied == n_bytes.unsigned_abs()).then_some(n_copied))
+}
+
+/// Running jobs go back to the queue, as when their worker releases them.
+async fn forget_workers(snapshot: &Pool) -> Result<(), Error> {
+    sql::query(
+        "update jobs set state = 'queued', worker = null, lease_until_ms = null, stage = null, \
+         progress = 0, attempt = attempt - 1 where state = 'running'",
+    )
+    .execute(snapshot)
+    .await?;
+    Ok(())
+}
+
+/// Syncs the copy's folders and gives it its name.
+fn publish(partial: &Path, target: &Path) -> io::Result<()> {
+    sync_folders(partial)?;
+    fs::rename(partial, target)?;
+    let parent = target.parent().filter(|parent| *parent != Path::new(""));
+    File::open(parent.unwrap_or(Path::new(".")))?.sync_all()
+}
+
+fn sync_folders(folder: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            sync_folders(&path)?;
+        }
+    }
+    File::open(folder)?.sync_all()
+}

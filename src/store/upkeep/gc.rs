@@ -1,0 +1,124 @@
+//! What nobody refers to any more (RELIABILITY.md, store rules and R5), counted before it is removed: for
+//! `flockreel gc`. What a running process is making is left alone.
+
+use std::fs;
+use std::time::SystemTime;
+
+use crate::store::idempotency::KEPT_MS;
+use crate::store::{Error, Store, sql};
+
+/// What there is to remove.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Waste {
+    /// Drafts of processes that are gone.
+    pub n_drafts: usize,
+    /// Folders that no row has named for an hour.
+    pub n_folders: usize,
+    /// Uploads that were given up.
+    pub n_uploads: usize,
+    /// Sessions and kept answers whose time is over.
+    pub n_rows: usize,
+    /// Bytes of all files among it.
+    pub n_bytes: u64,
+}
+
+impl Store {
+    /// Counts it, and changes nothing.
+    pub async fn waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
+        let mut waste = Waste::default();
+        (waste.n_drafts, waste.n_bytes) = self.blobs.work().n_left()?;
+        for folder in self.old_strays(now).await? {
+            waste.n_folders += 1;
+            waste.n_bytes += folder.n_bytes;
+        }
+        let sql = "select id from uploads where expires_ms <= $1";
+        let expired = sql::query_scalar(sql).bind(now_ms);
+        for id in expired.fetch_all(&self.reader).await? {
+            waste.n_uploads += 1;
+            // Its file may be another machine's.
+            let file = fs::metadata(self.upload_path(id));
+            waste.n_bytes += file.map_or(0, |file| file.len());
+        }
+        for (sql, until_ms) in [
+            (
+                "select count(*) from sessions where expires_ms <= $1",
+                now_ms,
+            ),
+            (
+                "select count(*) from idempotency where created_ms <= $1",
+                now_ms - KEPT_MS,
+            ),
+        ] {
+            let count: i64 = sql::query_scalar(sql)
+                .bind(until_ms)
+                .fetch_one(&self.reader)
+                .await?;
+            waste.n_rows += usize::try_from(count).unwrap_or(0);
+        }
+        Ok(waste)
+    }
+
+    /// Removes it, and says what it was.
+    pub async fn collect_waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
+        let waste = self.waste(now, now_ms).await?;
+        self.sweep(now).await?;
+        if self.serves() {
+            self.sweep_upload_files().await?;
+        }
+        self.sweep_uploads(now_ms).await?;
+        for (sql, until_ms) in [
+            ("delete from sessions where expires_ms <= $1", now_ms),
+            (
+                "delete from idempotency where created_ms <= $1",
+                now_ms - KEPT_MS,
+            ),
+        ] {
+            let delete = sql::query(sql).bind(until_ms);
+            delete.execute(&self.writer).await?;
+        }
+        Ok(waste)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::store::sweep::GRACE;
+
+    #[tokio::test]
+    async fn what_nobody_refers_to_is_counted_and_then_removed() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        for folder in ["tmp/draft", "blobs/flocks/stray.1"] {
+            fs::create_dir_all(data.path().join(folder)).unwrap();
+            fs::write(data.path().join(folder).join("video"), b"12345").unwrap();
+        }
+        let later = SystemTime::now() + 2 * GRACE;
+        let now = store.waste(SystemTime::now(), 0).await.unwrap();
+        assert_eq!(
+            (now.n_drafts, now.n_folders),
+            (1, 0),
+            "a stray may be in the making"
+        );
+        let found = store.waste(later, 0).await.unwrap();
+        assert_eq!((found.n_drafts, found.n_folders, found.n_bytes), (1, 1, 10));
+        assert_eq!(store.collect_waste(later, 0).await.unwrap(), found);
+        assert_eq!(store.waste(later, 0).await.unwrap(), Waste::default());
+    }
+
+    #[tokio::test]
+    async fn beside_a_service_its_drafts_are_left_alone() {
+        let data = tempfile::tempdir().unwrap();
+        let service = Store::open(data.path()).await.unwrap();
+        let draft = service.blobs().draft("under way").unwrap();
+        let beside = Store::open_beside(data.path()).await.unwrap();
+        let later = SystemTime::now() + GRACE + Duration::from_secs(1);
+        assert_eq!(
+            beside.collect_waste(later, 0).await.unwrap(),
+            Waste::default()
+        );
+        assert!(draft.path().is_dir());
+    }
+}

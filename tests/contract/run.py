@@ -1,0 +1,111 @@
+"""schemathesis over the OpenAPI document of a really started service that holds one thing of every kind.
+
+Half of the calls name what is there, so that more than 404 is seen; the other half what chance brings. Streams that
+never end are left out: tests/it/api/events.rs reads them.
+"""
+
+import json
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+
+SEED = "6"
+EXAMPLES = "12"
+CHECKS = "not_a_server_error,status_code_conformance,content_type_conformance,response_headers_conformance,response_schema_conformance"
+FILES = {"libraries": "poses.json", "flocks": "flock.json", "fish": "model.glb"}
+
+
+def main(program):
+    program = str(Path(program).resolve())
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        service, address = start(program, folder / "data")
+        try:
+            ids = furnish(program, address, folder)
+            faults = run(address, folder, "chance", "")
+            faults += run(address, folder, "what is there", known(ids))
+        finally:
+            service.terminate()
+            code = service.wait(timeout=30)
+        assert code == 0, f"the service ended with {code}"
+        checked = subprocess.run([program, "check", "--data", folder / "data"], check=False)
+        sys.exit(1 if faults or checked.returncode else 0)
+
+
+def start(program, data):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{probe.getsockname()[1]}"
+    arguments = ["serve", "--bind", address, "--data", data, "--no-sample", "--log", "warn", "--max-queued", "20"]
+    service = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL)
+    for _ in range(300):
+        try:
+            urllib.request.urlopen(f"http://{address}/healthz", timeout=1).close()
+            return service, f"http://{address}"
+        except OSError:
+            time.sleep(0.1)
+    raise TimeoutError("the service did not answer within 30 s")
+
+
+def furnish(program, address, folder):
+    """One of each kind, by the API; their ids."""
+    film = folder / "film.mp4"
+    size = ["--size", "160x120"]
+    subprocess.run([program, "sample", "-o", film, "--frames", "120", *size], check=True, stderr=subprocess.DEVNULL)
+    footage = post(f"{address}/v1/footage", film.read_bytes(), "video/mp4")["id"]
+    analysis = post(f"{address}/v1/analyses", {"footage_id": footage})
+    library = analysis["library_id"]
+    flock = post(f"{address}/v1/flocks", {"library_id": library, "count": 2, "frames": 10})
+    fish = post(f"{address}/v1/fish", {"library_id": library})
+    for made in (analysis, flock, fish):
+        wait_for(address, made["job_id"])
+    ids = {"libraries": library, "flocks": flock["flock_id"], "fish": fish["fish_id"]}
+    return {**ids, "footage": footage, "jobs": analysis["job_id"]}
+
+
+def known(ids):
+    """What of the document's parameters is given, by path; nothing is deleted of what others need."""
+    lines = []
+    for noun, thing in ids.items():
+        lines.append(f'[[operations]]\ninclude-path-regex = "^/v1/{noun}/"\ninclude-method = "GET"')
+        file = f', "path.file" = "{FILES[noun]}"' if noun in FILES else ""
+        lines.append(f'parameters = {{ "path.id" = "{thing}"{file} }}')
+    return "\n".join(lines) + "\n"
+
+
+def run(address, folder, what, settings):
+    """Whether it found a fault: 0 or 1."""
+    config = folder / "schemathesis.toml"
+    config.write_text(settings)
+    command = [Path(sys.prefix) / "bin/schemathesis", "--config-file", config, "run", f"{address}/openapi.json"]
+    command += ["--url", address, "--checks", CHECKS, "--phases", "examples,coverage,fuzzing", "--seed", SEED]
+    command += ["--max-examples", EXAMPLES, "--request-timeout", "20", "--workers", "1", "--no-color"]
+    command += ["--exclude-path-regex", "/events$", "--suppress-health-check", "all"]
+    print(f"contract tests: {what}", flush=True)
+    return subprocess.run(command, check=False, cwd=folder).returncode
+
+
+def post(url, body, media_type="application/json"):
+    data = body if isinstance(body, bytes) else json.dumps(body).encode()
+    request = urllib.request.Request(url, data, {"Content-Type": media_type})
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def wait_for(address, job_id):
+    for _ in range(1200):
+        with urllib.request.urlopen(f"{address}/v1/jobs/{job_id}") as answer:
+            job = json.load(answer)
+        if job["finished_at"]:
+            assert job["state"] == "done", job["error"]
+            return
+        time.sleep(0.1)
+    raise TimeoutError("the job did not end within 120 s")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

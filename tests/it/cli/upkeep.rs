@@ -1,0 +1,225 @@
+//! `backup`, `check`, `gc` and the file of settings, on the real program (RELIABILITY.md, R11 and I1 to I6).
+
+use std::path::Path;
+use std::process::{Command, Output};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use reqwest::Client;
+use serde_json::{Value, json};
+
+use crate::common::film::Films;
+use crate::common::process::{Server, numbered_film};
+
+fn flockreel(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_flockreel"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+fn said(done: &Output) -> String {
+    String::from_utf8_lossy(&done.stderr).into_owned()
+}
+
+async fn json_at(url: String) -> Value {
+    let answer = Client::new().get(url).send().await.unwrap();
+    answer.json().await.unwrap()
+}
+
+/// Uploads films, queues their analyses, and deletes every third, until told to stop.
+async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>) {
+    let client = Client::new();
+    while !stop.load(Ordering::Relaxed) {
+        let number = next.fetch_add(1, Ordering::Relaxed);
+        let sent = client
+            .post(format!("{base}/v1/footage"))
+            .body(numbered_film(number))
+            .send();
+        let footage: Value = sent.await.unwrap().json().await.unwrap();
+        let id = footage["id"].as_str().unwrap();
+        let wish = json!({"footage_id": id});
+        let analysis = client.post(format!("{base}/v1/analyses")).json(&wish);
+        assert_eq!(analysis.send().await.unwrap().status(), 202);
+        if number % 3 == 0 {
+            let gone = client.delete(format!("{base}/v1/footage/{id}")).send();
+            assert_eq!(gone.await.unwrap().status(), 204);
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
+    let films = Films::new();
+    let server = Server::start(&films.path("data"));
+    let (next, stop) = (Arc::default(), Arc::new(AtomicBool::new(false)));
+    let writers: Vec<_> = (0..3)
+        .map(|_| {
+            tokio::spawn(write_on(
+                server.base.clone(),
+                Arc::clone(&next),
+                stop.clone(),
+            ))
+        })
+        .collect();
+    while next.load(Ordering::Relaxed) < 12 {
+        tokio::time::sleep(std::time::Duration::from_millis(20)).await;
+    }
+    let folder = films.folder().to_owned();
+    let arguments = ["backup", "copy", "--data", "data", "--json"];
+    let (again, folder_2) = (arguments, folder.clone());
+    let done = tokio::task::spawn_blocking(move || flockreel(&arguments, &folder))
+        .await
+        .unwrap();
+    stop.store(true, Ordering::Relaxed);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let copied: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert!(copied["files"].as_u64().unwrap() >= 8, "{copied}");
+    assert_eq!(
+        flockreel(&again, &folder_2).status.code(),
+        Some(2),
+        "it is there already"
+    );
+    for writer in writers {
+        writer.await.unwrap();
+    }
+    let check = flockreel(&["check", "--data", "data"], films.folder());
+    assert_eq!(
+        check.status.code(),
+        Some(0),
+        "beside the service: {}",
+        said(&check)
+    );
+    drop(server);
+
+    let check = flockreel(&["check", "--data", "copy", "--json"], films.folder());
+    assert_eq!(check.status.code(), Some(0), "{}", said(&check));
+    assert!(!films.path("copy.partial").exists());
+    let restored = Server::start(&films.path("copy"));
+    let items = json_at(format!("{}/v1/footage?limit=200", restored.base)).await["items"].clone();
+    let items = items.as_array().unwrap().clone();
+    assert_eq!(items.len() as u64, copied["files"].as_u64().unwrap());
+    for footage in items {
+        let path = format!(
+            "{}/v1/footage/{}/file",
+            restored.base,
+            footage["id"].as_str().unwrap()
+        );
+        let answer = Client::new().get(path).send().await.unwrap();
+        let etag = answer.headers()["etag"].to_str().unwrap().to_owned();
+        let bytes = answer.bytes().await.unwrap();
+        assert_eq!(
+            etag.trim_matches('"'),
+            crate::common::process::sha256(&bytes)
+        );
+        assert_eq!(footage["sha256"], etag.trim_matches('"'));
+    }
+    let ended = Client::new().post(format!("{}/v1/footage", restored.base));
+    let ended = ended.body(numbered_film(100_000)).send().await.unwrap();
+    assert_eq!(ended.status(), 201, "it goes on");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
+    let films = Films::new();
+    let server = Server::start(&films.path("data"));
+    let sent = Client::new().post(format!("{}/v1/footage", server.base));
+    let footage: Value = sent
+        .body(numbered_film(1))
+        .send()
+        .await
+        .unwrap()
+        .json()
+        .await
+        .unwrap();
+    assert_eq!(server.terminate(), Some(0));
+    let run = |line: &str| flockreel(&line.split(' ').collect::<Vec<_>>(), films.folder());
+    assert_eq!(run("check --data data").status.code(), Some(0));
+
+    std::fs::create_dir(films.path("data/tmp/left")).unwrap();
+    std::fs::write(films.path("data/tmp/left/video"), b"12345").unwrap();
+    for dry in [true, false, false] {
+        let line = format!(
+            "gc --data data --json{}",
+            if dry { " --dry-run" } else { "" }
+        );
+        let done: Value = serde_json::from_slice(&run(&line).stdout).unwrap();
+        assert_eq!(done["dry_run"], dry);
+        let was_there = films.path("data/tmp/left").exists() || done["drafts"] == 1;
+        assert_eq!(done["bytes"], if was_there { 5 } else { 0 }, "{done}");
+    }
+    assert!(!films.path("data/tmp/left").exists());
+
+    let folder = films.path("data/blobs/footage");
+    let folder = std::fs::read_dir(folder)
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    std::fs::write(folder.join("video"), b"another").unwrap();
+    let check = run("check --data data");
+    assert_eq!(check.status.code(), Some(1), "{}", said(&check));
+    let altered = format!("I1: altered: footage/{}", footage["id"].as_str().unwrap());
+    assert!(said(&check).contains(&altered), "{}", said(&check));
+    let backup = run("backup copy --data data");
+    assert_eq!(
+        backup.status.code(),
+        Some(1),
+        "a broken file is not copied: {}",
+        said(&backup)
+    );
+    assert!(!films.path("copy").exists());
+    for command in ["check", "gc", "backup copy"] {
+        let absent = run(&format!("{command} --data nowhere"));
+        assert_eq!(
+            absent.status.code(),
+            Some(2),
+            "{command}: {}",
+            said(&absent)
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_flag_wins_over_the_environment_that_over_the_file_and_that_over_the_default() {
+    let films = Films::new();
+    films.write(
+        "settings.toml",
+        "max-upload-bytes = 111\nrate = 7\nno-sample = true\n",
+    );
+    let file = films.path("settings.toml");
+    let largest = async |flags: &[&str], variables: &[(&str, &str)]| {
+        let server = Server::start_in(&films.path("data"), flags, variables);
+        let url = format!("{}/v1/uploads", server.base);
+        let answer = Client::new()
+            .request(reqwest::Method::OPTIONS, url)
+            .send()
+            .await
+            .unwrap();
+        let max_bytes = answer.headers()["tus-max-size"]
+            .to_str()
+            .unwrap()
+            .to_owned();
+        assert_eq!(server.terminate(), Some(0));
+        max_bytes
+    };
+    let config = ["--config", file.to_str().unwrap()];
+    let variable = [("FLOCKREEL_MAX_UPLOAD_BYTES", "222")];
+    assert_eq!(largest(&[], &[]).await, "4294967296");
+    assert_eq!(largest(&config, &[]).await, "111");
+    let named = [("FLOCKREEL_CONFIG", file.to_str().unwrap())];
+    assert_eq!(largest(&[], &named).await, "111");
+    assert_eq!(largest(&config, &variable).await, "222");
+    let flag = [&config[..], &["--max-upload-bytes", "333"]].concat();
+    assert_eq!(largest(&flag, &variable).await, "333");
+
+    films.write("settings.toml", "rat = 7\n");
+    let done = flockreel(&["serve", "--config", "settings.toml"], films.folder());
+    assert_eq!(done.status.code(), Some(2));
+    assert_eq!(
+        said(&done),
+        "flockreel: no setting is called rat, in: settings.toml\n"
+    );
+}

@@ -1,0 +1,113 @@
+//! Kill -9 at seeded random moments while films are uploaded (RELIABILITY.md, R1 and R5): whatever was answered
+//! with 201 is there afterwards, byte for byte, the database is whole, the service is back within two seconds,
+//! and nothing is left behind. Twenty kills here; `make soak` asks for two hundred by FLOCKREEL_KILLS.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use flockreel::jobs::clock::now_ms;
+use flockreel::random::unit;
+use flockreel::store::Store;
+use reqwest::Client;
+use serde_json::Value;
+use tokio::sync::Mutex;
+
+use crate::common::process::{Server, numbered_film, processes_of, sha256};
+
+const SEED: u64 = 6;
+const UPLOADERS: usize = 4;
+
+/// What was answered with 201: id and hash.
+type Accepted = Arc<Mutex<Vec<(String, String)>>>;
+
+/// Uploads one film after the other until the server is gone.
+async fn upload_on(base: String, next: Arc<AtomicUsize>, accepted: Accepted) {
+    let client = Client::new();
+    loop {
+        let bytes = numbered_film(next.fetch_add(1, Ordering::Relaxed));
+        let sha256 = sha256(&bytes);
+        let sent = client.post(format!("{base}/v1/footage")).body(bytes).send();
+        let Ok(answer) = sent.await else { return };
+        let status = answer.status();
+        let Ok(footage) = answer.json::<Value>().await else {
+            return;
+        };
+        assert_eq!(status, 201, "{footage}");
+        let id = footage["id"].as_str().unwrap().to_owned();
+        accepted.lock().await.push((id, sha256));
+    }
+}
+
+async fn assert_all_there(base: &str, accepted: &[(String, String)]) {
+    let client = Client::new();
+    for (id, hash) in accepted {
+        let answer = client.get(format!("{base}/v1/footage/{id}/file")).send();
+        let bytes = answer.await.unwrap().bytes().await.unwrap();
+        assert_eq!(sha256(&bytes), *hash, "{id}");
+    }
+}
+
+/// No child of a server that was killed lives on, and its drafts were swept.
+async fn assert_nothing_left(data: &Path) {
+    let n_drafts = std::fs::read_dir(data.join("tmp")).unwrap().count();
+    assert_eq!(n_drafts, 0, "drafts are left");
+    let start = Instant::now();
+    while processes_of(data).len() > 1 {
+        assert!(
+            start.elapsed() < Duration::from_secs(5),
+            "{:?}",
+            processes_of(data)
+        );
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_accepted_upload_survives_every_kill() {
+    let n_kills: u64 = std::env::var("FLOCKREEL_KILLS").map_or(20, |n| n.parse().unwrap());
+    let data = tempfile::tempdir().unwrap();
+    let (next, accepted) = (Arc::new(AtomicUsize::new(0)), Accepted::default());
+    let mut server = Server::start(data.path());
+    let mut starts = Vec::new();
+    for kill in 0..n_kills {
+        let uploads: Vec<_> = (0..UPLOADERS)
+            .map(|_| {
+                tokio::spawn(upload_on(
+                    server.base.clone(),
+                    next.clone(),
+                    accepted.clone(),
+                ))
+            })
+            .collect();
+        tokio::time::sleep(Duration::from_secs_f64(0.05 + 0.4 * unit(SEED, &[kill]))).await;
+        server.kill();
+        for upload in uploads {
+            upload.await.unwrap();
+        }
+        let start = Instant::now();
+        server = Server::start(data.path());
+        starts.push(start.elapsed());
+        assert_nothing_left(data.path()).await;
+    }
+    starts.sort();
+    // The median: on a shared machine one start or another has to wait for others' work.
+    assert!(
+        starts[starts.len() / 2] < Duration::from_secs(2),
+        "{starts:?}"
+    );
+    let accepted = accepted.lock().await.clone();
+    assert!(
+        accepted.len() as u64 > n_kills,
+        "too little was uploaded: {}",
+        accepted.len()
+    );
+    assert_all_there(&server.base, &accepted).await;
+    assert_eq!(server.terminate(), Some(0));
+    let store = Store::open(data.path()).await.unwrap();
+    assert_eq!(
+        store.check_after_crash(now_ms()).await.unwrap(),
+        Vec::<String>::new()
+    );
+}
