@@ -107,6 +107,7 @@ impl AppState {
 pub fn router(state: AppState) -> Router {
     let (routes, mut document) = table().split_for_parts();
     openapi::add_headers(&mut document);
+    openapi::join_flattened(&mut document);
     let stop = state.context.draining.clone();
     let requests = state.requests.clone();
     let names = match state.config.demands_tokens() {

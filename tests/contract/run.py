@@ -5,6 +5,7 @@ never end are left out: tests/it/api/events.rs reads them.
 """
 
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from pathlib import Path
 SEED = "6"
 EXAMPLES = "12"
 CHECKS = "not_a_server_error,status_code_conformance,content_type_conformance,response_headers_conformance,response_schema_conformance"
+HOOKS = "hooks"
 FILES = {"libraries": "poses.json", "flocks": "flock.json", "fish": "model.glb"}
 
 
@@ -86,7 +88,7 @@ def run(address, folder, what, settings):
     command += ["--max-examples", EXAMPLES, "--request-timeout", "20", "--workers", "1", "--no-color"]
     command += ["--exclude-path-regex", "/events$", "--suppress-health-check", "all"]
     print(f"contract tests: {what}", flush=True)
-    return subprocess.run(command, check=False, cwd=folder).returncode
+    return subprocess.run(command, check=False, cwd=folder, env={**os.environ, "SCHEMATHESIS_HOOKS": HOOKS, "PYTHONPATH": str(Path(__file__).parent)}).returncode
 
 
 def post(url, body, media_type="application/json"):

