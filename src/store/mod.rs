@@ -18,7 +18,6 @@ pub mod libraries;
 pub mod owners;
 pub mod spill;
 mod sql;
-pub mod sweep;
 pub mod tokens;
 pub mod upkeep;
 pub mod uploads;
