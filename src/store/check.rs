@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 
 use sqlx::types::Uuid;
 
-use super::sweep::GRACE;
+use super::upkeep::sweep::GRACE;
 use super::{BlobFile, Error, Store, sql};
 
 /// One thing that is wrong, in words that name the row or file.

@@ -19,7 +19,6 @@ pub mod owners;
 pub mod room;
 pub mod spill;
 mod sql;
-pub mod sweep;
 pub mod tokens;
 pub mod upkeep;
 pub mod uploads;

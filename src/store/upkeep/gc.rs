@@ -85,7 +85,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::store::sweep::GRACE;
+    use crate::store::upkeep::sweep::GRACE;
 
     #[tokio::test]
     async fn what_nobody_refers_to_is_counted_and_then_removed() {

@@ -4,3 +4,4 @@
 pub mod backup;
 pub mod census;
 pub mod gc;
+pub mod sweep;

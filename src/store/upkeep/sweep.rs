@@ -3,11 +3,11 @@
 
 use std::time::{Duration, SystemTime};
 
-use super::blobs::Folder;
-use super::{Error, Store};
+use crate::store::blobs::Folder;
+use crate::store::{Error, Store};
 
 /// A folder without a row is younger than this while its row is being made.
-pub(super) const GRACE: Duration = Duration::from_secs(3600);
+pub(in crate::store) const GRACE: Duration = Duration::from_secs(3600);
 
 /// What a sweep removed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl Store {
     }
 
     /// The folders that no row has named for an hour.
-    pub(super) async fn old_strays(&self, now: SystemTime) -> Result<Vec<Folder>, Error> {
+    pub(in crate::store) async fn old_strays(&self, now: SystemTime) -> Result<Vec<Folder>, Error> {
         let mut strays = self.folders_without_row().await?;
         let is_old = |age: Duration| age > GRACE;
         strays.retain(|stray| now.duration_since(stray.modified).is_ok_and(is_old));
@@ -49,7 +49,7 @@ impl Store {
     }
 
     /// The folders in place that no row names.
-    pub(super) async fn folders_without_row(&self) -> Result<Vec<Folder>, Error> {
+    pub(in crate::store) async fn folders_without_row(&self) -> Result<Vec<Folder>, Error> {
         let mut strays = Vec::new();
         for folder in self.blobs.folders().await? {
             if !self.is_folder_known(&folder.name).await? {
