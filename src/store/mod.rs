@@ -142,7 +142,7 @@ impl Store {
 
 fn lock(path: &Path) -> Result<File, Error> {
     let file = File::create(path)?;
-    match file.try_lock() {
+    match try_for_a_moment(&file) {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let folder = path.parent().unwrap_or(path);
@@ -150,4 +150,15 @@ fn lock(path: &Path) -> Result<File, Error> {
         }
         Err(TryLockError::Error(error)) => Err(error.into()),
     }
+}
+
+/// A child of a process that was killed holds its locks too until it is another program: for a moment.
+fn try_for_a_moment(file: &File) -> Result<(), TryLockError> {
+    for _ in 0..10 {
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(30)),
+            tried => return tried,
+        }
+    }
+    file.try_lock()
 }
