@@ -16,7 +16,6 @@ pub mod intake;
 pub mod jobs;
 pub mod libraries;
 pub mod owners;
-pub mod room;
 pub mod spill;
 mod sql;
 pub mod tokens;

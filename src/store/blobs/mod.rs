@@ -7,6 +7,7 @@
 
 mod bucket;
 mod draft;
+mod room;
 mod shelf;
 
 use std::fs::{self, File};

@@ -31,18 +31,19 @@ async fn every_bad_film_is_answered_with_its_code() {
             faults.push(format!("{}: {status} {said}", case.path.display()));
         }
         if status == 201 {
-            taken.push(said["id"].clone());
+            taken.push((case.path.clone(), said["id"].clone()));
         }
     }
     assert_eq!(faults, Vec::<String>::new());
     let mut jobs = Vec::new();
-    for footage in taken {
+    for (film, footage) in taken {
         let accepted = app
             .accept("/v1/analyses", json!({"footage_id": footage}))
             .await;
-        jobs.push(accepted["job_id"].clone());
+        jobs.push((film, accepted["job_id"].clone()));
     }
-    for id in jobs {
+    for (film, id) in jobs {
+        println!("waiting for the job of {}", film.display());
         let job = app.ended_job(&id).await;
         let code = job["error"]["code"].as_str().unwrap_or("none");
         assert!(!["internal", "crashed_worker"].contains(&code), "{job}");

@@ -261,7 +261,7 @@ impl Corpus<'_> {
     fn of_odd_but_good_films(&mut self) {
         for args in [
             "-vf setsar=2/1 -c:v mpeg4 double.mkv",
-            "-vf scale=8192:64,setsar=1 -c:v ffv1 widest.mkv",
+            "-vf scale=8192:16,setsar=1 -c:v ffv1 widest.mkv",
             "-c:v mpeg4 -metadata:s:v:0 rotate=90 turned.mp4",
             "-vf setpts=N*N*0.01/TB -fps_mode vfr -c:v mpeg4 slowing.mkv",
             "-vf select='not(mod(floor(n/3),2))' -fps_mode vfr -c:v mpeg4 stutter.mkv",

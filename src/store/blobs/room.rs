@@ -4,7 +4,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use super::blobs::Blobs;
+use super::Blobs;
 
 impl Blobs {
     /// Bytes that we can still write where uploads and results grow: on the fuller one, where they grow
