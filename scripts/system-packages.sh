@@ -18,6 +18,7 @@ health    curl      curl
 test      cc        gcc libc6-dev
 test      ffmpeg    ffmpeg
 test      ffprobe   ffmpeg
+test      strace    strace
 scale-test initdb   postgresql
 scale-test python3  python3-venv
 truth-test python3  python3-venv
