@@ -4,15 +4,14 @@ Half of the calls name what is there, so that more than 404 is seen; the other h
 never end are left out: tests/it/api/events.rs reads them.
 """
 
-import json
 import os
-import socket
 import subprocess
 import sys
 import tempfile
-import time
-import urllib.request
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from service import post, started, wait_for_job  # noqa: E402, of the folder above
 
 SEED = "6"
 EXAMPLES = "12"
@@ -25,32 +24,12 @@ def main(program):
     program = str(Path(program).resolve())
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        service, address = start(program, folder / "data")
-        try:
+        with started(program, folder / "data", "--log", "warn", "--max-queued", "20") as address:
             ids = furnish(program, address, folder)
             faults = run(address, folder, "chance", "")
             faults += run(address, folder, "what is there", known(ids))
-        finally:
-            service.terminate()
-            code = service.wait(timeout=30)
-        assert code == 0, f"the service ended with {code}"
         checked = subprocess.run([program, "check", "--data", folder / "data"], check=False)
         sys.exit(1 if faults or checked.returncode else 0)
-
-
-def start(program, data):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{probe.getsockname()[1]}"
-    arguments = ["serve", "--bind", address, "--data", data, "--no-sample", "--log", "warn", "--max-queued", "20"]
-    service = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL)
-    for _ in range(300):
-        try:
-            urllib.request.urlopen(f"http://{address}/healthz", timeout=1).close()
-            return service, f"http://{address}"
-        except OSError:
-            time.sleep(0.1)
-    raise TimeoutError("the service did not answer within 30 s")
 
 
 def furnish(program, address, folder):
@@ -64,7 +43,7 @@ def furnish(program, address, folder):
     flock = post(f"{address}/v1/flocks", {"library_id": library, "count": 2, "frames": 10})
     fish = post(f"{address}/v1/fish", {"library_id": library})
     for made in (analysis, flock, fish):
-        wait_for(address, made["job_id"])
+        wait_for_job(address, made["job_id"])
     ids = {"libraries": library, "flocks": flock["flock_id"], "fish": fish["fish_id"]}
     return {**ids, "footage": footage, "jobs": analysis["job_id"]}
 
@@ -89,24 +68,6 @@ def run(address, folder, what, settings):
     command += ["--exclude-path-regex", "/events$", "--suppress-health-check", "all"]
     print(f"contract tests: {what}", flush=True)
     return subprocess.run(command, check=False, cwd=folder, env={**os.environ, "SCHEMATHESIS_HOOKS": HOOKS, "PYTHONPATH": str(Path(__file__).parent)}).returncode
-
-
-def post(url, body, media_type="application/json"):
-    data = body if isinstance(body, bytes) else json.dumps(body).encode()
-    request = urllib.request.Request(url, data, {"Content-Type": media_type})
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
-
-
-def wait_for(address, job_id):
-    for _ in range(1200):
-        with urllib.request.urlopen(f"{address}/v1/jobs/{job_id}") as answer:
-            job = json.load(answer)
-        if job["finished_at"]:
-            assert job["state"] == "done", job["error"]
-            return
-        time.sleep(0.1)
-    raise TimeoutError("the job did not end within 120 s")
 
 
 if __name__ == "__main__":

@@ -8,3 +8,8 @@ pub(crate) mod process;
 
 pub(crate) use app::TestApp;
 pub(crate) use place::Place;
+
+/// A client of the service.
+pub(crate) fn client() -> reqwest::Client {
+    reqwest::Client::new()
+}
