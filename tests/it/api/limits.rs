@@ -69,6 +69,19 @@ async fn a_body_that_is_announced_too_large_is_refused_before_it_comes() {
 }
 
 #[tokio::test]
+async fn a_body_that_does_not_say_how_long_it_is_ends_at_the_limit() {
+    let app = TestApp::start(&["--max-upload-bytes", "1000"]).await;
+    let more = "transfer-encoding: chunked\r\n";
+    let chunk = [&b"258\r\n"[..], &[7; 600], b"\r\n"].concat();
+    let all = [&head("POST", "/v1/footage", more), &chunk[..], &chunk].map(<[u8]>::to_vec);
+    // It has not ended, and never will.
+    let all: Vec<&[u8]> = all.iter().map(Vec::as_slice).collect();
+    let answer = exchange(&app, &all).await;
+    assert!(answer.starts_with("HTTP/1.1 413"), "{answer}");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
 async fn a_length_that_is_a_lie_leaves_nothing_behind() {
     let app = TestApp::idle().await;
     let more = |length: usize| format!("content-length: {length}\r\nconnection: close\r\n");

@@ -187,7 +187,12 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
     );
     let admin = app.token(Scope::Admin, 9).await;
     app.sign_in(&owner);
-    let things = belongings(&app).await;
+    let mut things = belongings(&app).await;
+    // What is not made yet has an id already.
+    let (_, footage) = things.iter().find(|(kind, _)| *kind == "footage").unwrap();
+    let wish = json!({"footage_id": footage});
+    let queued = app.accept("/v1/analyses", wish).await;
+    things.push(("queued", queued["library_id"].as_str().unwrap().to_owned()));
     for (method, path, touch) in &table() {
         let call = (*method, *path, touch);
         let (Touch::Path(wanted) | Touch::Body(_, wanted)) = touch else {
