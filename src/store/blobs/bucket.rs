@@ -18,7 +18,7 @@ use tokio::fs::File;
 use tokio::io::{AsyncWriteExt, BufReader};
 
 use super::Folder;
-use crate::store::Error;
+use crate::store::{Error, tls};
 
 /// Every part but the last: more than the least that any store takes, and of one size as some want it.
 const PART_BYTES: usize = 16 << 20;
@@ -35,6 +35,7 @@ pub(super) struct Bucket {
 impl Bucket {
     /// Fails where the bucket cannot be listed.
     pub(super) async fn open(name: &str, prefix: &str) -> Result<Bucket, Error> {
+        tls::choose_cryptography();
         let builder = AmazonS3Builder::from_env().with_bucket_name(name);
         // Whoever gives an address without encryption means it.
         let options = ClientOptions::new().with_allow_http(true);
