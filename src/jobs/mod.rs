@@ -64,6 +64,8 @@ pub struct Context {
     pub lease: Duration,
     /// How long one attempt at a job may take.
     pub budget: Duration,
+    /// How often what has expired is swept while the service runs.
+    pub sweep_every: Duration,
     /// How many jobs of everybody may be queued or running at once.
     pub max_queued: i64,
     /// What is counted of the jobs of this process.
@@ -86,6 +88,7 @@ impl Context {
             threads,
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(Crew::JOB_TIME_S),
+            sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
             meters: Meters::default(),
         }

@@ -111,6 +111,15 @@ impl Store {
         Ok(Begun::Run(ids))
     }
 
+    /// Forgets answers that nobody may ask for again, also where no other key ever comes.
+    pub async fn forget_old_answers(&self, now_ms: i64) -> Result<(), Error> {
+        sql::query("delete from idempotency where created_ms <= $1")
+            .bind(now_ms - KEPT_MS)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
     /// Whether a request that has been running since then is not any more.
     fn is_over(&self, since_ms: i64, now_ms: i64) -> bool {
         !self.is_alone() && since_ms < now_ms - LONGEST_REQUEST_MS

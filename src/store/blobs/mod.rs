@@ -180,12 +180,12 @@ impl Blobs {
         }
     }
 
-    /// Where unfinished uploads of this machine grow.
     /// Where things are made.
     pub(super) fn tmp(&self) -> &Path {
         self.work.folder()
     }
 
+    /// Where unfinished uploads of this machine grow.
     pub(super) fn uploads(&self) -> &Path {
         &self.uploads
     }
@@ -193,6 +193,16 @@ impl Blobs {
     /// Where this process makes what it makes, and others make theirs.
     pub(super) fn work(&self) -> &Workplace {
         &self.work
+    }
+}
+
+impl Place {
+    /// Whether it can be asked; a folder of this machine is there, or nothing of ours is.
+    async fn is_there(&self) -> bool {
+        match self {
+            Place::Shelf(_) => true,
+            Place::Bucket(bucket) => bucket.answers().await,
+        }
     }
 }
 
