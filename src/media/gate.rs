@@ -93,11 +93,12 @@ impl Order {
     }
 }
 
-/// A session of its own has a share of its own where Linux groups sessions for the scheduler (autogroup), whatever
-/// niceness its threads inherit. So the session gets the niceness of the thread that started it; where there are no
-/// such groups, or it may not be, the inherited one is all there is.
+/// Gives the child the niceness of the thread that asks for it, since another starts it; and its session too: a
+/// session of its own has a share of its own where Linux groups sessions for the scheduler (autogroup), however nice
+/// the processes in it are. Where it may not be, the child is no less itself.
 fn pass_on_niceness(child: Pid) {
     if let Ok(niceness @ 1..) = rustix::process::getpriority_process(None) {
+        rustix::process::setpriority_process(Some(child), niceness).ok();
         let group = format!("/proc/{}/autogroup", child.as_raw_nonzero());
         std::fs::write(group, niceness.to_string()).ok();
     }
