@@ -2,8 +2,7 @@
 //! many of those alike a search by lists finds (above 50 000 frames).
 
 use super::Search;
-use crate::analysis::distance::{Asked, Cancelled, Side};
-use crate::progress::Silent;
+use crate::analysis::distance::{Asked, Marks, Side};
 use crate::random;
 
 /// Clips whose pairs recall is measured on.
@@ -32,22 +31,19 @@ impl Joinable<'_> {
         lists.is_none_or(|lists| lists.holds(self.side, i, j))
     }
 
-    fn mark_all(&self, i: usize, row: &mut [bool]) {
-        let usable = &self.search.clips.usable[i..];
-        if !usable[0] {
+    fn mark_all(&self, i: usize, row: &mut Marks) {
+        if !self.search.clips.usable[i] {
             return;
         }
         let mirrored = self.side == Side::Mirrored;
         self.search.gate.mark(i, mirrored, row);
-        let least_gap = self.least_gap.min(row.len());
-        row[..least_gap].fill(false);
-        let each = row.iter_mut().zip(usable);
-        each.for_each(|(marked, usable)| *marked &= usable);
+        row.unmark_first(self.least_gap);
+        row.keep(&self.search.usable, i);
     }
 
     /// Of 256 clips chosen at random: how many pairs with later ones may be joined and have D < epsilon, and
     /// how many of those are compared.
-    pub(super) fn found_of_sample(&self, epsilon: u64) -> Result<[u64; 2], Cancelled> {
+    pub(super) fn found_of_sample(&self, epsilon: u64) -> [u64; 2] {
         let distances = crate::analysis::distance::Distances {
             side: self.side,
             ..self.search.distances
@@ -58,29 +54,23 @@ impl Joinable<'_> {
         let mut counts = [0; 2];
         for &i in clips.iter().take(N_SAMPLED) {
             let i = i as usize;
-            distances.for_each_below(i, epsilon, &Whole(self), &Silent, |j| {
-                let counted = u64::from(self.holds(i, j));
+            for pair in distances.row_below(i, epsilon, &Whole(self)) {
+                let counted = u64::from(self.holds(i, pair.to));
                 counts[0] += counted;
-                counts[1] += counted * u64::from(self.is_compared(i, j));
-            })?;
+                counts[1] += counted * u64::from(self.is_compared(i, pair.to));
+            }
         }
-        Ok(counts)
+        counts
     }
 }
 
 impl Asked for Joinable<'_> {
-    fn mark(&self, i: usize, row: &mut [bool]) {
-        match &self.search.lists {
-            None => self.mark_all(i, row),
-            Some(lists) if self.search.clips.usable[i] => {
-                lists.mark(self.side, i, row);
-                let least_gap = self.least_gap.min(row.len());
-                row[..least_gap].fill(false);
-                for (j, marked) in (i..).zip(row).filter(|(_, marked)| **marked) {
-                    *marked = self.holds(i, j);
-                }
-            }
-            Some(_) => {}
+    fn mark(&self, i: usize, row: &mut Marks) {
+        self.mark_all(i, row);
+        if let Some(lists) = &self.search.lists {
+            let mut compared = Marks::none(row.len());
+            lists.mark(self.side, i, &mut compared);
+            row.keep(&compared, 0);
         }
     }
 }
@@ -89,7 +79,7 @@ impl Asked for Joinable<'_> {
 struct Whole<'a>(&'a Joinable<'a>);
 
 impl Asked for Whole<'_> {
-    fn mark(&self, i: usize, row: &mut [bool]) {
+    fn mark(&self, i: usize, row: &mut Marks) {
         self.0.mark_all(i, row);
     }
 

@@ -12,7 +12,7 @@ mod joinable;
 mod tests;
 
 use crate::analysis::distance::{
-    Cancelled, ClipPair, ComparedSprites, Distances, Lists, LocalMinima, Side,
+    Cancelled, ClipPair, ComparedSprites, Distances, Lists, LocalMinima, Marks, Side,
 };
 use gate::Gate;
 use joinable::Joinable;
@@ -82,8 +82,10 @@ pub fn connect_compared(
     let clip_frames = params.clip_frames_at(poses.fps);
     let clips = Clips::new(sprites, poses, clip_frames);
     let clip = params.clip(clip_frames);
-    let steps = natural_steps(pixels, &clips, &clip.weights());
+    let steps = natural_steps(pixels.steps(cpu), &clips, &clip.weights());
     let rungs = rungs(params, steps);
+    let mut usable = Marks::none(clips.usable.len());
+    usable.mark_where(&clips.usable, |&usable| usable);
     let search = Search {
         distances: Distances {
             pixels,
@@ -93,6 +95,7 @@ pub fn connect_compared(
         },
         clips: &clips,
         gate: Gate::new(poses, clip_frames, params),
+        usable,
         lists: (params.approximate).then(|| Lists::of(pixels, clip, params.mirror, cpu)),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
@@ -109,9 +112,7 @@ pub fn connect_compared(
         }
     }
     let mut connections = connections.expect("there is always a first rung");
-    connections.recall = search
-        .recall(connections.epsilon, params.mirror)
-        .map_err(|Cancelled| Error::Cancelled)?;
+    connections.recall = search.recall(connections.epsilon, params.mirror);
     Ok(connections)
 }
 
@@ -155,9 +156,8 @@ struct NaturalSteps {
     p99: u64,
 }
 
-fn natural_steps(pixels: &ComparedSprites, clips: &Clips, weights: &[u64]) -> NaturalSteps {
-    let mut of_clips: Vec<u64> = pixels
-        .steps()
+fn natural_steps(steps: Vec<u64>, clips: &Clips, weights: &[u64]) -> NaturalSteps {
+    let mut of_clips: Vec<u64> = steps
         .windows(clips.clip_frames)
         .zip(clips.all_present.windows(2))
         .filter(|(_, present)| present[0] && present[1])
@@ -209,6 +209,8 @@ struct Search<'a> {
     distances: Distances<'a>,
     clips: &'a Clips,
     gate: Gate,
+    /// The clips that can be used.
+    usable: Marks,
     least_gap: usize,
     /// Of an approximate search: which clips are compared.
     lists: Option<Lists>,
@@ -252,16 +254,16 @@ impl Search<'_> {
             transitions,
             n_candidates,
         } = found;
-        distances.for_each_row_below(epsilon, &asked, progress, |i, row| {
+        distances.for_each_row_below(epsilon, &asked, progress, |i, pairs| {
             if side == Side::Plain {
-                let alike = (i..)
-                    .zip(row)
-                    .skip(least_gap)
-                    .filter(|(_, d)| **d < epsilon);
-                let known = |j| asked.holds(i, j) && asked.is_compared(i, j);
-                *n_candidates += alike.filter(|&(j, _)| known(j)).count() as u64;
+                let apart = pairs
+                    .iter()
+                    .map(|pair| pair.to)
+                    .filter(|j| j - i >= least_gap);
+                let known = |&j: &usize| asked.holds(i, j) && asked.is_compared(i, j);
+                *n_candidates += apart.filter(known).count() as u64;
             }
-            minima.push(row, |pair| {
+            minima.push(pairs, |pair| {
                 transitions.extend(self.transition(pair, &asked))
             });
         })?;
@@ -282,17 +284,15 @@ impl Search<'_> {
     }
 
     /// Of the pairs of some clips that are alike, the share that an approximate search compares.
-    fn recall(&self, epsilon: u64, mirror: bool) -> Result<Option<f64>, Cancelled> {
-        if self.lists.is_none() {
-            return Ok(None);
-        }
-        let mut counts = self.joinable(Side::Plain).found_of_sample(epsilon)?;
+    fn recall(&self, epsilon: u64, mirror: bool) -> Option<f64> {
+        self.lists.as_ref()?;
+        let mut counts = self.joinable(Side::Plain).found_of_sample(epsilon);
         if mirror {
-            let mirrored = self.joinable(Side::Mirrored).found_of_sample(epsilon)?;
+            let mirrored = self.joinable(Side::Mirrored).found_of_sample(epsilon);
             (0..2).for_each(|k| counts[k] += mirrored[k]);
         }
         let [all, found] = counts.map(|n| n as f64);
-        Ok(Some(if all > 0.0 { found / all } else { 1.0 }))
+        Some(if all > 0.0 { found / all } else { 1.0 })
     }
 
     /// A local minimum, if it may be joined. Around a pair that is compared so is all that it competes with; what was
