@@ -54,11 +54,6 @@ impl Distances<'_> {
         progress.report("distances", 1.0);
         Ok(())
     }
-
-    /// The pairs of clip `i` with itself and later ones, rising, that have D < `limit`, of those asked for.
-    pub fn row_below(&self, i: usize, limit: u64, asked: &impl Asked) -> Vec<ClipPair> {
-        Panel::new(self, limit).pairs(i..i + 1, asked).remove(0)
-    }
 }
 
 /// Some clips against all that come after them, and the memory for it.
