@@ -84,6 +84,7 @@ impl AppState {
         let mut context = Context::new(store, config.crew.threads_per_worker());
         context.budget = Duration::from_secs(config.crew.job_time_s);
         context.max_queued = config.max_queued;
+        context.least_room_bytes = Config::least_room_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::walls).await;
         let tool = tool.map_err(std::io::Error::other)?;

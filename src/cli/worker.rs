@@ -8,7 +8,7 @@ use tokio::runtime::Runtime;
 
 use super::serve::{from_store, wait_for_signal};
 use super::{Error, Summary, say};
-use crate::config::{Crew, Database, Storage};
+use crate::config::{Config, Crew, Database, Storage};
 use crate::jobs::Context;
 use crate::jobs::supervisor::{Supervisor, recover};
 use crate::media;
@@ -46,6 +46,7 @@ async fn work(args: Args) -> Result<(), Error> {
     let store = Store::open_beside(args.storage).await.map_err(from_store)?;
     let mut context = Context::new(store, threads);
     context.budget = Duration::from_secs(args.crew.job_time_s);
+    context.least_room_bytes = Config::least_room_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await.map_err(from_store)?;
     let supervisor = Supervisor::start(context.clone(), n_workers);
     say(&format!(

@@ -1,15 +1,49 @@
 //! Admission: received bytes become a footage, or are refused with the gate's reason and leave
 //! nothing behind (RELIABILITY.md, store rules and gate). One way in, for uploads and the sample.
 
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::time::timeout;
 use uuid::Uuid;
 
-use super::Error;
 use super::clock::now_ms;
+use super::{Context, Error};
 use crate::footage::{FootageFormat, FrameSource};
 use crate::media::{Limits, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, VIDEO};
 use crate::store::owners::Owner;
-use crate::store::{BlobFile, Draft, Store};
+use crate::store::{BlobFile, Draft};
+
+/// The longest wait for a place.
+const LONGEST_WAIT: Duration = Duration::from_secs(20);
+
+/// How many films may be looked at at once: each costs two processes and, with a background, a picture in memory.
+#[derive(Clone, Debug)]
+pub struct Places {
+    free: Arc<Semaphore>,
+    longest_wait: Duration,
+}
+
+impl Default for Places {
+    /// One for each core.
+    fn default() -> Places {
+        let n_cores = std::thread::available_parallelism().map_or(1, usize::from);
+        Places {
+            free: Arc::new(Semaphore::new(n_cores)),
+            longest_wait: LONGEST_WAIT,
+        }
+    }
+}
+
+impl Places {
+    /// A place until it is dropped; [`Error::Busy`] where none becomes free soon.
+    async fn take(&self) -> Result<OwnedSemaphorePermit, Error> {
+        let place = timeout(self.longest_wait, self.free.clone().acquire_owned());
+        place.await.ok().and_then(Result::ok).ok_or(Error::Busy)
+    }
+}
 
 /// Files received into a draft, synced and hashed, and what the sender calls them.
 pub struct Arrival {
@@ -27,9 +61,12 @@ pub struct Arrival {
     pub owner: Owner,
 }
 
-/// Looks at the files and stores them; the same bytes as before give the footage of then.
-pub async fn admit(store: &Store, arrival: Arrival) -> Result<Added, Error> {
+/// Looks at the files, once there is a place for that, and stores them; the same bytes as before give the
+/// footage of then.
+pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> {
+    let place = context.places.take().await?;
     let (arrival, format) = tokio::task::spawn_blocking(move || {
+        let _place = place;
         let format = inspect(&arrival)?;
         Ok::<_, Error>((arrival, format))
     })
@@ -38,6 +75,7 @@ pub async fn admit(store: &Store, arrival: Arrival) -> Result<Added, Error> {
     let footage = row(&arrival, &format);
     let mut files = vec![arrival.video];
     files.extend(arrival.background);
+    let store = &context.store;
     Ok(store.add_footage(footage, arrival.draft, &files).await?)
 }
 
@@ -72,5 +110,49 @@ fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
         n_frames_hint: i64::try_from(format.n_frames_hint).unwrap_or(i64::MAX),
         sample: arrival.sample,
         created_ms: now_ms(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn who_finds_no_place_soon_is_told_so_and_the_next_one_has_the_place_that_became_free() {
+        let places = Places {
+            free: Arc::new(Semaphore::new(1)),
+            longest_wait: Duration::from_millis(20),
+        };
+        let first = places.take().await.unwrap();
+        assert!(matches!(places.take().await, Err(Error::Busy)));
+        drop(first);
+        assert!(places.take().await.is_ok());
+    }
+
+    #[tokio::test]
+    async fn a_film_waits_for_a_place_before_anybody_looks_at_it() {
+        let data = tempfile::tempdir().unwrap();
+        let store = crate::store::Store::open(data.path()).await.unwrap();
+        let draft = store.blobs().draft("film").unwrap();
+        let video = BlobFile {
+            name: VIDEO.to_owned(),
+            size_bytes: 0,
+            sha256: Vec::new(),
+        };
+        let mut context = Context::new(store, 1);
+        context.places = Places {
+            free: Arc::new(Semaphore::new(0)),
+            longest_wait: Duration::from_millis(20),
+        };
+        let arrival = Arrival {
+            draft,
+            video,
+            background: None,
+            name: String::new(),
+            sample: false,
+            owner: Owner::local(),
+        };
+        let refused = admit(&context, arrival).await.unwrap_err();
+        assert_eq!(refused.code(), crate::code::Code::Busy);
     }
 }

@@ -66,8 +66,12 @@ pub struct Context {
     pub budget: Duration,
     /// How many jobs of everybody may be queued or running at once.
     pub max_queued: i64,
+    /// Room on the disk below which jobs are stopped, bytes, so that rows can still be written.
+    pub least_room_bytes: u64,
     /// What is counted of the jobs of this process.
     pub meters: Meters,
+    /// How many films are looked at at once.
+    pub places: admit::Places,
 }
 
 impl Context {
@@ -75,6 +79,12 @@ impl Context {
     pub async fn now_ms(&self) -> Result<i64, store::Error> {
         let shared = self.store.clock_ms().await?;
         Ok(shared.unwrap_or_else(clock::now_ms))
+    }
+
+    /// Whether a job that goes on writing would leave too little room on the disk.
+    fn lacks_room(&self) -> bool {
+        let room = self.store.blobs().room_bytes();
+        room.is_ok_and(|room_bytes| room_bytes < self.least_room_bytes)
     }
 
     /// The usual lease, over a store.
@@ -87,7 +97,9 @@ impl Context {
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(Crew::JOB_TIME_S),
             max_queued: i64::MAX,
+            least_room_bytes: 0,
             meters: Meters::default(),
+            places: admit::Places::default(),
         }
     }
 }
