@@ -157,6 +157,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(libraries::get_library, libraries::delete_library))
         .routes(routes!(libraries::get_library_file))
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
+        .routes(routes!(flocks::preview_flock))
         .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
         .routes(routes!(links::create_flock_link))

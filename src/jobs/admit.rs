@@ -1,11 +1,6 @@
 //! Admission: received bytes become a footage, or are refused with the gate's reason and leave
 //! nothing behind (RELIABILITY.md, store rules and gate). One way in, for uploads and the sample.
 
-use std::sync::Arc;
-use std::time::Duration;
-
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::clock::now_ms;
@@ -15,35 +10,6 @@ use crate::media::{Limits, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, VIDEO};
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
-
-/// The longest wait for a place.
-const LONGEST_WAIT: Duration = Duration::from_secs(20);
-
-/// How many films may be looked at at once: each costs two processes and, with a background, a picture in memory.
-#[derive(Clone, Debug)]
-pub struct Places {
-    free: Arc<Semaphore>,
-    longest_wait: Duration,
-}
-
-impl Default for Places {
-    /// One for each core.
-    fn default() -> Places {
-        let n_cores = std::thread::available_parallelism().map_or(1, usize::from);
-        Places {
-            free: Arc::new(Semaphore::new(n_cores)),
-            longest_wait: LONGEST_WAIT,
-        }
-    }
-}
-
-impl Places {
-    /// A place until it is dropped; [`Error::Busy`] where none becomes free soon.
-    async fn take(&self) -> Result<OwnedSemaphorePermit, Error> {
-        let place = timeout(self.longest_wait, self.free.clone().acquire_owned());
-        place.await.ok().and_then(Result::ok).ok_or(Error::Busy)
-    }
-}
 
 /// Files received into a draft, synced and hashed, and what the sender calls them.
 pub struct Arrival {
@@ -115,19 +81,10 @@ fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::time::Duration;
 
-    #[tokio::test]
-    async fn who_finds_no_place_soon_is_told_so_and_the_next_one_has_the_place_that_became_free() {
-        let places = Places {
-            free: Arc::new(Semaphore::new(1)),
-            longest_wait: Duration::from_millis(20),
-        };
-        let first = places.take().await.unwrap();
-        assert!(matches!(places.take().await, Err(Error::Busy)));
-        drop(first);
-        assert!(places.take().await.is_ok());
-    }
+    use super::*;
+    use crate::jobs::places::Places;
 
     #[tokio::test]
     async fn a_film_waits_for_a_place_before_anybody_looks_at_it() {
@@ -140,10 +97,7 @@ mod tests {
             sha256: Vec::new(),
         };
         let mut context = Context::new(store, 1);
-        context.places = Places {
-            free: Arc::new(Semaphore::new(0)),
-            longest_wait: Duration::from_millis(20),
-        };
+        context.places = Places::new(0, Duration::from_millis(20));
         let arrival = Arrival {
             draft,
             video,

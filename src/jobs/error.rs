@@ -31,6 +31,9 @@ pub enum Error {
     /// A library's folder could not be written or read.
     #[error(transparent)]
     LibraryDir(#[from] formats::library_dir::Error),
+    /// The library is too long for a whole matrix.
+    #[error(transparent)]
+    Numbers(#[from] formats::npy::Error),
     /// The store said no.
     #[error(transparent)]
     Store(#[from] store::Error),
@@ -66,6 +69,7 @@ impl Error {
             Error::Flock(error) => error.code(),
             Error::Fish(error) => error.code(),
             Error::LibraryDir(error) => of_library_dir(error),
+            Error::Numbers(error) => error.code(),
             Error::Store(error) => error.code(),
             Error::Io(error) => of_io(error),
             Error::Panicked => Code::Internal,

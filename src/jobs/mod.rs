@@ -29,6 +29,10 @@ pub mod flock; // library -> flock
 pub mod fish; // library -> virtual fish
 pub mod overlay; // footage -> the same with its poses drawn over it
 
+pub mod at_once; // library -> what somebody waits for
+
+pub mod places; // how much of that at once
+
 pub mod sample; // the first film of an empty data folder
 
 pub mod clock;
@@ -44,6 +48,7 @@ pub use attempt::{Attempt, Product};
 pub use error::Error;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
+pub use places::Places;
 
 use crate::config::Crew;
 use crate::store::jobs::{Kind, Lease};
@@ -71,7 +76,9 @@ pub struct Context {
     /// What is counted of the jobs of this process.
     pub meters: Meters,
     /// How many films are looked at at once.
-    pub places: admit::Places,
+    pub places: Places,
+    /// Who may have something computed while they wait.
+    pub at_once: Places,
 }
 
 impl Context {
@@ -99,7 +106,8 @@ impl Context {
             max_queued: i64::MAX,
             least_room_bytes: 0,
             meters: Meters::default(),
-            places: admit::Places::default(),
+            places: Places::of_cores(),
+            at_once: Places::one(),
         }
     }
 }
