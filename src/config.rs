@@ -33,9 +33,9 @@ pub struct Config {
     #[arg(long, env = "FLOCKREEL_MAX_QUEUED", default_value_t = 10_000, value_name = "N",
         value_parser = clap::value_parser!(i64).range(0..))]
     pub max_queued: i64,
-    /// Another address, where /metrics alone is answered, to whoever reaches it.
-    #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
-    pub metrics_bind: Option<SocketAddr>,
+    /// Who watches.
+    #[command(flatten)]
+    pub watch: Watch,
     /// The largest upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,
@@ -122,6 +122,14 @@ pub struct Crew {
         value_name = "N"
     )]
     pub job_time_s: u64,
+}
+
+/// How a process is watched from outside.
+#[derive(Args, Clone, Debug)]
+pub struct Watch {
+    /// Another address, where /metrics alone is answered, to whoever reaches it.
+    #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
+    pub metrics_bind: Option<SocketAddr>,
 }
 
 /// Where the rows are.

@@ -10,6 +10,7 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::access::Caller;
+use super::analyses::AnalysisOverrides;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::footage::admit;
@@ -80,9 +81,21 @@ pub(super) struct FlockForm {
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
     /// How to make the flock, JSON.
-    params: Option<Params>,
+    params: Option<FlockOverrides>,
     /// How to measure the film, JSON.
-    analysis: Option<crate::analysis::Params>,
+    analysis: Option<AnalysisOverrides>,
+}
+
+/// Parameters to override, those of `preset` or the defaults.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the parameters in the OpenAPI document"
+)]
+pub(super) struct FlockOverrides {
+    preset: Option<String>,
+    #[serde(flatten)]
+    params: Params,
 }
 
 /// One flock.

@@ -69,6 +69,8 @@ pub struct Context {
     pub lease: Duration,
     /// How long one attempt at a job may take.
     pub budget: Duration,
+    /// How often what has expired is swept while the service runs.
+    pub sweep_every: Duration,
     /// How many jobs of everybody may be queued or running at once.
     pub max_queued: i64,
     /// Room on the disk below which jobs are stopped, bytes, so that rows can still be written.
@@ -103,6 +105,7 @@ impl Context {
             threads,
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(Crew::JOB_TIME_S),
+            sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
             least_room_bytes: 0,
             meters: Meters::default(),

@@ -8,6 +8,7 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use rustix::process::{getpriority_process, setpriority_process};
 use tokio::runtime::Handle;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 use tracing::{Instrument, Span};
@@ -31,6 +32,9 @@ const MAX_ATTEMPTS: i64 = 3;
 const LET_GO: Duration = Duration::from_secs(10);
 /// The wait before the second attempt; each further one waits four times as long.
 const BACKOFF_MS: i64 = 2_000;
+
+/// How much nicer a job is than the service: under load it gets a tenth of what a request gets.
+const PATIENCE: i32 = 10;
 
 /// What one step did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -247,11 +251,15 @@ where
             .draft(&format!("{}.{}", lease.job_id, lease.fence))?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
+            .start_handler(|_| step_back())
             .build()
             .map_err(std::io::Error::other)?;
         let attempt = Attempt::new(&store, &draft, &listener, threads, &runtime);
-        let product = pool.install(|| run(&lease, &attempt))?;
-        let files = store.blobs().seal(&draft)?;
+        let made = pool.install(|| {
+            let product = run(&lease, &attempt)?;
+            Ok::<_, Error>((product, store.blobs().seal(&draft)?))
+        });
+        let (product, files) = made?;
         Ok::<_, Error>((draft, product, files))
     });
     async move {
@@ -265,6 +273,15 @@ where
             params: product.params,
             summary: product.summary,
         })
+    }
+}
+
+/// Lets those who answer requests go first: a job takes minutes and has time, a request has not. Threads and
+/// processes that the calling thread starts from now on are as patient.
+fn step_back() {
+    let usual = getpriority_process(None).unwrap_or(0);
+    if let Err(error) = setpriority_process(None, usual + PATIENCE) {
+        tracing::debug!(%error, "a job runs with the priority of the service");
     }
 }
 

@@ -94,6 +94,16 @@ impl Order {
     }
 }
 
+/// A session of its own has a share of its own where Linux groups sessions for the scheduler (autogroup), whatever
+/// niceness its threads inherit. So the session gets the niceness of the thread that started it; where there are no
+/// such groups, or it may not be, the inherited one is all there is.
+fn pass_on_niceness(child: Pid) {
+    if let Ok(niceness @ 1..) = rustix::process::getpriority_process(None) {
+        let group = format!("/proc/{}/autogroup", child.as_raw_nonzero());
+        std::fs::write(group, niceness.to_string()).ok();
+    }
+}
+
 fn n_cores() -> u64 {
     std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
 }
@@ -155,6 +165,7 @@ impl Child {
         sandbox::enclose(&mut command, &cage, &place.reach).map_err(&failed)?;
         let mut process = spawn(command).map_err(failed)?;
         let group = Pid::from_child(&process);
+        pass_on_niceness(group);
         let ended = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
             Ok(ended) => ended,
             Err(errno) => {

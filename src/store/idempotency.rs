@@ -111,6 +111,15 @@ impl Store {
         Ok(Begun::Run(ids))
     }
 
+    /// Forgets answers that nobody may ask for again, also where no other key ever comes.
+    pub async fn forget_old_answers(&self, now_ms: i64) -> Result<(), Error> {
+        sql::query("delete from idempotency where created_ms <= $1")
+            .bind(now_ms - KEPT_MS)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
     /// Notes the answer to the request that holds the key.
     pub async fn finish_key(&self, scope: &Scope, answer: &Answer) -> Result<(), Error> {
         sql::query(

@@ -18,6 +18,7 @@ pub mod libraries;
 pub mod owners;
 pub mod spill;
 mod sql;
+pub mod tls;
 pub mod tokens;
 pub mod upkeep;
 pub mod uploads;

@@ -48,12 +48,27 @@ pub(in crate::api) struct JobGone {
     id: Uuid,
 }
 
+/// One event of a stream, by the fields that it has there.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the streams in the OpenAPI document"
+)]
+pub(in crate::api) struct JobEvent {
+    /// `job`, or `gone`.
+    event: String,
+    /// JSON: of `job` what /v1/jobs/{id} answers, of `gone` the job's id.
+    data: String,
+    /// What to send as Last-Event-ID; of the stream of one job none.
+    id: Option<String>,
+}
+
 /// Every change of the caller's jobs, as events named `job`, or `gone` for one that was deleted: first those
 /// queued and running, and, after a Last-Event-ID, those that ended since. Ends when the token does.
 #[utoipa::path(get, path = "/v1/events",
     params(("Last-Event-ID" = Option<String>, Header, description = "the id of the last event seen")),
     responses(
-    (status = 200, content_type = "text/event-stream", body = JobView),
+    (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn get_events(
@@ -80,7 +95,7 @@ pub(in crate::api) async fn get_events(
 
 /// The job's states as server-sent events named `job`, until the last one.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = Uuid, Path)), responses(
-    (status = 200, content_type = "text/event-stream", body = JobView),
+    (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn get_job_events(

@@ -200,6 +200,16 @@ impl Blobs {
     }
 }
 
+impl Place {
+    /// Whether it can be asked; a folder of this machine is there, or nothing of ours is.
+    async fn is_there(&self) -> bool {
+        match self {
+            Place::Shelf(_) => true,
+            Place::Bucket(bucket) => bucket.answers().await,
+        }
+    }
+}
+
 impl Fetched {
     /// The folder in which the files are.
     pub fn path(&self) -> &Path {

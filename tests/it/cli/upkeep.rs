@@ -5,9 +5,9 @@ use std::process::{Command, Output};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use reqwest::Client;
 use serde_json::{Value, json};
 
+use crate::common::client;
 use crate::common::film::Films;
 use crate::common::process::{Server, numbered_film};
 
@@ -24,13 +24,13 @@ fn said(done: &Output) -> String {
 }
 
 async fn json_at(url: String) -> Value {
-    let answer = Client::new().get(url).send().await.unwrap();
+    let answer = client().get(url).send().await.unwrap();
     answer.json().await.unwrap()
 }
 
 /// Uploads films, queues their analyses, and deletes every third, until told to stop.
 async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>) {
-    let client = Client::new();
+    let client = client();
     while !stop.load(Ordering::Relaxed) {
         let number = next.fetch_add(1, Ordering::Relaxed);
         let sent = client
@@ -98,7 +98,7 @@ async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
     assert!(!films.path("copy.partial").exists());
     let restored = Server::start(&films.path("copy"));
     every_film_is_whole(&restored.base, copied["files"].as_u64().unwrap()).await;
-    let ended = Client::new().post(format!("{}/v1/footage", restored.base));
+    let ended = client().post(format!("{}/v1/footage", restored.base));
     let ended = ended.body(numbered_film(100_000)).send().await.unwrap();
     assert_eq!(ended.status(), 201, "it goes on");
 }
@@ -114,7 +114,7 @@ async fn every_film_is_whole(base: &str, n_films: u64) {
             base,
             footage["id"].as_str().unwrap()
         );
-        let answer = Client::new().get(path).send().await.unwrap();
+        let answer = client().get(path).send().await.unwrap();
         let etag = answer.headers()["etag"].to_str().unwrap().to_owned();
         let bytes = answer.bytes().await.unwrap();
         assert_eq!(
@@ -129,7 +129,7 @@ async fn every_film_is_whole(base: &str, n_films: u64) {
 async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
     let films = Films::new();
     let server = Server::start(&films.path("data"));
-    let sent = Client::new().post(format!("{}/v1/footage", server.base));
+    let sent = client().post(format!("{}/v1/footage", server.base));
     let footage: Value = sent
         .body(numbered_film(1))
         .send()
@@ -198,7 +198,7 @@ async fn a_flag_wins_over_the_environment_that_over_the_file_and_that_over_the_d
     let largest = async |flags: &[&str], variables: &[(&str, &str)]| {
         let server = Server::start_in(&films.path("data"), flags, variables);
         let url = format!("{}/v1/uploads", server.base);
-        let answer = Client::new()
+        let answer = client()
             .request(reqwest::Method::OPTIONS, url)
             .send()
             .await

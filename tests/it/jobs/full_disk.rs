@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use reqwest::{Client, Response};
 use serde_json::{Value, json};
 
-use crate::common::Place;
 use crate::common::app::code_of;
 use crate::common::clip::{SWIM, TINY};
 use crate::common::process::Server;
+use crate::common::{Place, client};
 
 /// A small disk of memory over a folder, until dropped.
 struct SmallDisk(PathBuf);
@@ -121,7 +121,7 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     };
     let reserve = (8 << 20).to_string();
     let server = Server::start_with(place.data(), &["--disk-reserve-bytes", &reserve]);
-    let client = Client::new();
+    let client = client();
     let service = Service { server, client };
     let swim: Value = service.upload(&SWIM).await.json().await.unwrap();
     let tiny: Value = service.upload(&TINY).await.json().await.unwrap();

@@ -9,27 +9,24 @@ use flockreel::store::jobs::JobState;
 use flockreel::store::owners::Reach;
 use futures_util::StreamExt;
 use futures_util::stream::once;
-use reqwest::{Client, StatusCode};
+use reqwest::StatusCode;
 use serde_json::{Value, json};
 use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 
-use crate::common::Place;
 use crate::common::app::code_of;
 use crate::common::clip::SWIM;
 use crate::common::process::{Server, numbered_film, processes_of};
+use crate::common::{Place, client};
 
 async fn get(server: &Server, path: &str) -> Value {
-    let answer = Client::new()
-        .get(format!("{}{path}", server.base))
-        .send()
-        .await;
+    let answer = client().get(format!("{}{path}", server.base)).send().await;
     answer.unwrap().json().await.unwrap()
 }
 
 /// Uploads the film and starts its analysis; returns the job's path.
 async fn start_job(server: &Server) -> String {
-    let client = Client::new();
+    let client = client();
     let post = |path: &str| client.post(format!("{}{path}", server.base));
     let footage = post("/v1/footage").body(SWIM.clone()).send().await.unwrap();
     let footage: Value = footage.json().await.unwrap();
@@ -113,7 +110,7 @@ async fn result_of(server: &Server, job: &Value) -> Vec<String> {
         "overlay.mp4",
     ] {
         let url = format!("{}{library}/{file}", server.base);
-        let answer = Client::new().head(url).send().await.unwrap();
+        let answer = client().head(url).send().await.unwrap();
         assert_eq!(answer.status(), 200, "{file}");
         tags.push(answer.headers()["etag"].to_str().unwrap().to_owned());
     }
@@ -172,7 +169,7 @@ fn slow_upload(server: &Server) -> (oneshot::Sender<()>, JoinHandle<StatusCode>)
         Ok(second)
     };
     let halves = once(async move { Ok::<_, std::io::Error>(first) }).chain(once(rest));
-    let sent = Client::new()
+    let sent = client()
         .post(format!("{}/v1/footage", server.base))
         .body(reqwest::Body::wrap_stream(halves))
         .send();
@@ -192,7 +189,7 @@ async fn a_server_told_to_stop_refuses_what_is_new_and_ends_what_is_under_way() 
     let start = Instant::now();
     server.tell_to_stop();
     tokio::time::sleep(Duration::from_millis(300)).await;
-    let sent = Client::new().post(format!("{}/v1/footage", server.base));
+    let sent = client().post(format!("{}/v1/footage", server.base));
     let refused = sent.body(numbered_film(2)).send().await.unwrap();
     assert_eq!(refused.headers()["retry-after"], "5");
     assert_eq!(code_of(refused, 503).await, "stopping");

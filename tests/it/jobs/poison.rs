@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use reqwest::Client;
 use serde_json::{Value, json};
 
-use crate::common::Place;
 use crate::common::clip::SWIM;
 use crate::common::process::Server;
+use crate::common::{Place, client};
 
 /// What the last bytes of a film do to its decoder, and the code that comes of it.
 const POISONS: [(&str, &str); 4] = [
@@ -111,7 +111,7 @@ async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
         wrapper.to_str().unwrap(),
     ];
     let server = Server::start_with(place.data(), &flags);
-    let client = Client::new();
+    let client = client();
     let queue = Queue { server, client };
     let mut poisoned = Vec::new();
     for (poison, code) in POISONS {

@@ -15,10 +15,10 @@ use rustix::process::Signal;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
-use crate::common::Place;
 use crate::common::app::json_of;
 use crate::common::clip::SWIM;
 use crate::common::process::{Server, WorkerProcess};
+use crate::common::{Place, client};
 
 /// The footage of the swimming fish, as an upload leaves it.
 pub(super) async fn admitted(store: &Store) -> Uuid {
@@ -46,7 +46,7 @@ struct Service {
 
 impl Service {
     fn of(server: &Server) -> Service {
-        let (client, base) = (Client::new(), server.base.clone());
+        let (client, base) = (client(), server.base.clone());
         Service { client, base }
     }
 
