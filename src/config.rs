@@ -168,6 +168,11 @@ impl Config {
     /// The usual reserve on the disk.
     pub const DISK_RESERVE_BYTES: u64 = 1 << 30;
 
+    /// What of a reserve jobs leave free, bytes: uploads leave all of it, results may use the rest.
+    pub fn least_room_bytes(reserve_bytes: u64) -> u64 {
+        reserve_bytes / 8
+    }
+
     /// Whether a request without a token is refused.
     pub fn demands_tokens(&self) -> bool {
         self.auth == Auth::Required || !self.bind.ip().is_loopback()

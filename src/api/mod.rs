@@ -95,6 +95,7 @@ impl AppState {
         let mut context = Context::new(store, config.crew.threads_per_worker());
         context.budget = Duration::from_secs(config.crew.job_time_s);
         context.max_queued = config.max_queued;
+        context.least_room_bytes = Config::least_room_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::walls).await;
         let tool = tool.map_err(std::io::Error::other)?;
@@ -166,6 +167,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(libraries::get_library, libraries::delete_library))
         .routes(routes!(libraries::get_library_file))
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
+        .routes(routes!(flocks::preview_flock))
         .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
         .routes(routes!(links::create_flock_link))

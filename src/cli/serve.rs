@@ -124,7 +124,7 @@ pub(super) async fn wait_for_signal() -> Result<(), Error> {
 
 pub(super) fn from_store(error: store::Error) -> Error {
     match error {
-        store::Error::InUse(_) => Error::Usage(error.to_string()),
+        store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),
         _ => Error::work(error.code(), &error),
     }
 }

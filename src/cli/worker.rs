@@ -10,7 +10,7 @@ use super::serve::{from_store, listen, wait_for_signal};
 use super::{Error, Summary, say};
 use crate::api;
 use crate::api::server::Stop;
-use crate::config::{Crew, Database, Storage, Watch};
+use crate::config::{Config, Crew, Database, Storage, Watch};
 use crate::jobs::Context;
 use crate::jobs::supervisor::{Supervisor, recover};
 use crate::media;
@@ -50,6 +50,7 @@ async fn work(args: Args) -> Result<(), Error> {
     let store = Store::open_beside(args.storage).await.map_err(from_store)?;
     let mut context = Context::new(store, threads);
     context.budget = Duration::from_secs(args.crew.job_time_s);
+    context.least_room_bytes = Config::least_room_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await.map_err(from_store)?;
     let stop = Stop::default();
     if let Some(bind) = args.watch.metrics_bind {

@@ -106,6 +106,24 @@ impl Bucket {
         .boxed()
     }
 
+    /// The mark of these files.
+    pub(super) async fn mark(&self) -> Result<Option<String>, Error> {
+        let found = match self.store.get(&self.path(super::MARK)).await {
+            Err(object_store::Error::NotFound { .. }) => return Ok(None),
+            found => found?.bytes().await?,
+        };
+        Ok(Some(String::from_utf8_lossy(&found).trim().to_owned()))
+    }
+
+    /// Marks these files, for good.
+    pub(super) async fn set_mark(&self, mark: &str) -> Result<(), Error> {
+        let bytes = Bytes::copy_from_slice(mark.as_bytes());
+        self.store
+            .put(&self.path(super::MARK), bytes.into())
+            .await?;
+        Ok(())
+    }
+
     pub(super) async fn folders(&self) -> Result<Vec<Folder>, Error> {
         let prefix = (!self.prefix.is_empty()).then(|| Path::from(self.prefix.as_str()));
         let mut objects = self.store.list(prefix.as_ref());
