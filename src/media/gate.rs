@@ -25,7 +25,6 @@ use super::tools::{self, Place, Tool};
 
 /// How much of a child's complaints is kept.
 const COMPLAINT_BYTES: usize = 8 << 10;
-
 /// The size we ask the kernel to give each pipe.
 const PIPE_BYTES: usize = 1 << 20;
 
@@ -94,17 +93,6 @@ impl Order {
     }
 }
 
-/// Gives the child the niceness of the thread that asks for it, since another starts it; and its session too: a
-/// session of its own has a share of its own where Linux groups sessions for the scheduler (autogroup), however nice
-/// the processes in it are. Where it may not be, the child is no less itself.
-fn pass_on_niceness(child: Pid) {
-    if let Ok(niceness @ 1..) = rustix::process::getpriority_process(None) {
-        rustix::process::setpriority_process(Some(child), niceness).ok();
-        let group = format!("/proc/{}/autogroup", child.as_raw_nonzero());
-        std::fs::write(group, niceness.to_string()).ok();
-    }
-}
-
 fn n_cores() -> u64 {
     std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
 }
@@ -166,7 +154,7 @@ impl Child {
         sandbox::enclose(&mut command, &cage, &place.reach).map_err(&failed)?;
         let mut process = spawn(command).map_err(failed)?;
         let group = Pid::from_child(&process);
-        pass_on_niceness(group);
+        super::niceness::pass_on(group);
         let ended = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
             Ok(ended) => ended,
             Err(errno) => {
