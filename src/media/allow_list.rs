@@ -53,6 +53,7 @@ pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> 
 mod tests {
     use std::io::ErrorKind;
     use std::net::TcpListener;
+    use std::time::Duration;
 
     use super::*;
     use crate::media::gate::{Child, Order};
@@ -63,6 +64,8 @@ mod tests {
     fn limits() -> Limits {
         Limits {
             layers: Layers::OLD,
+            // A busy machine takes its time to start a program.
+            probe_time: Duration::from_secs(60),
             ..Limits::default()
         }
     }
