@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race truth-test page-test contract-test soak arm-test docs deny bench accuracy papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench accuracy papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -45,6 +45,12 @@ SCALE_TESTS = $(CARGO) test --locked --lib store:: && $(CARGO) test --locked --l
 scale-test: target/vendor ## the service on a PostgreSQL and an S3 store that are started for it, with workers that are killed
 	@scripts/with-servers.sh sh -c '$(SCALE_TESTS)'
 
+guards: target/vendor ## every guard of a promise taken out once: its test must fail (docs/GUARDS.md; half an hour)
+	@scripts/system-packages.sh test contract-test
+	@scripts/venv.sh target/contract-venv tests/contract/requirements.txt
+	python3 -B tests/guards/run.py --write
+	scripts/with-servers.sh python3 -B tests/guards/run.py --write
+
 race: target/vendor ## eight processes race for 2000 jobs, on SQLite and on PostgreSQL
 	FLOCKREEL_RACE_JOBS=2000 $(CARGO) test --locked --test it -- --nocapture jobs::races
 	FLOCKREEL_RACE_JOBS=2000 scripts/with-servers.sh $(CARGO) test --locked --test it -- --nocapture jobs::races
@@ -52,15 +58,15 @@ race: target/vendor ## eight processes race for 2000 jobs, on SQLite and on Post
 # The program that the tests built, here and below: `cargo build` would build the dependencies anew, without the tests' features.
 truth-test: target/vendor ## a flock's ground truth, read by the field's own tools
 	$(CARGO) test --locked --no-run
-	@scripts/truth-tests.sh $(DEBUG)
+	@scripts/python-tests.sh truth $(DEBUG)
 
 page-test: vendor ## the page in a browser, against a really started service
 	$(CARGO) test --locked --no-run
-	@scripts/page-tests.sh $(DEBUG)
+	@scripts/python-tests.sh page $(DEBUG)
 
 contract-test: target/vendor ## the API against its own description, by schemathesis
 	$(CARGO) test --locked --no-run
-	@scripts/contract-tests.sh $(DEBUG)
+	@scripts/python-tests.sh contract $(DEBUG)
 
 soak: target/vendor ## two hundred kills while films are uploaded
 	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads

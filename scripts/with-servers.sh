@@ -11,13 +11,7 @@ cd "$(dirname "$0")/.."
 scripts/system-packages.sh scale-test
 postgres=$(for bin in /usr/lib/postgresql/*/bin; do echo "$bin"; done | sort -V | tail -n 1)
 venv=target/scale-venv
-requirements=tests/it/scale/requirements.txt
-if ! cmp -s "$requirements" "$venv/installed.txt"; then
-    printf 'with servers: installing %s into %s\n' "$requirements" "$venv"
-    python3 -m venv --clear "$venv"
-    "$venv/bin/pip" install -q --disable-pip-version-check -r "$requirements"
-    cp "$requirements" "$venv/installed.txt"
-fi
+scripts/venv.sh "$venv" tests/it/scale/requirements.txt
 
 folder=$(mktemp -d)
 weed=

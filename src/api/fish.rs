@@ -14,13 +14,13 @@ use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::jobs::{absent_result, accepted, job_to_follow};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Problem, ProblemBody, gone};
 use super::timestamp::rfc3339;
 use crate::fish::Params;
 use crate::formats::params;
 use crate::ids::{FishId, JobId, LibraryId};
 use crate::jobs::fish::{Input, Summary, enqueue};
-use crate::store::fish::Fish;
+use crate::store::flocks::Film;
 
 const FILES: Files = &[
     ("model.glb", "model/gltf-binary"),
@@ -125,10 +125,7 @@ pub(super) async fn delete_fish(
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
     find(&state, &caller, id).await?;
-    match state.context.store.delete_film(id).await? {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(Problem::not_found()),
-    }
+    gone(state.context.store.delete_film(id).await?)
 }
 
 /// A file of a virtual fish: model.glb, video.mp4.
@@ -160,7 +157,7 @@ pub(super) async fn get_fish_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Fish, Problem> {
+async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Film, Problem> {
     match state.context.store.fish(id, &caller.reach).await? {
         Some(fish) => Ok(fish),
         None => Err(absent_result(state, caller, id).await?),
@@ -168,7 +165,7 @@ async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Fish, Probl
 }
 
 impl FishView {
-    fn of(row: Fish) -> Result<FishView, Problem> {
+    fn of(row: Film) -> Result<FishView, Problem> {
         Ok(FishView {
             id: row.id,
             job_id: row.job_id,

@@ -16,7 +16,7 @@ use super::extract::{Conditions, FileOf, Id, Json};
 use super::footage::admit;
 use super::jobs::{absent_result, accepted, job_to_follow};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Problem, ProblemBody, gone};
 use super::receive::{is_film, receive_with};
 use super::timestamp::rfc3339;
 use super::{AppState, libraries};
@@ -26,7 +26,7 @@ use crate::formats::params;
 use crate::ids::{FlockId, FootageId, JobId, LibraryId};
 use crate::jobs::flock::{Input, Summary, enqueue};
 use crate::jobs::{analysis, at_once};
-use crate::store::flocks::Flock;
+use crate::store::flocks::Film;
 use crate::store::footage::Added;
 
 pub(super) const FILES: Files = &[
@@ -248,10 +248,7 @@ pub(super) async fn delete_flock(
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
     find(&state, &caller, id).await?;
-    match state.context.store.delete_film(id).await? {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(Problem::not_found()),
-    }
+    gone(state.context.store.delete_film(id).await?)
 }
 
 /// A file of a flock: flock.json, plan.svg, video.mp4; tracks.csv and ground-truth.zip unless declined; and,
@@ -297,7 +294,7 @@ fn label_of(name: &str, id: Uuid) -> String {
     }
 }
 
-pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Flock, Problem> {
+pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Film, Problem> {
     match state.context.store.flock(id, &caller.reach).await? {
         Some(flock) => Ok(flock),
         None => Err(absent_result(state, caller, id).await?),
@@ -305,7 +302,7 @@ pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<
 }
 
 impl FlockView {
-    fn of(row: Flock) -> Result<FlockView, Problem> {
+    fn of(row: Film) -> Result<FlockView, Problem> {
         Ok(FlockView {
             id: row.id,
             job_id: row.job_id,

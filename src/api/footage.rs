@@ -14,7 +14,7 @@ use super::access::Caller;
 use super::download::{Download, disposition};
 use super::extract::{Conditions, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Problem, ProblemBody, gone};
 use super::receive::receive;
 use super::timestamp::rfc3339;
 use crate::jobs::admit::Arrival;
@@ -139,10 +139,7 @@ pub(super) async fn delete_footage(
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
     find(&state, &caller, id).await?;
-    match state.context.store.delete_footage(id).await? {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(Problem::not_found()),
-    }
+    gone(state.context.store.delete_footage(id).await?)
 }
 
 /// The video as it was uploaded, to keep: never shown in place.

@@ -7,6 +7,7 @@
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
+use std::time::Duration;
 
 use axum::body::{Body, BodyDataStream, to_bytes};
 use axum::extract::{Request, State};
@@ -22,10 +23,9 @@ use super::access::Caller;
 use super::problem::MayPass;
 use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::code::Code;
-use crate::jobs::allotted;
-use crate::jobs::clock::now_ms;
+use crate::jobs::{self, allotted};
 use crate::store::Store;
-use crate::store::idempotency::{Answer, Begun, Scope};
+use crate::store::idempotency::{Answer, Begun, LEASE_MS, Scope};
 
 /// The routes that make something.
 pub(super) const ROUTES: [&str; 5] = [
@@ -37,6 +37,8 @@ pub(super) const ROUTES: [&str; 5] = [
 ];
 /// The header that carries the key.
 pub(super) const KEY: &str = "idempotency-key";
+/// A key is renewed so often while its request is under way.
+const RENEWED: Duration = Duration::from_millis(LEASE_MS as u64 / 3);
 const REPLAYED: HeaderName = HeaderName::from_static("idempotent-replayed");
 const MAX_KEY_BYTES: usize = 255;
 /// What may come after the end of a form.
@@ -94,7 +96,8 @@ async fn run_keyed(
         (Tally::of(body, hasher), None)
     };
     let store = state.context.store.clone();
-    let family = match store.begin_key(&scope, known.as_deref(), now_ms()).await? {
+    let now_ms = state.context.now_ms().await?;
+    let family = match store.begin_key(&scope, known.as_deref(), now_ms).await? {
         Begun::Run(family) => family,
         Begun::Running => return Err(Code::RequestInProgress.into()),
         Begun::OtherBody => return Err(Code::IdempotencyKeyReused.into()),
@@ -103,10 +106,38 @@ async fn run_keyed(
             return replay(answer, &tally, max_bytes).await;
         }
     };
-    let held = Held(Some((store, scope)));
+    let held = Held(Some((store, scope.clone())));
     let request = Request::from_parts(parts, tally.body());
-    let answer = allotted::under(family, next.run(request)).await;
+    let run = allotted::under(family, next.run(request));
+    let answer = renewing(&state.context, &scope, RENEWED, run).await;
     keep(held, answer, &tally).await
+}
+
+/// Runs a request, and says `every` so often that it is under way still, where others would take its silence
+/// for its process's death.
+async fn renewing<Run: Future>(
+    context: &jobs::Context,
+    scope: &Scope,
+    every: Duration,
+    run: Run,
+) -> Run::Output {
+    let renew = async {
+        while !context.store.is_alone() {
+            tokio::time::sleep(every).await;
+            let renewed = async {
+                let now_ms = context.now_ms().await?;
+                context.store.renew_key(scope, now_ms).await
+            };
+            if let Err(error) = renewed.await {
+                tracing::warn!(%error, "an idempotency key could not be renewed");
+            }
+        }
+        std::future::pending::<Run::Output>().await
+    };
+    tokio::select! {
+        answer = run => answer,
+        never = renew => never,
+    }
 }
 
 /// The kept answer, where the body is the one that it answers.
@@ -323,5 +354,25 @@ mod tests {
         for status in [408, 409, 429, 500, 503, 507] {
             assert!(!is_kept(StatusCode::from_u16(status).unwrap()), "{status}");
         }
+    }
+
+    #[tokio::test]
+    async fn a_request_that_outlasts_a_lease_keeps_its_key() {
+        let data = tempfile::tempdir().unwrap();
+        let _first = Store::open(data.path()).await.unwrap();
+        let store = Store::open_beside(data.path()).await.unwrap();
+        let context = jobs::Context::new(store.clone(), 1);
+        let scope = Scope {
+            caller: String::new(),
+            route: "/v1/fish".into(),
+            key: "k".into(),
+        };
+        let begun_ms = context.now_ms().await.unwrap() - LEASE_MS + 1000;
+        store.begin_key(&scope, None, begun_ms).await.unwrap();
+        let slow = tokio::time::sleep(Duration::from_millis(300));
+        renewing(&context, &scope, Duration::from_millis(10), slow).await;
+        let later_ms = context.now_ms().await.unwrap() + LEASE_MS - 5000;
+        let met = store.begin_key(&scope, None, later_ms).await;
+        assert_eq!(met.unwrap(), Begun::Running);
     }
 }

@@ -15,7 +15,7 @@ use super::download::{Download, Files, built, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id};
 use super::jobs::absent_result;
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Problem, ProblemBody, gone};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
 use crate::jobs::{self, at_once};
@@ -101,10 +101,7 @@ pub(super) async fn delete_library(
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
     find(&state, &caller, id).await?;
-    match state.context.store.delete_library(id).await? {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(Problem::not_found()),
-    }
+    gone(state.context.store.delete_library(id).await?)
 }
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,

@@ -66,6 +66,14 @@ impl Problem {
     }
 }
 
+/// The answer to a DELETE: 204, or that there was nothing of that id.
+pub(super) fn gone(was_there: bool) -> Result<StatusCode, Problem> {
+    match was_there {
+        true => Ok(StatusCode::NO_CONTENT),
+        false => Err(Problem::not_found()),
+    }
+}
+
 impl From<Code> for Problem {
     fn from(code: Code) -> Problem {
         Problem::new(code, code.meaning())

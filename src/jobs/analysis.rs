@@ -4,7 +4,6 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::allotted::next_id;
 use super::decoding::Counted;
 use super::{Attempt, Context, Error, Product, Stages, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
@@ -18,7 +17,6 @@ use crate::media::{Limits, Video, read_image};
 use crate::progress::Progress;
 use crate::store::footage::{BACKGROUND, Footage, VIDEO};
 use crate::store::jobs::Kind;
-use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
 use crate::{cpu, store};
@@ -83,20 +81,9 @@ pub async fn enqueue(
     input: &Input,
     account: &Account,
 ) -> Result<(JobId, LibraryId), store::Error> {
-    let (job_id, library_id) = (JobId(next_id()), LibraryId(next_id()));
-    let job = NewJob {
-        job_id,
-        account: account.clone(),
-        kind: Kind::Analysis,
-        input: serde_json::json!(input).to_string(),
-        result_id: library_id.0,
-        after_job: None,
-        priority: 0,
-        room: context.max_queued,
-    };
-    context.store.enqueue(&job, context.now_ms().await?).await?;
-    context.wake.notify_one();
-    Ok((job_id, library_id))
+    let queued = context.enqueue(Kind::Analysis, input, None, account);
+    let (job_id, library_id) = queued.await?;
+    Ok((job_id, LibraryId(library_id)))
 }
 
 impl Input {

@@ -4,7 +4,6 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::allotted::next_id;
 use super::{Attempt, Context, Error, Product, Stages};
 use crate::fish::{Film, Params, drive};
 use crate::formats::{glb, library_dir};
@@ -14,7 +13,6 @@ use crate::progress::Progress;
 use crate::raster::{ColorSpec, Frame};
 use crate::store;
 use crate::store::jobs::Kind;
-use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
 
@@ -51,20 +49,9 @@ pub async fn enqueue(
     after_job: Option<JobId>,
     account: &Account,
 ) -> Result<(JobId, FishId), store::Error> {
-    let (job_id, fish_id) = (JobId(next_id()), FishId(next_id()));
-    let job = NewJob {
-        job_id,
-        account: account.clone(),
-        kind: Kind::Fish,
-        input: serde_json::json!(input).to_string(),
-        result_id: fish_id.0,
-        after_job,
-        priority: 0,
-        room: context.max_queued,
-    };
-    context.store.enqueue(&job, context.now_ms().await?).await?;
-    context.wake.notify_one();
-    Ok((job_id, fish_id))
+    let queued = context.enqueue(Kind::Fish, input, after_job, account);
+    let (job_id, fish_id) = queued.await?;
+    Ok((job_id, FishId(fish_id)))
 }
 
 impl Input {

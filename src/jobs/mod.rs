@@ -41,8 +41,10 @@ pub mod error;
 use std::sync::Arc;
 use std::time::Duration;
 
+use serde::Serialize;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
+use uuid::Uuid;
 
 pub use attempt::{Attempt, Product};
 pub use error::Error;
@@ -50,8 +52,13 @@ pub use listener::{Listener, Stages};
 pub use meters::Meters;
 pub use places::Places;
 
+use allotted::next_id;
+
 use crate::config::Crew;
+use crate::ids::JobId;
+use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::{Kind, Lease};
+use crate::store::owners::Account;
 use crate::store::{self, Store};
 
 /// What workers share: smaller than the API's state.
@@ -94,6 +101,31 @@ impl Context {
     fn lacks_room(&self) -> bool {
         let room = self.store.blobs().room_bytes();
         room.is_ok_and(|room_bytes| room_bytes < self.least_room_bytes)
+    }
+
+    /// Queues a job, after another one if it needs that one's result; its id, and the id that its result will
+    /// have. Both are chosen in this order, as a request that comes again asks for them.
+    async fn enqueue<Input: Serialize>(
+        &self,
+        kind: Kind,
+        input: &Input,
+        after_job: Option<JobId>,
+        account: &Account,
+    ) -> Result<(JobId, Uuid), store::Error> {
+        let (job_id, result_id) = (JobId(next_id()), next_id());
+        let job = NewJob {
+            job_id,
+            account: account.clone(),
+            kind,
+            input: serde_json::json!(input).to_string(),
+            result_id,
+            after_job,
+            priority: 0,
+            room: self.max_queued,
+        };
+        self.store.enqueue(&job, self.now_ms().await?).await?;
+        self.wake.notify_one();
+        Ok((job_id, result_id))
     }
 
     /// The usual lease, over a store.

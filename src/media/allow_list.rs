@@ -48,3 +48,101 @@ pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> 
     args.extend(["-i".into(), file]);
     args
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::ErrorKind;
+    use std::net::TcpListener;
+    use std::time::Duration;
+
+    use super::*;
+    use crate::media::gate::{Child, Order};
+    use crate::media::sandbox::Layers;
+    use crate::media::tools::Tool;
+
+    /// The lists alone are to be judged here, whether or not the sandbox would hold.
+    fn limits() -> Limits {
+        Limits {
+            layers: Layers::OLD,
+            // A busy machine takes its time to start a program.
+            probe_time: Duration::from_secs(60),
+            ..Limits::default()
+        }
+    }
+
+    /// What ffmpeg says to such arguments; None where it does as it is told.
+    fn complaint(args: Vec<OsString>) -> Option<String> {
+        let mut child = Child::reading(Order::new(Tool::Ffmpeg, args, &limits(), 0)).unwrap();
+        child.read_full(&mut vec![0; 1 << 20]).unwrap();
+        child.finish().unwrap().check().err().map(|e| e.to_string())
+    }
+
+    /// Decodes a film to nowhere, without our own look at its container, and with one list changed.
+    fn decode(path: &Path, list: &str, value: Option<&str>) -> Option<String> {
+        let mut args = input_args(Container::Mov, path, &limits());
+        for (name, value) in [("-f", None), (list, value)] {
+            let at = args.iter().position(|arg| arg == name);
+            match (at, value) {
+                (Some(at), Some(value)) => args[at + 1] = value.into(),
+                (Some(at), None) => drop(args.drain(at..at + 2)),
+                (None, _) => {}
+            }
+        }
+        args.extend(["-f", "null", "-"].map(Into::into));
+        complaint(args)
+    }
+
+    fn make(folder: &Path, name: &str, options: &str) -> std::path::PathBuf {
+        let path = folder.join(name);
+        std::fs::write(&path, b"").unwrap();
+        let mut args: Vec<OsString> = ["-y", "-f", "lavfi", "-i", "testsrc2=size=64x64:rate=25"]
+            .map(Into::into)
+            .to_vec();
+        args.extend(["-frames:v", "5"].map(Into::into));
+        args.extend(options.split(' ').map(Into::into));
+        args.push(path.clone().into());
+        let order = Order::new(Tool::Ffmpeg, args, &limits(), 0).with_output(&path, 1 << 20);
+        let end = Child::reading(order).unwrap().finish().unwrap();
+        assert!(end.check().is_ok());
+        path
+    }
+
+    fn playlist(folder: &Path, name: &str, of: &str) -> std::path::PathBuf {
+        let path = folder.join(name);
+        let text = format!("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n{of}\n#EXT-X-ENDLIST\n");
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    #[test]
+    fn each_list_alone_closes_a_way_out_of_a_film() {
+        let folder = tempfile::tempdir().unwrap();
+        make(folder.path(), "another.ts", "-c:v mpeg2video -f mpegts");
+        let list = playlist(folder.path(), "film.mp4", "another.ts");
+        let formats = "-format_whitelist";
+        assert_eq!(
+            decode(&list, formats, Some("hls,mpegts")),
+            None,
+            "so it would leak"
+        );
+        let held = decode(&list, "-nothing", None).expect("a playlist was followed");
+        assert!(held.contains("not on whitelist"), "{held}");
+
+        let film = make(folder.path(), "huff.avi", "-c:v huffyuv");
+        assert_eq!(decode(&film, "-codec_whitelist", None), None);
+        let held = decode(&film, "-nothing", None).expect("another decoder ran");
+        assert!(held.contains("not on whitelist"), "{held}");
+    }
+
+    #[test]
+    fn no_address_is_asked_even_where_every_format_is_allowed() {
+        let folder = tempfile::tempdir().unwrap();
+        let server = TcpListener::bind("127.0.0.1:0").unwrap();
+        server.set_nonblocking(true).unwrap();
+        let at = server.local_addr().unwrap();
+        let list = playlist(folder.path(), "film.mp4", &format!("http://{at}/x.ts"));
+        let held = decode(&list, "-format_whitelist", None).expect("an address was asked");
+        let asked = server.accept().map_err(|error| error.kind());
+        assert_eq!(asked.err(), Some(ErrorKind::WouldBlock), "{held}");
+    }
+}

@@ -2,44 +2,19 @@
 
 use sqlx::types::Uuid;
 
-use super::jobs::Lease;
-use super::jobs::finish::Outcome;
+use super::flocks::Film;
 use super::owners::Reach;
-use super::{Error, Store, Transaction, sql};
-
-/// One fish as stored; its files lie in `folder`.
-#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
-pub struct Fish {
-    /// Its id.
-    pub id: Uuid,
-    /// The job that made it.
-    pub job_id: Uuid,
-    /// The library it was made of.
-    pub library_id: Uuid,
-    /// Its folder in the blob store.
-    pub folder: String,
-    /// The parameters it was made with, JSON.
-    pub params: String,
-    /// What is worth knowing at a glance, JSON.
-    pub summary: String,
-    /// Whether it came of the sample that the program made itself.
-    pub sample: bool,
-    /// Size of all its files, bytes.
-    pub size_bytes: i64,
-    /// When it was finished, milliseconds since 1970.
-    pub created_ms: i64,
-}
+use super::{Error, Store};
 
 impl Store {
     /// One fish, if it is finished, there and within reach.
-    pub async fn fish(&self, id: Uuid, reach: &Reach) -> Result<Option<Fish>, Error> {
+    pub async fn fish(&self, id: Uuid, reach: &Reach) -> Result<Option<Film>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
                    from fish r join libraries l on l.id = library_id \
                    join footage f on f.id = footage_id where r.id = $1 \
                    and ($2 is null or r.owner = $2)";
-        let row = sql::query(sql).bind(id).bind(reach.owner());
-        Ok(row.fetch_optional(&self.reader).await?)
+        self.one_of(sql, id, reach).await
     }
 
     /// The newest fish, at most `limit`, older than `before`.
@@ -48,42 +23,18 @@ impl Store {
         limit: i64,
         before: Option<Uuid>,
         reach: &Reach,
-    ) -> Result<Vec<Fish>, Error> {
+    ) -> Result<Vec<Film>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
                    from fish r join libraries l on l.id = library_id \
                    join footage f on f.id = footage_id \
                    where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3) \
                    order by r.id desc limit $2";
-        let rows = sql::query(sql).bind(before).bind(limit);
-        let rows = rows.bind(reach.owner());
-        Ok(rows.fetch_all(&self.reader).await?)
+        self.newest_of(sql, limit, before, reach).await
     }
 }
 
-/// Adds the row, the job's owner's, in the transaction that finishes the job.
-pub(super) async fn insert(
-    transaction: &mut Transaction,
-    lease: &Lease,
-    library_id: Uuid,
-    outcome: &Outcome,
-    now_ms: i64,
-) -> Result<(), sqlx::Error> {
-    sql::query(
-        "insert into fish (id, job_id, fence, library_id, folder, params, summary, \
-         size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
-         (select owner from jobs where id = $2))",
-    )
-    .bind(lease.result_id)
-    .bind(lease.job_id.0)
-    .bind(lease.fence)
-    .bind(library_id)
-    .bind(&outcome.folder)
-    .bind(&outcome.params)
-    .bind(&outcome.summary)
-    .bind(outcome.size_bytes())
-    .bind(now_ms)
-    .execute(transaction)
-    .await?;
-    Ok(())
-}
+/// What a finished job adds; the parameters are those of every result (`jobs/finish`).
+pub(super) const INSERT: &str = "insert into fish (id, job_id, fence, library_id, folder, params, summary, \
+    size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+    (select owner from jobs where id = $2))";

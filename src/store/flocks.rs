@@ -1,15 +1,13 @@
-//! The table of flocks: what each finished flock job left.
+//! The table of flocks: what each finished flock job left. A virtual fish leaves the same, in a table of its own.
 
 use sqlx::types::Uuid;
 
-use super::jobs::Lease;
-use super::jobs::finish::Outcome;
 use super::owners::Reach;
-use super::{Error, Store, Transaction, sql};
+use super::{Error, Store};
 
-/// One flock as stored; its files lie in `folder`.
+/// One flock or virtual fish as stored; its files lie in `folder`.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
-pub struct Flock {
+pub struct Film {
     /// Its id.
     pub id: Uuid,
     /// The job that made it.
@@ -32,14 +30,13 @@ pub struct Flock {
 
 impl Store {
     /// One flock, if it is finished, there and within reach.
-    pub async fn flock(&self, id: Uuid, reach: &Reach) -> Result<Option<Flock>, Error> {
+    pub async fn flock(&self, id: Uuid, reach: &Reach) -> Result<Option<Film>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
                    from flocks r join libraries l on l.id = library_id \
                    join footage f on f.id = footage_id where r.id = $1 \
                    and ($2 is null or r.owner = $2)";
-        let row = sql::query(sql).bind(id).bind(reach.owner());
-        Ok(row.fetch_optional(&self.reader).await?)
+        self.one_of(sql, id, reach).await
     }
 
     /// The newest flocks, at most `limit`, older than `before`.
@@ -48,42 +45,18 @@ impl Store {
         limit: i64,
         before: Option<Uuid>,
         reach: &Reach,
-    ) -> Result<Vec<Flock>, Error> {
+    ) -> Result<Vec<Film>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
                    from flocks r join libraries l on l.id = library_id \
                    join footage f on f.id = footage_id \
                    where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3) \
                    order by r.id desc limit $2";
-        let rows = sql::query(sql).bind(before).bind(limit);
-        let rows = rows.bind(reach.owner());
-        Ok(rows.fetch_all(&self.reader).await?)
+        self.newest_of(sql, limit, before, reach).await
     }
 }
 
-/// Adds the row, the job's owner's, in the transaction that finishes the job.
-pub(super) async fn insert(
-    transaction: &mut Transaction,
-    lease: &Lease,
-    library_id: Uuid,
-    outcome: &Outcome,
-    now_ms: i64,
-) -> Result<(), sqlx::Error> {
-    sql::query(
-        "insert into flocks (id, job_id, fence, library_id, folder, params, summary, \
-         size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
-         (select owner from jobs where id = $2))",
-    )
-    .bind(lease.result_id)
-    .bind(lease.job_id.0)
-    .bind(lease.fence)
-    .bind(library_id)
-    .bind(&outcome.folder)
-    .bind(&outcome.params)
-    .bind(&outcome.summary)
-    .bind(outcome.size_bytes())
-    .bind(now_ms)
-    .execute(transaction)
-    .await?;
-    Ok(())
-}
+/// What a finished job adds; the parameters are those of every result (`jobs/finish`).
+pub(super) const INSERT: &str = "insert into flocks (id, job_id, fence, library_id, folder, params, summary, \
+    size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+    (select owner from jobs where id = $2))";

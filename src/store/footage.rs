@@ -90,8 +90,7 @@ impl Store {
     /// One footage, if it is there and within reach.
     pub async fn footage(&self, id: Uuid, reach: &Reach) -> Result<Option<Footage>, Error> {
         let sql = "select * from footage where id = $1 and ($2 is null or owner = $2)";
-        let row = sql::query(sql).bind(id).bind(reach.owner());
-        Ok(row.fetch_optional(&self.reader).await?)
+        self.one_of(sql, id, reach).await
     }
 
     /// The newest footage, at most `limit`, older than `before`.
@@ -103,9 +102,7 @@ impl Store {
     ) -> Result<Vec<Footage>, Error> {
         let sql = "select * from footage where ($1 is null or id < $1) \
                    and ($3 is null or owner = $3) order by id desc limit $2";
-        let rows = sql::query(sql).bind(before).bind(limit);
-        let rows = rows.bind(reach.owner());
-        Ok(rows.fetch_all(&self.reader).await?)
+        self.newest_of(sql, limit, before, reach).await
     }
 
     async fn footage_of_bytes(&self, footage: &Footage) -> Result<Option<Footage>, Error> {

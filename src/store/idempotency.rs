@@ -13,6 +13,9 @@ pub const KEPT_MS: i64 = 24 * 3600 * 1000;
 /// Who has held a key for longer has died with it, milliseconds: another process, or a request of this one that could
 /// not give it back. An upload over a slow line may take so long.
 const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
+/// Where other processes may have died with keys of theirs: who has not renewed one for as long has,
+/// milliseconds.
+pub const LEASE_MS: i64 = 15_000;
 
 /// Where a key means what it means.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -53,8 +56,9 @@ pub enum Begun {
 }
 
 impl Store {
-    /// Takes the key for a request. `body_sha256` where it is known before the request runs. Answers older
-    /// than a day are forgotten first.
+    /// Takes the key for a request, which must renew it every third of [`LEASE_MS`] where other processes share
+    /// the rows. `body_sha256` where it is known before the request runs. Answers older than a day are
+    /// forgotten first.
     pub async fn begin_key(
         &self,
         scope: &Scope,
@@ -79,8 +83,8 @@ impl Store {
         .fetch_optional(&mut transaction)
         .await?;
         let ids = match known {
-            Some((state, _, _, since_ms))
-                if state == "running" && since_ms >= now_ms - LONGEST_REQUEST_MS =>
+            Some((state, _, _, heard_ms))
+                if state == "running" && !self.is_over(heard_ms, now_ms) =>
             {
                 return Ok(Begun::Running);
             }
@@ -117,6 +121,30 @@ impl Store {
             .bind(now_ms - KEPT_MS)
             .execute(&self.writer)
             .await?;
+        Ok(())
+    }
+
+    /// Whether a request that was last heard of then is not under way any more.
+    fn is_over(&self, heard_ms: i64, now_ms: i64) -> bool {
+        let longest_ms = match self.is_alone() {
+            true => LONGEST_REQUEST_MS,
+            false => LEASE_MS,
+        };
+        heard_ms < now_ms - longest_ms
+    }
+
+    /// The request that holds the key is still under way.
+    pub async fn renew_key(&self, scope: &Scope, now_ms: i64) -> Result<(), Error> {
+        sql::query(
+            "update idempotency set created_ms = $4 \
+             where caller = $1 and route = $2 and key = $3 and state = 'running'",
+        )
+        .bind(&scope.caller)
+        .bind(&scope.route)
+        .bind(&scope.key)
+        .bind(now_ms)
+        .execute(&self.writer)
+        .await?;
         Ok(())
     }
 
@@ -250,5 +278,21 @@ mod tests {
         assert_eq!(met, Begun::OtherBody);
         let met = store.begin_key(&scope(), Some(&[1; 32]), 3).await.unwrap();
         assert_eq!(met, first);
+    }
+
+    #[tokio::test]
+    async fn a_key_whose_process_fell_silent_elsewhere_is_free_after_a_lease() {
+        let data = tempfile::tempdir().unwrap();
+        let storage = fresh::storage(data.path());
+        let (dead, other) = (
+            Store::open(storage.clone()).await.unwrap(),
+            Store::open_beside(storage).await.unwrap(),
+        );
+        let first = dead.begin_key(&scope(), None, 0).await.unwrap();
+        dead.renew_key(&scope(), 10_000).await.unwrap();
+        let met = other.begin_key(&scope(), None, 10_000 + LEASE_MS).await;
+        assert_eq!(met.unwrap(), Begun::Running);
+        let met = other.begin_key(&scope(), None, 10_001 + LEASE_MS).await;
+        assert_eq!(met.unwrap(), first);
     }
 }

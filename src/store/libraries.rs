@@ -2,10 +2,8 @@
 
 use sqlx::types::Uuid;
 
-use super::jobs::Lease;
-use super::jobs::finish::Outcome;
 use super::owners::Reach;
-use super::{Error, Store, Transaction, sql};
+use super::{Error, Store};
 
 /// One library as stored; its files lie in `folder`.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
@@ -39,8 +37,7 @@ impl Store {
                    l.size_bytes, l.created_ms \
                    from libraries l join footage f on f.id = footage_id where l.id = $1 \
                    and ($2 is null or l.owner = $2)";
-        let row = sql::query(sql).bind(id).bind(reach.owner());
-        Ok(row.fetch_optional(&self.reader).await?)
+        self.one_of(sql, id, reach).await
     }
 
     /// The newest libraries, at most `limit`, older than `before`.
@@ -55,35 +52,11 @@ impl Store {
                    from libraries l join footage f on f.id = footage_id \
                    where ($1 is null or l.id < $1) and ($3 is null or l.owner = $3) \
                    order by l.id desc limit $2";
-        let rows = sql::query(sql).bind(before).bind(limit);
-        let rows = rows.bind(reach.owner());
-        Ok(rows.fetch_all(&self.reader).await?)
+        self.newest_of(sql, limit, before, reach).await
     }
 }
 
-/// Adds the row, the job's owner's, in the transaction that finishes the job.
-pub(super) async fn insert(
-    transaction: &mut Transaction,
-    lease: &Lease,
-    footage_id: Uuid,
-    outcome: &Outcome,
-    now_ms: i64,
-) -> Result<(), sqlx::Error> {
-    sql::query(
-        "insert into libraries (id, job_id, fence, footage_id, folder, params, summary, \
-         size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
-         (select owner from jobs where id = $2))",
-    )
-    .bind(lease.result_id)
-    .bind(lease.job_id.0)
-    .bind(lease.fence)
-    .bind(footage_id)
-    .bind(&outcome.folder)
-    .bind(&outcome.params)
-    .bind(&outcome.summary)
-    .bind(outcome.size_bytes())
-    .bind(now_ms)
-    .execute(transaction)
-    .await?;
-    Ok(())
-}
+/// What a finished analysis adds; the parameters are those of every result (`jobs/finish`).
+pub(super) const INSERT: &str = "insert into libraries (id, job_id, fence, footage_id, folder, params, \
+    summary, size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+    (select owner from jobs where id = $2))";

@@ -25,6 +25,33 @@ impl Store {
     }
 }
 
+/// Questions within reach: one row by its id, and the newest of a table.
+impl Store {
+    /// The row that `sql` asks for: `$1` is the id, `$2` the owner, null for everybody's.
+    pub(super) async fn one_of<T: sql::Row>(
+        &self,
+        sql: &'static str,
+        id: Uuid,
+        reach: &Reach,
+    ) -> Result<Option<T>, Error> {
+        let row = sql::query(sql).bind(id).bind(reach.owner());
+        Ok(row.fetch_optional(&self.reader).await?)
+    }
+
+    /// The rows that `sql` asks for: `$1` is the id that they are older than, null for the newest; `$2` how
+    /// many at most, `$3` the owner, null for everybody's.
+    pub(super) async fn newest_of<T: sql::Row>(
+        &self,
+        sql: &'static str,
+        limit: i64,
+        before: Option<Uuid>,
+        reach: &Reach,
+    ) -> Result<Vec<T>, Error> {
+        let rows = sql::query(sql).bind(before).bind(limit);
+        Ok(rows.bind(reach.owner()).fetch_all(&self.reader).await?)
+    }
+}
+
 /// Whose rows a question is about.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reach {

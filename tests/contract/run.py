@@ -4,18 +4,17 @@ A third of the calls names what is there, a third what chance brings; a walk ask
 it is a fault when one of them never succeeded. Streams that never end are left out: tests/it/api/events.rs reads them.
 """
 
-import json
 import os
-import socket
 import subprocess
 import sys
 import tempfile
-import time
-import urllib.request
 from pathlib import Path
 
 import hooks  # noqa: F401 (it tells schemathesis, in this process too)
 from walk import Walk, tell
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from service import post, started, wait_for_job  # noqa: E402, of the folder above
 
 SEED = "6"
 EXAMPLES = "12"
@@ -28,34 +27,14 @@ def main(program):
     program = str(Path(program).resolve())
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
-        service, address = start(program, folder / "data")
-        try:
-            os.environ["CONTRACT_SEEN"] = str(folder / "seen")
+        os.environ["CONTRACT_SEEN"] = str(folder / "seen")
+        with started(program, folder / "data", "--log", "warn", "--max-queued", "20") as address:
             ids = furnish(program, address, folder)
             faults = run(address, folder, "chance", "")
             faults += run(address, folder, "what is there", known(ids))
             faults += walk_through(program, address, folder)
-        finally:
-            service.terminate()
-            code = service.wait(timeout=30)
-        assert code == 0, f"the service ended with {code}"
         checked = subprocess.run([program, "check", "--data", folder / "data"], check=False)
         sys.exit(1 if faults or checked.returncode else 0)
-
-
-def start(program, data):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{probe.getsockname()[1]}"
-    arguments = ["serve", "--bind", address, "--data", data, "--no-sample", "--log", "warn", "--max-queued", "20"]
-    service = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL)
-    for _ in range(300):
-        try:
-            urllib.request.urlopen(f"http://{address}/healthz", timeout=1).close()
-            return service, f"http://{address}"
-        except OSError:
-            time.sleep(0.1)
-    raise TimeoutError("the service did not answer within 30 s")
 
 
 def furnish(program, address, folder):
@@ -69,7 +48,7 @@ def furnish(program, address, folder):
     flock = post(f"{address}/v1/flocks", {"library_id": library, "count": 2, "frames": 10})
     fish = post(f"{address}/v1/fish", {"library_id": library})
     for made in (analysis, flock, fish):
-        wait_for(address, made["job_id"])
+        wait_for_job(address, made["job_id"])
     ids = {"libraries": library, "flocks": flock["flock_id"], "fish": fish["fish_id"]}
     return {**ids, "footage": footage, "jobs": analysis["job_id"]}
 
@@ -110,24 +89,6 @@ def walk_through(program, address, folder):
     for operation in never:
         print(f"contract tests: never a success: {operation}")
     return len(never)
-
-
-def post(url, body, media_type="application/json"):
-    data = body if isinstance(body, bytes) else json.dumps(body).encode()
-    request = urllib.request.Request(url, data, {"Content-Type": media_type})
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
-
-
-def wait_for(address, job_id):
-    for _ in range(1200):
-        with urllib.request.urlopen(f"{address}/v1/jobs/{job_id}") as answer:
-            job = json.load(answer)
-        if job["finished_at"]:
-            assert job["state"] == "done", job["error"]
-            return
-        time.sleep(0.1)
-    raise TimeoutError("the job did not end within 120 s")
 
 
 if __name__ == "__main__":

@@ -60,6 +60,7 @@ class Walk:
         library = analysis["library_id"]
         self.wait_for(analysis["job_id"])
         asked = {"library_id": library, "count": 2, "frames": 10}
+        self.call("POST /v1/flocks/preview", body=asked)
         flock = self.call("POST /v1/flocks", body=asked).json()
         wish = {"footage": self.film, "params": '{"count": 2, "frames": 10}', "analysis": "{}"}
         self.call("POST /v1/flocks", body=wish, media_type=FORM)

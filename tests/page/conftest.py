@@ -1,17 +1,17 @@
 """A really started service, a film made by the program, and Debian's chromium."""
 
-import json
 import os
 import re
-import socket
 import subprocess
-import time
+import sys
 import urllib.parse
-import urllib.request
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import sync_playwright
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from service import post, started, wait_for_job  # noqa: E402, of the folder above
 
 PROGRAM = str(Path(os.environ["FLOCKREEL_PROGRAM"]).resolve())
 CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
@@ -28,7 +28,7 @@ def film(tmp_path_factory):
 @pytest.fixture(scope="session")
 def filled_service(tmp_path_factory, film):
     """The address of a service that holds one film and one flock of 6, made by its API."""
-    for address in started(tmp_path_factory.mktemp("filled") / "data"):
+    with started(PROGRAM, tmp_path_factory.mktemp("filled") / "data") as address:
         name = urllib.parse.quote(film.name)
         footage = post(f"{address}/v1/footage?name={name}", film.read_bytes(), "video/mp4")
         analysis = post(f"{address}/v1/analyses", {"footage_id": footage["id"]})
@@ -40,7 +40,8 @@ def filled_service(tmp_path_factory, film):
 @pytest.fixture
 def empty_service(tmp_path):
     """The address of a service that holds nothing yet."""
-    yield from started(tmp_path / "data")
+    with started(PROGRAM, tmp_path / "data") as address:
+        yield address
 
 
 @pytest.fixture(scope="session")
@@ -81,49 +82,5 @@ def closed_service(tmp_path):
     data = tmp_path / "data"
     command = [PROGRAM, "token", "create", "--name", "page", "--data", data]
     token = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-    for address in started(data, "--auth", "required"):
+    with started(PROGRAM, data, "--auth", "required") as address:
         yield address, token
-
-
-def started(data, *flags):
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    address = f"http://127.0.0.1:{port}"
-    arguments = ["serve", "--bind", f"127.0.0.1:{port}", "--data", data.name, "--no-sample", *flags]
-    service = subprocess.Popen([PROGRAM, *arguments], cwd=data.parent, stdin=subprocess.DEVNULL)
-    try:
-        wait_until_ready(service, address)
-        yield address
-    finally:
-        service.terminate()
-        service.wait(timeout=30)
-
-
-def wait_until_ready(service, address):
-    for _ in range(300):
-        assert service.poll() is None, "the service ended by itself"
-        try:
-            urllib.request.urlopen(f"{address}/healthz", timeout=1).close()
-            return
-        except OSError:
-            time.sleep(0.1)
-    raise TimeoutError("the service did not answer within 30 s")
-
-
-def post(url, body, media_type="application/json"):
-    data = body if isinstance(body, bytes) else json.dumps(body).encode()
-    request = urllib.request.Request(url, data, {"Content-Type": media_type})
-    with urllib.request.urlopen(request) as answer:
-        return json.load(answer)
-
-
-def wait_for_job(address, job_id):
-    for _ in range(2400):
-        with urllib.request.urlopen(f"{address}/v1/jobs/{job_id}") as answer:
-            job = json.load(answer)
-        if job["finished_at"]:
-            assert job["state"] == "done", job["error"]
-            return
-        time.sleep(0.1)
-    raise TimeoutError("the job did not end within 240 s")

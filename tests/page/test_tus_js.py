@@ -9,7 +9,8 @@ import threading
 import urllib.request
 from pathlib import Path
 
-from test_uploads import free_address, start
+from conftest import PROGRAM
+from service import free_address, start
 
 HERE = Path(__file__).parent
 MODULES = HERE.parents[1] / "target/web"
@@ -21,12 +22,12 @@ def test_an_upload_by_tus_js_client_goes_on_where_it_was_cut(tmp_path, film):
     assert (MODULES / "node_modules/tus-js-client").is_dir(), "tus-js-client is missing: run `make vendor`"
     size = film.stat().st_size
     address = free_address()
-    service = [start(tmp_path / "data", address)]
+    service = [start(PROGRAM, tmp_path / "data", address)]
 
     def kill_and_start_again():
         service[0].kill()
         service[0].wait()
-        service[0] = start(tmp_path / "data", address)
+        service[0] = start(PROGRAM, tmp_path / "data", address)
 
     wire = CutWire(address, size // 2, kill_and_start_again)
     try:

@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use self::film::{Backdrop, Film, Output, Target};
-use super::allotted::next_id;
 use super::{Attempt, Context, Error, Product, Stages};
 use crate::flock::composite::params::{Format, Render};
 use crate::flock::{Flock, Params, plan_flock};
@@ -23,7 +22,6 @@ use crate::library::Library;
 use crate::progress::Progress;
 use crate::store;
 use crate::store::jobs::Kind;
-use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
 
@@ -67,20 +65,9 @@ pub async fn enqueue(
     after_job: Option<JobId>,
     account: &Account,
 ) -> Result<(JobId, FlockId), store::Error> {
-    let (job_id, flock_id) = (JobId(next_id()), FlockId(next_id()));
-    let job = NewJob {
-        job_id,
-        account: account.clone(),
-        kind: Kind::Flock,
-        input: serde_json::json!(input).to_string(),
-        result_id: flock_id.0,
-        after_job,
-        priority: 0,
-        room: context.max_queued,
-    };
-    context.store.enqueue(&job, context.now_ms().await?).await?;
-    context.wake.notify_one();
-    Ok((job_id, flock_id))
+    let queued = context.enqueue(Kind::Flock, input, after_job, account);
+    let (job_id, flock_id) = queued.await?;
+    Ok((job_id, FlockId(flock_id)))
 }
 
 impl Input {

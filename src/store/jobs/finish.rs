@@ -4,7 +4,7 @@
 use sqlx::types::Uuid;
 
 use super::{Change, Lease};
-use crate::store::{BlobFile, Error, Store, blobs, fish, flocks, libraries, sql};
+use crate::store::{BlobFile, Error, Store, Transaction, blobs, fish, flocks, libraries, sql};
 
 /// What a finished job leaves: files already in place, and the row that names them.
 #[derive(Clone, Debug)]
@@ -56,17 +56,7 @@ impl Store {
             return Ok(Change::Lost);
         }
         blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
-        match outcome.made {
-            Made::Library(footage_id) => {
-                libraries::insert(&mut transaction, lease, footage_id, outcome, now_ms).await?;
-            }
-            Made::Flock(library_id) => {
-                flocks::insert(&mut transaction, lease, library_id, outcome, now_ms).await?;
-            }
-            Made::Fish(library_id) => {
-                fish::insert(&mut transaction, lease, library_id, outcome, now_ms).await?;
-            }
-        }
+        insert(&mut transaction, lease, outcome, now_ms).await?;
         transaction.commit().await?;
         tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
         Ok(Change::Made)
@@ -78,4 +68,31 @@ impl Outcome {
     pub fn size_bytes(&self) -> i64 {
         self.files.iter().map(|file| file.size_bytes).sum()
     }
+}
+
+/// Adds the row of the result, which is the job's owner's.
+async fn insert(
+    transaction: &mut Transaction,
+    lease: &Lease,
+    outcome: &Outcome,
+    now_ms: i64,
+) -> Result<(), sqlx::Error> {
+    let (sql, made_of) = match outcome.made {
+        Made::Library(footage_id) => (libraries::INSERT, footage_id),
+        Made::Flock(library_id) => (flocks::INSERT, library_id),
+        Made::Fish(library_id) => (fish::INSERT, library_id),
+    };
+    sql::query(sql)
+        .bind(lease.result_id)
+        .bind(lease.job_id.0)
+        .bind(lease.fence)
+        .bind(made_of)
+        .bind(&outcome.folder)
+        .bind(&outcome.params)
+        .bind(&outcome.summary)
+        .bind(outcome.size_bytes())
+        .bind(now_ms)
+        .execute(transaction)
+        .await?;
+    Ok(())
 }

@@ -6,7 +6,7 @@ use super::{JobState, Kind};
 use crate::code::Code;
 use crate::ids::JobId;
 use crate::store::owners::Reach;
-use crate::store::{Error, Store, sql};
+use crate::store::{Error, Store};
 
 /// One job as people see it.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,11 +58,7 @@ impl Store {
     /// One job, if it is there and within reach.
     pub async fn job(&self, id: JobId, reach: &Reach) -> Result<Option<JobRow>, Error> {
         let sql = "select * from jobs where id = $1 and ($2 is null or owner = $2)";
-        let row: Option<Row> = sql::query(sql)
-            .bind(id.0)
-            .bind(reach.owner())
-            .fetch_optional(&self.reader)
-            .await?;
+        let row: Option<Row> = self.one_of(sql, id.0, reach).await?;
         row.map(JobRow::try_from).transpose()
     }
 
@@ -73,11 +69,7 @@ impl Store {
         reach: &Reach,
     ) -> Result<Option<JobRow>, Error> {
         let sql = "select * from jobs where result_id = $1 and ($2 is null or owner = $2)";
-        let row: Option<Row> = sql::query(sql)
-            .bind(result)
-            .bind(reach.owner())
-            .fetch_optional(&self.reader)
-            .await?;
+        let row: Option<Row> = self.one_of(sql, result, reach).await?;
         row.map(JobRow::try_from).transpose()
     }
 
@@ -90,12 +82,7 @@ impl Store {
     ) -> Result<Vec<JobRow>, Error> {
         let sql = "select * from jobs where ($1 is null or id < $1) \
                    and ($3 is null or owner = $3) order by id desc limit $2";
-        let rows: Vec<Row> = sql::query(sql)
-            .bind(before)
-            .bind(limit)
-            .bind(reach.owner())
-            .fetch_all(&self.reader)
-            .await?;
+        let rows: Vec<Row> = self.newest_of(sql, limit, before, reach).await?;
         rows.into_iter().map(JobRow::try_from).collect()
     }
 }

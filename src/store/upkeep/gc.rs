@@ -86,6 +86,7 @@ mod tests {
 
     use super::*;
     use crate::store::upkeep::sweep::GRACE;
+    use crate::store::{blobs, fresh};
 
     #[tokio::test]
     async fn what_nobody_refers_to_is_counted_and_then_removed() {
@@ -106,6 +107,25 @@ mod tests {
         assert_eq!((found.n_drafts, found.n_folders, found.n_bytes), (1, 1, 10));
         assert_eq!(store.collect_waste(later, 0).await.unwrap(), found);
         assert_eq!(store.waste(later, 0).await.unwrap(), Waste::default());
+    }
+
+    #[tokio::test]
+    async fn what_a_row_names_is_kept_however_old() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let draft = store.blobs().draft("film").unwrap();
+        fs::write(draft.path().join("video"), b"12345").unwrap();
+        let files = store.blobs().seal(&draft).unwrap();
+        store.blobs().adopt(draft, "footage/kept").await.unwrap();
+        let mut transaction = store.begin().await.unwrap();
+        blobs::insert(&mut transaction, "footage/kept", &files)
+            .await
+            .unwrap();
+        transaction.commit().await.unwrap();
+        let later = SystemTime::now() + 2 * GRACE;
+        let removed = store.collect_waste(later, 0).await.unwrap();
+        assert_eq!(removed, Waste::default());
+        assert_eq!(store.blobs().folders().await.unwrap().len(), 1);
     }
 
     #[tokio::test]

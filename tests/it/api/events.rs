@@ -89,6 +89,8 @@ async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
     app.sign_in(&stranger);
     let footage = app.upload(&TINY).await;
     queued(&app, &footage).await;
+    let ended = queued(&app, &footage).await;
+    cancel(&app, &ended).await;
     app.sign_in(&owner);
     let footage = app.upload(&TINY).await;
     let first = queued(&app, &footage).await;
@@ -97,7 +99,7 @@ async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
     let second = queued(&app, &footage).await;
     assert_eq!(stream.told().await, (second.clone(), "queued".to_owned()));
     cancel(&app, &first).await;
-    assert_eq!(stream.told().await, (first, "cancelled".to_owned()));
+    assert_eq!(stream.told().await, (first.clone(), "cancelled".to_owned()));
     // Made and ended between two looks.
     let third = queued(&app, &footage).await;
     cancel(&app, &third).await;
@@ -105,7 +107,13 @@ async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
     if told == (third.clone(), "queued".to_owned()) {
         told = stream.told().await;
     }
-    assert_eq!(told, (third, "cancelled".to_owned()));
+    assert_eq!(told, (third.clone(), "cancelled".to_owned()));
+    // Whoever asks for all that ever ended is told of the own alone, too.
+    let all = app.get("/v1/events").header("last-event-id", "1");
+    let mut all = Stream::open(all).await;
+    for expected in [&first, &second, &third] {
+        assert_eq!(all.told().await.0, *expected);
+    }
     let deleted = app.delete(&format!("/v1/footage/{footage}")).send().await;
     assert_eq!(deleted.unwrap().status(), 204);
     assert_eq!(stream.told().await, (second, "gone".to_owned()));

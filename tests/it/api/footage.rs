@@ -33,12 +33,7 @@ async fn the_same_bytes_again_are_the_same_footage() {
     let app = TestApp::idle().await;
     let id = app.upload(&TINY).await;
     let form = Form::new().part("video", Part::bytes(TINY.clone()));
-    let again = app
-        .post("/v1/footage")
-        .multipart(form)
-        .send()
-        .await
-        .unwrap();
+    let again = app.send_form("/v1/footage", form).await;
     let again = json_of(again, StatusCode::OK).await;
     assert_eq!(again["id"], id);
     assert_eq!(app.n_folders("footage").await, 1);
@@ -107,12 +102,7 @@ async fn a_form_must_hold_a_video_and_nothing_unknown() {
         Form::new().text("vidoe", "x"),
         Form::new().part("background", Part::bytes(TINY.clone())),
     ] {
-        let answer = app
-            .post("/v1/footage")
-            .multipart(form)
-            .send()
-            .await
-            .unwrap();
+        let answer = app.send_form("/v1/footage", form).await;
         assert_eq!(code_of(answer, 400).await, "malformed_request");
     }
     app.assert_sound().await;
@@ -125,12 +115,7 @@ async fn a_background_of_another_size_is_refused() {
     let form = Form::new()
         .part("video", Part::bytes(TINY.clone()))
         .part("background", Part::bytes(picture));
-    let answer = app
-        .post("/v1/footage")
-        .multipart(form)
-        .send()
-        .await
-        .unwrap();
+    let answer = app.send_form("/v1/footage", form).await;
     assert_eq!(code_of(answer, 422).await, "background_size_differs");
     assert_eq!(app.n_folders("footage").await, 0);
     app.assert_sound().await;

@@ -69,6 +69,19 @@ async fn a_body_that_is_announced_too_large_is_refused_before_it_comes() {
 }
 
 #[tokio::test]
+async fn a_body_that_does_not_say_how_long_it_is_ends_at_the_limit() {
+    let app = TestApp::start(&["--max-upload-bytes", "1000"]).await;
+    let more = "transfer-encoding: chunked\r\n";
+    let chunk = [&b"258\r\n"[..], &[7; 600], b"\r\n"].concat();
+    let all = [&head("POST", "/v1/footage", more), &chunk[..], &chunk].map(<[u8]>::to_vec);
+    // It has not ended, and never will.
+    let all: Vec<&[u8]> = all.iter().map(Vec::as_slice).collect();
+    let answer = exchange(&app, &all).await;
+    assert!(answer.starts_with("HTTP/1.1 413"), "{answer}");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
 async fn a_length_that_is_a_lie_leaves_nothing_behind() {
     let app = TestApp::idle().await;
     let more = |length: usize| format!("content-length: {length}\r\nconnection: close\r\n");
@@ -125,13 +138,20 @@ async fn a_packed_body_is_refused_on_every_route() {
 #[tokio::test]
 async fn a_form_of_ten_thousand_parts_is_refused_at_the_first_that_is_not_asked_for() {
     let app = TestApp::idle().await;
-    let parts: String = (0..10_000)
-        .map(|k| format!("--x\r\ncontent-disposition: form-data; name=\"f{k}\"\r\n\r\nv\r\n"))
-        .collect();
+    let part = |name: &str, value: &[u8]| {
+        let head = format!("--x\r\ncontent-disposition: form-data; name=\"{name}\"\r\n\r\n");
+        [head.as_bytes(), value, b"\r\n"].concat()
+    };
+    // With what is asked for at its beginning, so that nothing is missing.
+    let mut parts = part("video", &TINY);
+    for k in 0..10_000 {
+        parts.extend(part(&format!("f{k}"), b"v"));
+    }
+    parts.extend(b"--x--\r\n");
     let answer = app
         .post("/v1/footage")
         .header("content-type", "multipart/form-data; boundary=x");
-    let answer = answer.body(parts + "--x--\r\n").send().await.unwrap();
+    let answer = answer.body(parts).send().await.unwrap();
     assert_eq!(code_of(answer, 400).await, "malformed_request");
     app.assert_sound().await;
 }

@@ -19,12 +19,7 @@ async fn a_film_sent_to_be_measured_is_stored_and_measured() {
     let form = Form::new()
         .text("params", r#"{"threshold": 30}"#)
         .part("video", Part::bytes(TINY.clone()));
-    let form = app
-        .post("/v1/analyses")
-        .multipart(form)
-        .send()
-        .await
-        .unwrap();
+    let form = app.send_form("/v1/analyses", form).await;
     let form = json_of(form, StatusCode::ACCEPTED).await;
     assert_eq!(form["footage_id"], raw["footage_id"], "the same bytes");
     assert_ne!(form["job_id"], raw["job_id"]);
@@ -43,12 +38,7 @@ async fn a_film_sent_to_be_measured_is_stored_and_measured() {
 async fn a_form_may_be_larger_than_any_json() {
     let app = TestApp::idle().await;
     let form = Form::new().part("video", Part::bytes(vec![7; 3 << 20]));
-    let answer = app
-        .post("/v1/footage")
-        .multipart(form)
-        .send()
-        .await
-        .unwrap();
+    let answer = app.send_form("/v1/footage", form).await;
     assert_eq!(code_of(answer, 422).await, "not_a_video");
     app.assert_sound().await;
 }
@@ -59,7 +49,7 @@ async fn a_film_becomes_a_flock_in_one_call() {
     let form = Form::new()
         .part("footage", Part::bytes(SWIM.clone()).file_name("fish.mp4"))
         .text("params", json!({"count": 2, "frames": 10}).to_string());
-    let answer = app.post("/v1/flocks").multipart(form).send().await.unwrap();
+    let answer = app.send_form("/v1/flocks", form).await;
     let link = answer.headers()["link"].to_str().unwrap().to_owned();
     let flock = json_of(answer, StatusCode::ACCEPTED).await;
     let path = format!("/v1/flocks/{}", flock["flock_id"].as_str().unwrap());

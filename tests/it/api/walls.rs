@@ -48,6 +48,11 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/jobs/{id}/events", Path("jobs")),
         ("POST", "/v1/analyses", Body("footage_id", "footage")),
         ("POST", "/v1/flocks", Body("library_id", "libraries")),
+        (
+            "POST",
+            "/v1/flocks/preview",
+            Body("library_id", "libraries"),
+        ),
         ("POST", "/v1/fish", Body("library_id", "libraries")),
         ("POST", "/v1/flocks/{id}/links", Path("flocks")),
         ("HEAD", "/v1/uploads/{id}", Path("uploads")),
@@ -187,7 +192,12 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
     );
     let admin = app.token(Scope::Admin, 9).await;
     app.sign_in(&owner);
-    let things = belongings(&app).await;
+    let mut things = belongings(&app).await;
+    // What is not made yet has an id already.
+    let (_, footage) = things.iter().find(|(kind, _)| *kind == "footage").unwrap();
+    let wish = json!({"footage_id": footage});
+    let queued = app.accept("/v1/analyses", wish).await;
+    things.push(("queued", queued["library_id"].as_str().unwrap().to_owned()));
     for (method, path, touch) in &table() {
         let call = (*method, *path, touch);
         let (Touch::Path(wanted) | Touch::Body(_, wanted)) = touch else {

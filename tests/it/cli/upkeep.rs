@@ -2,8 +2,8 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 use serde_json::{Value, json};
 
@@ -28,8 +28,11 @@ async fn json_at(url: String) -> Value {
     answer.json().await.unwrap()
 }
 
+/// Films that were stored and are not deleted again.
+type Kept = Arc<Mutex<Vec<String>>>;
+
 /// Uploads films, queues their analyses, and deletes every third, until told to stop.
-async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>) {
+async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>, kept: Kept) {
     let client = client();
     while !stop.load(Ordering::Relaxed) {
         let number = next.fetch_add(1, Ordering::Relaxed);
@@ -45,6 +48,8 @@ async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>) {
         if number.is_multiple_of(3) {
             let gone = client.delete(format!("{base}/v1/footage/{id}")).send();
             assert_eq!(gone.await.unwrap().status(), 204);
+        } else {
+            kept.lock().unwrap().push(id.to_owned());
         }
     }
 }
@@ -54,18 +59,21 @@ async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
     let films = Films::new();
     let server = Server::start(&films.path("data"));
     let (next, stop) = (Arc::default(), Arc::new(AtomicBool::new(false)));
+    let kept = Kept::default();
     let writers: Vec<_> = (0..3)
         .map(|_| {
             tokio::spawn(write_on(
                 server.base.clone(),
                 Arc::clone(&next),
                 stop.clone(),
+                kept.clone(),
             ))
         })
         .collect();
     while next.load(Ordering::Relaxed) < 12 {
         tokio::time::sleep(std::time::Duration::from_millis(20)).await;
     }
+    let before = kept.lock().unwrap().clone();
     let folder = films.folder().to_owned();
     let arguments = ["backup", "copy", "--data", "data", "--json"];
     let (again, folder_2) = (arguments, folder.clone());
@@ -97,18 +105,20 @@ async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
     assert_eq!(check.status.code(), Some(0), "{}", said(&check));
     assert!(!films.path("copy.partial").exists());
     let restored = Server::start(&films.path("copy"));
-    every_film_is_whole(&restored.base, copied["files"].as_u64().unwrap()).await;
+    let stored = every_film_is_whole(&restored.base, copied["files"].as_u64().unwrap()).await;
+    let lost: Vec<_> = before.iter().filter(|id| !stored.contains(id)).collect();
+    assert!(lost.is_empty(), "stored before the backup: {lost:?}");
     let ended = client().post(format!("{}/v1/footage", restored.base));
     let ended = ended.body(numbered_film(100_000)).send().await.unwrap();
     assert_eq!(ended.status(), 201, "it goes on");
 }
 
-/// So many films are listed, and each is served with the bytes that its hash is of.
-async fn every_film_is_whole(base: &str, n_films: u64) {
+/// So many films are listed, and each is served with the bytes that its hash is of; their ids.
+async fn every_film_is_whole(base: &str, n_films: u64) -> Vec<String> {
     let items = json_at(format!("{}/v1/footage?limit=200", base)).await["items"].clone();
     let items = items.as_array().unwrap().clone();
     assert_eq!(items.len() as u64, n_films);
-    for footage in items {
+    for footage in &items {
         let path = format!(
             "{}/v1/footage/{}/file",
             base,
@@ -123,6 +133,8 @@ async fn every_film_is_whole(base: &str, n_films: u64) {
         );
         assert_eq!(footage["sha256"], etag.trim_matches('"'));
     }
+    let ids = items.iter().map(|footage| footage["id"].as_str().unwrap());
+    ids.map(str::to_owned).collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -185,6 +197,36 @@ async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
             said(&absent)
         );
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn gc_beside_a_service_leaves_what_it_is_receiving() {
+    let films = Films::new();
+    let server = Server::start(&films.path("data"));
+    let film = numbered_film(1);
+    let (first, second) = film.split_at(film.len() / 2);
+    let (first, second) = (first.to_vec(), second.to_vec());
+    let folder = films.folder().to_owned();
+    // What comes between the halves is that somebody looks for waste.
+    let rest = async move {
+        let gc = move || {
+            let is_received =
+                |tmp: std::io::Result<std::fs::ReadDir>| tmp.unwrap().next().is_some();
+            while !is_received(std::fs::read_dir(folder.join("data/tmp"))) {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+            }
+            flockreel(&["gc", "--data", "data", "--json"], &folder)
+        };
+        let done = tokio::task::spawn_blocking(gc).await.unwrap();
+        let removed: Value = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(removed["drafts"], 0, "{removed}");
+        Ok::<_, std::io::Error>(second)
+    };
+    let first = futures_util::stream::once(async move { Ok(first) });
+    let halves = futures_util::StreamExt::chain(first, futures_util::stream::once(rest));
+    let sent = client().post(format!("{}/v1/footage", server.base));
+    let answer = sent.body(reqwest::Body::wrap_stream(halves)).send().await;
+    assert_eq!(answer.unwrap().status(), 201);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -11,6 +11,7 @@ use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::Supervisor;
 use flockreel::store::tokens::{NewToken, Scope};
 use reqwest::header::{self, HeaderMap};
+use reqwest::multipart::Form;
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
 use serde_json::Value;
 use tokio::net::TcpListener;
@@ -129,6 +130,11 @@ impl TestApp {
 
     pub(crate) fn head(&self, path: &str) -> RequestBuilder {
         self.client.head(format!("{}{path}", self.base))
+    }
+
+    /// POSTs a form.
+    pub(crate) async fn send_form(&self, path: &str, form: Form) -> Response {
+        self.post(path).multipart(form).send().await.unwrap()
     }
 
     /// Uploads a film that must be taken, and returns its id.

@@ -5,13 +5,17 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use flockreel::store::blobs::hex;
+use reqwest::{Client, Response, StatusCode};
 use rustix::process::{Pid, Signal, kill_process};
+use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
-use super::Place;
+use super::app::json_of;
 use super::clip::TINY;
+use super::{Place, client};
 
 /// A running `flockreel worker`, and what it has said.
 pub(crate) struct WorkerProcess {
@@ -77,10 +81,11 @@ impl Drop for WorkerProcess {
     }
 }
 
-/// A running `flockreel serve` without a sample.
+/// A running `flockreel serve` without a sample, and what asks it.
 pub(crate) struct Server {
     child: Child,
     log: JoinHandle<String>,
+    client: Client,
     pub(crate) base: String,
 }
 
@@ -104,11 +109,25 @@ impl Server {
 
     /// The same with variables of its environment.
     pub(crate) fn start_in(data: &Path, flags: &[&str], variables: &[(&str, &str)]) -> Server {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_flockreel"))
+        let mut service = Command::new(env!("CARGO_BIN_EXE_flockreel"));
+        service.envs(variables.iter().copied());
+        Server::started(service, data, flags)
+    }
+
+    /// Starts it by another program that stands before it, such as one that writes down its calls.
+    pub(crate) fn start_under(before: &[&str], data: &Path) -> Server {
+        let mut service = Command::new(before[0]);
+        service
+            .args(&before[1..])
+            .arg(env!("CARGO_BIN_EXE_flockreel"));
+        Server::started(service, data, &[])
+    }
+
+    fn started(mut service: Command, data: &Path, flags: &[&str]) -> Server {
+        let mut child = service
             .args(["serve", "--no-sample", "--bind", "127.0.0.1:0", "--data"])
             .arg(data)
             .args(flags)
-            .envs(variables.iter().copied())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
@@ -126,7 +145,66 @@ impl Server {
             let lines = lines.map_while(Result::ok);
             lines.fold(log, |log, line| format!("{log}{line}\n"))
         });
-        Server { child, log, base }
+        Server {
+            child,
+            log,
+            client: client(),
+            base,
+        }
+    }
+
+    pub(crate) async fn get(&self, path: &str) -> Response {
+        let request = self.client.get(format!("{}{path}", self.base));
+        request.send().await.unwrap()
+    }
+
+    /// GETs JSON.
+    pub(crate) async fn json(&self, path: &str) -> Value {
+        self.get(path).await.json().await.unwrap()
+    }
+
+    pub(crate) async fn delete(&self, path: &str) -> Response {
+        let request = self.client.delete(format!("{}{path}", self.base));
+        request.send().await.unwrap()
+    }
+
+    /// Sends a film.
+    pub(crate) async fn upload(&self, film: Vec<u8>) -> Response {
+        let request = self.client.post(format!("{}/v1/footage", self.base));
+        request.body(film).send().await.unwrap()
+    }
+
+    /// POSTs JSON that must be accepted as a job, and returns the answer.
+    pub(crate) async fn accept(&self, path: &str, wish: Value) -> Value {
+        let request = self.client.post(format!("{}{path}", self.base));
+        let answer = request.json(&wish).send().await.unwrap();
+        json_of(answer, StatusCode::ACCEPTED).await
+    }
+
+    /// Sends a film that must be taken, and has it measured.
+    pub(crate) async fn analyze(&self, film: Vec<u8>) -> Value {
+        let footage = json_of(self.upload(film).await, StatusCode::CREATED).await;
+        let wish = json!({"footage_id": footage["id"]});
+        self.accept("/v1/analyses", wish).await
+    }
+
+    /// The job once it is as wanted, which it must be within four minutes.
+    pub(crate) async fn job_when(&self, id: &Value, is_so: impl Fn(&Value) -> bool) -> Value {
+        let path = format!("/v1/jobs/{}", id.as_str().unwrap());
+        let start = Instant::now();
+        loop {
+            let job = self.json(&path).await;
+            if is_so(&job) {
+                return job;
+            }
+            assert!(start.elapsed() < Duration::from_secs(240), "{job}");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+
+    /// The job in its final state.
+    pub(crate) async fn ended(&self, id: &Value) -> Value {
+        self.job_when(id, |job| !job["finished_at"].is_null()).await
     }
 
     /// SIGKILL.

@@ -1,5 +1,6 @@
 //! The life of jobs: stepped by hand, run by a real pool, under a killed server, and raced for.
 
+mod durable;
 mod full_disk;
 mod kills;
 mod life_cycle;

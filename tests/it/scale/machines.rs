@@ -10,15 +10,15 @@ use flockreel::jobs::clock::now_ms;
 use flockreel::store::Store;
 use flockreel::store::footage::{Added, VIDEO};
 use flockreel::store::owners::Owner;
-use reqwest::{Client, StatusCode};
+use reqwest::StatusCode;
 use rustix::process::Signal;
 use serde_json::{Value, json};
 use uuid::Uuid;
 
+use crate::common::Place;
 use crate::common::app::json_of;
 use crate::common::clip::SWIM;
 use crate::common::process::{Server, WorkerProcess};
-use crate::common::{Place, client};
 
 /// The footage of the swimming fish, as an upload leaves it.
 pub(super) async fn admitted(store: &Store) -> Uuid {
@@ -38,102 +38,64 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
     footage.id
 }
 
-/// A service, as its users see it.
-struct Service {
-    client: Client,
-    base: String,
+/// Queues two analyses, and of each a flock and a fish; returns jobs and files, in one order.
+async fn queue_everything(server: &Server) -> (Vec<Value>, Vec<String>) {
+    let footage = json_of(server.upload(SWIM.clone()).await, StatusCode::CREATED).await;
+    let (mut jobs, mut files) = (Vec::new(), Vec::new());
+    for seed in 1..=2 {
+        let wish = json!({"footage_id": footage["id"]});
+        let analysis = server.accept("/v1/analyses", wish).await;
+        let library = &analysis["library_id"];
+        let wish = json!({"library_id": library, "count": 3, "frames": 20, "seed": seed});
+        let flock = server.accept("/v1/flocks", wish).await;
+        let wish = json!({"library_id": library});
+        let fish = server.accept("/v1/fish", wish).await;
+        for accepted in [&analysis, &flock, &fish] {
+            jobs.push(accepted["job_id"].clone());
+        }
+        for (kind, id, names) in [
+            (
+                "libraries",
+                library,
+                &["library.json", "poses.json", "sprites.zip", "overlay.mp4"][..],
+            ),
+            ("flocks", &flock["flock_id"], &["flock.json", "video.mp4"]),
+            ("fish", &fish["fish_id"], &["video.mp4", "model.glb"]),
+        ] {
+            let id = id.as_str().unwrap();
+            files.extend(names.iter().map(|name| format!("/v1/{kind}/{id}/{name}")));
+        }
+    }
+    (jobs, files)
 }
 
-impl Service {
-    fn of(server: &Server) -> Service {
-        let (client, base) = (client(), server.base.clone());
-        Service { client, base }
+async fn all_done(server: &Server, jobs: &[Value]) -> Vec<Value> {
+    let mut ended = Vec::new();
+    for id in jobs {
+        let job = server.ended(id).await;
+        assert_eq!(job["state"], "done", "{job}");
+        ended.push(job);
     }
+    ended
+}
 
-    async fn post(&self, path: &str, body: Value) -> Value {
-        let url = format!("{}{path}", self.base);
-        let answer = self.client.post(url).json(&body).send().await.unwrap();
-        json_of(answer, StatusCode::ACCEPTED).await
-    }
-
-    async fn bytes(&self, path: &str) -> Vec<u8> {
-        let url = format!("{}{path}", self.base);
-        let answer = self.client.get(url).send().await.unwrap();
+async fn contents(server: &Server, files: &[String]) -> Vec<Vec<u8>> {
+    let mut contents = Vec::new();
+    for path in files {
+        let answer = server.get(path).await;
         assert_eq!(answer.status(), StatusCode::OK, "{path}");
-        answer.bytes().await.unwrap().to_vec()
+        contents.push(answer.bytes().await.unwrap().to_vec());
     }
-
-    async fn json(&self, path: &str) -> Value {
-        serde_json::from_slice(&self.bytes(path).await).unwrap()
-    }
-
-    /// Queues two analyses, and of each a flock and a fish; returns jobs and files, in one order.
-    async fn queue_everything(&self) -> (Vec<String>, Vec<String>) {
-        let url = format!("{}/v1/footage", self.base);
-        let answer = self.client.post(url).body(SWIM.clone()).send().await;
-        let footage = json_of(answer.unwrap(), StatusCode::CREATED).await;
-        let (mut jobs, mut files) = (Vec::new(), Vec::new());
-        for seed in 1..=2 {
-            let wish = json!({"footage_id": footage["id"]});
-            let analysis = self.post("/v1/analyses", wish).await;
-            let library = &analysis["library_id"];
-            let wish = json!({"library_id": library, "count": 3, "frames": 20, "seed": seed});
-            let flock = self.post("/v1/flocks", wish).await;
-            let fish = self.post("/v1/fish", json!({"library_id": library})).await;
-            for accepted in [&analysis, &flock, &fish] {
-                jobs.push(format!("/v1/jobs/{}", accepted["job_id"].as_str().unwrap()));
-            }
-            for (kind, id, names) in [
-                (
-                    "libraries",
-                    library,
-                    &["library.json", "poses.json", "sprites.zip", "overlay.mp4"][..],
-                ),
-                ("flocks", &flock["flock_id"], &["flock.json", "video.mp4"]),
-                ("fish", &fish["fish_id"], &["video.mp4", "model.glb"]),
-            ] {
-                let id = id.as_str().unwrap();
-                files.extend(names.iter().map(|name| format!("/v1/{kind}/{id}/{name}")));
-            }
-        }
-        (jobs, files)
-    }
-
-    async fn wait_for(&self, jobs: &[String]) -> Vec<Value> {
-        let begun = Instant::now();
-        let mut ended = Vec::new();
-        for path in jobs {
-            loop {
-                let job = self.json(path).await;
-                if !job["finished_at"].is_null() {
-                    assert_eq!(job["state"], "done", "{job}");
-                    ended.push(job);
-                    break;
-                }
-                assert!(begun.elapsed() < Duration::from_secs(240), "{job}");
-                tokio::time::sleep(Duration::from_millis(100)).await;
-            }
-        }
-        ended
-    }
-
-    async fn contents(&self, files: &[String]) -> Vec<Vec<u8>> {
-        let mut contents = Vec::new();
-        for path in files {
-            contents.push(self.bytes(path).await);
-        }
-        contents
-    }
+    contents
 }
 
 /// What a run that nobody disturbs makes, on one machine.
 async fn undisturbed() -> Vec<Vec<u8>> {
     let place = Place::local();
     let server = Server::start_at(&place);
-    let service = Service::of(&server);
-    let (jobs, files) = service.queue_everything().await;
-    service.wait_for(&jobs).await;
-    let contents = service.contents(&files).await;
+    let (jobs, files) = queue_everything(&server).await;
+    all_done(&server, &jobs).await;
+    let contents = contents(&server, &files).await;
     assert_eq!(server.terminate(), Some(0));
     contents
 }
@@ -161,13 +123,12 @@ async fn a_worker_killed_in_the_middle_changes_no_result() {
     let server = Server::start_at(&place);
     let machines = [place.elsewhere(), place.elsewhere()];
     let mut workers: Vec<_> = machines.iter().map(WorkerProcess::start).collect();
-    let service = Service::of(&server);
-    let (jobs, files) = service.queue_everything().await;
+    let (jobs, files) = queue_everything(&server).await;
     let killed = workers.remove(at_work(&workers).await);
     killed.signal(Signal::KILL);
     drop(killed);
 
-    let ended = service.wait_for(&jobs).await;
+    let ended = all_done(&server, &jobs).await;
     let n_attempts: i64 = ended
         .iter()
         .map(|job| job["attempt"].as_i64().unwrap())
@@ -177,7 +138,7 @@ async fn a_worker_killed_in_the_middle_changes_no_result() {
         jobs.len() as i64 + 1,
         "one was tried twice: {ended:?}"
     );
-    let found = service.contents(&files).await;
+    let found = contents(&server, &files).await;
     let differ: BTreeMap<_, _> = (files.iter().zip(found.iter().zip(&expected)))
         .filter(|(_, (found, expected))| found != expected)
         .map(|(path, (found, expected))| (path, (found.len(), expected.len())))

@@ -1,0 +1,170 @@
+"""Takes the guards of guards.toml out, one after the other, and asks that the test of each fails then.
+
+One program is built of a copy of the sources, in which every guard has a switch; FLOCKREEL_GUARD_OFF says which one is
+taken out. Each test must pass with all guards in place. Writes the table of docs/GUARDS.md anew where --write is given.
+
+  tests/guards/run.py [--write] [NAME...]       the guards whose name begins so, or all
+  scripts/with-servers.sh tests/guards/run.py   those that need several machines
+"""
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PLACE = ROOT / "target/guards"
+SOURCES = PLACE / "sources"
+LONGEST_S = 600
+SWITCH = """
+/// Whether the guard of that name is taken out.
+#[doc(hidden)]
+pub fn guard_off(name: &str) -> bool {
+    std::env::var("FLOCKREEL_GUARD_OFF").is_ok_and(|off| off == name)
+}
+"""
+DOCUMENT = ROOT / "docs/GUARDS.md"
+BEGIN, END = "<!-- the table: tests/guards/run.py --write -->\n", "<!-- end of the table -->\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--write", action="store_true", help="write docs/GUARDS.md")
+    asked = parser.parse_args()
+    guards = tomllib.loads(Path(__file__).with_name("guards.toml").read_text())["guard"]
+    lay_out(guards)
+    programs = build()
+    wanted = [g for g in guards if not asked.names or any(g["name"].startswith(n) for n in asked.names)]
+    servers = "FLOCKREEL_TEST_POSTGRES" in os.environ
+    wanted = [g for g in wanted if servers == g["test"].startswith("scale ")]
+    green, seen, faults = {}, {}, 0
+    for guard in wanted:
+        test = guard["test"]
+        if test not in green:
+            green[test] = run(programs, test, None)
+            if green[test] is not None:
+                print(f"RED WITH ALL GUARDS  {test}: {green[test]}", flush=True)
+        began = time.monotonic()
+        said = run(programs, test, guard["name"])
+        faults += said is None or green[test] is not None
+        seen[guard["name"]] = said
+        verdict = "GREEN WITHOUT" if said is None else "red"
+        print(f"{verdict:14}{guard['promise']:12}{guard['name']:24}{time.monotonic() - began:6.1f} s  {said or ''}", flush=True)
+    if asked.write:
+        write(guards, seen)
+    sys.exit(1 if faults else 0)
+
+
+def lay_out(guards):
+    """The sources with a switch beside every guard; files that stay the same keep their time."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    texts = {}
+    for name in filter(None, listed.split("\0")):
+        path = ROOT / name
+        if path.is_file():
+            texts[name] = path.read_bytes()
+    vendored = ROOT / "target/vendor"
+    switched = {}
+    for guard in guards:
+        for edit in guard.get("edit", []):
+            text = switched.get(edit["file"]) or texts[edit["file"]].decode()
+            if text.count(edit["old"]) != 1:
+                sys.exit(f"guards: {guard['name']}: stands {text.count(edit['old'])} times in {edit['file']}: {edit['old']}")
+            new = re.sub(r"\bOFF\b", f'crate::guard_off("{guard["name"]}")', edit["new"])
+            switched[edit["file"]] = text.replace(edit["old"], new)
+    switched["src/lib.rs"] = switched.get("src/lib.rs", texts["src/lib.rs"].decode()) + SWITCH
+    texts.update({name: text.encode() for name, text in switched.items()})
+    for name, text in texts.items():
+        path = SOURCES / name
+        if not path.is_file() or path.read_bytes() != text:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text)
+    if vendored.is_dir():
+        shutil.copytree(vendored, SOURCES / "target/vendor", dirs_exist_ok=True)
+
+
+def build():
+    """The test programs by their kind. Dependencies that are built already are shared by links."""
+    built, target = ROOT / "target/debug", PLACE / "target"
+    if built.is_dir() and not target.is_dir():
+        (target / "debug").mkdir(parents=True)
+        for part in ("deps", "build", ".fingerprint"):
+            subprocess.run(["cp", "-al", built / part, target / "debug" / part], check=True)
+    command = ["cargo", "test", "--locked", "--no-run", "--lib", "--test", "it", "--message-format=json"]
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(target)}
+    done = subprocess.run(command, cwd=SOURCES, env=environment, stdout=subprocess.PIPE, text=True)
+    if done.returncode:
+        for line in done.stdout.splitlines():
+            message = json.loads(line).get("message", {})
+            if isinstance(message, dict) and message.get("level") == "error":
+                print(message["rendered"])
+        sys.exit("guards: the program with switches does not build")
+    programs = {}
+    for line in done.stdout.splitlines():
+        built = json.loads(line)
+        if built.get("executable") and built["target"]["name"] in ("flockreel", "it") and built["profile"]["test"]:
+            programs["lib" if built["target"]["name"] == "flockreel" else "it"] = built["executable"]
+    return programs
+
+
+def run(programs, test, off):
+    """Why a test fails; None where it passes."""
+    kind, path = test.split(" ")
+    if kind == "contract":
+        command = [ROOT / "target/contract-venv/bin/python", "-B", ROOT / path, PLACE / "target/debug/flockreel"]
+    else:
+        program = programs["it" if kind == "scale" else kind]
+        command = [program, "--exact", path, "--nocapture"] + (["--ignored"] if kind == "scale" else [])
+    environment = {**os.environ, "FLOCKREEL_GUARD_OFF": off or "", "CARGO_MANIFEST_DIR": str(SOURCES)}
+    try:
+        done = subprocess.run(command, cwd=SOURCES, env=environment, capture_output=True, text=True, errors="replace", timeout=LONGEST_S)
+    except subprocess.TimeoutExpired:
+        return f"did not end in {LONGEST_S} s"
+    if kind != "contract" and "running 1 test" not in done.stdout:
+        sys.exit(f"guards: there is no such test: {test}")
+    if done.returncode == 0:
+        return None
+    return reason(done.stderr + done.stdout)
+
+
+def reason(said):
+    """The words of the panic, in one line."""
+    lines = said.splitlines()
+    for line in lines:
+        # schemathesis: the first fault that it found.
+        if line.startswith("- "):
+            return line[2:].strip()
+    at_home = [at for at, line in enumerate(lines) if "panicked at tests/" in line]
+    anywhere = [at for at, line in enumerate(lines) if "panicked at " in line]
+    for at in (at_home or anywhere)[:1]:
+        words = " ".join(lines[at + 1 : at + 4]).split("note: run with")[0].split("stack backtrace")[0]
+        return re.sub(r"\s+", " ", re.sub(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", "ID", words)).strip()[:160] or "failed"
+    return "failed"
+
+
+def write(guards, seen):
+    """Rows that were not seen this time stay as they were."""
+    text = DOCUMENT.read_text()
+    before, rest = text.split(BEGIN)
+    old, after = rest.split(END)
+    rows = {row.split("|")[1].strip(): row for row in old.splitlines() if row.startswith("| `")}
+    for guard in guards:
+        said = seen.get(guard["name"])
+        if said:
+            said = said.replace("|", "\\|").replace("<", "&lt;")
+            rows[f"`{guard['name']}`"] = f"| `{guard['name']}` | {guard['promise']} | {guard['out']} | `{guard['test'].split(' ')[1]}` | {said} |"
+    head = "| guard | promise | taken out | test | what it said then |\n| --- | --- | --- | --- | --- |\n"
+    order = [f"`{guard['name']}`" for guard in guards]
+    table = "".join(rows[name] + "\n" for name in order if name in rows)
+    DOCUMENT.write_text(before + BEGIN + head + table + END + after)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""A really started service, for the tests in Python: in a data folder of its own, on a port of its own."""
+
+import contextlib
+import json
+import socket
+import subprocess
+import time
+import urllib.request
+
+
+@contextlib.contextmanager
+def started(program, data, *flags):
+    """The address of the service while it runs; it must end well."""
+    address = free_address()
+    service = start(program, data, address, *flags)
+    try:
+        yield address
+    finally:
+        service.terminate()
+        code = service.wait(timeout=30)
+    assert code == 0, f"the service ended with {code}"
+
+
+def free_address():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"http://127.0.0.1:{probe.getsockname()[1]}"
+
+
+def start(program, data, address, *flags):
+    """The process of the service, once it answers."""
+    arguments = ["serve", "--bind", address.removeprefix("http://"), "--data", data, "--no-sample", *flags]
+    service = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL)
+    wait_until_ready(service, address)
+    return service
+
+
+def wait_until_ready(service, address):
+    for _ in range(300):
+        assert service.poll() is None, "the service ended by itself"
+        try:
+            urllib.request.urlopen(f"{address}/healthz", timeout=1).close()
+            return
+        except OSError:
+            time.sleep(0.1)
+    raise TimeoutError("the service did not answer within 30 s")
+
+
+def post(url, body, media_type="application/json"):
+    data = body if isinstance(body, bytes) else json.dumps(body).encode()
+    request = urllib.request.Request(url, data, {"Content-Type": media_type})
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def wait_for_job(address, job_id):
+    for _ in range(2400):
+        with urllib.request.urlopen(f"{address}/v1/jobs/{job_id}") as answer:
+            job = json.load(answer)
+        if job["finished_at"]:
+            assert job["state"] == "done", job["error"]
+            return
+        time.sleep(0.1)
+    raise TimeoutError("the job did not end within 240 s")
