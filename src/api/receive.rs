@@ -155,7 +155,7 @@ where
     S: Stream<Item = Result<Bytes, E>> + Unpin,
     E: std::error::Error,
 {
-    let mut intake = Intake::create(draft, name, limit_bytes).await?;
+    let mut intake = Intake::create(draft, name, limit_bytes);
     let mut n_unchecked = 0;
     loop {
         match timeout(PIECE, stream.next()).await {
@@ -165,7 +165,7 @@ where
                     check_room(state, 0)?;
                     n_unchecked = 0;
                 }
-                intake.take(&bytes).await?;
+                intake.take(bytes).await?;
             }
             Ok(Some(Err(error))) => {
                 tracing::debug!(%error, "a body was cut off");

@@ -40,7 +40,10 @@ pub async fn distances(context: &Context, library: &Library) -> Result<File, Err
             side: Side::Plain,
             cpu: Level::detect(),
         };
-        let matrix = DistanceMatrix::of(&distances, waiting).map_err(|_| Error::Cancelled)?;
+        let matrix = DistanceMatrix::of(&distances, waiting);
+        let Ok(matrix) = matrix else {
+            return Err(Error::Cancelled);
+        };
         let mut file = BufWriter::new(tempfile::tempfile_in(draft.path())?);
         npy::write(&matrix, &mut file)?;
         file.flush()?;

@@ -180,9 +180,9 @@ mod tests {
         assert_eq!(marks(&[]).runs().count(), 0);
         let mut long = Marks::none(200);
         long.mark_all();
-        assert_eq!(long.runs().collect::<Vec<_>>(), [0..200]);
+        assert!(long.runs().eq(std::iter::once(0..200)));
         long.unmark_first(130);
-        assert_eq!(long.runs().collect::<Vec<_>>(), [130..200]);
+        assert!(long.runs().eq(std::iter::once(130..200)));
     }
 
     proptest! {
