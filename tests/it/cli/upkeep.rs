@@ -180,14 +180,9 @@ async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
     assert_eq!(check.status.code(), Some(1), "{}", said(&check));
     let altered = format!("I1: altered: footage/{}", footage["id"].as_str().unwrap());
     assert!(said(&check).contains(&altered), "{}", said(&check));
-    let backup = run("backup copy --data data");
-    assert_eq!(
-        backup.status.code(),
-        Some(1),
-        "a broken file is not copied: {}",
-        said(&backup)
-    );
-    assert!(!films.path("copy").exists());
+    assert_no_copy_is_made(&films);
+    std::fs::remove_file(folder.join("video")).unwrap();
+    assert_no_copy_is_made(&films);
     for command in ["check", "gc", "backup copy"] {
         let absent = run(&format!("{command} --data nowhere"));
         assert_eq!(
@@ -197,6 +192,13 @@ async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
             said(&absent)
         );
     }
+}
+
+/// What is broken or missing is not copied.
+fn assert_no_copy_is_made(films: &Films) {
+    let backup = flockreel(&["backup", "copy", "--data", "data"], films.folder());
+    assert_eq!(backup.status.code(), Some(1), "{}", said(&backup));
+    assert!(!films.path("copy").exists());
 }
 
 #[tokio::test(flavor = "multi_thread")]
