@@ -21,6 +21,7 @@ test      ffprobe   ffmpeg
 test      strace    strace
 scale-test initdb   postgresql
 scale-test python3  python3-venv
+scale-test openssl  openssl
 truth-test python3  python3-venv
 truth-test ffmpeg   ffmpeg
 page-test python3   python3-venv

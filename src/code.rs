@@ -136,6 +136,8 @@ codes! {
         "Wait for a job to end, or cancel one."
     QueueFull "queue_full" "There are as many jobs under way as the service has room for."
         "Wait as long as `Retry-After` says, and ask again; what was uploaded is kept."
+    Busy "busy" "The service has as much to do right now as there is room for."
+        "Wait as long as `Retry-After` says, and send it again; of `/v1/uploads` what came is kept."
     RateLimited "rate_limited" "Too many requests in a short time: ask again soon."
         "Wait as long as `Retry-After` says; follow jobs by `/v1/events` rather than by asking often."
     CrossSite "cross_site" "Another site may not ask for this."

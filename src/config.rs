@@ -33,9 +33,9 @@ pub struct Config {
     #[arg(long, env = "FLOCKREEL_MAX_QUEUED", default_value_t = 10_000, value_name = "N",
         value_parser = clap::value_parser!(i64).range(0..))]
     pub max_queued: i64,
-    /// Another address, where /metrics alone is answered, to whoever reaches it.
-    #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
-    pub metrics_bind: Option<SocketAddr>,
+    /// Who watches.
+    #[command(flatten)]
+    pub watch: Watch,
     /// The largest upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,
@@ -124,6 +124,14 @@ pub struct Crew {
     pub job_time_s: u64,
 }
 
+/// How a process is watched from outside.
+#[derive(Args, Clone, Debug)]
+pub struct Watch {
+    /// Another address, where /metrics alone is answered, to whoever reaches it.
+    #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
+    pub metrics_bind: Option<SocketAddr>,
+}
+
 /// Where the rows are.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Database {
@@ -159,6 +167,11 @@ pub enum Auth {
 impl Config {
     /// The usual reserve on the disk.
     pub const DISK_RESERVE_BYTES: u64 = 1 << 30;
+
+    /// What of a reserve jobs leave free, bytes: uploads leave all of it, results may use the rest.
+    pub fn least_room_bytes(reserve_bytes: u64) -> u64 {
+        reserve_bytes / 8
+    }
 
     /// Whether a request without a token is refused.
     pub fn demands_tokens(&self) -> bool {

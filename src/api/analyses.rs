@@ -29,8 +29,20 @@ pub(super) struct AnalysisRequest {
     footage_id: FootageId,
     /// Overrides of the defaults, or of `preset` (`papers`).
     #[serde(default)]
-    #[schema(value_type = Params)]
+    #[schema(value_type = AnalysisOverrides)]
     params: Map<String, Value>,
+}
+
+/// Parameters to override, those of `preset` (`papers`) or the defaults.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the parameters in the OpenAPI document"
+)]
+pub(super) struct AnalysisOverrides {
+    preset: Option<String>,
+    #[serde(flatten)]
+    params: Params,
 }
 
 /// The job, and the library that it will make.
@@ -57,7 +69,7 @@ pub(super) struct AnalysisForm {
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
     /// JSON.
-    params: Option<Params>,
+    params: Option<AnalysisOverrides>,
 }
 
 /// Measure the animal of a footage, or of a film that comes with the request: as the raw body, or as a form.

@@ -2,14 +2,15 @@
 
 use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
-use axum::http::{Response, StatusCode};
+use axum::http::{Response, StatusCode, header};
+use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::AppState;
 use super::access::Caller;
+use super::analyses::AnalysisOverrides;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
 use super::footage::admit;
@@ -18,11 +19,13 @@ use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody, gone};
 use super::receive::{is_film, receive_with};
 use super::timestamp::rfc3339;
+use super::{AppState, libraries};
+use crate::code::Code;
 use crate::flock::Params;
 use crate::formats::params;
 use crate::ids::{FlockId, FootageId, JobId, LibraryId};
-use crate::jobs::analysis;
 use crate::jobs::flock::{Input, Summary, enqueue};
+use crate::jobs::{analysis, at_once};
 use crate::store::flocks::Film;
 use crate::store::footage::Added;
 
@@ -40,6 +43,9 @@ pub(super) const FILES: Files = &[
     ("video.webm", "video/webm"),
     ("video.mp4", "video/mp4"),
 ];
+
+/// The most that individuals times frames of a preview may be: what takes a second or so.
+const MOST_PREVIEWED: u64 = 200_000;
 
 /// What to make it of, and how: overrides of the defaults, or of `preset` (`papers`).
 #[derive(Debug, Deserialize, ToSchema)]
@@ -75,9 +81,21 @@ pub(super) struct FlockForm {
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
     /// How to make the flock, JSON.
-    params: Option<Params>,
+    params: Option<FlockOverrides>,
     /// How to measure the film, JSON.
-    analysis: Option<crate::analysis::Params>,
+    analysis: Option<AnalysisOverrides>,
+}
+
+/// Parameters to override, those of `preset` or the defaults.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the parameters in the OpenAPI document"
+)]
+pub(super) struct FlockOverrides {
+    preset: Option<String>,
+    #[serde(flatten)]
+    params: Params,
 }
 
 /// One flock.
@@ -159,6 +177,34 @@ async fn make(
             library_id,
         },
     ))
+}
+
+/// A flock simulated and planned at once, without a film: what `flock.json` will say of it. Individuals times frames
+/// are at most 200,000.
+#[utoipa::path(post, path = "/v1/flocks/preview", request_body = FlockRequest, responses(
+    (status = 200, content_type = "application/json", body = Value),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn preview_flock(
+    State(state): State<AppState>,
+    caller: Caller,
+    Json(request): Json<FlockRequest>,
+) -> Result<Response<Body>, Problem> {
+    let params: Params = params::read(request.params)?;
+    let n_shown = u64::from(params.count) * u64::from(params.frames);
+    if n_shown > MOST_PREVIEWED {
+        return Err(Problem {
+            code: Code::InvalidParams,
+            detail: format!(
+                "a preview has at most {MOST_PREVIEWED} individuals times frames, not {n_shown}: make the flock"
+            ),
+        });
+    }
+    let library = libraries::find(&state, &caller, request.library_id.0).await?;
+    let flock = at_once::flock(&state.context, &library, params).await?;
+    let json = [(header::CONTENT_TYPE, "application/json")];
+    Ok((json, flock).into_response())
 }
 
 /// Every flock, newest first.

@@ -91,8 +91,8 @@ pub(super) async fn create_footage(
 
 /// In a task of its own, so that a sender who hangs up now leaves no half of it behind.
 pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, Problem> {
-    let store = state.context.store.clone();
-    let admitted = tokio::spawn(async move { admit::admit(&store, arrival).await });
+    let context = state.context.clone();
+    let admitted = tokio::spawn(async move { admit::admit(&context, arrival).await });
     Ok(admitted.await.unwrap_or(Err(Error::Panicked))?)
 }
 

@@ -20,6 +20,7 @@ use futures_util::stream::{StreamExt, poll_fn};
 use sha2::{Digest, Sha256};
 
 use super::access::Caller;
+use super::problem::MayPass;
 use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::code::Code;
 use crate::jobs::{self, allotted};
@@ -160,7 +161,7 @@ async fn replay(answer: Answer, tally: &Tally, max_bytes: u64) -> Result<Respons
 
 /// Keeps the answer if it is one to keep and the body was read to its end.
 async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Response, Problem> {
-    if !is_kept(answer.status()) {
+    if !is_kept(answer.status()) || answer.extensions().get::<MayPass>().is_some() {
         return Ok(answer);
     }
     let Some(body_sha256) = tally.rest(MAX_EPILOGUE_BYTES as u64).await else {
@@ -182,9 +183,11 @@ async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Respons
         headers: serde_json::json!(headers).to_string(),
         answer: body.to_vec(),
     };
-    if let Some((store, scope)) = held.0.take() {
-        store.finish_key(&scope, &kept).await?;
+    // Held until the answer is noted: a sender who hangs up meanwhile, or a database that fails, gives it back.
+    if let Some((store, scope)) = &held.0 {
+        store.finish_key(scope, &kept).await?;
     }
+    held.0 = None;
     Ok(Response::from_parts(parts, Body::from(body)))
 }
 
@@ -290,6 +293,58 @@ fn is_json(headers: &HeaderMap) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[tokio::test]
+    async fn a_sender_who_hangs_up_while_the_answer_is_noted_gives_the_key_back() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let scope = Scope {
+            caller: String::new(),
+            route: "/v1/fish".into(),
+            key: "k".into(),
+        };
+        store.begin_key(&scope, None, 0).await.unwrap();
+        // The one writer is busy.
+        let mut busy = Box::pin(store.is_writable());
+        assert!(futures_util::poll!(&mut busy).is_pending());
+        let held = Held(Some((store.clone(), scope.clone())));
+        let tally = Tally::of(Body::empty(), Sha256::new());
+        let mut noted = Box::pin(keep(held, StatusCode::ACCEPTED.into_response(), &tally));
+        assert!(futures_util::poll!(&mut noted).is_pending());
+        drop(noted);
+        busy.await;
+        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+        let met = store.begin_key(&scope, None, 1).await.unwrap();
+        assert!(matches!(met, Begun::Run(_)), "{met:?}");
+    }
+
+    #[tokio::test]
+    async fn what_failed_on_a_busy_machine_is_not_kept_although_it_is_told_as_the_films_fault() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let scope = |key: Code| Scope {
+            caller: String::new(),
+            route: "/v1/footage".into(),
+            key: key.to_string(),
+        };
+        let is_kept = async |code: Code| {
+            store.begin_key(&scope(code), None, 0).await.unwrap();
+            let held = Held(Some((store.clone(), scope(code))));
+            let tally = Tally::of(Body::empty(), Sha256::new());
+            let answer = Problem::from(code).into_response();
+            assert_eq!(answer.status(), StatusCode::UNPROCESSABLE_ENTITY);
+            keep(held, answer, &tally).await.unwrap();
+            tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+            matches!(
+                store.begin_key(&scope(code), None, 1).await.unwrap(),
+                Begun::Done(_)
+            )
+        };
+        assert!(is_kept(Code::NotAVideo).await);
+        for code in [Code::TimeLimit, Code::MemoryLimit, Code::DecoderCrashed] {
+            assert!(!is_kept(code).await, "{code}");
+        }
+    }
 
     #[test]
     fn no_failure_of_ours_is_kept_and_nothing_that_passes() {

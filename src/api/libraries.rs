@@ -2,21 +2,23 @@
 
 use axum::body::Body;
 use axum::extract::State;
-use axum::http::{Response, StatusCode};
+use axum::http::{Response, StatusCode, header};
 use serde::Serialize;
 use serde_json::Value;
+use tokio_util::io::ReaderStream;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
 use super::access::Caller;
-use super::download::{Download, Files, disposition, find as find_file};
+use super::download::{Download, Files, built, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id};
 use super::jobs::absent_result;
 use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody, gone};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
+use crate::jobs::{self, at_once};
 use crate::store::libraries::Library;
 
 const FILES: Files = &[
@@ -33,6 +35,9 @@ const FILES: Files = &[
     ("overlay.mp4", "video/mp4"),
     ("sprites.zip", "application/zip"),
 ];
+
+/// The one file that is not kept.
+const NUMBERS: &str = "distance.npy";
 
 /// What one analysis yielded.
 #[derive(Debug, Serialize, ToSchema)]
@@ -100,7 +105,8 @@ pub(super) async fn delete_library(
 }
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,
-/// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip.
+/// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip; and
+/// distance.npy, which is computed anew each time and comes whole.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -114,6 +120,10 @@ pub(super) async fn get_library_file(
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
+    if name == NUMBERS {
+        let library = find(&state, &caller, id).await?;
+        return numbers(&state, &library, &conditions).await;
+    }
     let (name, media_type) = find_file(FILES, &name)?;
     let library = find(&state, &caller, id).await?;
     let download = Download {
@@ -125,7 +135,37 @@ pub(super) async fn get_library_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Library, Problem> {
+/// The distances as numbers. They are made of files that never change: whoever has them keeps them.
+async fn numbers(
+    state: &AppState,
+    library: &Library,
+    conditions: &Conditions,
+) -> Result<Response<Body>, Problem> {
+    let etag = format!("\"{}-{NUMBERS}\"", library.id);
+    let known = conditions.headers.get(header::IF_NONE_MATCH);
+    let answer = Response::builder().header(header::ETAG, &etag).header(
+        header::CACHE_CONTROL,
+        "private, max-age=31536000, immutable",
+    );
+    if known.is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
+        return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
+    }
+    let file = at_once::distances(&state.context, library).await?;
+    let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
+    let file = ReaderStream::new(tokio::fs::File::from_std(file));
+    built(
+        answer
+            .header(header::CONTENT_TYPE, "application/octet-stream")
+            .header(header::CONTENT_LENGTH, n_bytes)
+            .header(
+                header::CONTENT_DISPOSITION,
+                disposition("attachment", NUMBERS),
+            )
+            .body(Body::from_stream(file)),
+    )
+}
+
+pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Library, Problem> {
     match state.context.store.library(id, &caller.reach).await? {
         Some(library) => Ok(library),
         None => Err(absent_result(state, caller, id).await?),

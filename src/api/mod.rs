@@ -24,6 +24,7 @@ mod page; // the page, the pages about the API
 mod seen; // health, metrics, ids of requests
 mod uploads;
 
+use std::ops::Deref;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -31,7 +32,6 @@ use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use axum::{Router, middleware};
-use tokio_util::sync::CancellationToken;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::timeout::RequestBodyTimeoutLayer;
 use utoipa::OpenApi;
@@ -40,7 +40,7 @@ use utoipa_axum::routes;
 
 pub use access::signed;
 pub use problem::Problem;
-pub use seen::metrics::metrics_router;
+pub use seen::metrics::{metrics_router, worker_metrics_router};
 
 use access::{Names, Rates, authenticate, guard, session};
 use page::{docs, openapi};
@@ -60,21 +60,32 @@ const MAX_JSON_BYTES: usize = 1 << 20;
 /// The longest wait for the next piece of a body.
 const BODY_PIECE: Duration = Duration::from_secs(30);
 
-/// What handlers share.
+/// What handlers share. Every layer has one of its own for every request, so that cloning it must cost nothing.
 #[derive(Clone)]
-pub struct AppState {
+pub struct AppState(Arc<Shared>);
+
+/// What is behind an [`AppState`].
+pub struct Shared {
     /// The settings.
-    pub config: Arc<Config>,
+    pub config: Config,
     /// The store, and the way to wake the workers.
     pub context: Context,
     /// The media tool and the walls around it, or why there is none; asked for at the start.
-    pub walls: Arc<Result<media::Walls, String>>,
+    pub walls: Result<media::Walls, String>,
     /// How often each owner may ask.
-    rates: Arc<Rates>,
+    rates: Rates,
     /// What is counted of requests.
     requests: Requests,
     /// What is told of everything.
     metrics: Metrics,
+}
+
+impl Deref for AppState {
+    type Target = Shared;
+
+    fn deref(&self) -> &Shared {
+        &self.0
+    }
 }
 
 impl AppState {
@@ -84,6 +95,7 @@ impl AppState {
         let mut context = Context::new(store, config.crew.threads_per_worker());
         context.budget = Duration::from_secs(config.crew.job_time_s);
         context.max_queued = config.max_queued;
+        context.least_room_bytes = Config::least_room_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::walls).await;
         let tool = tool.map_err(std::io::Error::other)?;
@@ -92,14 +104,14 @@ impl AppState {
             Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
         }
         let requests = Requests::default();
-        Ok(AppState {
+        Ok(AppState(Arc::new(Shared {
             metrics: Metrics::new(&context.meters, &requests),
             requests,
-            rates: Arc::new(Rates::new(config.rate)),
-            config: Arc::new(config),
+            rates: Rates::new(config.rate),
+            config,
             context,
-            walls: Arc::new(tool.map_err(|error| error.to_string())),
-        })
+            walls: tool.map_err(|error| error.to_string()),
+        })))
     }
 }
 
@@ -108,7 +120,6 @@ pub fn router(state: AppState) -> Router {
     let (routes, mut document) = table().split_for_parts();
     openapi::add_headers(&mut document);
     openapi::join_flattened(&mut document);
-    let stop = state.context.draining.clone();
     let requests = state.requests.clone();
     let names = match state.config.demands_tokens() {
         true => Names::Any,
@@ -130,11 +141,11 @@ pub fn router(state: AppState) -> Router {
             jobs::wait::wait_for_result,
         ))
         .layer(middleware::from_fn(uploads::speak_tus))
-        .layer(middleware::from_fn_with_state(state, authenticate))
+        .layer(middleware::from_fn_with_state(state.clone(), authenticate))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
         .layer(CatchPanicLayer::custom(panicked))
-        .layer(middleware::from_fn_with_state(stop, refuse_while_stopping))
+        .layer(middleware::from_fn_with_state(state, refuse_while_stopping))
         .layer(middleware::from_fn_with_state(names, guard))
         .layer(middleware::from_fn_with_state(requests, observe))
 }
@@ -156,6 +167,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(libraries::get_library, libraries::delete_library))
         .routes(routes!(libraries::get_library_file))
         .routes(routes!(flocks::create_flock, flocks::list_flocks))
+        .routes(routes!(flocks::preview_flock))
         .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
         .routes(routes!(links::create_flock_link))
@@ -174,11 +186,11 @@ fn table() -> OpenApiRouter<AppState> {
 
 /// Nothing new is begun once the service stops; what is there can still be read.
 async fn refuse_while_stopping(
-    State(draining): State<CancellationToken>,
+    State(state): State<AppState>,
     request: Request,
     next: Next,
 ) -> Response {
-    match draining.is_cancelled() && !request.method().is_safe() {
+    match state.context.draining.is_cancelled() && !request.method().is_safe() {
         true => Problem::from(Code::Stopping).into_response(),
         false => next.run(request).await,
     }

@@ -21,6 +21,10 @@ pub struct Problem {
     pub detail: String,
 }
 
+/// Marks an answer that the same request may not meet again.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MayPass;
+
 /// The body of every answer that is not a success.
 #[derive(Serialize, ToSchema)]
 pub(super) struct ProblemBody {
@@ -44,6 +48,16 @@ impl Problem {
             code,
             detail: detail.into(),
         }
+    }
+
+    /// Whether the same request may be answered otherwise at another time: it failed inside, or on a machine that
+    /// had too much to do.
+    pub(super) fn may_pass(&self) -> bool {
+        let is_of_the_moment = matches!(
+            self.code,
+            Code::TimeLimit | Code::MemoryLimit | Code::DecoderCrashed
+        );
+        is_of_the_moment || !status_of(self.code).is_client_error()
     }
 
     /// There is nothing of that id: the same answer as for an id of somebody else.
@@ -98,6 +112,7 @@ fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = status_of(self.code);
+        let may_pass = self.may_pass();
         let body = ProblemBody {
             type_url: format!("/docs/errors#{}", self.code),
             title: self.code.meaning(),
@@ -117,6 +132,7 @@ impl IntoResponse for Problem {
                 | Code::RequestInProgress
                 | Code::QuotaExceeded
                 | Code::QueueFull
+                | Code::Busy
                 | Code::RateLimited
         ) {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(RETRY_AFTER_S));
@@ -124,6 +140,9 @@ impl IntoResponse for Problem {
         if self.code == Code::Unauthenticated {
             let challenge = HeaderValue::from_static("Bearer realm=\"flockreel\"");
             headers.insert(header::WWW_AUTHENTICATE, challenge);
+        }
+        if may_pass {
+            response.extensions_mut().insert(MayPass);
         }
         response
     }
@@ -176,7 +195,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,
         Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
         Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
-        Code::Stopping | Code::QueueFull => StatusCode::SERVICE_UNAVAILABLE,
+        Code::Stopping | Code::QueueFull | Code::Busy => StatusCode::SERVICE_UNAVAILABLE,
         Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
     }
 }

@@ -11,6 +11,7 @@ use futures_util::{Stream, StreamExt};
 use serde_json::{Map, Value};
 use tokio::time::timeout;
 
+use super::server::is_too_slow;
 use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::code::Code;
 use crate::jobs::admit::Arrival;
@@ -22,6 +23,9 @@ use crate::store::{BlobFile, Draft};
 
 /// The longest wait for the next piece of a body.
 pub(super) const PIECE: Duration = Duration::from_secs(30);
+/// Bytes after which the room on the disk is looked at again: others fill it too, and a body need not say how long
+/// it is.
+pub(super) const CHECK_EVERY_BYTES: u64 = 8 << 20;
 /// The largest given background.
 const MAX_BACKGROUND_BYTES: u64 = 64 << 20;
 
@@ -56,7 +60,8 @@ pub(super) async fn receive_with(
     }
     let body = request.into_body().into_data_stream();
     let limit_bytes = state.config.max_upload_bytes;
-    let video = receive_file(body, &draft, VIDEO, limit_bytes).await?;
+    let into = (&draft, VIDEO, limit_bytes);
+    let video = receive_file(state, body, into).await?;
     let arrival = Arrival {
         draft,
         video,
@@ -88,11 +93,12 @@ async fn receive_form(
             Some("video" | "footage") if video.is_none() => {
                 file_name = field.file_name().map(str::to_owned);
                 let limit_bytes = state.config.max_upload_bytes;
-                video = Some(receive_file(field, &draft, VIDEO, limit_bytes).await?);
+                let into = (&draft, VIDEO, limit_bytes);
+                video = Some(receive_file(state, field, into).await?);
             }
             Some("background") if background.is_none() => {
-                let file = receive_file(field, &draft, BACKGROUND, MAX_BACKGROUND_BYTES).await?;
-                background = Some(file);
+                let into = (&draft, BACKGROUND, MAX_BACKGROUND_BYTES);
+                background = Some(receive_file(state, field, into).await?);
             }
             name => {
                 let wish = wishes.iter().find(|wish| name == Some(wish));
@@ -139,24 +145,31 @@ async fn next_field(form: &mut Multipart) -> Result<Option<Field<'_>>, Problem> 
     }
 }
 
-/// Takes a stream to its end: counted, hashed, synced.
+/// Takes a stream to its end: counted, hashed, synced, and only while there is room.
 async fn receive_file<S, E>(
+    state: &AppState,
     mut stream: S,
-    draft: &Draft,
-    name: &'static str,
-    limit_bytes: u64,
+    (draft, name, limit_bytes): (&Draft, &'static str, u64),
 ) -> Result<BlobFile, Problem>
 where
     S: Stream<Item = Result<Bytes, E>> + Unpin,
     E: std::error::Error,
 {
-    let mut intake = Intake::create(draft, name, limit_bytes).await?;
+    let mut intake = Intake::create(draft, name, limit_bytes);
+    let mut n_unchecked = 0;
     loop {
         match timeout(PIECE, stream.next()).await {
-            Ok(Some(Ok(bytes))) => intake.take(&bytes).await?,
+            Ok(Some(Ok(bytes))) => {
+                n_unchecked += bytes.len() as u64;
+                if n_unchecked >= CHECK_EVERY_BYTES {
+                    check_room(state, 0)?;
+                    n_unchecked = 0;
+                }
+                intake.take(bytes).await?;
+            }
             Ok(Some(Err(error))) => {
                 tracing::debug!(%error, "a body was cut off");
-                return Err(Code::BodyCutOff.into());
+                return Err(of_broken_body(&error).into());
             }
             Ok(None) => return Ok(intake.finish().await?),
             Err(_) => return Err(Code::BodyTimeout.into()),
@@ -209,7 +222,18 @@ fn is_form(request: &Request) -> bool {
     media_type.is_some_and(|text| text.to_ascii_lowercase().starts_with("multipart/"))
 }
 
+/// What it means that a body did not come to its end.
+pub(super) fn of_broken_body(error: &dyn std::error::Error) -> Code {
+    match is_too_slow(error) {
+        true => Code::BodyTimeout,
+        false => Code::BodyCutOff,
+    }
+}
+
 fn from_multipart(error: &MultipartError) -> Problem {
+    if is_too_slow(error) {
+        return Code::BodyTimeout.into();
+    }
     Problem::new(Code::MalformedRequest, error.body_text())
 }
 

@@ -19,7 +19,7 @@ use super::AppState;
 use super::access::Caller;
 use super::extract::Id;
 use super::problem::{Problem, ProblemBody};
-use super::receive::{PIECE, check_room, label};
+use super::receive::{CHECK_EVERY_BYTES, PIECE, check_room, label, of_broken_body};
 use crate::code::Code;
 use crate::jobs::admit::Arrival;
 use crate::jobs::allotted::next_id;
@@ -34,7 +34,7 @@ const OFFSET: HeaderName = HeaderName::from_static("upload-offset");
 const LENGTH: HeaderName = HeaderName::from_static("upload-length");
 const PIECE_TYPE: &str = "application/offset+octet-stream";
 /// Bytes after which what came is synced and noted: what a crash can cost at most.
-const SAFE_EVERY: i64 = 8 << 20;
+const SAFE_EVERY: i64 = CHECK_EVERY_BYTES as i64;
 
 /// Says of every answer of these routes which protocol it speaks, and refuses other versions.
 pub(super) async fn speak_tus(request: Request, next: Next) -> Response<Body> {
@@ -210,6 +210,14 @@ async fn take(
             came_bytes -= piece.len() as i64;
             break Err(Code::TooLarge.into());
         }
+        // Others fill the disk too.
+        let before = came_bytes - piece.len() as i64;
+        if before / SAFE_EVERY != came_bytes / SAFE_EVERY
+            && let Err(problem) = check_room(state, 0)
+        {
+            came_bytes = before;
+            break Err(problem);
+        }
         growing.add(&piece).await?;
         if let Some(checksum) = &mut checksum {
             checksum.update(&piece);
@@ -242,7 +250,7 @@ async fn next_piece(
     match next {
         Ok(piece) => piece.transpose().map_err(|error| {
             tracing::debug!(%error, "an upload was cut off");
-            Code::BodyCutOff.into()
+            of_broken_body(&error).into()
         }),
         Err(_) => Err(Code::BodyTimeout.into()),
     }
@@ -270,7 +278,7 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
             upload.footage_id = Some(footage.id);
             Ok(upload)
         }
-        Err(problem) if super::problem::status_of(problem.code).is_client_error() => {
+        Err(problem) if !problem.may_pass() => {
             store.delete_upload(upload.id).await?;
             Err(problem)
         }

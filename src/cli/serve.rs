@@ -39,7 +39,7 @@ async fn serve(config: Config) -> Result<(), Error> {
     refuse_open_door(&config).await?;
     let state = AppState::open(config).await.map_err(from_store)?;
     let (listener, address) = listen(bind).await?;
-    let metrics = match state.config.metrics_bind {
+    let metrics = match state.config.watch.metrics_bind {
         Some(bind) => Some(listen(bind).await?),
         None => None,
     };
@@ -77,7 +77,7 @@ async fn serve(config: Config) -> Result<(), Error> {
     Ok(())
 }
 
-async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
+pub(super) async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
     let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
     let listener = TcpListener::bind(bind).await.map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
@@ -124,7 +124,7 @@ pub(super) async fn wait_for_signal() -> Result<(), Error> {
 
 pub(super) fn from_store(error: store::Error) -> Error {
     match error {
-        store::Error::InUse(_) => Error::Usage(error.to_string()),
+        store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),
         _ => Error::work(error.code(), &error),
     }
 }

@@ -6,9 +6,11 @@ use std::time::Duration;
 
 use tokio::runtime::Runtime;
 
-use super::serve::{from_store, wait_for_signal};
+use super::serve::{from_store, listen, wait_for_signal};
 use super::{Error, Summary, say};
-use crate::config::{Crew, Database, Storage};
+use crate::api;
+use crate::api::server::Stop;
+use crate::config::{Config, Crew, Database, Storage, Watch};
 use crate::jobs::Context;
 use crate::jobs::supervisor::{Supervisor, recover};
 use crate::media;
@@ -21,6 +23,8 @@ pub struct Args {
     storage: Storage,
     #[command(flatten)]
     crew: Crew,
+    #[command(flatten)]
+    watch: Watch,
 }
 
 /// Works until it is told to stop.
@@ -46,14 +50,26 @@ async fn work(args: Args) -> Result<(), Error> {
     let store = Store::open_beside(args.storage).await.map_err(from_store)?;
     let mut context = Context::new(store, threads);
     context.budget = Duration::from_secs(args.crew.job_time_s);
+    context.least_room_bytes = Config::least_room_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await.map_err(from_store)?;
+    let stop = Stop::default();
+    if let Some(bind) = args.watch.metrics_bind {
+        let (listener, address) = listen(bind).await?;
+        let router = api::worker_metrics_router(&context.meters);
+        tokio::spawn(api::server::serve(listener, router, stop.clone()));
+        say(&format!(
+            "flockreel: the metrics are at http://{address}/metrics"
+        ));
+    }
     let supervisor = Supervisor::start(context.clone(), n_workers);
     say(&format!(
         "flockreel: waiting for jobs, workers: {n_workers}"
     ));
     wait_for_signal().await?;
     tracing::info!("stopping");
+    stop.begun.cancel();
     supervisor.drain().await;
+    stop.over.cancel();
     context.store.close().await;
     Ok(())
 }

@@ -11,7 +11,7 @@ const WATER: [[f64; 3]; 2] = [[126.0, 184.0, 188.0], [34.0, 84.0, 98.0]];
 
 /// The scene without the fish.
 pub(super) fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
-    let mut scene = Scene::of_water(width, height, seed);
+    let mut scene = Painting::of_water(width, height, seed);
     scene.plants(&PlantBed {
         key: 1,
         n: 16,
@@ -53,7 +53,7 @@ pub(super) fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
     scene.into_image()
 }
 
-struct Scene {
+struct Painting {
     width: usize,
     height: usize,
     seed: u64,
@@ -78,8 +78,8 @@ struct Pebble {
     color: [f64; 3],
 }
 
-impl Scene {
-    fn of_water(width: u32, height: u32, seed: u64) -> Scene {
+impl Painting {
+    fn of_water(width: u32, height: u32, seed: u64) -> Painting {
         let (w, h) = (width as usize, height as usize);
         let mut pixels = Vec::with_capacity(w * h);
         for y in 0..h {
@@ -87,7 +87,7 @@ impl Scene {
                 pixels.push(water([x as f64 / w as f64, y as f64 / h as f64], seed));
             }
         }
-        Scene {
+        Painting {
             width: w,
             height: h,
             seed,

@@ -15,7 +15,7 @@ use super::composite::params::Render;
 pub struct Params {
     /// Individuals, 1..=2000.
     pub count: u32,
-    /// Frames of the film, 1..=10000.
+    /// Frames of the film, 1..=10000; times the individuals at most 4,000,000.
     pub frames: u32,
     /// Everything random follows from it.
     pub seed: u64,
@@ -131,6 +131,10 @@ pub enum TankExtent {
     /// The whole picture.
     Picture,
 }
+
+/// The most that individuals times frames may be: where everyone is in every frame is held in memory, and told in
+/// `flock.json`, with some hundreds of bytes each.
+const MOST_SHOWN: u64 = 4_000_000;
 
 impl Default for Matching {
     fn default() -> Matching {
@@ -249,6 +253,12 @@ impl Params {
     pub fn check(&self) -> Result<(), String> {
         within("count", f64::from(self.count), 1.0, 2000.0)?;
         within("frames", f64::from(self.frames), 1.0, 10_000.0)?;
+        let n_shown = u64::from(self.count) * u64::from(self.frames);
+        if n_shown > MOST_SHOWN {
+            return Err(format!(
+                "count times frames must be at most {MOST_SHOWN}: {n_shown}"
+            ));
+        }
         if self.is_loop {
             within("frames of a loop", f64::from(self.frames), 30.0, 5000.0)?;
             if self.position == Position::Papers {
@@ -329,6 +339,16 @@ mod tests {
             ..Params::default()
         };
         assert_eq!(no_one.check(), Err("count must lie in 1..=2000: 0".into()));
+        let of = |count, frames| Params {
+            count,
+            frames,
+            ..Params::default()
+        };
+        assert_eq!(of(2000, 2000).check(), Ok(()));
+        assert_eq!(of(400, 10_000).check(), Ok(()));
+        let crowd = of(2000, 10_000).check();
+        let sentence = "count times frames must be at most 4000000: 20000000";
+        assert_eq!(crowd, Err(sentence.into()));
         let mut params = Params::default();
         params.matching.wx = f64::NAN;
         let sentence = params.check().expect_err("NaN lies in no range");

@@ -8,7 +8,7 @@
 //! of a longer footage a cell shows the least of its pairs, so that a single like moment still shows.
 
 use super::picture;
-use crate::analysis::distance::{Cancelled, Distances, Everything, NOT_BELOW};
+use crate::analysis::distance::{Cancelled, ClipPair, Distances, Everything};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
@@ -21,6 +21,8 @@ const LARGE_SIDE: usize = 256;
 /// Of more clips than these only the distances below some epsilon are computed.
 const MOST_WHOLE: usize = 8192;
 const FAR: u64 = 4;
+/// Stands for a distance that was not computed.
+const UNKNOWN: u64 = u64::MAX;
 
 const PAPER: [u8; 3] = [0xfd, 0xfc, 0xf9];
 /// A pair with D < epsilon.
@@ -50,12 +52,16 @@ impl DistanceMap {
     ) -> Result<DistanceMap, Cancelled> {
         let present = whole_clips(&library.sprites, library.clip_frames);
         let mut map = DistanceMap::empty(distances.n_clips());
-        let pool = |i: usize, row: &[u64]| map.pool(i, row, &present, library.epsilon);
+        let mut pool = |pair: ClipPair| map.pool(pair, &present, library.epsilon);
         match distances.n_clips() > MOST_WHOLE {
-            false => distances.for_each_row(progress, pool)?,
+            false => distances.for_each_row(progress, |from, row| {
+                let pair = |(to, &distance)| ClipPair { from, to, distance };
+                (from..).zip(row).map(pair).for_each(&mut pool);
+            })?,
             true => {
                 let limit = library.epsilon.saturating_mul(FAR);
-                distances.for_each_row_below(limit, &Everything, progress, pool)?
+                let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
+                distances.for_each_row_below(limit, &Everything, progress, near)?
             }
         }
         map.mirror_triangle();
@@ -103,19 +109,15 @@ impl DistanceMap {
         DistanceMap {
             side,
             n_clips,
-            least: vec![NOT_BELOW; side * side],
+            least: vec![UNKNOWN; side * side],
             alike: vec![false; side * side],
         }
     }
 
-    fn pool(&mut self, i: usize, row: &[u64], present: &[bool], epsilon: u64) {
-        let first = self.cell(i) * self.side;
-        let present_too = |j: usize| present[i] && present[j];
-        for (j, &distance) in (i..).zip(row) {
-            let at = first + self.cell(j);
-            self.least[at] = distance.min(self.least[at]);
-            self.alike[at] |= distance < epsilon && present_too(j);
-        }
+    fn pool(&mut self, pair: ClipPair, present: &[bool], epsilon: u64) {
+        let at = self.cell(pair.from) * self.side + self.cell(pair.to);
+        self.least[at] = pair.distance.min(self.least[at]);
+        self.alike[at] |= pair.distance < epsilon && present[pair.from] && present[pair.to];
     }
 
     fn mirror_triangle(&mut self) {
@@ -161,10 +163,10 @@ fn whole_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
 }
 
 fn levels(cells: &[u64]) -> Vec<u8> {
-    let drawn = cells.iter().copied().filter(|&d| d != NOT_BELOW);
+    let drawn = cells.iter().copied().filter(|&d| d != UNKNOWN);
     let largest = drawn.max().unwrap_or(0).max(1);
     let level = |&distance: &u64| match distance {
-        NOT_BELOW => 255,
+        UNKNOWN => 255,
         _ => (255.0 * distance as f64 / largest as f64).round() as u8,
     };
     cells.iter().map(level).collect()
@@ -188,7 +190,7 @@ mod tests {
     fn near_is_black_and_far_is_white() {
         assert_eq!(levels(&[0, 50, 200, 100]), [0, 64, 255, 128]);
         assert_eq!(levels(&[0, 0]), [0, 0]);
-        assert_eq!(levels(&[0, NOT_BELOW, 10]), [0, 255, 255]);
+        assert_eq!(levels(&[0, UNKNOWN, 10]), [0, 255, 255]);
     }
 
     /// `n_clips` clips, all far from each other but for the pairs given.
@@ -197,7 +199,14 @@ mod tests {
         for i in 0..n_clips {
             let distance = |j| if near.contains(&(i, j)) { 5 } else { 10 };
             let row: Vec<u64> = (i..n_clips).map(distance).collect();
-            map.pool(i, &row, present, 10);
+            for (to, distance) in (i..).zip(row) {
+                let pair = ClipPair {
+                    from: i,
+                    to,
+                    distance,
+                };
+                map.pool(pair, present, 10);
+            }
         }
         map.mirror_triangle();
         map
@@ -266,7 +275,7 @@ mod tests {
             cpu: Level::detect(),
         };
         let map = DistanceMap::of(&distances, &library, &Silent).expect("nobody cancels");
-        assert_eq!((map.least[0], map.least[1023]), (0, NOT_BELOW));
+        assert_eq!((map.least[0], map.least[1023]), (0, UNKNOWN));
         assert_eq!(levels(&map.least)[1023], 255);
     }
 

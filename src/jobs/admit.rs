@@ -3,13 +3,13 @@
 
 use uuid::Uuid;
 
-use super::Error;
 use super::clock::now_ms;
+use super::{Context, Error};
 use crate::footage::{FootageFormat, FrameSource};
 use crate::media::{Limits, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, VIDEO};
 use crate::store::owners::Owner;
-use crate::store::{BlobFile, Draft, Store};
+use crate::store::{BlobFile, Draft};
 
 /// Files received into a draft, synced and hashed, and what the sender calls them.
 pub struct Arrival {
@@ -27,9 +27,12 @@ pub struct Arrival {
     pub owner: Owner,
 }
 
-/// Looks at the files and stores them; the same bytes as before give the footage of then.
-pub async fn admit(store: &Store, arrival: Arrival) -> Result<Added, Error> {
+/// Looks at the files, once there is a place for that, and stores them; the same bytes as before give the
+/// footage of then.
+pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> {
+    let place = context.places.take().await?;
     let (arrival, format) = tokio::task::spawn_blocking(move || {
+        let _place = place;
         let format = inspect(&arrival)?;
         Ok::<_, Error>((arrival, format))
     })
@@ -38,6 +41,7 @@ pub async fn admit(store: &Store, arrival: Arrival) -> Result<Added, Error> {
     let footage = row(&arrival, &format);
     let mut files = vec![arrival.video];
     files.extend(arrival.background);
+    let store = &context.store;
     Ok(store.add_footage(footage, arrival.draft, &files).await?)
 }
 
@@ -72,5 +76,37 @@ fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
         n_frames_hint: i64::try_from(format.n_frames_hint).unwrap_or(i64::MAX),
         sample: arrival.sample,
         created_ms: now_ms(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::jobs::places::Places;
+
+    #[tokio::test]
+    async fn a_film_waits_for_a_place_before_anybody_looks_at_it() {
+        let data = tempfile::tempdir().unwrap();
+        let store = crate::store::Store::open(data.path()).await.unwrap();
+        let draft = store.blobs().draft("film").unwrap();
+        let video = BlobFile {
+            name: VIDEO.to_owned(),
+            size_bytes: 0,
+            sha256: Vec::new(),
+        };
+        let mut context = Context::new(store, 1);
+        context.places = Places::new(0, Duration::from_millis(20));
+        let arrival = Arrival {
+            draft,
+            video,
+            background: None,
+            name: String::new(),
+            sample: false,
+            owner: Owner::local(),
+        };
+        let refused = admit(&context, arrival).await.unwrap_err();
+        assert_eq!(refused.code(), crate::code::Code::Busy);
     }
 }

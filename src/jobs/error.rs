@@ -31,6 +31,9 @@ pub enum Error {
     /// A library's folder could not be written or read.
     #[error(transparent)]
     LibraryDir(#[from] formats::library_dir::Error),
+    /// The library is too long for a whole matrix.
+    #[error(transparent)]
+    Numbers(#[from] formats::npy::Error),
     /// The store said no.
     #[error(transparent)]
     Store(#[from] store::Error),
@@ -43,6 +46,12 @@ pub enum Error {
     /// It took longer than a job may.
     #[error("the job took longer than a job may")]
     OverTime,
+    /// What it writes would fill the disk.
+    #[error("there is too little room on the disk for what the job makes")]
+    NoRoom,
+    /// As many films are being looked at as there is room for.
+    #[error("many films are coming in at once: ask again soon")]
+    Busy,
     /// Somebody cancelled, or the worker drains.
     #[error("the job was cancelled")]
     Cancelled,
@@ -60,10 +69,13 @@ impl Error {
             Error::Flock(error) => error.code(),
             Error::Fish(error) => error.code(),
             Error::LibraryDir(error) => of_library_dir(error),
+            Error::Numbers(error) => error.code(),
             Error::Store(error) => error.code(),
             Error::Io(error) => of_io(error),
             Error::Panicked => Code::Internal,
             Error::OverTime => Code::TimeLimit,
+            Error::NoRoom => Code::StorageFull,
+            Error::Busy => Code::Busy,
             Error::Cancelled => Code::Cancelled,
         }
     }
@@ -72,7 +84,12 @@ impl Error {
     /// never bad input and never a panic.
     pub fn may_pass(&self) -> bool {
         match self {
-            Error::Store(_) | Error::Io(_) => self.code() == Code::Internal,
+            Error::Store(_) | Error::Io(_) | Error::Media(media::Error::Io { .. }) => {
+                self.code() == Code::Internal
+            }
+            Error::Source(error) => {
+                matches!(error.cause.downcast_ref(), Some(media::Error::Io { .. }))
+            }
             Error::LibraryDir(formats::library_dir::Error::Io { .. }) => {
                 self.code() == Code::Internal
             }
@@ -92,5 +109,25 @@ fn of_io(error: &std::io::Error) -> Code {
     match error.kind() {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => Code::StorageFull,
         _ => Code::Internal,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tool_that_could_not_be_started_for_a_moment_is_tried_again_and_bad_input_never() {
+        let io = |kind: std::io::ErrorKind| media::Error::Io {
+            doing: "starting the media tool",
+            source: kind.into(),
+        };
+        let busy = || io(std::io::ErrorKind::WouldBlock);
+        assert!(Error::Media(busy()).may_pass());
+        assert!(Error::Source(busy().into()).may_pass());
+        for error in [media::Error::TimeLimit, media::Error::NoVideoStream] {
+            assert!(!Error::Source(error.into()).may_pass());
+        }
+        assert!(!Error::Media(media::Error::StorageFull).may_pass());
     }
 }

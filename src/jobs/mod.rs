@@ -29,6 +29,10 @@ pub mod flock; // library -> flock
 pub mod fish; // library -> virtual fish
 pub mod overlay; // footage -> the same with its poses drawn over it
 
+pub mod at_once; // library -> what somebody waits for
+
+pub mod places; // how much of that at once
+
 pub mod sample; // the first film of an empty data folder
 
 pub mod clock;
@@ -46,6 +50,7 @@ pub use attempt::{Attempt, Product};
 pub use error::Error;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
+pub use places::Places;
 
 use allotted::next_id;
 
@@ -71,10 +76,18 @@ pub struct Context {
     pub lease: Duration,
     /// How long one attempt at a job may take.
     pub budget: Duration,
+    /// How often what has expired is swept while the service runs.
+    pub sweep_every: Duration,
     /// How many jobs of everybody may be queued or running at once.
     pub max_queued: i64,
+    /// Room on the disk below which jobs are stopped, bytes, so that rows can still be written.
+    pub least_room_bytes: u64,
     /// What is counted of the jobs of this process.
     pub meters: Meters,
+    /// How many films are looked at at once.
+    pub places: Places,
+    /// Who may have something computed while they wait.
+    pub at_once: Places,
 }
 
 impl Context {
@@ -82,6 +95,12 @@ impl Context {
     pub async fn now_ms(&self) -> Result<i64, store::Error> {
         let shared = self.store.clock_ms().await?;
         Ok(shared.unwrap_or_else(clock::now_ms))
+    }
+
+    /// Whether a job that goes on writing would leave too little room on the disk.
+    fn lacks_room(&self) -> bool {
+        let room = self.store.blobs().room_bytes();
+        room.is_ok_and(|room_bytes| room_bytes < self.least_room_bytes)
     }
 
     /// Queues a job, after another one if it needs that one's result; its id, and the id that its result will
@@ -118,8 +137,12 @@ impl Context {
             threads,
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(Crew::JOB_TIME_S),
+            sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
+            least_room_bytes: 0,
             meters: Meters::default(),
+            places: Places::of_cores(),
+            at_once: Places::one(),
         }
     }
 }

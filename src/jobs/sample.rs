@@ -36,7 +36,7 @@ pub async fn fill(context: &Context) -> Result<(), Error> {
     let stop = context.draining.clone();
     let filmed = tokio::task::spawn_blocking(move || film(draft, || stop.is_cancelled()));
     let arrival = filmed.await.unwrap_or(Err(Error::Panicked))?;
-    let (Added::New(footage) | Added::Known(footage)) = admit(&context.store, arrival).await?;
+    let (Added::New(footage) | Added::Known(footage)) = admit(context, arrival).await?;
     let measure = analysis::Input {
         footage_id: FootageId(footage.id),
         params: crate::analysis::Params::default(),

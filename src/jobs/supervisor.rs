@@ -1,8 +1,8 @@
-//! The supervisor: a pool of workers, the rescue of jobs whose workers fell silent, and the drain
-//! at the end (RELIABILITY.md, R2 and R4).
+//! The supervisor: a pool of workers, the rescue of jobs whose workers fell silent, the sweeps while the service
+//! runs (R5), and the drain at the end (RELIABILITY.md, R2 and R4).
 
 use std::convert::Infallible;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
@@ -10,7 +10,7 @@ use tokio::time::{sleep, timeout};
 use super::worker::{Step, Worker};
 use super::{Context, clock};
 use crate::ids::JobId;
-use crate::store::{self, jobs::JobState};
+use crate::store::{self, Store, jobs::JobState};
 
 /// Idle workers look for jobs this often even if nobody wakes them.
 const POLL: Duration = Duration::from_secs(1);
@@ -32,6 +32,9 @@ impl Supervisor {
         }
         tasks.spawn(rescue(context.clone()));
         tasks.spawn(listen(context.clone()));
+        if context.store.serves() {
+            tasks.spawn(sweep(context.clone()));
+        }
         Supervisor { context, tasks }
     }
 
@@ -105,6 +108,27 @@ async fn listen(context: Context) {
     }
 }
 
+/// Sweeps again and again what a start would, for a service that runs for months.
+async fn sweep(context: Context) {
+    loop {
+        tokio::select! {
+            () = sleep(context.sweep_every) => {}
+            () = context.draining.cancelled() => return,
+        }
+        if let Err(error) = sweep_expired(&context.store).await {
+            tracing::error!(%error, "what has expired could not be swept");
+        }
+    }
+}
+
+/// Removes expired uploads, answers kept for their day, what the dead were making, and folders that no row names.
+async fn sweep_expired(store: &Store) -> Result<(), store::Error> {
+    store.sweep_uploads(clock::now_ms()).await?;
+    store.forget_old_answers(clock::now_ms()).await?;
+    store.sweep(SystemTime::now()).await?;
+    Ok(())
+}
+
 /// Mends what a crash left, before the first worker starts: leases of the dead, drafts, strays. Where
 /// other processes share the rows only what has run out is of the dead.
 pub async fn recover(context: &Context) -> Result<(), store::Error> {
@@ -116,9 +140,7 @@ pub async fn recover(context: &Context) -> Result<(), store::Error> {
         context.store.rescue(now_ms).await?;
     }
     if context.store.serves() {
-        context.store.sweep_uploads(clock::now_ms()).await?;
         context.store.sweep_upload_files().await?;
     }
-    context.store.sweep(std::time::SystemTime::now()).await?;
-    Ok(())
+    sweep_expired(&context.store).await
 }

@@ -4,11 +4,12 @@
 //! The computation runs on a blocking thread with a pool of its own; beside it, this task beats
 //! every third of the lease, and at most twice a second when there is progress to note.
 
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use rustix::process::{getpriority_process, setpriority_process};
 use tokio::runtime::Handle;
-use tokio::task::JoinHandle;
 use tokio::time::{Instant, MissedTickBehavior, interval};
 use tracing::{Instrument, Span};
 use uuid::Uuid;
@@ -31,6 +32,9 @@ const MAX_ATTEMPTS: i64 = 3;
 const LET_GO: Duration = Duration::from_secs(10);
 /// The wait before the second attempt; each further one waits four times as long.
 const BACKOFF_MS: i64 = 2_000;
+
+/// How much nicer a job is than the service: under load it gets a tenth of what a request gets.
+const PATIENCE: i32 = 10;
 
 /// What one step did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,7 +105,7 @@ impl Worker {
         Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
     {
         let listener = Arc::new(Listener::new(stages(lease.kind)));
-        let work = spawn(&self.context, lease.clone(), listener.clone(), run);
+        let work = begin(&self.context, lease.clone(), listener.clone(), run);
         let result = self.beat_until_done(&lease, &listener, work).await;
         let step = self.end(&lease, &listener, result).await?;
         self.context.meters.count(lease.kind, &step, &listener);
@@ -113,25 +117,27 @@ impl Worker {
         &self,
         lease: &Lease,
         listener: &Listener,
-        mut work: JoinHandle<Result<Outcome, Error>>,
+        work: impl Future<Output = Result<Outcome, Error>>,
     ) -> Result<Outcome, Error> {
+        let mut work = pin!(work);
         let mut tick = interval(TICK.min(self.context.lease / 3));
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (start, mut last_beat) = (Instant::now(), Instant::now());
         let mut noted = listener.position();
-        let mut told_to_stop = None;
+        let (mut told_to_stop, mut lacks_room) = (None, false);
         loop {
             tokio::select! {
-                joined = &mut work => return self.unless_late(start, joined.unwrap_or(Err(Error::Panicked))),
+                ended = &mut work => return self.unless_stopped(start, lacks_room, ended),
                 _ = tick.tick() => {}
             }
+            lacks_room |= self.context.lacks_room();
             let is_late = start.elapsed() > self.context.budget;
-            if is_late || self.context.draining.is_cancelled() {
+            if is_late || lacks_room || self.context.draining.is_cancelled() {
                 listener.cancel();
                 let let_go = LET_GO.min(self.context.lease);
                 if told_to_stop.get_or_insert_with(Instant::now).elapsed() > let_go {
                     // A thread cannot be ended from outside: it runs on, and its result is thrown away.
-                    return self.unless_late(start, Err(Error::Cancelled));
+                    return self.unless_stopped(start, lacks_room, Err(Error::Cancelled));
                 }
             }
             let position = listener.position();
@@ -142,13 +148,18 @@ impl Worker {
         }
     }
 
-    /// Work that was told to stop because its time was up failed for that reason, whatever it says.
-    fn unless_late(
+    /// Work that was told to stop because its time was up, or the room, failed for that reason, whatever it says.
+    fn unless_stopped(
         &self,
         start: Instant,
+        lacks_room: bool,
         result: Result<Outcome, Error>,
     ) -> Result<Outcome, Error> {
         match start.elapsed() > self.context.budget {
+            _ if lacks_room => result.map_err(|error| {
+                tracing::warn!(%error, "a job was stopped for want of room");
+                Error::NoRoom
+            }),
             true => result.map_err(|error| {
                 tracing::warn!(%error, "a job took too long");
                 Error::OverTime
@@ -219,13 +230,14 @@ impl Worker {
     }
 }
 
-/// Runs the work on a blocking thread, and puts what it made into place.
-fn spawn<Run>(
+/// Begins the work on a blocking thread; what is returned waits for it and puts what it made into place. Who drops
+/// that has given the work up: its thread runs on, and what it makes goes with its draft.
+fn begin<Run>(
     context: &Context,
     lease: Lease,
     listener: Arc<Listener>,
     run: Run,
-) -> JoinHandle<Result<Outcome, Error>>
+) -> impl Future<Output = Result<Outcome, Error>> + use<Run>
 where
     Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
 {
@@ -239,14 +251,18 @@ where
             .draft(&format!("{}.{}", lease.job_id, lease.fence))?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
+            .start_handler(|_| step_back())
             .build()
             .map_err(std::io::Error::other)?;
         let attempt = Attempt::new(&store, &draft, &listener, threads, &runtime);
-        let product = pool.install(|| run(&lease, &attempt))?;
-        let files = store.blobs().seal(&draft)?;
+        let made = pool.install(|| {
+            let product = run(&lease, &attempt)?;
+            Ok::<_, Error>((product, store.blobs().seal(&draft)?))
+        });
+        let (product, files) = made?;
         Ok::<_, Error>((draft, product, files))
     });
-    tokio::spawn(async move {
+    async move {
         let (draft, product, files) = work.await.unwrap_or(Err(Error::Panicked))?;
         let folder = folder_of(product.made, result_id, fence);
         blobs.adopt(draft, &folder).await?;
@@ -257,26 +273,34 @@ where
             params: product.params,
             summary: product.summary,
         })
-    })
+    }
 }
 
-/// Links the result; one that came too late is thrown away. After an error the row decides: where
-/// none names the folder, nothing was linked.
-async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Change, store::Error> {
-    let change = store.finish(lease, outcome, now_ms()).await;
-    let is_linked = match &change {
-        Ok(change) => *change == Change::Made,
-        Err(_) => store.is_folder_known(&outcome.folder).await?,
-    };
-    if !is_linked {
-        store.blobs().discard(&outcome.folder).await?;
+/// Lets those who answer requests go first: a job takes minutes and has time, a request has not. Threads and
+/// processes that the calling thread starts from now on are as patient.
+fn step_back() {
+    let usual = getpriority_process(None).unwrap_or(0);
+    if let Err(error) = setpriority_process(None, usual + PATIENCE) {
+        tracing::debug!(%error, "a job runs with the priority of the service");
     }
-    change
+}
+
+/// Links the result; one that came too late is thrown away.
+async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Change, store::Error> {
+    match store.finish(lease, outcome, now_ms()).await {
+        Ok(Change::Lost) => {
+            store.blobs().discard(&outcome.folder).await?;
+            Ok(Change::Lost)
+        }
+        Err(error) if store.is_linked_after(&outcome.folder, &error).await? => Ok(Change::Made),
+        change => change,
+    }
 }
 
 /// Whether the work ended because somebody wanted it to, and not because it failed.
 fn was_stopped(error: &Error, listener: &Listener) -> bool {
-    crate::progress::Progress::cancelled(listener) && !matches!(error, Error::OverTime)
+    crate::progress::Progress::cancelled(listener)
+        && !matches!(error, Error::OverTime | Error::NoRoom)
 }
 
 /// What a person is told: the reason, where it is one of theirs; what failed inside stays in the log.

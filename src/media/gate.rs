@@ -25,11 +25,11 @@ use super::tools::{self, Place, Tool};
 
 /// How much of a child's complaints is kept.
 const COMPLAINT_BYTES: usize = 8 << 10;
-
 /// The size we ask the kernel to give each pipe.
 const PIPE_BYTES: usize = 1 << 20;
 
-/// How long a child may take to end by itself once it has closed its output.
+/// How long a reader may take to end once we listen no more; a writer, who may have its whole film to write again
+/// with the index in front, has all the time that it has left.
 const END_TIME: Duration = Duration::from_secs(30);
 
 /// What to start, and within which limits.
@@ -108,6 +108,8 @@ pub(super) struct Child {
     stdout: Option<ChildStdout>,
     stderr: Option<JoinHandle<String>>,
     time_left: Duration,
+    /// When it is late by the wall clock.
+    due: Instant,
     stall: Duration,
     /// The files it was given: what it says of them is for people, who know them by other names.
     files: Vec<PathBuf>,
@@ -152,6 +154,7 @@ impl Child {
         sandbox::enclose(&mut command, &cage, &place.reach).map_err(&failed)?;
         let mut process = spawn(command).map_err(failed)?;
         let group = Pid::from_child(&process);
+        super::niceness::pass_on(group);
         let ended = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
             Ok(ended) => ended,
             Err(errno) => {
@@ -176,6 +179,7 @@ impl Child {
             stdout,
             stderr,
             time_left: order.time,
+            due: Instant::now() + order.time,
             stall: order.stall,
             files: [cage.input, cage.output].into_iter().flatten().collect(),
         })
@@ -201,8 +205,12 @@ impl Child {
         Ok(n_read)
     }
 
-    /// Reads some of the child's output, as much as there is; 0 at its end.
+    /// Reads some of the child's output, as much as there is; 0 at its end. Here the clock runs all the time,
+    /// for one who talks without end is never waited for.
     pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
+        if Instant::now() > self.due {
+            return Err(Error::TimeLimit);
+        }
         let Some(mut stdout) = self.stdout.take() else {
             return Ok(0);
         };
@@ -256,17 +264,16 @@ impl Child {
     }
 
     fn end(&mut self) -> Result<End, Error> {
-        self.stdin = None;
+        let patience = match self.stdin.take() {
+            Some(_) => self.time_left,
+            None => END_TIME.max(self.stall),
+        };
         self.stdout = None;
         let ended = self
             .ended
             .try_clone()
             .map_err(Error::io("watching the media tool"))?;
-        self.wait_for(
-            ended.as_fd(),
-            PollFlags::IN,
-            Instant::now() + END_TIME.max(self.stall),
-        )?;
+        self.wait_for(ended.as_fd(), PollFlags::IN, Instant::now() + patience)?;
         // It has ended but is not reaped, so its number is still its own: whatever it may have
         // started goes with it.
         rustix::process::kill_process_group(self.group, Signal::KILL).ok();

@@ -14,6 +14,7 @@ mod error;
 mod gate; // the one place that starts a process
 mod image; // a given background
 mod limits;
+mod niceness; // who steps back for whom
 mod packets; // when each packet is shown
 mod probe; // what a file holds
 mod sandbox; // what the child may do

@@ -13,11 +13,14 @@ use super::error::Error;
 use super::gate::{Child, Order};
 use super::limits::Limits;
 use super::probe::{n_streams, number, ratio, text};
-use super::timeline::Timeline;
+use super::timeline::{Timeline, check_extent};
 use super::tools::Tool;
 
 /// Disks read at least this fast, bytes a second; the packet times need the whole file.
 const SLOWEST_DISK: u64 = 50_000_000;
+
+/// What is said of one packet is shorter, side data and all.
+const MAX_LINE_BYTES: usize = 64 << 10;
 
 /// What the packets of a stream say.
 pub(super) struct Packets {
@@ -51,28 +54,14 @@ impl Packets {
             .with_input(path)
             .with_more_time(Duration::from_secs(n_bytes / SLOWEST_DISK));
         let mut child = Child::reading(order)?;
-        let mut packets = Packets {
-            container,
-            times_s: Vec::new(),
-            n_shown: 0,
-            end_s: f64::MIN,
-            cut: false,
-            encrypted: false,
-        };
+        let mut packets = Packets::none(container);
         let (mut chunk, mut line) = (vec![0; 1 << 16], Vec::new());
         loop {
             let n_read = child.read_some(&mut chunk)?;
             if n_read == 0 {
                 break;
             }
-            for &byte in &chunk[..n_read] {
-                if byte != b'\n' {
-                    line.push(byte);
-                    continue;
-                }
-                packets.add(&String::from_utf8_lossy(&line));
-                line.clear();
-            }
+            packets.add_lines(&chunk[..n_read], &mut line)?;
             if packets.n_shown > limits.max_frames {
                 return Err(Error::TooManyFrames {
                     limit: limits.max_frames,
@@ -91,6 +80,32 @@ impl Packets {
             packets.times_s.clear(); // some have no time: then none can be told
         }
         Ok(packets)
+    }
+
+    fn none(container: Container) -> Packets {
+        Packets {
+            container,
+            times_s: Vec::new(),
+            n_shown: 0,
+            end_s: f64::MIN,
+            cut: false,
+            encrypted: false,
+        }
+    }
+
+    /// The next piece of the output; `line` is what came of a line that has not ended.
+    fn add_lines(&mut self, piece: &[u8], line: &mut Vec<u8>) -> Result<(), Error> {
+        for &byte in piece {
+            if byte == b'\n' {
+                self.add(&String::from_utf8_lossy(line));
+                line.clear();
+            } else if line.len() < MAX_LINE_BYTES {
+                line.push(byte);
+            } else {
+                return Err(Error::NotAVideo("a packet is told without an end".into()));
+            }
+        }
+        Ok(())
     }
 
     /// One line: time, duration, flags, side data, of which the first two may be missing. Side data
@@ -127,7 +142,7 @@ impl Packets {
             .flatten()
             .collect();
         let tick_s = ratio(text(&stream["time_base"]), '/').unwrap_or(0.001);
-        let timeline = Timeline::of(&self.times_s, &claimed, tick_s)
+        let timeline = Timeline::of(&self.times_s, &claimed, tick_s, limits)?
             .or_else(|| {
                 claimed.first().map(|&fps| Timeline::Constant {
                     fps,
@@ -137,27 +152,13 @@ impl Packets {
             .ok_or(Error::TooFewFrames {
                 n_frames: self.n_shown,
             })?;
-        let fps = timeline.fps();
-        if fps > limits.max_fps {
-            return Err(Error::TooFast { fps });
-        }
         let n_frames = match &timeline {
             Timeline::Constant { .. } => self.n_shown,
             Timeline::Variable { sources, .. } => sources.len(),
         };
-        let duration_s = n_frames as f64 / fps;
-        if duration_s > limits.max_duration_s {
-            return Err(Error::TooLong {
-                found: duration_s,
-                unit: "s",
-            });
-        }
-        match n_frames > limits.max_frames {
-            true => Err(Error::TooManyFrames {
-                limit: limits.max_frames,
-            }),
-            false => Ok(timeline),
-        }
+        let fps = timeline.fps();
+        check_extent(n_frames as f64 / fps, fps, limits)?;
+        Ok(timeline)
     }
 
     /// Compares what is there with what the header promised.
@@ -206,4 +207,24 @@ fn clock(text: &str) -> Option<f64> {
     text.split(':').try_fold(0.0, |sum, part| {
         Some(sum * 60.0 + part.parse::<f64>().ok()?)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::Code;
+
+    #[test]
+    fn a_line_may_come_in_pieces_but_must_end() {
+        let mut packets = Packets::none(Container::Matroska);
+        let mut line = Vec::new();
+        for piece in ["0.000000,0.04,K__\n0.04", "0000,0.04,___\n"] {
+            packets.add_lines(piece.as_bytes(), &mut line).unwrap();
+        }
+        assert_eq!(packets.times_s, [0.0, 0.04]);
+        let endless = [b'x'; MAX_LINE_BYTES + 1];
+        let refused = packets.add_lines(&endless, &mut line).unwrap_err();
+        assert_eq!(refused.code(), Code::NotAVideo);
+        assert_eq!(line.len(), MAX_LINE_BYTES);
+    }
 }

@@ -4,6 +4,9 @@
 //! regular grid, up to the rounding of its clock, is left as it is. Any other is given at its
 //! nominal rate, each frame being the one nearest in time, with its own true time.
 
+use super::error::Error;
+use super::limits::Limits;
+
 /// Rates that cameras are sold with; a wandering film was meant to have one of them.
 const COMMON_FPS: [f64; 11] = [
     24000.0 / 1001.0,
@@ -51,14 +54,22 @@ impl Timeline {
     /// The timeline of frames shown at `times_s` (ascending), given the rates that the header
     /// claims and the length of a tick of its clock.
     ///
-    /// `None` when there are fewer than two times or all are equal.
-    pub(super) fn of(times_s: &[f64], claimed_fps: &[f64], tick_s: f64) -> Option<Timeline> {
-        let first = *times_s.first()?;
-        let span = times_s.last()? - first;
-        if span <= 0.0 {
-            return None;
+    /// `None` when there are fewer than two times or all are equal. Times that lie far apart, or a rate that
+    /// is far too high, are refused before a frame of it is counted out: a few bytes can claim billions.
+    pub(super) fn of(
+        times_s: &[f64],
+        claimed_fps: &[f64],
+        tick_s: f64,
+        limits: &Limits,
+    ) -> Result<Option<Timeline>, Error> {
+        let (Some(first), Some(last)) = (times_s.first(), times_s.last()) else {
+            return Ok(None);
+        };
+        let span_s = last - first;
+        if span_s <= 0.0 {
+            return Ok(None);
         }
-        let mean_fps = (times_s.len() - 1) as f64 / span;
+        let mean_fps = (times_s.len() - 1) as f64 / span_s;
         for n_ragged in [0, RAGGED] {
             let Some(even) = times_s
                 .len()
@@ -71,17 +82,20 @@ impl Timeline {
             let rates = claimed_fps.iter().copied().chain([mean_fps]);
             if let Some(fps) = rates.into_iter().find(|&fps| is_regular(even, fps, tick_s)) {
                 let ragged_s = ragged.iter().map(|time| time - first).collect();
-                return Some(Timeline::Constant { fps, ragged_s });
+                return Ok(Some(Timeline::Constant { fps, ragged_s }));
             }
         }
         let times_s: Vec<f64> = times_s.iter().map(|time| time - first).collect();
-        let fps = nominal_fps(&times_s, claimed_fps)?;
+        let Some(fps) = nominal_fps(&times_s, claimed_fps) else {
+            return Ok(None);
+        };
+        check_extent(span_s, fps, limits)?;
         let sources = nearest(&times_s, fps);
-        Some(Timeline::Variable {
+        Ok(Some(Timeline::Variable {
             fps,
             times_s,
             sources,
-        })
+        }))
     }
 
     /// Frames a second, as given.
@@ -129,6 +143,25 @@ fn nominal_fps(times_s: &[f64], claimed_fps: &[f64]) -> Option<f64> {
     )
 }
 
+/// Whether so many seconds at this rate are within the limits.
+pub(super) fn check_extent(span_s: f64, fps: f64, limits: &Limits) -> Result<(), Error> {
+    if fps > limits.max_fps {
+        return Err(Error::TooFast { fps });
+    }
+    if span_s > limits.max_duration_s {
+        return Err(Error::TooLong {
+            found: span_s,
+            unit: "s",
+        });
+    }
+    match span_s * fps >= limits.max_frames as f64 + 0.5 {
+        true => Err(Error::TooManyFrames {
+            limit: limits.max_frames,
+        }),
+        false => Ok(()),
+    }
+}
+
 /// For each instant k / fps the index of the nearest time, the earlier one at a tie.
 fn nearest(times_s: &[f64], fps: f64) -> Vec<u32> {
     let last_s = times_s[times_s.len() - 1];
@@ -150,6 +183,25 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::code::Code;
+
+    fn of(times_s: &[f64], claimed_fps: &[f64], tick_s: f64) -> Option<Timeline> {
+        Timeline::of(times_s, claimed_fps, tick_s, &Limits::default()).unwrap()
+    }
+
+    #[test]
+    fn a_leap_in_time_is_refused_before_its_frames_are_counted_out() {
+        let refusal = |steps_s: [f64; 2]| {
+            let times: Vec<f64> = (0..40)
+                .map(|k| f64::from(k) * steps_s[0] + f64::from(k / 20) * steps_s[1])
+                .collect();
+            let timeline = Timeline::of(&times, &[], 1e-6, &Limits::default());
+            timeline.unwrap_err().code()
+        };
+        assert_eq!(refusal([0.04, 1e11]), Code::TooLong);
+        assert_eq!(refusal([1e-6, 1e6]), Code::TooFast);
+        assert_eq!(refusal([0.002, 3000.0]), Code::TooManyFrames);
+    }
 
     fn rounded(times_s: impl Iterator<Item = f64>, tick_s: f64) -> Vec<f64> {
         times_s.map(|t| (t / tick_s).round() * tick_s).collect()
@@ -158,7 +210,7 @@ mod tests {
     #[test]
     fn times_rounded_to_milliseconds_are_a_constant_rate() {
         let times = rounded((0..500).map(|k| f64::from(k) / 29.97), 0.001);
-        let timeline = Timeline::of(&times, &[29.97], 0.001);
+        let timeline = of(&times, &[29.97], 0.001);
         let ragged_s = Vec::new();
         let constant = Timeline::Constant {
             fps: 29.97,
@@ -171,7 +223,7 @@ mod tests {
     fn a_film_that_lacks_its_last_frame_but_one_is_still_constant() {
         let shown = (0..10).filter(|k| *k != 8);
         let times: Vec<f64> = shown.map(|k| f64::from(k) / 25.0).collect();
-        let timeline = Timeline::of(&times, &[25.0], 1e-4);
+        let timeline = of(&times, &[25.0], 1e-4);
         let ragged_s = vec![0.24, 0.28, 0.36];
         let constant = Timeline::Constant {
             fps: 25.0,
@@ -190,7 +242,7 @@ mod tests {
             fps,
             times_s,
             sources,
-        }) = Timeline::of(&times, &[25.0], 1e-4)
+        }) = of(&times, &[25.0], 1e-4)
         else {
             panic!("a gap is not a constant rate");
         };
@@ -205,7 +257,7 @@ mod tests {
             .filter(|k| *k != 5)
             .map(|k| f64::from(k) / 30.0)
             .collect();
-        let timeline = Timeline::of(&times, &[30.0], 1.0 / 30.0);
+        let timeline = of(&times, &[30.0], 1.0 / 30.0);
         assert!(matches!(timeline, Some(Timeline::Variable { .. })));
     }
 
@@ -214,7 +266,7 @@ mod tests {
         fn every_given_frame_is_the_nearest_in_time(steps in prop::collection::vec(0.001f64..0.2, 2..60)) {
             let mut time = 0.0;
             let times: Vec<f64> = steps.iter().map(|step| { time += step; time }).collect();
-            if let Some(Timeline::Variable { fps, times_s, sources }) = Timeline::of(&times, &[], 1e-6) {
+            if let Some(Timeline::Variable { fps, times_s, sources }) = of(&times, &[], 1e-6) {
                 for (k, &source) in sources.iter().enumerate() {
                     let instant_s = k as f64 / fps;
                     let least = times_s.iter().map(|t| (t - instant_s).abs()).fold(f64::MAX, f64::min);

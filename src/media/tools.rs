@@ -122,7 +122,17 @@ fn found(tool: Tool) -> Result<&'static Found, Error> {
         Tool::Ffmpeg => &FFMPEG,
         Tool::Ffprobe => &FFPROBE,
     };
-    let found = cell.get_or_init(|| find(tool).map_err(|error| error.to_string()));
+    if cell.get().is_none() {
+        let found = match find(tool) {
+            Err(error) if is_of_the_moment(&error) => return Err(error),
+            found => found.map_err(|error| error.to_string()),
+        };
+        // Whoever was first has found the same.
+        cell.set(found).ok();
+    }
+    let found = cell
+        .get()
+        .ok_or_else(|| Error::ToolMissing(format!("{tool:?}")))?;
     found
         .as_ref()
         .map_err(|why| Error::ToolMissing(why.clone()))
@@ -176,11 +186,30 @@ fn path_of(tool: Tool) -> Result<PathBuf, Error> {
         .ok_or_else(|| Error::ToolMissing(name.to_owned()))
 }
 
+/// Whether it says something of a machine that had too much to do, and nothing of the tool or its layers.
+fn is_of_the_moment(error: &Error) -> bool {
+    use std::io::ErrorKind::{Interrupted, OutOfMemory, ResourceBusy, WouldBlock};
+    const TOO_MANY_FILES: [Option<i32>; 2] = [Some(libc::EMFILE), Some(libc::ENFILE)];
+    match error {
+        Error::TimeLimit => true,
+        Error::Io { source, .. } => {
+            let kinds = [Interrupted, OutOfMemory, ResourceBusy, WouldBlock];
+            kinds.contains(&source.kind()) || TOO_MANY_FILES.contains(&source.raw_os_error())
+        }
+        _ => false,
+    }
+}
+
 /// Lets the tool tell its version in all layers that there are; where it cannot, in fewer. Returns
-/// what it said, and which layers it cannot bear.
+/// what it said, and which layers it cannot bear. No layer is given up because the machine was busy.
 fn try_out(place: &mut Place) -> Result<(String, Vec<(Layer, String)>), Error> {
-    let whole = match ask(place, &["-version"]) {
+    let asked = match ask(place, &["-version"]) {
+        Err(error) if is_of_the_moment(&error) => ask(place, &["-version"]),
+        asked => asked,
+    };
+    let whole = match asked {
         Ok(version) => return Ok((version, Vec::new())),
+        Err(error) if is_of_the_moment(&error) => return Err(error),
         Err(error) => error.to_string(),
     };
     let all = place.layers;
@@ -263,4 +292,27 @@ fn parse_listing(listing: &str) -> Reach {
     reach.reads.sort();
     reach.reads.dedup();
     reach
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn a_busy_machine_says_nothing_of_a_layer_and_a_refusal_does() {
+        let io = |errno| Error::io("starting the media tool")(io::Error::from_raw_os_error(errno));
+        for error in [
+            Error::TimeLimit,
+            io(libc::EAGAIN),
+            io(libc::ENOMEM),
+            io(libc::EMFILE),
+        ] {
+            assert!(is_of_the_moment(&error), "{error}");
+        }
+        for error in [io(libc::EPERM), io(libc::ENOSYS), io(libc::ENOENT)] {
+            assert!(!is_of_the_moment(&error), "{error}");
+        }
+    }
 }

@@ -32,6 +32,12 @@ pub enum Error {
     /// Another process serves the same folder.
     #[error("the data folder is in use by another flockreel: {}", .0.display())]
     InUse(PathBuf),
+    /// The files bear the mark of another database.
+    #[error(
+        "these files are another database's: name the database and the store that belong together, or an empty \
+         place for the files"
+    )]
+    OtherFiles,
     /// More bytes than an upload may have.
     #[error("the upload is larger than {limit_bytes} bytes")]
     TooLarge {
@@ -82,6 +88,7 @@ impl Error {
             | Error::Bucket(_)
             | Error::Altered(_)
             | Error::InUse(_)
+            | Error::OtherFiles
             | Error::RowsElsewhere
             | Error::UnknownValue { .. } => Code::Internal,
         }

@@ -68,14 +68,22 @@ impl Store {
                 tracing::info!(footage.id = %footage.id, size_bytes = footage.size_bytes, "footage stored");
                 Ok(Added::New(footage))
             }
-            Err(error) => {
+            Err(error) => self.settle(footage, error.into()).await,
+        }
+    }
+
+    /// What became of a footage whose row could not be added, or whose row was, and only the answer lost.
+    async fn settle(&self, footage: Footage, error: Error) -> Result<Added, Error> {
+        if self.is_linked_after(&footage.folder, &error).await? {
+            return Ok(Added::New(footage));
+        }
+        // Two uploads of the same bytes at once: the other one came first.
+        match self.footage_of_bytes(&footage).await? {
+            Some(known) => {
                 self.blobs.discard(&footage.folder).await?;
-                // Two uploads of the same bytes at once: the other one came first.
-                match self.footage_of_bytes(&footage).await? {
-                    Some(known) => Ok(Added::Known(known)),
-                    None => Err(error.into()),
-                }
+                Ok(Added::Known(known))
             }
+            None => Err(error),
         }
     }
 
@@ -135,5 +143,83 @@ impl Store {
         .await?;
         blobs::insert(&mut transaction, &footage.folder, files).await?;
         transaction.commit().await
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::fresh;
+
+    fn footage(sha256: u8) -> Footage {
+        let id = Uuid::now_v7();
+        Footage {
+            id,
+            owner: Owner::local(),
+            folder: format!("footage/{id}"),
+            sha256: vec![sha256; 32],
+            background_sha256: Vec::new(),
+            name: String::new(),
+            size_bytes: 0,
+            width: 64,
+            height: 48,
+            fps: 25.0,
+            n_frames_hint: 40,
+            sample: false,
+            created_ms: 0,
+        }
+    }
+
+    /// The error of a commit whose answer was lost.
+    fn lost() -> Error {
+        Error::Sql(sqlx::Error::Io(std::io::ErrorKind::ConnectionReset.into()))
+    }
+
+    /// How many folders there are in place.
+    async fn n_folders(store: &Store) -> usize {
+        store.blobs.folders().await.unwrap().len()
+    }
+
+    /// A folder in place, as an upload leaves it, whose row is still to come.
+    async fn put_in_place(store: &Store, footage: &Footage) -> Vec<BlobFile> {
+        let draft = store.blobs.draft(&footage.id.to_string()).unwrap();
+        std::fs::write(draft.path().join(VIDEO), b"film").unwrap();
+        let files = store.blobs.seal(&draft).unwrap();
+        store.blobs.adopt(draft, &footage.folder).await.unwrap();
+        files
+    }
+
+    #[tokio::test]
+    async fn a_film_whose_commit_was_made_keeps_its_folder_although_the_answer_was_lost() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let film = footage(1);
+        let files = put_in_place(&store, &film).await;
+        store.insert_footage(&film, &files).await.unwrap();
+        let added = store.settle(film.clone(), lost()).await.unwrap();
+        assert_eq!((added, n_folders(&store).await), (Added::New(film), 1));
+    }
+
+    #[tokio::test]
+    async fn a_folder_of_which_nobody_knows_is_left_to_the_sweep() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let film = footage(1);
+        put_in_place(&store, &film).await;
+        store.settle(film, lost()).await.unwrap_err();
+        assert_eq!(n_folders(&store).await, 1, "its commit may be under way");
+    }
+
+    #[tokio::test]
+    async fn of_the_same_bytes_twice_at_once_one_folder_stays() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let (first, second) = (footage(1), footage(1));
+        for film in [&first, &second] {
+            put_in_place(&store, film).await;
+        }
+        store.insert_footage(&first, &[]).await.unwrap();
+        let added = store.settle(second, lost()).await.unwrap();
+        assert_eq!((added, n_folders(&store).await), (Added::Known(first), 1));
     }
 }

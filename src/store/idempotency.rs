@@ -5,11 +5,14 @@
 
 use sqlx::types::Uuid;
 
-use super::{Error, Store, sql};
+use super::{Error, Store, Transaction, sql};
 
 /// How long an answer is kept, milliseconds.
 pub const KEPT_MS: i64 = 24 * 3600 * 1000;
 
+/// Who has held a key for longer has died with it, milliseconds: another process, or a request of this one that could
+/// not give it back. An upload over a slow line may take so long.
+const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
 /// Where other processes may have died with keys of theirs: who has not renewed one for as long has,
 /// milliseconds.
 pub const LEASE_MS: i64 = 15_000;
@@ -86,7 +89,7 @@ impl Store {
                 return Ok(Begun::Running);
             }
             Some((state, ..)) if state == "done" => {
-                return Ok(Begun::Done(self.answer(scope).await?));
+                return Ok(Begun::Done(answer(&mut transaction, scope).await?));
             }
             Some((_, _, Some(then), _)) if body_sha256.is_some_and(|now| now != then) => {
                 return Ok(Begun::OtherBody);
@@ -112,9 +115,22 @@ impl Store {
         Ok(Begun::Run(ids))
     }
 
+    /// Forgets answers that nobody may ask for again, also where no other key ever comes.
+    pub async fn forget_old_answers(&self, now_ms: i64) -> Result<(), Error> {
+        sql::query("delete from idempotency where created_ms <= $1")
+            .bind(now_ms - KEPT_MS)
+            .execute(&self.writer)
+            .await?;
+        Ok(())
+    }
+
     /// Whether a request that was last heard of then is not under way any more.
     fn is_over(&self, heard_ms: i64, now_ms: i64) -> bool {
-        !self.is_alone() && heard_ms < now_ms - LEASE_MS
+        let longest_ms = match self.is_alone() {
+            true => LONGEST_REQUEST_MS,
+            false => LEASE_MS,
+        };
+        heard_ms < now_ms - longest_ms
     }
 
     /// The request that holds the key is still under way.
@@ -130,15 +146,6 @@ impl Store {
         .execute(&self.writer)
         .await?;
         Ok(())
-    }
-
-    async fn answer(&self, scope: &Scope) -> Result<Answer, Error> {
-        let row = sql::query(
-            "select body_sha256, status, headers, answer from idempotency \
-             where caller = $1 and route = $2 and key = $3",
-        );
-        let row = row.bind(&scope.caller).bind(&scope.route).bind(&scope.key);
-        Ok(row.fetch_one(&self.reader).await?)
     }
 
     /// Notes the answer to the request that holds the key.
@@ -182,6 +189,17 @@ impl Store {
     }
 }
 
+/// The kept answer, read where it was found: a second connection might never become free, where all of them wait
+/// for one.
+async fn answer(transaction: &mut Transaction, scope: &Scope) -> Result<Answer, sqlx::Error> {
+    let row = sql::query(
+        "select body_sha256, status, headers, answer from idempotency \
+         where caller = $1 and route = $2 and key = $3",
+    );
+    let row = row.bind(&scope.caller).bind(&scope.route).bind(&scope.key);
+    row.fetch_one(transaction).await
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,6 +231,39 @@ mod tests {
         assert_eq!(met, Begun::Done(answer));
         let met = store.begin_key(&scope(), None, KEPT_MS).await.unwrap();
         assert!(matches!(met, Begun::Run(ids) if ids != first), "{met:?}");
+    }
+
+    #[tokio::test]
+    async fn a_key_that_nobody_gave_back_is_free_after_an_hour() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let first = store.begin_key(&scope(), None, 0).await.unwrap();
+        let met = store.begin_key(&scope(), None, LONGEST_REQUEST_MS).await;
+        assert_eq!(met.unwrap(), Begun::Running);
+        let met = store
+            .begin_key(&scope(), None, LONGEST_REQUEST_MS + 1)
+            .await;
+        assert_eq!(met.unwrap(), first);
+    }
+
+    #[tokio::test]
+    async fn more_replays_at_once_than_there_are_connections_are_all_answered() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        store.begin_key(&scope(), None, 0).await.unwrap();
+        let answer = Answer {
+            body_sha256: vec![7; 32],
+            status: 202,
+            headers: "[]".into(),
+            answer: b"{}".to_vec(),
+        };
+        store.finish_key(&scope(), &answer).await.unwrap();
+        let scope = scope();
+        let replays = (0..40).map(|_| store.begin_key(&scope, None, 1));
+        let all = futures_util::future::join_all(replays);
+        for met in all.await {
+            assert_eq!(met.unwrap(), Begun::Done(answer.clone()));
+        }
     }
 
     #[tokio::test]

@@ -18,6 +18,7 @@ pub mod libraries;
 pub mod owners;
 pub mod spill;
 mod sql;
+pub mod tls;
 pub mod tokens;
 pub mod upkeep;
 pub mod uploads;
@@ -51,12 +52,14 @@ pub struct Store {
 
 impl Store {
     /// Opens the store, made if absent, and brings the database to this version's form. Fails with
-    /// [`Error::InUse`] when another process serves the same data folder or file of rows.
+    /// [`Error::InUse`] when another process serves the same data folder or file of rows, with
+    /// [`Error::OtherFiles`] when the files are another database's.
     pub async fn open(storage: impl Into<Storage>) -> Result<Store, Error> {
         let storage = storage.into();
         std::fs::create_dir_all(&storage.data)?;
         let mut locks = vec![lock(&storage.data.join("lock"))?];
-        if let Some(Database::Sqlite(file)) = &storage.database {
+        // Another process may name the same file while its data folder is another.
+        if let Database::Sqlite(file) = storage.database() {
             locks.push(lock(&file.with_extension("lock"))?);
         }
         Store::connect(&storage, locks).await
@@ -88,14 +91,16 @@ impl Store {
                 (pool.clone(), pool, false)
             }
         };
-        Ok(Store {
+        let store = Store {
             writer,
             reader,
             blobs,
             holders: uploads::Holders::default(),
             locks: Arc::new(locks),
             is_alone,
-        })
+        };
+        store.own_files().await?;
+        Ok(store)
     }
 
     /// Whether every lease that stands was given by a process that is gone: no other can have the rows.

@@ -1,7 +1,7 @@
 """schemathesis over the OpenAPI document of a really started service that holds one thing of every kind.
 
-Half of the calls name what is there, so that more than 404 is seen; the other half what chance brings. Streams that
-never end are left out: tests/it/api/events.rs reads them.
+A third of the calls names what is there, a third what chance brings; a walk asks every operation for what it can give, and
+it is a fault when one of them never succeeded. Streams that never end are left out: tests/it/api/events.rs reads them.
 """
 
 import os
@@ -9,6 +9,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import hooks  # noqa: F401 (it tells schemathesis, in this process too)
+from walk import Walk, tell
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from service import post, started, wait_for_job  # noqa: E402, of the folder above
@@ -24,10 +27,12 @@ def main(program):
     program = str(Path(program).resolve())
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
+        os.environ["CONTRACT_SEEN"] = str(folder / "seen")
         with started(program, folder / "data", "--log", "warn", "--max-queued", "20") as address:
             ids = furnish(program, address, folder)
             faults = run(address, folder, "chance", "")
             faults += run(address, folder, "what is there", known(ids))
+            faults += walk_through(program, address, folder)
         checked = subprocess.run([program, "check", "--data", folder / "data"], check=False)
         sys.exit(1 if faults or checked.returncode else 0)
 
@@ -68,6 +73,22 @@ def run(address, folder, what, settings):
     command += ["--exclude-path-regex", "/events$", "--suppress-health-check", "all"]
     print(f"contract tests: {what}", flush=True)
     return subprocess.run(command, check=False, cwd=folder, env={**os.environ, "SCHEMATHESIS_HOOKS": HOOKS, "PYTHONPATH": str(Path(__file__).parent)}).returncode
+
+
+def walk_through(program, address, folder):
+    """How many operations never succeeded."""
+    print("contract tests: a walk", flush=True)
+    film, data = folder / "another.mp4", folder / "data"
+    command = [program, "sample", "-o", film, "--frames", "120", "--size", "160x120", "--seed", "2"]
+    subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
+    command = [program, "token", "create", "--name", "walk", "--data", data]
+    token = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+    walk = Walk(address, film, token)
+    walk.whole()
+    never = tell(folder / "seen", walk.document.raw_schema)
+    for operation in never:
+        print(f"contract tests: never a success: {operation}")
+    return len(never)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@
 //! holds their differences: what rounding may add is taken off the bound again.
 
 use super::kernel::{LANES, least_differences};
-use super::pixels::Flip;
+use super::page::Flip;
 use crate::cpu::Level;
 
 /// Side of a fine square, pixels: its sum is at most 64 * 255.

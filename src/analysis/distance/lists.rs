@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::Side;
 use super::bounds::SquareSums;
 use super::kernel::least_differences;
+use super::marks::Marks;
 use super::pixels::ComparedSprites;
 use super::window::Clip;
 use crate::cpu::Level;
@@ -73,12 +74,12 @@ impl Lists {
 
     /// Marks those that clip `i` is compared with, from itself on: entry k of `row` is clip i + k. Nothing else
     /// is changed.
-    pub fn mark(&self, side: Side, i: usize, row: &mut [bool]) {
+    pub fn mark(&self, side: Side, i: usize, row: &mut Marks) {
         for &list in &self.probed[side as usize][i] {
             let members = &self.members[list as usize];
             let later = members.partition_point(|&j| (j as usize) < i);
             for &j in &members[later..] {
-                row[j as usize - i] = true;
+                row.mark(j as usize - i);
             }
         }
     }

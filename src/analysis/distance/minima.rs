@@ -28,8 +28,16 @@ pub struct LocalMinima<'a> {
     usable: &'a [bool],
     least_gap: usize,
     limit: u64,
-    rows: [Vec<u64>; N_ROWS],
+    rows: [Row; N_ROWS],
     n_rows: usize,
+}
+
+/// The pairs of one clip that compete.
+#[derive(Default)]
+struct Row {
+    pairs: Vec<ClipPair>,
+    /// Their distances by j - i, and `u64::MAX` where there is none.
+    by_gap: Vec<u64>,
 }
 
 impl LocalMinima<'_> {
@@ -45,21 +53,15 @@ impl LocalMinima<'_> {
         }
     }
 
-    /// Takes D(i, i..) for the next i, and reports the minima that are settled by it.
-    pub fn push(&mut self, row: &[u64], on_minimum: impl FnMut(ClipPair)) {
+    /// Takes the pairs (i, j >= i) of the next clip i, those that are left out being far, and reports the minima
+    /// that are settled by it.
+    pub fn push(&mut self, pairs: &[ClipPair], on_minimum: impl FnMut(ClipPair)) {
         let i = self.n_rows;
-        let usable = &self.usable[i..];
-        let kept = &mut self.rows[i % N_ROWS];
-        kept.clear();
-        kept.extend(
-            row.iter()
-                .zip(usable)
-                .enumerate()
-                .map(|(gap, (&distance, &usable_too))| {
-                    let competes = usable[0] && usable_too && gap >= self.least_gap;
-                    if competes { distance } else { u64::MAX }
-                }),
-        );
+        let competes = |pair: &&ClipPair| {
+            self.usable[i] && self.usable[pair.to] && pair.to - i >= self.least_gap
+        };
+        let pairs = pairs.iter().filter(competes).copied();
+        self.rows[i % N_ROWS].fill(self.usable.len() - i, pairs);
         self.n_rows += 1;
         if let Some(settled) = i.checked_sub(REACH) {
             self.report(settled, on_minimum);
@@ -73,13 +75,10 @@ impl LocalMinima<'_> {
         }
     }
 
-    fn report(&self, from: usize, mut on_minimum: impl FnMut(ClipPair)) {
-        for (to, &distance) in (from..).zip(&self.rows[from % N_ROWS]) {
-            let pair = ClipPair { from, to, distance };
-            if distance < self.limit && self.is_minimum(pair) {
-                on_minimum(pair);
-            }
-        }
+    fn report(&self, from: usize, on_minimum: impl FnMut(ClipPair)) {
+        let below = self.rows[from % N_ROWS].pairs.iter().copied();
+        let minima = below.filter(|&pair| pair.distance < self.limit && self.is_minimum(pair));
+        minima.for_each(on_minimum);
     }
 
     fn is_minimum(&self, pair: ClipPair) -> bool {
@@ -98,8 +97,21 @@ impl LocalMinima<'_> {
         if from >= self.n_rows {
             return None;
         }
-        let distance = *self.rows[from % N_ROWS].get(to - from)?;
+        let distance = *self.rows[from % N_ROWS].by_gap.get(to - from)?;
         Some(ClipPair { from, to, distance })
+    }
+}
+
+impl Row {
+    fn fill(&mut self, n_clips: usize, pairs: impl Iterator<Item = ClipPair>) {
+        for pair in self.pairs.drain(..) {
+            self.by_gap[pair.to - pair.from] = u64::MAX;
+        }
+        self.pairs.extend(pairs);
+        self.by_gap.resize(n_clips, u64::MAX);
+        for pair in &self.pairs {
+            self.by_gap[pair.to - pair.from] = pair.distance;
+        }
     }
 }
 
@@ -114,8 +126,12 @@ mod tests {
     fn minima(rows: &[&[u64]], usable: &[bool], limit: u64) -> Vec<(usize, usize)> {
         let mut found = Vec::new();
         let mut minima = LocalMinima::new(usable, 0, limit);
-        for row in rows {
-            minima.push(row, |pair| found.push((pair.from, pair.to)));
+        for (from, row) in rows.iter().enumerate() {
+            let pairs: Vec<ClipPair> = (from..)
+                .zip(*row)
+                .map(|(to, &distance)| ClipPair { from, to, distance })
+                .collect();
+            minima.push(&pairs, |pair| found.push((pair.from, pair.to)));
         }
         minima.finish(|pair| found.push((pair.from, pair.to)));
         found

@@ -9,8 +9,10 @@ mod bounds;
 mod group;
 mod kernel;
 mod lists;
+mod marks;
 mod matrix;
 mod minima;
+mod page;
 mod pixels;
 mod pruned;
 mod upright;
@@ -21,10 +23,10 @@ pub(crate) mod tests;
 
 pub use asked::{Asked, Everything};
 pub use lists::Lists;
+pub use marks::Marks;
 pub use matrix::DistanceMatrix;
 pub use minima::{ClipPair, LocalMinima};
 pub use pixels::ComparedSprites;
-pub use pruned::NOT_BELOW;
 pub use window::Clip;
 
 use rayon::prelude::*;
@@ -81,6 +83,7 @@ impl Distances<'_> {
         let n_frames = self.pixels.n_frames();
         let mut window = WindowSums::new(self.clip, n_frames);
         let mut row: Vec<u64> = Vec::with_capacity(n_frames);
+        let mut memory = <[GroupMemory; PANEL]>::default();
         for panel_idx in (0..self.pixels.n_groups()).step_by(PANEL) {
             if progress.cancelled() {
                 return Err(Cancelled);
@@ -89,7 +92,7 @@ impl Distances<'_> {
             // Two rows from the bottom hold two distances: work done is that of the triangle above.
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
-            let tiles = self.panel(panel_idx);
+            let tiles = self.panel(panel_idx, &mut memory);
             for r in first..n_frames.min(first + PANEL * GROUP) {
                 let (group, line) = ((r - first) / GROUP, (r - first) % GROUP);
                 let of_tiles = tiles[group..].iter().flat_map(|column| column[group][line]);
@@ -106,11 +109,14 @@ impl Distances<'_> {
 
     /// The tiles of a panel of groups of rows, from the diagonal to the right: for every group of columns
     /// one for each group of rows not below it.
-    fn panel(&self, first: usize) -> Vec<Vec<Box<kernel::SadTile>>> {
+    fn panel(
+        &self,
+        first: usize,
+        memory: &mut [GroupMemory; PANEL],
+    ) -> Vec<Vec<Box<kernel::SadTile>>> {
         let n_groups = self.pixels.n_groups();
-        let mut memory: [GroupMemory; PANEL] = Default::default();
         let rows: Vec<Group<'_>> = (first..n_groups.min(first + PANEL))
-            .zip(&mut memory)
+            .zip(memory)
             .map(|(group_idx, memory)| self.row_group(group_idx, memory))
             .collect();
         (first..n_groups)

@@ -5,27 +5,22 @@
 //! groups (`group`), in memory or put aside, together with the sums that bound their distances (`bounds`).
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
 use super::Side;
 use super::bounds::{Bounds, Sums};
-use super::group::{BLOCK, GROUP, Group, GroupMemory, SIDE, gather, sad, scatter};
+use super::group::{GROUP, Group, GroupMemory, SIDE};
+use super::kernel::{Tile, sad_tile};
+use super::page::{Flip, Page};
 use super::upright::Canvas;
 use crate::analysis::params::Planes;
+use crate::cpu::Level;
 use crate::library::{Poses, Sprites, View};
 use crate::scratch::{Full, Scratch};
 
-/// How a sprite is mirrored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Flip {
-    /// Columns reversed: the side view's left-right mirror.
-    Columns,
-    /// Rows reversed: an animal that heads along +x, mirrored across its own axis.
-    Rows,
-}
-
-/// Bytes of all blocks up to which they stay in memory; those of a longer footage are put aside.
+/// Bytes of blocks that stay in memory; what else a longer footage has is put aside.
 const HELD_BYTES: usize = 64 << 20;
 
 /// Every frame's U.
@@ -60,7 +55,7 @@ impl ComparedSprites {
         ComparedSprites::holding(HELD_BYTES, sprites, poses, planes)
     }
 
-    /// As `new`, with the blocks in memory only if they take no more than `held_bytes`.
+    /// As `new`, with no more than `held_bytes` of the blocks in memory.
     pub(super) fn holding(
         held_bytes: usize,
         sprites: &Sprites,
@@ -90,7 +85,8 @@ impl ComparedSprites {
             scratch: Arc::clone(sprites.scratch()),
         };
         let n_groups = compared.n_frames.div_ceil(GROUP);
-        let held = n_groups * GROUP * compared.n_blocks() * BLOCK <= held_bytes;
+        // Which stay depends on the order in which they come; what they are compared to does not.
+        let n_held = AtomicUsize::new(0);
         let source = Source {
             sprites,
             poses,
@@ -101,8 +97,9 @@ impl ComparedSprites {
             .into_par_iter()
             .map(|group_idx| {
                 let (group, sums) = compared.gathered(group_idx, &source);
-                let stored = match held {
-                    true => Stored::Held(group),
+                let n_before = n_held.fetch_add(group.n_bytes(), Ordering::Relaxed);
+                let stored = match n_before + group.n_bytes() <= held_bytes {
+                    true => Stored::Held(group.hold()),
                     false => {
                         let (sums, at) = group.put_aside(&*compared.scratch)?;
                         Stored::Aside { sums, at }
@@ -122,17 +119,15 @@ impl ComparedSprites {
     /// The blocks of one group, made of its sprites, and the sums of each, as it is and mirrored.
     fn gathered(&self, group_idx: usize, source: &Source<'_>) -> (GroupMemory, Vec<(Sums, Sums)>) {
         let mut group = GroupMemory::default();
-        group.clear(GROUP * self.n_blocks());
         let mut bytes = vec![0; self.n_bytes()];
         let mut sums = Vec::with_capacity(GROUP);
-        let first = group_idx * GROUP;
-        for frame_idx in first..self.n_frames.min(first + GROUP) {
-            source.draw(frame_idx, &mut bytes);
-            scatter(&bytes, self.width, frame_idx - first, &mut group.blocks);
+        let size = [self.n_sprites(group_idx), self.n_blocks()];
+        group.take_in(size, &mut self.page(), |sprite, page| {
+            source.draw(group_idx * GROUP + sprite, &mut bytes);
+            page.draw(&bytes);
             let mirrored = Sums::of_mirrored(&bytes, self.width, self.flip);
             sums.push((Sums::of(&bytes, self.width), mirrored));
-        }
-        group.sum_up();
+        });
         (group, sums)
     }
 
@@ -147,16 +142,33 @@ impl ComparedSprites {
     }
 
     /// d(i, i + 1) of every frame but the last.
-    pub fn steps(&self) -> Vec<u64> {
+    pub fn steps(&self, cpu: Level) -> Vec<u64> {
         let of_group = |group_idx: usize| {
             let (mut one, mut other) = (GroupMemory::default(), GroupMemory::default());
             let group = self.group(group_idx, &mut one);
-            let mut steps: Vec<u64> = (1..group.n_sprites)
-                .map(|k| sad(group, k - 1, group, k))
-                .collect();
+            let wanted = std::array::from_fn(|k| (k + 1 < group.n_sprites).then_some(2 << k));
+            let wanted = wanted.map(Option::unwrap_or_default);
+            let within = sad_tile(
+                cpu,
+                Tile {
+                    rows: group,
+                    columns: group,
+                    wanted: &wanted,
+                },
+            );
+            let mut steps: Vec<u64> = (1..group.n_sprites).map(|k| within[k - 1][k]).collect();
             if group_idx + 1 < self.n_groups() {
-                let next = self.group(group_idx + 1, &mut other);
-                steps.push(sad(group, GROUP - 1, next, 0));
+                let columns = self.group(group_idx + 1, &mut other);
+                let wanted = std::array::from_fn(|k| u64::from(k + 1 == GROUP));
+                let across = sad_tile(
+                    cpu,
+                    Tile {
+                        rows: group,
+                        columns,
+                        wanted: &wanted,
+                    },
+                );
+                steps.push(across[GROUP - 1][0]);
             }
             steps
         };
@@ -196,14 +208,10 @@ impl ComparedSprites {
     ) -> Group<'a> {
         let mut aside = GroupMemory::default();
         let group = self.group(group_idx, &mut aside);
-        memory.clear(GROUP * self.n_blocks());
-        let mut bytes = vec![0; self.n_bytes()];
-        for sprite in 0..group.n_sprites {
-            gather(group, self.width, sprite, &mut bytes);
-            self.mirror(&mut bytes);
-            scatter(&bytes, self.width, sprite, &mut memory.blocks);
-        }
-        memory.sum_up();
+        let size = [group.n_sprites, self.n_blocks()];
+        memory.take_in(size, &mut self.page(), |sprite, page| {
+            page.draw_mirrored(group, sprite, self.flip);
+        });
         memory.lend(group.n_sprites)
     }
 
@@ -211,21 +219,8 @@ impl ComparedSprites {
         (self.n_frames - group_idx * GROUP).min(GROUP)
     }
 
-    fn mirror(&self, bytes: &mut [u8]) {
-        let row_bytes = self.width * 4;
-        match self.flip {
-            Flip::Columns => {
-                for row in bytes.chunks_exact_mut(row_bytes) {
-                    row.as_chunks_mut::<4>().0.reverse();
-                }
-            }
-            Flip::Rows => {
-                for y in 0..self.height / 2 {
-                    let (upper, lower) = bytes.split_at_mut((self.height - 1 - y) * row_bytes);
-                    upper[y * row_bytes..][..row_bytes].swap_with_slice(&mut lower[..row_bytes]);
-                }
-            }
-        }
+    fn page(&self) -> Page {
+        Page::new([self.width, self.height])
     }
 
     fn n_blocks(&self) -> usize {

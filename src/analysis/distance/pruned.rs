@@ -1,10 +1,13 @@
 //! Only the distances below a limit, without computing most of the others (ALGORITHMS.md 5, exact pruning).
 //!
 //! Of the pairs of clips in a panel that are asked for the sums over 16 x 16 squares are compared; where the
-//! bound of a pair is below the limit, those over 8 x 8 squares; where it still is, the pixels. What comes out
-//! is exact: a distance that is asked for is left out only when a bound says that it is not below the limit.
+//! bound of a pair is below the limit, those over 8 x 8 squares; where it still is, and of all that such a pair
+//! competes with, the pixels. What comes out is exact: a distance that is asked for is left out only when a
+//! bound says that it is not below the limit.
 //!
 //! Pairs of clips are told by their offset j - i, so that all that one of them adds up stands in one column.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -12,41 +15,40 @@ use super::asked::{self, Asked};
 use super::bounds::SquareSums;
 use super::group::{GROUP, Group, GroupMemory};
 use super::kernel::{self, SadTile, Tile, Wanted};
-use super::{Cancelled, Distances, Side};
+use super::marks::Marks;
+use super::{Cancelled, ClipPair, Distances, Side};
 use crate::progress::Progress;
 
-/// Bytes that the bounds of a panel take, about.
-const PANEL_BYTES: usize = 16 << 20;
-/// Most groups of clips in a panel.
-const MOST_GROUPS: usize = 4;
-
-/// Stands for a distance that is not below the limit.
-pub const NOT_BELOW: u64 = u64::MAX;
+/// Bytes that a panel takes, about: what has been put aside is had back once for each.
+const PANEL_BYTES: usize = 128 << 20;
+/// Bytes for a pair of frames: its bound, and its place in a tile.
+const PAIR_BYTES: usize = size_of::<u32>() + size_of::<u64>();
+/// Most groups of clips in a panel; in tests so few that their films have several.
+const MOST_GROUPS: usize = if cfg!(test) { 1 } else { 8 };
 
 impl Distances<'_> {
-    /// As [`for_each_row`](Distances::for_each_row), but of the distances that are not below `limit` it
-    /// is only told that they are not: they are [`NOT_BELOW`]. So are those not asked for.
+    /// Calls `on_row(i, pairs)` for every clip i in order, with the pairs (i, j), j >= i and rising, that have
+    /// D(i, j) < `limit`: all of those asked for, and some that they compete with.
     pub fn for_each_row_below(
         &self,
         limit: u64,
         asked: &impl Asked,
         progress: &dyn Progress,
-        mut on_row: impl FnMut(usize, &[u64]),
+        mut on_row: impl FnMut(usize, &[ClipPair]),
     ) -> Result<(), Cancelled> {
         let (n_frames, n_clips) = (self.pixels.n_frames(), self.n_clips());
-        let n_groups = PANEL_BYTES / (GROUP * n_frames.max(1) * size_of::<u32>());
+        let n_groups = PANEL_BYTES / (GROUP * n_frames.max(1) * PAIR_BYTES);
         let n_rows = GROUP * n_groups.clamp(1, MOST_GROUPS);
+        let mut panel = Panel::new(self, limit);
         for first in (0..n_clips).step_by(n_rows) {
             if progress.cancelled() {
                 return Err(Cancelled);
             }
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
-            let n_rows = n_rows.min(n_clips - first);
-            let asked = asked::rows(asked, [first, n_rows, n_clips]);
-            let rows = Panel::of(self, first, limit, asked).distances();
-            for (clip_idx, row) in (first..).zip(rows) {
-                on_row(clip_idx, &row);
+            let clips = first..n_clips.min(first + n_rows);
+            for (i, pairs) in clips.clone().zip(panel.pairs(clips, asked)) {
+                on_row(i, &pairs);
             }
         }
         progress.report("distances", 1.0);
@@ -54,88 +56,82 @@ impl Distances<'_> {
     }
 }
 
-impl Distances<'_> {
-    /// Calls `on_clip(j)` for every clip j >= i with D(i, j) < `limit`, of those asked for.
-    pub fn for_each_below(
-        &self,
-        i: usize,
-        limit: u64,
-        asked: &impl Asked,
-        progress: &dyn Progress,
-        on_clip: impl FnMut(usize),
-    ) -> Result<(), Cancelled> {
-        if progress.cancelled() {
-            return Err(Cancelled);
-        }
-        let asked = asked::rows(asked, [i, 1, self.n_clips()]);
-        let row = Panel::of(self, i, limit, asked).distances().remove(0);
-        let below = (i..).zip(row).filter(|(_, d)| *d != NOT_BELOW);
-        below.map(|(j, _)| j).for_each(on_clip);
-        Ok(())
-    }
-}
-
-/// Some clips against all that come after them.
+/// Some clips against all that come after them, and the memory for it.
 struct Panel<'a> {
     distances: &'a Distances<'a>,
     limit: u64,
     weights: Vec<u64>,
+    /// Bounds are cut off here: so low that all that is added up fits 32 bits, and where it can be as high
+    /// as the limit.
+    most: u32,
     /// The first clip.
     first: usize,
-    /// Per clip: which pairs with so many clips after it may be below the limit.
-    near: Vec<Vec<bool>>,
     /// Per frame of these clips: at least d of it and the frame so many after it, where that was looked at.
     least: Vec<Vec<u32>>,
+    /// For their groups.
+    memory: Vec<GroupMemory>,
 }
 
 impl<'a> Panel<'a> {
-    /// Of the clips from `first` on, of which these pairs are asked for.
-    fn of(
-        distances: &'a Distances<'a>,
-        first: usize,
-        limit: u64,
-        asked: Vec<Vec<bool>>,
-    ) -> Panel<'a> {
-        let n_frames = distances.pixels.n_frames();
-        let last = first + asked.len() + distances.clip.frames - 1;
+    fn new(distances: &'a Distances<'a>, limit: u64) -> Panel<'a> {
+        let weights = distances.clip.weights();
+        let most = u64::from(u32::MAX) / weights.iter().sum::<u64>();
         Panel {
             distances,
             limit,
-            weights: distances.clip.weights(),
-            first,
-            near: asked,
-            least: (first..last).map(|row| vec![0; n_frames - row]).collect(),
+            most: most.min(limit) as u32,
+            weights,
+            first: 0,
+            least: Vec::new(),
+            memory: Vec::new(),
         }
     }
 
-    /// D of every clip of the panel and all from it on.
-    fn distances(mut self) -> Vec<Vec<u64>> {
+    /// The pairs below the limit of each of the clips, rising.
+    fn pairs(&mut self, clips: Range<usize>, asked: &impl Asked) -> Vec<Vec<ClipPair>> {
+        let (reach, n_clips) = (asked.reach(), self.distances.n_clips());
+        // A pair of a clip before or after may compete with one of these.
+        let around = clips.start.saturating_sub(reach)..n_clips.min(clips.end + reach);
+        let ask = |i: usize| {
+            let mut row = Marks::none(n_clips - i);
+            asked.mark(i, &mut row);
+            row
+        };
+        let asked: Vec<Marks> = around.clone().into_par_iter().map(ask).collect();
+        self.begin_at(around.clone());
         let pixels = self.distances.pixels;
         let [rows, columns] = [self.distances.side, Side::Plain].map(|side| pixels.bounds(side));
-        self.look_at(&rows.coarse, &columns.coarse);
-        self.look_at(&rows.fine, &columns.fine);
-        let tiles = Tiles::of(&self, &self.frames());
-        let one = |(clip, near): (usize, &Vec<bool>)| {
-            let exact = |(offset, &near): (usize, &bool)| match near {
-                false => NOT_BELOW,
-                true => self.exact(&tiles, [clip, offset]),
-            };
-            near.iter().enumerate().map(exact).collect()
-        };
-        self.near.par_iter().enumerate().map(one).collect()
+        let mut near = asked.clone();
+        self.drop_far(&mut near, &rows.coarse, &columns.coarse);
+        self.drop_far(&mut near, &rows.fine, &columns.fine);
+        let mut competing = asked::competing(&near, &asked, reach);
+        self.drop_far(&mut competing, &rows.fine, &columns.fine);
+        let both = near.iter_mut().zip(&competing);
+        both.for_each(|(near, competing)| near.add(competing, 0));
+        self.exact(
+            clips.start,
+            &near[clips.start - around.start..][..clips.len()],
+        )
     }
 
-    /// Raises the bounds of the frames of all pairs that are near to those of such squares, and drops the
-    /// pairs that are not near by these.
-    fn look_at(&mut self, rows: &SquareSums, columns: &SquareSums) {
-        let wanted = self.frames();
-        let (first, cpu) = (self.first, self.distances.cpu);
-        // So low that all that is added up fits 32 bits, and where it can be as high as the limit.
-        let most = u64::from(u32::MAX) / self.weights.iter().sum::<u64>();
-        let most = most.min(self.limit) as u32;
-        let of_frame = |(k, (least, wanted)): (usize, (&mut Vec<u32>, &Vec<bool>))| {
+    fn begin_at(&mut self, clips: Range<usize>) {
+        let frames = clips.start..clips.end + self.distances.clip.frames - 1;
+        let n_frames = self.distances.pixels.n_frames();
+        self.first = clips.start;
+        self.least.resize_with(frames.len(), Vec::new);
+        // What is left of a panel before is never read: bounds are, where they were looked at.
+        let rows = self.least.iter_mut().zip(frames);
+        rows.for_each(|(least, row)| least.resize(n_frames - row, 0));
+    }
+
+    /// Looks at the bounds by such squares of the frames of all pairs that are near, and drops the pairs that are
+    /// not near by these.
+    fn drop_far(&mut self, near: &mut [Marks], rows: &SquareSums, columns: &SquareSums) {
+        let (first, f, cpu) = (self.first, self.distances.clip.frames, self.distances.cpu);
+        let (most, limit, weights) = (self.most, self.limit, &self.weights);
+        let of_frame = |(k, least): (usize, &mut Vec<u32>)| {
             let row = first + k;
-            for run in asked::runs(wanted) {
+            for run in frames_of(near, k, f).runs() {
                 let least = &mut least[run.clone()];
                 rows.against(cpu, row, columns, row + run.start, least);
                 least
@@ -143,46 +139,48 @@ impl<'a> Panel<'a> {
                     .for_each(|least| *least = (*least).min(most));
             }
         };
-        let frames = self.least.par_iter_mut().zip(&wanted);
-        frames.enumerate().for_each(of_frame);
-        let (least, weights, limit) = (&self.least, &self.weights, self.limit);
-        let clips = self.near.par_iter_mut().enumerate();
-        clips.for_each(|(clip, near)| drop_far(near, &least[clip..], weights, limit));
+        self.least.par_iter_mut().enumerate().for_each(of_frame);
+        let least = &self.least;
+        let clips = near.par_iter_mut().enumerate();
+        clips.for_each(|(clip, near)| drop_far_of(near, &least[clip..], weights, limit));
     }
 
-    /// Which pairs of frames the pairs of clips that are near consist of.
-    fn frames(&self) -> Vec<Vec<bool>> {
-        let f = self.distances.clip.frames;
-        let of_frame = |row: usize| {
-            let mut wanted = vec![false; self.least[row].len()];
-            for clip in &self.near[(row + 1).saturating_sub(f)..self.near.len().min(row + 1)] {
-                let both = wanted.iter_mut().zip(clip);
-                both.for_each(|(wanted, near)| *wanted |= near);
-            }
-            wanted
+    /// Of these clips the pairs marked that are below the limit.
+    fn exact(&mut self, first: usize, near: &[Marks]) -> Vec<Vec<ClipPair>> {
+        let tiles = Tiles::of(self.distances, first, near, &mut self.memory);
+        let one = |(from, near): (usize, &Marks)| {
+            let pair = |offset: usize| {
+                let weighed = (from..).zip(&self.weights);
+                let d = weighed.map(|(row, w)| w * tiles.sad(row, row + offset));
+                ClipPair {
+                    from,
+                    to: from + offset,
+                    distance: d.sum(),
+                }
+            };
+            let pairs = near.ones().map(pair);
+            pairs.filter(|pair| pair.distance < self.limit).collect()
         };
-        (0..self.least.len())
-            .into_par_iter()
-            .map(of_frame)
-            .collect()
+        let clips = (first..first + near.len()).into_par_iter().zip(near);
+        clips.map(one).collect()
     }
+}
 
-    fn exact(&self, tiles: &Tiles, [clip, offset]: [usize; 2]) -> u64 {
-        let first = self.first + clip;
-        let weighed = (first..).zip(&self.weights);
-        let sum = weighed
-            .map(|(row, w)| w * tiles.sad(row, row + offset))
-            .sum();
-        if sum < self.limit { sum } else { NOT_BELOW }
-    }
+/// Which pairs of frame `row` (of the first of these clips) and later ones the pairs of clips consist of.
+fn frames_of(clips: &[Marks], row: usize, f: usize) -> Marks {
+    let within = clips[..clips.len().min(row + 1)].iter();
+    let mut within = within.skip((row + 1).saturating_sub(f));
+    let mut frames = within.next().cloned().unwrap_or_default();
+    within.for_each(|clip| frames.add(clip, 0));
+    frames
 }
 
 /// Drops the pairs of a clip that the bounds of their frames say are not below the limit. All that is
 /// added up fits 32 bits.
-fn drop_far(near: &mut [bool], least: &[Vec<u32>], weights: &[u64], limit: u64) {
+fn drop_far_of(near: &mut Marks, least: &[Vec<u32>], weights: &[u64], limit: u64) {
     let mut sums = Vec::new();
-    let asked: Vec<_> = asked::runs(near).collect();
-    for run in asked {
+    let runs: Vec<Range<usize>> = near.runs().collect();
+    for run in runs {
         sums.clear();
         sums.resize(run.len(), 0u32);
         for (&weight, row) in weights.iter().zip(least) {
@@ -192,9 +190,8 @@ fn drop_far(near: &mut [bool], least: &[Vec<u32>], weights: &[u64], limit: u64) 
                 weight => each.for_each(|(sum, least)| *sum += least * weight),
             }
         }
-        for (near, &sum) in near[run].iter_mut().zip(&sums) {
-            *near &= u64::from(sum) < limit;
-        }
+        let far = run.zip(&sums).filter(|&(_, &sum)| u64::from(sum) >= limit);
+        far.for_each(|(offset, _)| near.unmark(offset));
     }
 }
 
@@ -207,44 +204,47 @@ struct Tiles {
 }
 
 impl Tiles {
-    /// Computes the wanted ones.
-    fn of(panel: &Panel<'_>, wanted: &[Vec<bool>]) -> Tiles {
-        let distances = panel.distances;
-        let first = panel.first / GROUP;
-        let last = (panel.first + wanted.len() - 1) / GROUP;
-        let mut memory: Vec<GroupMemory> = (first..=last).map(|_| GroupMemory::default()).collect();
+    /// Of the frames of the pairs that are marked, of clips from `first_clip` on.
+    fn of(
+        distances: &Distances<'_>,
+        first_clip: usize,
+        clips: &[Marks],
+        memory: &mut Vec<GroupMemory>,
+    ) -> Tiles {
+        let f = distances.clip.frames;
+        let frames: Vec<Marks> = (0..clips.len() + f - 1)
+            .map(|row| frames_of(clips, row, f))
+            .collect();
+        let first = first_clip / GROUP;
+        let last = (first_clip + frames.len() - 1) / GROUP;
+        memory.resize_with(memory.len().max(last + 1 - first), GroupMemory::default);
         let rows: Vec<Group<'_>> = (first..=last)
-            .zip(&mut memory)
+            .zip(memory)
             .map(|(group_idx, memory)| distances.row_group(group_idx, memory))
             .collect();
-        let masks = masks(
-            panel.first,
-            wanted,
-            [first, last],
-            distances.pixels.n_groups(),
-        );
-        let tiles = (first..)
-            .zip(&masks)
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map_init(GroupMemory::default, |memory, (column_idx, masks)| {
-                if masks.iter().flatten().all(|&bits| bits == 0) {
-                    return vec![None; rows.len()];
-                }
-                let columns = distances.pixels.group(column_idx, memory);
-                let tile = |(&rows, wanted): (&Group<'_>, &Wanted)| {
-                    let tile = Tile {
-                        rows,
-                        columns,
-                        wanted,
-                    };
-                    let any = wanted.iter().any(|&bits| bits != 0);
-                    any.then(|| kernel::sad_tile(distances.cpu, tile))
+        let of_columns = |memory: &mut GroupMemory, column_idx: usize| {
+            let wanted = |row_idx: usize| wanted(&frames, first_clip, [row_idx, column_idx]);
+            let wanted: Vec<Wanted> = (first..=last).map(wanted).collect();
+            if wanted.as_flattened().iter().all(|&bits| bits == 0) {
+                return vec![None; rows.len()];
+            }
+            let columns = distances.pixels.group(column_idx, memory);
+            let tile = |(&rows, wanted): (&Group<'_>, &Wanted)| {
+                let tile = Tile {
+                    rows,
+                    columns,
+                    wanted,
                 };
-                rows.iter().zip(masks).map(tile).collect()
-            })
-            .collect();
-        Tiles { first, tiles }
+                let any = wanted.iter().any(|&bits| bits != 0);
+                any.then(|| kernel::sad_tile(distances.cpu, tile))
+            };
+            rows.iter().zip(&wanted).map(tile).collect()
+        };
+        let columns = (first..distances.pixels.n_groups()).into_par_iter();
+        Tiles {
+            first,
+            tiles: columns.map_init(GroupMemory::default, of_columns).collect(),
+        }
     }
 
     /// d of a pair that was wanted.
@@ -255,20 +255,12 @@ impl Tiles {
     }
 }
 
-/// Which pairs of each tile are wanted: by groups of columns, then of rows, both from `first_group` on.
-fn masks(
-    first_row: usize,
-    wanted: &[Vec<bool>],
-    [first_group, last_group]: [usize; 2],
-    n_groups: usize,
-) -> Vec<Vec<Wanted>> {
-    let nothing = vec![[0; GROUP]; last_group + 1 - first_group];
-    let mut masks = vec![nothing; n_groups - first_group];
-    for (row, wanted) in (first_row..).zip(wanted) {
-        for (column, _) in (row..).zip(wanted).filter(|(_, wanted)| **wanted) {
-            let of_group = &mut masks[column / GROUP - first_group][row / GROUP - first_group];
-            of_group[row % GROUP] |= 1 << (column % GROUP);
-        }
-    }
-    masks
+/// Which pairs of a group of rows and one of columns are wanted, of those of frames from `first` on.
+fn wanted(frames: &[Marks], first: usize, [row_idx, column_idx]: [usize; 2]) -> Wanted {
+    std::array::from_fn(|k| {
+        let row = row_idx * GROUP + k;
+        let marks = row.checked_sub(first).and_then(|at| frames.get(at));
+        let offset = (column_idx * GROUP) as isize - row as isize;
+        marks.map_or(0, |marks| marks.bits(offset) & ((1 << GROUP) - 1))
+    })
 }

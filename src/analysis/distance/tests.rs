@@ -219,8 +219,8 @@ fn blocks_put_aside_are_compared_as_those_in_memory() {
     let aside = ComparedSprites::holding(0, &sprites, &poses, Planes::Rgba);
     let aside = aside.expect("memory has room");
     assert_eq!(
-        aside.steps(),
-        compared(&sprites, &poses, Planes::Rgba).steps()
+        aside.steps(Level::detect()),
+        compared(&sprites, &poses, Planes::Rgba).steps(Level::detect())
     );
     for side in [Side::Plain, Side::Mirrored] {
         let held = triangle(&sprites, &poses, 3, side, Level::detect());
@@ -266,11 +266,13 @@ proptest! {
             for cpu in [Level::Scalar, Level::detect()] {
                 let distances = Distances { pixels: &pixels, clip, side, cpu };
                 let mut rows = Vec::new();
-                let push = |_: usize, row: &[u64]| rows.push(row.to_vec());
+                let push = |_: usize, row: &[ClipPair]| rows.push(row.to_vec());
                 distances.for_each_row_below(limit, &Everything, &Silent, push).expect("nobody cancels");
-                let below = |&d: &u64| if d < limit { d } else { NOT_BELOW };
-                let wanted: Vec<Vec<u64>> =
-                    whole.iter().map(|row| row.iter().map(below).collect()).collect();
+                let below = |(from, row): (usize, &Vec<u64>)| -> Vec<ClipPair> {
+                    let pair = |(to, &distance)| ClipPair { from, to, distance };
+                    (from..).zip(row).map(pair).filter(|pair| pair.distance < limit).collect()
+                };
+                let wanted: Vec<Vec<ClipPair>> = whole.iter().enumerate().map(below).collect();
                 prop_assert!(rows == wanted, "{:?} {:?} {}", side, cpu, limit);
             }
         }
@@ -284,7 +286,7 @@ fn rgb_planes_leave_alpha_out() {
         rgba.copy_from_slice(&colors[frame_idx])
     });
     let poses = from_the_side(&sprites);
-    let d = |planes| compared(&sprites, &poses, planes).steps();
+    let d = |planes| compared(&sprites, &poses, planes).steps(Level::detect());
     assert_eq!(d(Planes::Rgb), [40]);
     assert_eq!(d(Planes::Rgba), [40 + 204]);
 }

@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use crate::analysis::Params;
+use crate::analysis::distance::Marks;
 use crate::geometry::angle::{mean_rad, mirrored_rad, wrap_rad};
 use crate::library::{Poses, View};
 
@@ -67,7 +68,7 @@ impl Gate {
 
     /// Marks which pairs of clip `i` may pass: entry k is (i, i + k). Every pair that passes is marked, and
     /// hardly any other. Whole numbers, because every pair of a footage is asked.
-    pub(super) fn mark(&self, i: usize, mirrored: bool, row: &mut [bool]) {
+    pub(super) fn mark(&self, i: usize, mirrored: bool, row: &mut Marks) {
         let turned = match (self.view, mirrored) {
             // Of half a circle less the heading, and of the rate the other way.
             (_, false) => |parts: u32| parts,
@@ -75,10 +76,10 @@ impl Gate {
             (View::Top, true) => |parts: u32| parts.wrapping_neg(),
         };
         let here = turned(self.parts[i]);
-        for (marked, &there) in row.iter_mut().zip(&self.parts[i..]) {
+        row.mark_where(&self.parts[i..], |&there| {
             let gap = here.wrapping_sub(there) as i32;
-            *marked = gap.unsigned_abs() <= self.most_parts;
-        }
+            gap.unsigned_abs() <= self.most_parts
+        });
     }
 
     /// The difference of the clips' mean headings, 0..=pi, if the pair may pass.
@@ -193,9 +194,11 @@ mod tests {
             };
             let gate = gate(if from_above { View::Top } else { View::Side }, &headings);
             for i in 0..headings.len() - 1 {
-                let mut row = vec![false; headings.len() - 1 - i];
+                let mut row = Marks::none(headings.len() - 1 - i);
                 gate.mark(i, mirrored, &mut row);
-                for (j, marked) in (i..).zip(row) {
+                let marked: Vec<usize> = row.ones().map(|k| i + k).collect();
+                for j in i..headings.len() - 1 {
+                    let marked = marked.contains(&j);
                     let passes = gate.pass(i, j, mirrored).is_some();
                     proptest::prop_assert!(marked || !passes, "({}, {})", i, j);
                     let on_edge = whole;

@@ -1,15 +1,35 @@
-//! Which pairs of clips may be joined at all, whatever their distance (ALGORITHMS.md 5, candidates), and how
-//! many of those alike a search by lists finds (above 50 000 frames).
+//! Which pairs of clips may be joined at all, whatever their distance (ALGORITHMS.md 5, candidates), and which
+//! of those an approximate search compares (above 50 000 frames).
 
 use super::Search;
-use crate::analysis::distance::{Asked, Cancelled, Side};
-use crate::progress::Silent;
+use crate::analysis::distance::{Asked, Lists, Marks, Side};
 use crate::random;
 
 /// Clips whose pairs recall is measured on.
 const N_SAMPLED: usize = 256;
 /// Of the numbers that choose them.
 const SEED: u64 = 0x5eed;
+
+/// What an approximate search leaves out, and how that is measured.
+pub(super) struct Approximate {
+    pub(super) lists: Lists,
+    /// The clips that are compared with all later ones, to see what the lists miss.
+    pub(super) sampled: Vec<bool>,
+}
+
+impl Approximate {
+    /// A search by these lists among so many clips.
+    pub(super) fn new(lists: Lists, n_clips: usize) -> Approximate {
+        let mut clips: Vec<usize> = (0..n_clips).collect();
+        clips.sort_unstable_by_key(|&i| (random::bits(SEED, &[i as u64]), i));
+        let mut sampled = vec![false; n_clips];
+        clips
+            .iter()
+            .take(N_SAMPLED)
+            .for_each(|&i| sampled[i] = true);
+        Approximate { lists, sampled }
+    }
+}
 
 /// The pairs of clips that may be joined, whatever their distance.
 pub(super) struct Joinable<'a> {
@@ -28,72 +48,30 @@ impl Joinable<'_> {
 
     /// Of two such clips, whether they are compared.
     pub(super) fn is_compared(&self, i: usize, j: usize) -> bool {
-        let lists = self.search.lists.as_ref();
-        lists.is_none_or(|lists| lists.holds(self.side, i, j))
+        let approximate = self.search.approximate.as_ref();
+        approximate.is_none_or(|found_by| found_by.lists.holds(self.side, i, j))
     }
 
-    fn mark_all(&self, i: usize, row: &mut [bool]) {
-        let usable = &self.search.clips.usable[i..];
-        if !usable[0] {
+    fn mark_all(&self, i: usize, row: &mut Marks) {
+        if !self.search.clips.usable[i] {
             return;
         }
         let mirrored = self.side == Side::Mirrored;
         self.search.gate.mark(i, mirrored, row);
-        let least_gap = self.least_gap.min(row.len());
-        row[..least_gap].fill(false);
-        let each = row.iter_mut().zip(usable);
-        each.for_each(|(marked, usable)| *marked &= usable);
-    }
-
-    /// Of 256 clips chosen at random: how many pairs with later ones may be joined and have D < epsilon, and
-    /// how many of those are compared.
-    pub(super) fn found_of_sample(&self, epsilon: u64) -> Result<[u64; 2], Cancelled> {
-        let distances = crate::analysis::distance::Distances {
-            side: self.side,
-            ..self.search.distances
-        };
-        let n_clips = distances.n_clips() as u64;
-        let mut clips: Vec<u64> = (0..n_clips).collect();
-        clips.sort_unstable_by_key(|&i| (random::bits(SEED, &[i]), i));
-        let mut counts = [0; 2];
-        for &i in clips.iter().take(N_SAMPLED) {
-            let i = i as usize;
-            distances.for_each_below(i, epsilon, &Whole(self), &Silent, |j| {
-                let counted = u64::from(self.holds(i, j));
-                counts[0] += counted;
-                counts[1] += counted * u64::from(self.is_compared(i, j));
-            })?;
-        }
-        Ok(counts)
+        row.unmark_first(self.least_gap);
+        row.keep(&self.search.usable, i);
     }
 }
 
 impl Asked for Joinable<'_> {
-    fn mark(&self, i: usize, row: &mut [bool]) {
-        match &self.search.lists {
-            None => self.mark_all(i, row),
-            Some(lists) if self.search.clips.usable[i] => {
-                lists.mark(self.side, i, row);
-                let least_gap = self.least_gap.min(row.len());
-                row[..least_gap].fill(false);
-                for (j, marked) in (i..).zip(row).filter(|(_, marked)| **marked) {
-                    *marked = self.holds(i, j);
-                }
-            }
-            Some(_) => {}
+    fn mark(&self, i: usize, row: &mut Marks) {
+        self.mark_all(i, row);
+        if let Some(approximate) = &self.search.approximate
+            && !approximate.sampled[i]
+        {
+            let mut compared = Marks::none(row.len());
+            approximate.lists.mark(self.side, i, &mut compared);
+            row.keep(&compared, 0);
         }
-    }
-}
-
-/// All that may be joined, compared or not, and nothing around it.
-struct Whole<'a>(&'a Joinable<'a>);
-
-impl Asked for Whole<'_> {
-    fn mark(&self, i: usize, row: &mut [bool]) {
-        self.0.mark_all(i, row);
-    }
-
-    fn reach(&self) -> usize {
-        0
     }
 }

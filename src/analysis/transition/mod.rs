@@ -12,10 +12,10 @@ mod joinable;
 mod tests;
 
 use crate::analysis::distance::{
-    Cancelled, ClipPair, ComparedSprites, Distances, Lists, LocalMinima, Side,
+    Cancelled, ClipPair, ComparedSprites, Distances, Lists, LocalMinima, Marks, Side,
 };
 use gate::Gate;
-use joinable::Joinable;
+use joinable::{Approximate, Joinable};
 
 use crate::analysis::{Error, Params, playback};
 use crate::cpu::Level;
@@ -82,8 +82,10 @@ pub fn connect_compared(
     let clip_frames = params.clip_frames_at(poses.fps);
     let clips = Clips::new(sprites, poses, clip_frames);
     let clip = params.clip(clip_frames);
-    let steps = natural_steps(pixels, &clips, &clip.weights());
+    let steps = natural_steps(pixels.steps(cpu), &clips, &clip.weights());
     let rungs = rungs(params, steps);
+    let mut usable = Marks::none(clips.usable.len());
+    usable.mark_where(&clips.usable, |&usable| usable);
     let search = Search {
         distances: Distances {
             pixels,
@@ -93,7 +95,11 @@ pub fn connect_compared(
         },
         clips: &clips,
         gate: Gate::new(poses, clip_frames, params),
-        lists: (params.approximate).then(|| Lists::of(pixels, clip, params.mirror, cpu)),
+        usable,
+        approximate: params.approximate.then(|| {
+            let lists = Lists::of(pixels, clip, params.mirror, cpu);
+            Approximate::new(lists, clips.usable.len())
+        }),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
     let mut connections = None;
@@ -101,18 +107,14 @@ pub fn connect_compared(
         let found = search
             .run(rung, params.mirror, progress)
             .map_err(|Cancelled| Error::Cancelled)?;
-        let found = found.connections(rung, &clips, steps.median);
+        let found = found.connections(rung, &clips, steps.median, params.approximate);
         let long_enough = found.playback.component.len() as f64 >= LEAST_COMPONENT_S * poses.fps;
         connections = Some(found);
         if long_enough {
             break;
         }
     }
-    let mut connections = connections.expect("there is always a first rung");
-    connections.recall = search
-        .recall(connections.epsilon, params.mirror)
-        .map_err(|Cancelled| Error::Cancelled)?;
-    Ok(connections)
+    Ok(connections.expect("there is always a first rung"))
 }
 
 /// Which frames and clips can be used.
@@ -155,9 +157,8 @@ struct NaturalSteps {
     p99: u64,
 }
 
-fn natural_steps(pixels: &ComparedSprites, clips: &Clips, weights: &[u64]) -> NaturalSteps {
-    let mut of_clips: Vec<u64> = pixels
-        .steps()
+fn natural_steps(steps: Vec<u64>, clips: &Clips, weights: &[u64]) -> NaturalSteps {
+    let mut of_clips: Vec<u64> = steps
         .windows(clips.clip_frames)
         .zip(clips.all_present.windows(2))
         .filter(|(_, present)| present[0] && present[1])
@@ -209,9 +210,10 @@ struct Search<'a> {
     distances: Distances<'a>,
     clips: &'a Clips,
     gate: Gate,
+    /// The clips that can be used.
+    usable: Marks,
     least_gap: usize,
-    /// Of an approximate search: which clips are compared.
-    lists: Option<Lists>,
+    approximate: Option<Approximate>,
 }
 
 /// What a search found below an epsilon.
@@ -220,6 +222,9 @@ struct Found {
     transitions: Vec<Transition>,
     /// Raw pairs.
     n_candidates: u64,
+    /// Of the clips that an approximate search samples: pairs that are alike, and those of them that it compares.
+    n_alike: u64,
+    n_compared: u64,
 }
 
 impl Search<'_> {
@@ -248,23 +253,14 @@ impl Search<'_> {
             side,
             ..self.distances
         };
-        let Found {
-            transitions,
-            n_candidates,
-        } = found;
-        distances.for_each_row_below(epsilon, &asked, progress, |i, row| {
-            if side == Side::Plain {
-                let alike = (i..)
-                    .zip(row)
-                    .skip(least_gap)
-                    .filter(|(_, d)| **d < epsilon);
-                let known = |j| asked.holds(i, j) && asked.is_compared(i, j);
-                *n_candidates += alike.filter(|&(j, _)| known(j)).count() as u64;
-            }
-            minima.push(row, |pair| {
+        distances.for_each_row_below(epsilon, &asked, progress, |i, pairs| {
+            found.count(i, pairs, &asked);
+            let transitions = &mut found.transitions;
+            minima.push(pairs, |pair| {
                 transitions.extend(self.transition(pair, &asked))
             });
         })?;
+        let transitions = &mut found.transitions;
         minima.finish(|pair| transitions.extend(self.transition(pair, &asked)));
         Ok(())
     }
@@ -279,20 +275,6 @@ impl Search<'_> {
             side,
             least_gap,
         }
-    }
-
-    /// Of the pairs of some clips that are alike, the share that an approximate search compares.
-    fn recall(&self, epsilon: u64, mirror: bool) -> Result<Option<f64>, Cancelled> {
-        if self.lists.is_none() {
-            return Ok(None);
-        }
-        let mut counts = self.joinable(Side::Plain).found_of_sample(epsilon)?;
-        if mirror {
-            let mirrored = self.joinable(Side::Mirrored).found_of_sample(epsilon)?;
-            (0..2).for_each(|k| counts[k] += mirrored[k]);
-        }
-        let [all, found] = counts.map(|n| n as f64);
-        Ok(Some(if all > 0.0 { found / all } else { 1.0 }))
     }
 
     /// A local minimum, if it may be joined. Around a pair that is compared so is all that it competes with; what was
@@ -314,8 +296,36 @@ impl Search<'_> {
 }
 
 impl Found {
+    /// Counts the pairs of a clip that are alike and may be joined.
+    fn count(&mut self, i: usize, pairs: &[ClipPair], asked: &Joinable<'_>) {
+        let later = pairs
+            .iter()
+            .map(|pair| pair.to)
+            .filter(|j| j - i >= asked.least_gap);
+        let joinable: Vec<usize> = later.filter(|&j| asked.holds(i, j)).collect();
+        let n_compared = joinable
+            .iter()
+            .filter(|&&j| asked.is_compared(i, j))
+            .count() as u64;
+        if asked.side == Side::Plain {
+            self.n_candidates += n_compared;
+        }
+        if let Some(approximate) = &asked.search.approximate
+            && approximate.sampled[i]
+        {
+            self.n_alike += joinable.len() as u64;
+            self.n_compared += n_compared;
+        }
+    }
+
     /// What these transitions make of the footage.
-    fn connections(self, rung: &Rung, clips: &Clips, natural_step: u64) -> Connections {
+    fn connections(
+        self,
+        rung: &Rung,
+        clips: &Clips,
+        natural_step: u64,
+        is_approximate: bool,
+    ) -> Connections {
         let playback = playback::playback(&self.transitions, &clips.shown, clips.clip_frames);
         let n_frames = clips.shown.len();
         Connections {
@@ -324,7 +334,10 @@ impl Found {
             natural_step,
             kappa_used: rung.kappa,
             n_candidates: self.n_candidates,
-            recall: None,
+            recall: is_approximate.then(|| match self.n_alike {
+                0 => 1.0,
+                n_alike => self.n_compared as f64 / n_alike as f64,
+            }),
             component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
             patches: playback::patches(&playback),
             transitions: self.transitions,

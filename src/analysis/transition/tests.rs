@@ -141,7 +141,11 @@ fn by_definition(
             side,
             cpu,
         };
-        let push = |_: usize, row: &[u64]| minima.push(row, &mut keep);
+        let push = |from: usize, row: &[u64]| {
+            let pair = |(to, &distance)| ClipPair { from, to, distance };
+            let pairs: Vec<ClipPair> = (from..).zip(row).map(pair).collect();
+            minima.push(&pairs, &mut keep);
+        };
         distances
             .for_each_row(&Silent, push)
             .expect("nobody cancels");

@@ -120,7 +120,9 @@ fn unsatisfiable(size_bytes: u64) -> Response<Body> {
     answer
 }
 
-fn built(answer: Result<Response<Body>, axum::http::Error>) -> Result<Response<Body>, Problem> {
+pub(super) fn built(
+    answer: Result<Response<Body>, axum::http::Error>,
+) -> Result<Response<Body>, Problem> {
     answer.map_err(|error| {
         tracing::error!(%error, "an answer could not be built");
         Code::Internal.into()

@@ -33,6 +33,8 @@ use crate::store::jobs::read::JobRow;
 const LOOK: Duration = Duration::from_millis(500);
 /// How far back each look reaches, for what was written late.
 const OVERLAP_MS: i64 = 10_000;
+/// How long a stream may have been cut to be told what happened meanwhile.
+const LOOK_BACK_MS: i64 = 3_600_000;
 /// How long a client should wait before it comes back.
 const RETRY: Duration = Duration::from_secs(1);
 
@@ -46,12 +48,27 @@ pub(in crate::api) struct JobGone {
     id: Uuid,
 }
 
+/// One event of a stream, by the fields that it has there.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the streams in the OpenAPI document"
+)]
+pub(in crate::api) struct JobEvent {
+    /// `job`, or `gone`.
+    event: String,
+    /// JSON: of `job` what /v1/jobs/{id} answers, of `gone` the job's id.
+    data: String,
+    /// What to send as Last-Event-ID; of the stream of one job none.
+    id: Option<String>,
+}
+
 /// Every change of the caller's jobs, as events named `job`, or `gone` for one that was deleted: first those
 /// queued and running, and, after a Last-Event-ID, those that ended since. Ends when the token does.
 #[utoipa::path(get, path = "/v1/events",
     params(("Last-Event-ID" = Option<String>, Header, description = "the id of the last event seen")),
     responses(
-    (status = 200, content_type = "text/event-stream", body = JobView),
+    (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn get_events(
@@ -61,6 +78,7 @@ pub(in crate::api) async fn get_events(
 ) -> Response<Body> {
     let last = headers.get("last-event-id");
     let last_ms = last.and_then(|id| id.to_str().ok()?.parse().ok());
+    let last_ms = last_ms.map(|id_ms| within_look_back(id_ms, now_ms()));
     let feed = Feed {
         state,
         caller,
@@ -77,7 +95,7 @@ pub(in crate::api) async fn get_events(
 
 /// The job's states as server-sent events named `job`, until the last one.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = Uuid, Path)), responses(
-    (status = 200, content_type = "text/event-stream", body = JobView),
+    (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn get_job_events(
@@ -204,6 +222,29 @@ impl Feed {
     }
 }
 
+/// The time that a client says it was here last, which may be any number.
+fn within_look_back(id_ms: i64, now_ms: i64) -> i64 {
+    id_ms.clamp(now_ms - LOOK_BACK_MS, now_ms)
+}
+
 fn stamped(event: Event, now_ms: i64) -> Event {
     event.id(now_ms.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_looks_back_an_hour_and_never_ahead_whatever_its_id_says() {
+        let now_ms = 1_800_000_000_000;
+        for (id_ms, from_ms) in [
+            (i64::MIN, now_ms - LOOK_BACK_MS),
+            (0, now_ms - LOOK_BACK_MS),
+            (now_ms - 5, now_ms - 5),
+            (i64::MAX, now_ms),
+        ] {
+            assert_eq!(within_look_back(id_ms, now_ms), from_ms, "{id_ms}");
+        }
+    }
 }

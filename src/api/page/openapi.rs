@@ -54,7 +54,12 @@ pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
     let Some(components) = &mut document.components else {
         return;
     };
-    for name in ["FlockRequest", "FishRequest"] {
+    for name in [
+        "AnalysisOverrides",
+        "FlockOverrides",
+        "FlockRequest",
+        "FishRequest",
+    ] {
         let Some(RefOr::T(Schema::AllOf(all))) = components.schemas.get(name) else {
             continue;
         };

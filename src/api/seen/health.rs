@@ -15,7 +15,7 @@ pub(in crate::api) struct Readiness {
     ready: bool,
     /// Whether the database can be written.
     database: bool,
-    /// Whether files can be written.
+    /// Whether files can be written on this machine, and a bucket, where they are kept in one, answers within two seconds.
     blob_store: bool,
     /// The version of the media tool; null when it is missing.
     media_tool: Option<String>,
@@ -64,14 +64,15 @@ pub(in crate::api) async fn readyz(
 ) -> (StatusCode, axum::Json<Readiness>) {
     let database = state.context.store.is_writable().await;
     let blobs = state.context.store.blobs().clone();
-    let files = tokio::task::spawn_blocking(move || (blobs.is_writable(), blobs.room_bytes().ok()));
-    let (blob_store, room_bytes) = files.await.unwrap_or((false, None));
+    let blob_store = blobs.is_writable().await;
+    let room = tokio::task::spawn_blocking(move || blobs.room_bytes().ok());
+    let room_bytes = room.await.ok().flatten();
     let disk = DiskView {
         room_bytes,
         reserve_bytes: state.config.disk_reserve_bytes,
         ok: room_bytes.is_some_and(|room| room > state.config.disk_reserve_bytes),
     };
-    let (media_tool, sandbox) = match state.walls.as_ref() {
+    let (media_tool, sandbox) = match &state.walls {
         Ok(walls) => (Some(walls.version.clone()), LayerView::all(walls)),
         Err(_) => (None, Vec::new()),
     };

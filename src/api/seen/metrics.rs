@@ -54,11 +54,9 @@ pub(in crate::api) struct Metrics {
 impl Metrics {
     /// Over what is counted elsewhere in the process.
     pub(in crate::api) fn new(meters: &Meters, requests: &Requests) -> Metrics {
-        let mut registry = Registry::default();
+        let mut registry = counted(meters);
         let (jobs, stored) = (Family::default(), Family::default());
         let oldest_queued = Gauge::default();
-        let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
-        registry.register("flockreel_build", "What is running", version);
         registry.register("flockreel_jobs", "Jobs, by kind and state", jobs.clone());
         registry.register_with_unit(
             "flockreel_queue_oldest",
@@ -72,7 +70,6 @@ impl Metrics {
             Unit::Bytes,
             stored.clone(),
         );
-        meters.register(&mut registry);
         requests.register(&mut registry);
         let registry = Arc::new(registry);
         Metrics {
@@ -131,11 +128,36 @@ pub fn metrics_router(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(Names::Any, guard))
 }
 
+/// The metrics of a process that works and serves nobody: what it did itself. What is queued and stored is the
+/// service's to tell, once for all of them.
+pub fn worker_metrics_router(meters: &Meters) -> Router {
+    let registry = Arc::new(counted(meters));
+    let answer = async |State(registry): State<Arc<Registry>>| written(&registry);
+    Router::new()
+        .route("/metrics", get(answer))
+        .fallback(|| async { Problem::from(Code::NotFound) })
+        .with_state(registry)
+        .layer(middleware::from_fn_with_state(Names::Any, guard))
+}
+
+/// What every process tells: its version, and its jobs.
+fn counted(meters: &Meters) -> Registry {
+    let mut registry = Registry::default();
+    let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
+    registry.register("flockreel_build", "What is running", version);
+    meters.register(&mut registry);
+    registry
+}
+
 async fn text(state: &AppState) -> Result<Response<Body>, Problem> {
     let census = state.context.store.census().await?;
     state.metrics.note(&census, now_ms());
+    written(&state.metrics.registry)
+}
+
+fn written(registry: &Registry) -> Result<Response<Body>, Problem> {
     let mut text = String::new();
-    encode(&mut text, &state.metrics.registry).map_err(|error| {
+    encode(&mut text, registry).map_err(|error| {
         tracing::error!(%error, "the metrics could not be written");
         Code::Internal
     })?;

@@ -1,5 +1,6 @@
 //! What a flock of boids promises: order, walls, limits, and the same numbers on any threads.
 
+use super::calibration::Slopes;
 use super::measures::Order;
 use super::vector::{add_scaled, norm, unit};
 use super::*;
@@ -94,6 +95,73 @@ fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
             v[1] <= down * level + 1e-9 && -v[1] <= up * level + 1e-9,
             "{v:?}"
         );
+    }
+}
+
+/// One boid that swims at 1 BL/s, in turns of mostly less than 1 rad/s.
+fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
+    let mut params = Params {
+        count: 1,
+        leaders: false,
+        ..preset("school")
+    };
+    params.rules.circling = 0.0;
+    let calibration = Calibration {
+        cruise_bl_per_s: 1.0,
+        speed_limits_bl_per_s: [0.1, 1.5],
+        turn_rad_per_s: 2.0,
+        wander_rad_per_s: 0.7,
+        slopes,
+    };
+    (params, calibration)
+}
+
+#[test]
+fn who_heads_for_a_wall_turns_aside_and_does_not_dawdle_before_it() {
+    let (params, calibration) = alone(None);
+    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
+    // Head-on, and on a slant either way.
+    for y_speed in [0.0, 0.5, -0.5] {
+        let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+        boids.positions[0] = [9.0, 4.5, 0.0];
+        boids.velocities[0] = unit([1.0, y_speed, 0.0]);
+        let mut slowest = f64::INFINITY;
+        for _ in 0..150 {
+            boids.advance();
+            slowest = slowest.min(norm(boids.velocities[0]));
+        }
+        assert!(slowest > 0.8, "{y_speed}: slows down to {slowest} BL/s");
+        let [outward, along, _] = boids.velocities[0];
+        assert!(
+            outward < 0.5 * along.abs(),
+            "{y_speed}: {:?}",
+            boids.velocities[0]
+        );
+    }
+}
+
+#[test]
+fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
+    let slopes = Slopes {
+        limits: [1.5, 1.5],
+        usual: -0.2,
+        spread: 0.05,
+    };
+    let (params, calibration) = alone(Some(slopes));
+    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [60.0, 60.0, 60.0]));
+    for steep in [1.4, -1.4, 0.0] {
+        let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+        boids.positions[0] = [30.0; 3];
+        boids.velocities[0] = unit([1.0, steep, 0.2]);
+        (0..90).for_each(|_| boids.advance());
+        let slope = |v: Vec3| v[1] / v[0].hypot(v[2]);
+        let mut seen = Vec::new();
+        for _ in 0..300 {
+            boids.advance();
+            seen.push(slope(boids.velocities[0]));
+        }
+        let mean = seen.iter().sum::<f64>() / seen.len() as f64;
+        assert!((mean - slopes.usual).abs() < 0.08, "from {steep}: {mean}");
     }
 }
 

@@ -16,7 +16,7 @@ use crate::raster::resample::{Placement, Quad, Resampled, Room};
 
 /// What drawing needs besides the individual.
 #[derive(Clone, Copy)]
-pub(super) struct Scene<'a> {
+pub(super) struct Stage<'a> {
     pub(super) sprites: &'a Sprites,
     pub(super) stock: &'a Stock,
     pub(super) view: View,
@@ -55,15 +55,15 @@ pub(super) struct Painter {
 impl Painter {
     /// Draws an individual's layer for a picture of the film.
     /// What is hidden by what is `nearer` may be left out.
-    pub(super) fn paint(&mut self, scene: &Scene, who: &Appearance, nearer: Option<&Canvas>) {
-        let is_bent = who.fade.is_some() && scene.cut == Cut::Morph;
+    pub(super) fn paint(&mut self, stage: &Stage, who: &Appearance, nearer: Option<&Canvas>) {
+        let is_bent = who.fade.is_some() && stage.cut == Cut::Morph;
         let room = Room {
-            size: scene.view.size_px,
+            size: stage.view.size_px,
             // Sprites are bent by all that they show.
             nearer: nearer.filter(|_| !is_bent),
         };
-        self.paint_shifted(scene, who, room, [0.0; 2]);
-        if let Some(veil) = scene.haze {
+        self.paint_shifted(stage, who, room, [0.0; 2]);
+        if let Some(veil) = stage.haze {
             let depth_px = who.individual.boid.position_px[who.frame_idx][2].max(0.0);
             haze(
                 &mut self.layer,
@@ -74,13 +74,13 @@ impl Painter {
     }
 
     /// Draws the shadow of an individual in place of it.
-    pub(super) fn shade(&mut self, floor: &Floor, scene: &Scene, who: &Appearance) {
-        floor.draw(who, &scene.view, &mut self.layer);
+    pub(super) fn shade(&mut self, floor: &Floor, stage: &Stage, who: &Appearance) {
+        floor.draw(who, &stage.view, &mut self.layer);
     }
 
     /// What was painted last, as the ground truth needs it; the layer is used up.
-    pub(super) fn drawn(&mut self, scene: &Scene, who: &Appearance) -> Drawn {
-        let place = placement(scene, who);
+    pub(super) fn drawn(&mut self, stage: &Stage, who: &Appearance) -> Drawn {
+        let place = placement(stage, who);
         let alpha = self.layer.pixels.iter().map(|pixel| pixel[3] as u16);
         let mut drawn = Drawn {
             id: who.individual.id,
@@ -90,21 +90,21 @@ impl Painter {
             alpha: alpha.collect(),
             whole: None,
         };
-        if self.is_clipped(scene) {
-            drawn.whole = Some(self.whole(scene, who));
+        if self.is_clipped(stage) {
+            drawn.whole = Some(self.whole(stage, who));
         }
         drawn
     }
 
     /// Draws once more with room on all sides, to see what the border cut off.
-    fn whole(&mut self, scene: &Scene, who: &Appearance) -> Whole {
-        let (sprites, place) = (scene.sprites, placement(scene, who));
+    fn whole(&mut self, stage: &Stage, who: &Appearance) -> Whole {
+        let (sprites, place) = (stage.sprites, placement(stage, who));
         let [w, h] = [sprites.width(), sprites.height()].map(f64::from);
         let diagonal = (w * w + h * h).sqrt();
         let of_fade = who
             .fade
             .map_or(0.0, |fade| fade.scale[who.frame_idx - fade.start as usize]);
-        let scale = place.scale.max(of_fade * scene.view.scale);
+        let scale = place.scale.max(of_fade * stage.view.scale);
         let room = (diagonal * scale).ceil() as u32 + 4;
         // From the nearest whole pixel inside of the picture, however far outside it is drawn.
         let size = [2 * room, 2 * room];
@@ -112,36 +112,36 @@ impl Painter {
             .center_px
             .map(|px| i64::from(room) - px.floor() as i64);
         let room = Room { size, nearer: None };
-        self.paint_shifted(scene, who, room, shift.map(|px| px as f64));
+        self.paint_shifted(stage, who, room, shift.map(|px| px as f64));
         let alpha: Vec<u16> = self.layer.pixels.iter().map(|p| p[3] as u16).collect();
         Whole::of(&alpha, self.layer.rect, shift)
     }
 
     /// A box that ends inside of the picture on every side has not been clipped.
-    fn is_clipped(&self, scene: &Scene) -> bool {
-        let (rect, [width, height]) = (self.layer.rect, scene.view.size_px);
+    fn is_clipped(&self, stage: &Stage) -> bool {
+        let (rect, [width, height]) = (self.layer.rect, stage.view.size_px);
         let clipped_before = rect.x == 0 || rect.y == 0;
         rect.is_empty() || clipped_before || rect.right() == width || rect.bottom() == height
     }
 
-    fn paint_shifted(&mut self, scene: &Scene, who: &Appearance, room: Room, shift: [f64; 2]) {
+    fn paint_shifted(&mut self, stage: &Stage, who: &Appearance, room: Room, shift: [f64; 2]) {
         let (individual, t) = (who.individual, who.frame_idx);
-        let mut place = placement(scene, who);
+        let mut place = placement(stage, who);
         place.center_px = std::array::from_fn(|k| place.center_px[k] + shift[k]);
         let frame = individual.source_frame[t];
-        let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);
-        self.layer.draw(&sprite, &place, room, scene.cpu);
+        let sprite = (stage.stock).take(stage.sprites, frame, place.scale, &mut self.packed);
+        self.layer.draw(&sprite, &place, room, stage.cpu);
         let Some(fade) = who.fade else {
             return;
         };
         let k = t - fade.start as usize;
         place.rotation_rad = fade.rotation_rad[k];
-        place.scale = fade.scale[k] * scene.view.scale;
+        place.scale = fade.scale[k] * stage.view.scale;
         place.mirrored = fade.mirrored;
         let frame = fade.source_frame[k];
-        let sprite = (scene.stock).take(scene.sprites, frame, place.scale, &mut self.packed);
-        self.second.draw(&sprite, &place, room, scene.cpu);
-        if scene.cut == Cut::Morph {
+        let sprite = (stage.stock).take(stage.sprites, frame, place.scale, &mut self.packed);
+        self.second.draw(&sprite, &place, room, stage.cpu);
+        if stage.cut == Cut::Morph {
             bend(&mut self.layer, &mut self.second, fade.weight[k]);
         }
         mix(
@@ -149,18 +149,18 @@ impl Painter {
             &self.second,
             fade.weight[k],
             &mut self.mixed,
-            scene.cpu,
+            stage.cpu,
         );
     }
 }
 
 /// Where the main sprite goes in the film.
-fn placement(scene: &Scene, who: &Appearance) -> Placement {
+fn placement(stage: &Stage, who: &Appearance) -> Placement {
     let (individual, t) = (who.individual, who.frame_idx);
     Placement {
-        center_px: scene.view.point(individual.centroid_px[t]),
+        center_px: stage.view.point(individual.centroid_px[t]),
         rotation_rad: individual.rotation_rad[t],
-        scale: individual.scale[t] * scene.view.scale,
+        scale: individual.scale[t] * stage.view.scale,
         mirrored: individual.mirrored[t],
     }
 }

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use self::backdrop::Backdrop;
 use self::bleed::bleed;
-use self::layer::{Appearance, Haze, Painter, Scene};
+use self::layer::{Appearance, Haze, Painter, Stage};
 use self::params::Background;
 use self::shadow::Floor;
 use self::stock::Stock;
@@ -291,8 +291,8 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    fn scene(&self) -> Scene<'_> {
-        Scene {
+    fn stage(&self) -> Stage<'_> {
+        Stage {
             sprites: &self.library.sprites,
             stock: &self.stock,
             view: self.view,
@@ -305,16 +305,16 @@ impl<'a> Compositor<'a> {
     fn draw(&self, who: Appearance, desk: &mut Desk) {
         // The truth asks for everyone whole.
         let nearer = (!self.with_truth).then_some(&desk.canvas);
-        desk.painter.paint(&self.scene(), &who, nearer);
+        desk.painter.paint(&self.stage(), &who, nearer);
         desk.put(self.cpu);
         if self.with_truth {
-            let drawn = desk.painter.drawn(&self.scene(), &who);
+            let drawn = desk.painter.drawn(&self.stage(), &who);
             desk.drawn.push(drawn);
         }
     }
 
     fn shade(&self, floor: &Floor, who: Appearance, desk: &mut Desk) {
-        desk.painter.shade(floor, &self.scene(), &who);
+        desk.painter.shade(floor, &self.stage(), &who);
         desk.put(self.cpu);
     }
 }

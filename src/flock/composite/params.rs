@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Render {
-    /// Width and height of the film, pixels, 16..=8192 each; null = the footage's. The field of view stays
+    /// Width and height of the film, pixels, 16..=8192 each, at most 8,294,400 (3840 x 2160) together; null = the footage's. The field of view stays
     /// that of the footage; a film of another shape has bars.
     pub size_px: Option<[u32; 2]>,
     /// What lies behind: `plate`, `transparent`, or a color as `#rrggbb`. Where a format has no
@@ -28,6 +28,9 @@ pub struct Render {
     /// Whether to make ground-truth.zip and tracks.csv.
     pub ground_truth: bool,
 }
+
+/// The largest picture, as of footage: a frame is held in memory several times over.
+const MOST_PIXELS: u64 = 3840 * 2160;
 
 /// What lies behind a flock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -93,6 +96,13 @@ impl Render {
             if !(16..=8192).contains(&side) {
                 return Err(format!("render.size_px must lie in 16..=8192: {side}"));
             }
+        }
+        if let Some([width, height]) = self.size_px
+            && u64::from(width) * u64::from(height) > MOST_PIXELS
+        {
+            return Err(format!(
+                "render.size_px must have at most {MOST_PIXELS} pixels in all, as 3840 x 2160 has: {width} x {height}"
+            ));
         }
         for (name, value) in [
             ("render.haze_per_bl", self.haze_per_bl),
@@ -168,6 +178,16 @@ mod tests {
             ..Render::default()
         };
         assert!(huge.check().unwrap_err().contains("render.size_px"));
+        let vast = Render {
+            size_px: Some([8192, 8192]),
+            ..Render::default()
+        };
+        assert!(vast.check().unwrap_err().contains("8294400"));
+        let long = Render {
+            size_px: Some([8192, 1012]),
+            ..Render::default()
+        };
+        assert_eq!(long.check(), Ok(()));
         let dark = Render {
             shadow: f64::NAN,
             ..Render::default()

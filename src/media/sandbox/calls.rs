@@ -1,4 +1,4 @@
-//! Seccomp (RELIABILITY.md, "The gate"): the system calls that no film needs, as a list with reasons.
+//! Seccomp (RELIABILITY.md, "The gate"): the filter that refuses the system calls that no film needs (`refused`).
 //! The program is written out here instructions by instruction, because it is short and must be read.
 //!
 //! A refused call fails with EPERM; it does not kill. Libraries are curious, and live with a refusal: a
@@ -14,113 +14,10 @@ use std::io;
 
 use libc::{c_long, sock_filter};
 
-/// Calls that are refused, with the reason.
-const REFUSED: &[(&str, &[c_long])] = &[
-    (
-        "a film is a file: it needs no network",
-        &[
-            libc::SYS_socket,
-            libc::SYS_socketpair,
-            libc::SYS_connect,
-            libc::SYS_bind,
-            libc::SYS_listen,
-            libc::SYS_accept,
-            libc::SYS_accept4,
-        ],
-    ),
-    (
-        "one program, which is running already: `clone` is looked at below, `execve` by Landlock",
-        &[
-            #[cfg(target_arch = "x86_64")]
-            libc::SYS_fork,
-            #[cfg(target_arch = "x86_64")]
-            libc::SYS_vfork,
-            libc::SYS_execveat,
-            libc::SYS_memfd_create,
-        ],
-    ),
-    (
-        "other processes are none of its business",
-        &[
-            libc::SYS_ptrace,
-            libc::SYS_process_vm_readv,
-            libc::SYS_process_vm_writev,
-            libc::SYS_process_madvise,
-            libc::SYS_kcmp,
-            libc::SYS_pidfd_open,
-            libc::SYS_pidfd_getfd,
-            libc::SYS_pidfd_send_signal,
-            libc::SYS_kill,
-            libc::SYS_rt_sigqueueinfo,
-            libc::SYS_rt_tgsigqueueinfo,
-        ],
-    ),
-    (
-        "the files are where they are",
-        &[
-            libc::SYS_mount,
-            libc::SYS_umount2,
-            libc::SYS_pivot_root,
-            libc::SYS_chroot,
-            libc::SYS_unshare,
-            libc::SYS_setns,
-            libc::SYS_open_tree,
-            libc::SYS_move_mount,
-            libc::SYS_fsopen,
-            libc::SYS_fsconfig,
-            libc::SYS_fsmount,
-            libc::SYS_fspick,
-            libc::SYS_mount_setattr,
-            libc::SYS_name_to_handle_at,
-            libc::SYS_open_by_handle_at,
-            libc::SYS_fanotify_init,
-            libc::SYS_quotactl,
-        ],
-    ),
-    (
-        "ways to make calls, or to catch them, that this list does not see",
-        &[
-            libc::SYS_io_uring_setup,
-            libc::SYS_io_uring_enter,
-            libc::SYS_io_uring_register,
-            libc::SYS_userfaultfd,
-        ],
-    ),
-    (
-        "limits that were lowered stay low; `prlimit64` is looked at below",
-        &[libc::SYS_setrlimit, libc::SYS_capset, libc::SYS_personality],
-    ),
-    (
-        "keys are somebody else's",
-        &[libc::SYS_add_key, libc::SYS_request_key, libc::SYS_keyctl],
-    ),
-    (
-        "the machine is not the film's",
-        &[
-            libc::SYS_bpf,
-            libc::SYS_perf_event_open,
-            libc::SYS_init_module,
-            libc::SYS_finit_module,
-            libc::SYS_delete_module,
-            libc::SYS_kexec_load,
-            libc::SYS_reboot,
-            libc::SYS_swapon,
-            libc::SYS_swapoff,
-            libc::SYS_syslog,
-            libc::SYS_acct,
-            libc::SYS_settimeofday,
-            libc::SYS_clock_settime,
-            libc::SYS_adjtimex,
-            libc::SYS_clock_adjtime,
-            libc::SYS_sethostname,
-            libc::SYS_setdomainname,
-            #[cfg(target_arch = "x86_64")]
-            libc::SYS_iopl,
-            #[cfg(target_arch = "x86_64")]
-            libc::SYS_ioperm,
-        ],
-    ),
-];
+use super::refused::REFUSED;
+
+/// Stands in the filter where the child's own number goes, which is known after the fork alone.
+const OWN: u32 = u32::MAX;
 
 /// Calls with larger numbers are newer than the list: they are answered as by a kernel that has not
 /// learned them yet, which every library knows how to meet. On x86 that holds the 32-bit numbers too.
@@ -179,6 +76,11 @@ pub(super) fn program() -> Vec<sock_filter> {
         then.load(low(0));
         then.unless_bit(libc::CLONE_THREAD as u32, refusal(libc::EPERM));
     });
+    // A signal to itself is how a program aborts.
+    program.when_then(libc::SYS_tgkill, |then| {
+        then.load(low(0));
+        then.when_not(OWN, refusal(libc::EPERM));
+    });
     // The leash cannot be slipped.
     program.when_then(libc::SYS_prctl, |then| {
         then.load(low(0));
@@ -199,8 +101,18 @@ fn refusal(errno: i32) -> u32 {
     libc::SECCOMP_RET_ERRNO | errno as u32
 }
 
-/// Enters the filter, for good. Async-signal-safe.
-pub(super) fn enter(program: &[sock_filter]) -> io::Result<()> {
+/// Writes the number of the process that asks into its filter. Async-signal-safe.
+fn own(program: &mut [sock_filter]) {
+    // SAFETY: the call has no arguments and cannot fail.
+    let process = unsafe { libc::getpid() };
+    for step in program.iter_mut().filter(|step| step.k == OWN) {
+        step.k = process as u32;
+    }
+}
+
+/// Enters the filter, for good, in the child that it is for. Async-signal-safe.
+pub(super) fn enter(program: &mut [sock_filter]) -> io::Result<()> {
+    own(program);
     let filter = libc::sock_fprog {
         len: program.len() as u16,
         filter: program.as_ptr().cast_mut(),
@@ -292,7 +204,8 @@ mod tests {
     }
 
     fn run(call: &[u32]) -> u32 {
-        let program = program();
+        let mut program = program();
+        own(&mut program);
         let (mut at, mut loaded) = (0, 0);
         loop {
             let step = &program[at];
@@ -327,11 +240,19 @@ mod tests {
             libc::SYS_futex,
             libc::SYS_execve,
             libc::SYS_get_mempolicy,
-            libc::SYS_tgkill,
+            libc::SYS_ftruncate,
             libc::SYS_madvise,
         ] {
             assert_eq!(answer(call, [0; 3]), YES, "{call}");
         }
+    }
+
+    #[test]
+    fn a_program_may_abort_itself_and_nobody_else() {
+        let process = u64::from(std::process::id());
+        assert_eq!(answer(libc::SYS_tgkill, [process, 7, 6]), YES);
+        let other = answer(libc::SYS_tgkill, [process + 1, 7, 6]);
+        assert_eq!(other, refusal(libc::EPERM));
     }
 
     #[test]

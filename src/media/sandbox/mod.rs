@@ -8,9 +8,10 @@
 
 #![expect(unsafe_code, reason = "code between fork and exec needs `pre_exec`")]
 
-mod calls; // seccomp: which system calls are refused, and why
+mod calls; // seccomp: the filter
 mod files; // Landlock: files, network, signals
-mod layer; // the layers by name, and which of them this machine has
+mod layer;
+mod refused; // which system calls it refuses, and why // the layers by name, and which of them this machine has
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -51,7 +52,7 @@ const OPEN_FILES: u64 = 64;
 /// live as long as the process (see `gate`). Fails when a file that the child is to use is not there.
 pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::Result<()> {
     let ruleset = files::ruleset(cage, reach)?;
-    let refusals = match cage.layers.has(Layer::Calls) {
+    let mut refusals = match cage.layers.has(Layer::Calls) {
         true => calls::program(),
         false => Vec::new(),
     };
@@ -76,7 +77,7 @@ pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::
                 lower(resource, limit)?;
             }
         }
-        enter_rules(ruleset.as_ref(), &refusals)
+        enter_rules(ruleset.as_ref(), &mut refusals)
     };
     // SAFETY: between fork and exec only async-signal-safe work is allowed. `enter` makes plain
     // system calls on values that were made before: it neither allocates, nor locks, nor panics.
@@ -123,7 +124,7 @@ fn lower(resource: Resource, limit: u64) -> rustix::io::Result<()> {
 }
 
 /// The last two layers, in this order: the second refuses what it takes to enter the first.
-fn enter_rules(ruleset: Option<&OwnedFd>, refusals: &[libc::sock_filter]) -> io::Result<()> {
+fn enter_rules(ruleset: Option<&OwnedFd>, refusals: &mut [libc::sock_filter]) -> io::Result<()> {
     if let Some(ruleset) = ruleset {
         files::enter(ruleset)?;
     }

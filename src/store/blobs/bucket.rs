@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::Path as FilePath;
 use std::sync::Arc;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 use bytes::Bytes;
 use futures_util::stream::{BoxStream, StreamExt, TryStreamExt, try_unfold};
@@ -16,14 +16,18 @@ use object_store::path::Path;
 use object_store::{ClientOptions, ObjectMeta, ObjectStore, ObjectStoreExt};
 use tokio::fs::File;
 use tokio::io::{AsyncWriteExt, BufReader};
+use tokio::time::timeout;
 
 use super::Folder;
-use crate::store::Error;
+use crate::store::{Error, tls};
 
 /// Every part but the last: more than the least that any store takes, and of one size as some want it.
 const PART_BYTES: usize = 16 << 20;
 /// Bytes asked for at a time: no request lasts as long as the one who downloads is slow.
 const PIECE_BYTES: u64 = 4 << 20;
+
+/// The longest wait for a sign of life; a bucket that is busy is asked again by the next probe.
+const ANSWER: Duration = Duration::from_secs(2);
 
 /// A bucket, and where in it our files begin.
 #[derive(Clone, Debug)]
@@ -35,6 +39,7 @@ pub(super) struct Bucket {
 impl Bucket {
     /// Fails where the bucket cannot be listed.
     pub(super) async fn open(name: &str, prefix: &str) -> Result<Bucket, Error> {
+        tls::choose_cryptography();
         let builder = AmazonS3Builder::from_env().with_bucket_name(name);
         // Whoever gives an address without encryption means it.
         let options = ClientOptions::new().with_allow_http(true);
@@ -47,6 +52,16 @@ impl Bucket {
         objects.try_next().await?;
         drop(objects);
         Ok(bucket)
+    }
+
+    /// Whether the bucket answers us in time: asked for something that never was, it says that it is not there.
+    pub(super) async fn answers(&self) -> bool {
+        let nothing = self.path("footage/readiness");
+        let asked = self.store.head(&nothing);
+        matches!(
+            timeout(ANSWER, asked).await,
+            Ok(Ok(_) | Err(object_store::Error::NotFound { .. }))
+        )
     }
 
     pub(super) async fn put(&self, draft: &FilePath, folder: &str) -> Result<(), Error> {
@@ -89,6 +104,24 @@ impl Bucket {
             }
         })
         .boxed()
+    }
+
+    /// The mark of these files.
+    pub(super) async fn mark(&self) -> Result<Option<String>, Error> {
+        let found = match self.store.get(&self.path(super::MARK)).await {
+            Err(object_store::Error::NotFound { .. }) => return Ok(None),
+            found => found?.bytes().await?,
+        };
+        Ok(Some(String::from_utf8_lossy(&found).trim().to_owned()))
+    }
+
+    /// Marks these files, for good.
+    pub(super) async fn set_mark(&self, mark: &str) -> Result<(), Error> {
+        let bytes = Bytes::copy_from_slice(mark.as_bytes());
+        self.store
+            .put(&self.path(super::MARK), bytes.into())
+            .await?;
+        Ok(())
     }
 
     pub(super) async fn folders(&self) -> Result<Vec<Folder>, Error> {

@@ -7,6 +7,7 @@
 
 mod bucket;
 mod draft;
+mod identity;
 mod room;
 mod shelf;
 
@@ -33,6 +34,9 @@ use crate::config::{Files, Storage};
 
 /// The kinds of folders.
 const KINDS: [&str; 4] = ["footage", "libraries", "flocks", "fish"];
+
+/// The name under which files bear their mark (`identity`).
+const MARK: &str = "store-id";
 
 /// One file of a folder in the store.
 #[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
@@ -180,12 +184,12 @@ impl Blobs {
         }
     }
 
-    /// Where unfinished uploads of this machine grow.
     /// Where things are made.
     pub(super) fn tmp(&self) -> &Path {
         self.work.folder()
     }
 
+    /// Where unfinished uploads of this machine grow.
     pub(super) fn uploads(&self) -> &Path {
         &self.uploads
     }
@@ -193,6 +197,16 @@ impl Blobs {
     /// Where this process makes what it makes, and others make theirs.
     pub(super) fn work(&self) -> &Workplace {
         &self.work
+    }
+}
+
+impl Place {
+    /// Whether it can be asked; a folder of this machine is there, or nothing of ours is.
+    async fn is_there(&self) -> bool {
+        match self {
+            Place::Shelf(_) => true,
+            Place::Bucket(bucket) => bucket.answers().await,
+        }
     }
 }
 
@@ -245,6 +259,21 @@ impl Store {
         let sql = "select exists (select 1 from blobs where folder = $1)";
         let known = sql::query_scalar(sql).bind(folder);
         Ok(known.fetch_one(&self.reader).await?)
+    }
+
+    /// Whether a folder in place was linked by a transaction that ended with `error`: of a lost connection nobody
+    /// knows, so the rows are asked. Where they name it not, and it was the database itself that refused, the
+    /// folder is thrown away; else it is left to the sweep, for a commit may still be under way.
+    pub async fn is_linked_after(&self, folder: &str, error: &Error) -> Result<bool, Error> {
+        match self.is_folder_known(folder).await {
+            Ok(true) => return Ok(true),
+            Ok(false) if matches!(error, Error::Sql(sqlx::Error::Database(_))) => {
+                self.blobs.discard(folder).await?;
+            }
+            Ok(false) => tracing::warn!(folder, "a folder without a row is left to the sweep"),
+            Err(unknown) => tracing::warn!(folder, %unknown, "a folder is left to the sweep"),
+        }
+        Ok(false)
     }
 }
 

@@ -18,9 +18,13 @@ impl Blobs {
         Ok(least)
     }
 
-    /// Whether a folder can be made and removed again. Blocks.
-    pub fn is_writable(&self) -> bool {
-        self.draft(&uuid::Uuid::now_v7().to_string()).is_ok()
+    /// Whether a folder of this machine can be made and removed again, and a bucket, where the files are in
+    /// one, answers in time: for readiness.
+    pub async fn is_writable(&self) -> bool {
+        let work = self.work.clone();
+        let name = uuid::Uuid::now_v7().to_string();
+        let made = tokio::task::spawn_blocking(move || work.draft(&name).is_ok());
+        made.await.unwrap_or(false) && self.place.is_there().await
     }
 
     /// The folders of this machine that grow.
@@ -38,8 +42,8 @@ mod tests {
     async fn a_usual_folder_has_room_and_can_be_written() {
         let data = tempfile::tempdir().unwrap();
         let blobs = Blobs::open(&Storage::from(data.path())).await.unwrap();
-        assert!(blobs.room_bytes().unwrap() > 0 && blobs.is_writable());
+        assert!(blobs.room_bytes().unwrap() > 0 && blobs.is_writable().await);
         std::fs::remove_dir_all(blobs.tmp()).unwrap();
-        assert!(!blobs.is_writable());
+        assert!(!blobs.is_writable().await);
     }
 }

@@ -8,11 +8,12 @@ use std::path::{Path, PathBuf};
 use bytes::Bytes;
 use futures_util::StreamExt;
 use futures_util::stream::BoxStream;
+use rustix::fs::{AtFlags, CWD, Timespec, Timestamps, UTIME_NOW, utimensat};
 use tokio::io::{AsyncReadExt, AsyncSeekExt};
 use tokio::task::spawn_blocking;
 use tokio_util::io::ReaderStream;
 
-use super::{Draft, Folder, KINDS};
+use super::{Draft, Folder, KINDS, MARK};
 use crate::store::Error;
 
 /// Bytes read at a time.
@@ -42,6 +43,7 @@ impl Shelf {
     pub(super) async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
         let (place, root) = (self.folder(folder), self.root.clone());
         let adopt = move || {
+            touch(draft.path())?;
             sync_folder(draft.path())?;
             draft.move_to(&place)?;
             sync_folder(place.parent().unwrap_or(&root))
@@ -71,6 +73,23 @@ impl Shelf {
         Ok(ReaderStream::with_capacity(file.take(n_bytes), PIECE_BYTES).boxed())
     }
 
+    /// The mark of these files.
+    pub(super) fn mark(&self) -> io::Result<Option<String>> {
+        match fs::read_to_string(self.root.join(MARK)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            mark => mark.map(|mark| Some(mark.trim().to_owned())),
+        }
+    }
+
+    /// Marks these files, for good.
+    pub(super) fn set_mark(&self, mark: &str) -> io::Result<()> {
+        let unfinished = self.root.join(format!("{MARK}.new"));
+        fs::write(&unfinished, mark)?;
+        File::open(&unfinished)?.sync_all()?;
+        fs::rename(unfinished, self.root.join(MARK))?;
+        sync_folder(&self.root)
+    }
+
     pub(super) fn folders(&self) -> io::Result<Vec<Folder>> {
         let mut folders = Vec::new();
         for kind in KINDS {
@@ -92,6 +111,19 @@ impl Shelf {
     }
 }
 
+/// Makes a folder as young as it is in its place: one that was long in the making is no stray before its row comes.
+fn touch(path: &Path) -> io::Result<()> {
+    let now = Timespec {
+        tv_sec: 0,
+        tv_nsec: UTIME_NOW,
+    };
+    let times = Timestamps {
+        last_access: now,
+        last_modification: now,
+    };
+    Ok(utimensat(CWD, path, &times, AtFlags::empty())?)
+}
+
 /// Bytes of a file, or of all files below a folder; of what is gone already, none.
 pub(super) fn size_of(path: &Path) -> io::Result<u64> {
     let about = match fs::symlink_metadata(path) {
@@ -111,4 +143,26 @@ pub(super) fn size_of(path: &Path) -> io::Result<u64> {
 /// Makes the names in a folder outlive a power cut.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, SystemTime};
+
+    use super::*;
+    use crate::store::blobs::draft::Workplace;
+
+    #[tokio::test]
+    async fn what_was_long_in_the_making_is_young_when_it_is_put_in_place() {
+        let data = tempfile::tempdir().unwrap();
+        let work = Workplace::open(&data.path().join("tmp")).unwrap();
+        let shelf = Shelf::open(&data.path().join("blobs")).unwrap();
+        let draft = work.draft("x").unwrap();
+        let long_ago = SystemTime::UNIX_EPOCH + Duration::from_secs(1);
+        let folder = File::open(draft.path()).unwrap();
+        folder.set_modified(long_ago).unwrap();
+        shelf.adopt(draft, "flocks/x.1").await.unwrap();
+        let folder = shelf.folders().unwrap().remove(0);
+        assert!(folder.modified > long_ago + Duration::from_secs(3600));
+    }
 }

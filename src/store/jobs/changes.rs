@@ -10,23 +10,30 @@ use crate::store::{Error, Store, sql};
 
 /// The most that a stream which was cut is told of what ended meanwhile.
 const MAX_ENDED: i64 = 1_000;
+/// The most that any stream follows at once: the latest.
+const MAX_UNDER_WAY: i64 = 10_000;
 
 impl Store {
-    /// The jobs within reach that are queued, running, or were made since, the oldest first.
+    /// The jobs within reach that are queued, running, or were made since, the latest ten thousand, oldest first.
     pub async fn jobs_under_way(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
-        let sql = "select * from jobs where (state in ('queued', 'running') or id >= $1) \
-                   and ($2 is null or owner = $2) order by id";
+        let sql = "select id, kind, state, result_id, cancel_requested, attempt, stage, progress, code, \
+                   detail, created_ms, started_ms, finished_ms from jobs \
+                   where (state in ('queued', 'running') or id >= $1) \
+                   and ($2 is null or owner = $2) order by id desc limit $3";
         let rows: Vec<Row> = sql::query(sql)
             .bind(first_id_of(since_ms))
             .bind(reach.owner())
+            .bind(MAX_UNDER_WAY)
             .fetch_all(&self.reader)
             .await?;
-        rows.into_iter().map(JobRow::try_from).collect()
+        rows.into_iter().rev().map(JobRow::try_from).collect()
     }
 
     /// The jobs within reach that ended since, the latest thousand of them.
     pub async fn jobs_ended(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
-        let sql = "select * from jobs where finished_ms >= $1 and ($2 is null or owner = $2) \
+        let sql = "select id, kind, state, result_id, cancel_requested, attempt, stage, progress, code, \
+                   detail, created_ms, started_ms, finished_ms from jobs \
+                   where finished_ms >= $1 and ($2 is null or owner = $2) \
                    order by finished_ms desc limit $3";
         let rows: Vec<Row> = sql::query(sql)
             .bind(since_ms)

@@ -59,14 +59,17 @@ impl Pool {
         migrates: bool,
     ) -> Result<[Pool; 2], Error> {
         let options = options(file);
-        let writer = SqlitePoolOptions::new()
+        // A file does not hang up: to ask each time whether a connection still answers would double the way to it.
+        let pool = SqlitePoolOptions::new().test_before_acquire(false);
+        let writer = pool
+            .clone()
             .max_connections(1)
             .connect_with(options.clone())
             .await?;
         if migrates {
             FOR_SQLITE.run(&writer).await?;
         }
-        let readers = SqlitePoolOptions::new()
+        let readers = pool
             .max_connections(SQLITE_READERS)
             .connect_with(options.read_only(true))
             .await?;

@@ -5,6 +5,7 @@ mod key;
 pub mod secret;
 pub mod sessions;
 
+pub(super) use secret::random_key;
 use secret::{Presented, Secret};
 
 use super::owners::{Account, Owner, Reach};

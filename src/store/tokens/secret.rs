@@ -69,7 +69,7 @@ pub(super) fn random_id() -> io::Result<String> {
 }
 
 /// 32 bytes of the system's randomness.
-pub(super) fn random_key() -> io::Result<[u8; 32]> {
+pub(in crate::store) fn random_key() -> io::Result<[u8; 32]> {
     let mut bytes = [0; 32];
     fill(&mut bytes)?;
     Ok(bytes)

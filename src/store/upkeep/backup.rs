@@ -93,12 +93,17 @@ impl Store {
         Ok(true)
     }
 
-    /// Copies one file and checks on the way that it is what its row says; false where it is gone.
+    /// Copies one file and checks on the way that it is what its row says; false where it is gone. It has its name
+    /// only once it is whole, so that a copy that was cut short is not taken for one by the next.
     async fn copy(&self, folder: &str, file: &BlobFile, to: &Path) -> Result<bool, Error> {
         fs::create_dir_all(to)?;
-        let mut target = tokio::fs::File::create(to.join(&file.name)).await?;
+        let unproven = to.join(format!("{}.unproven", file.name));
+        let mut target = tokio::fs::File::create(&unproven).await?;
         match self.blobs.copy(file, folder, &mut target).await {
-            Err(Error::Io(error)) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
+            Err(Error::Io(error)) if error.kind() == io::ErrorKind::NotFound => {
+                fs::remove_file(&unproven)?;
+                return Ok(false);
+            }
             Ok(found) if found == (file.size_bytes, file.sha256.clone()) => {}
             Ok(_) => {
                 let name = &file.name;
@@ -108,6 +113,7 @@ impl Store {
             Err(error) => return Err(error),
         }
         target.sync_all().await?;
+        fs::rename(&unproven, to.join(&file.name))?;
         Ok(true)
     }
 }
@@ -159,4 +165,45 @@ fn sync_folders(folder: &Path) -> io::Result<()> {
         }
     }
     File::open(folder)?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_backup_after_one_that_was_cut_short_is_whole() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let draft = store.blobs().draft("film").unwrap();
+        let bytes: Vec<u8> = (0..24_u32 << 20).map(|k| (k >> 7) as u8).collect();
+        fs::write(draft.path().join("video"), &bytes).unwrap();
+        let file = store.blobs().seal(&draft).unwrap().remove(0);
+        store.blobs().adopt(draft, "footage/a").await.unwrap();
+        sql::query("insert into blobs (folder, name, size_bytes, sha256) values ($1, $2, $3, $4)")
+            .bind("footage/a")
+            .bind("video")
+            .bind(file.size_bytes)
+            .bind(file.sha256.as_slice())
+            .execute(&store.writer)
+            .await
+            .unwrap();
+        let target = data.path().join("copy");
+        let partial = beside(&target).join("blobs/footage/a");
+        let begun = async {
+            let has_bytes = |entry: fs::DirEntry| entry.metadata().is_ok_and(|file| file.len() > 0);
+            while !fs::read_dir(&partial).is_ok_and(|mut all| all.any(|e| e.is_ok_and(has_bytes))) {
+                tokio::task::yield_now().await;
+            }
+        };
+        tokio::select! {
+            biased;
+            () = begun => {}
+            _ = store.back_up(&target) => panic!("it ended before it could be cut short"),
+        }
+        store.back_up(&target).await.unwrap();
+        let copy = target.join("blobs/footage/a");
+        assert_eq!(fs::read(copy.join("video")).unwrap(), bytes);
+        assert_eq!(fs::read_dir(copy).unwrap().count(), 1);
+    }
 }

@@ -190,5 +190,23 @@ async fn the_document_has_one_meaning_for_every_name() {
             assert!(request["properties"][field].is_object(), "{name} {field}");
         }
     }
+    // What is asked for may name a preset; what was measured with is in full, and names none.
+    for (name, field) in [
+        ("AnalysisOverrides", "clip_frames"),
+        ("FlockOverrides", "count"),
+    ] {
+        let overrides = &schemas[name];
+        assert_eq!(overrides["additionalProperties"], false, "{name}");
+        assert!(overrides["required"].is_null(), "{overrides}");
+        for field in [field, "preset"] {
+            assert!(overrides["properties"][field].is_object(), "{name} {field}");
+        }
+    }
+    let overrides = "#/components/schemas/AnalysisOverrides";
+    assert_eq!(
+        schemas["AnalysisRequest"]["properties"]["params"]["$ref"],
+        overrides
+    );
+    assert!(schemas["AnalysisParams"]["properties"]["preset"].is_null());
     app.assert_sound().await;
 }

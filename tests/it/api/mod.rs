@@ -1,5 +1,6 @@
 //! The API, through the real router over a real connection; a file per noun.
 
+mod at_once;
 mod auth;
 mod contract;
 mod corpus;

@@ -48,6 +48,11 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/jobs/{id}/events", Path("jobs")),
         ("POST", "/v1/analyses", Body("footage_id", "footage")),
         ("POST", "/v1/flocks", Body("library_id", "libraries")),
+        (
+            "POST",
+            "/v1/flocks/preview",
+            Body("library_id", "libraries"),
+        ),
         ("POST", "/v1/fish", Body("library_id", "libraries")),
         ("POST", "/v1/flocks/{id}/links", Path("flocks")),
         ("HEAD", "/v1/uploads/{id}", Path("uploads")),

@@ -6,6 +6,7 @@ mod upkeep;
 
 use std::process::{Command, Output};
 
+use crate::common::client;
 use crate::common::film::Films;
 use crate::common::process::Server;
 
@@ -109,9 +110,7 @@ async fn the_log_in_json_names_the_request_and_never_a_signature() {
     let flags = ["--log-format", "json", "--metrics-bind", "127.0.0.1:0"];
     let server = Server::start_with(data.path(), &flags);
     let url = format!("{}/v1/jobs?limit=1&signature=secret", server.base);
-    let ask = reqwest::Client::new()
-        .get(url)
-        .header("x-request-id", "lab-1");
+    let ask = client().get(url).header("x-request-id", "lab-1");
     assert_eq!(ask.send().await.expect("an answer").status(), 422);
     let log = server.terminate_and_read();
     assert!(!log.contains("secret"), "{log}");

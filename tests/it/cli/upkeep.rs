@@ -5,9 +5,9 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-use reqwest::Client;
 use serde_json::{Value, json};
 
+use crate::common::client;
 use crate::common::film::Films;
 use crate::common::process::{Server, numbered_film};
 
@@ -24,7 +24,7 @@ fn said(done: &Output) -> String {
 }
 
 async fn json_at(url: String) -> Value {
-    let answer = Client::new().get(url).send().await.unwrap();
+    let answer = client().get(url).send().await.unwrap();
     answer.json().await.unwrap()
 }
 
@@ -33,7 +33,7 @@ type Kept = Arc<Mutex<Vec<String>>>;
 
 /// Uploads films, queues their analyses, and deletes every third, until told to stop.
 async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>, kept: Kept) {
-    let client = Client::new();
+    let client = client();
     while !stop.load(Ordering::Relaxed) {
         let number = next.fetch_add(1, Ordering::Relaxed);
         let sent = client
@@ -108,7 +108,7 @@ async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
     let stored = every_film_is_whole(&restored.base, copied["files"].as_u64().unwrap()).await;
     let lost: Vec<_> = before.iter().filter(|id| !stored.contains(id)).collect();
     assert!(lost.is_empty(), "stored before the backup: {lost:?}");
-    let ended = Client::new().post(format!("{}/v1/footage", restored.base));
+    let ended = client().post(format!("{}/v1/footage", restored.base));
     let ended = ended.body(numbered_film(100_000)).send().await.unwrap();
     assert_eq!(ended.status(), 201, "it goes on");
 }
@@ -124,7 +124,7 @@ async fn every_film_is_whole(base: &str, n_films: u64) -> Vec<String> {
             base,
             footage["id"].as_str().unwrap()
         );
-        let answer = Client::new().get(path).send().await.unwrap();
+        let answer = client().get(path).send().await.unwrap();
         let etag = answer.headers()["etag"].to_str().unwrap().to_owned();
         let bytes = answer.bytes().await.unwrap();
         assert_eq!(
@@ -141,7 +141,7 @@ async fn every_film_is_whole(base: &str, n_films: u64) -> Vec<String> {
 async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
     let films = Films::new();
     let server = Server::start(&films.path("data"));
-    let sent = Client::new().post(format!("{}/v1/footage", server.base));
+    let sent = client().post(format!("{}/v1/footage", server.base));
     let footage: Value = sent
         .body(numbered_film(1))
         .send()
@@ -226,7 +226,7 @@ async fn gc_beside_a_service_leaves_what_it_is_receiving() {
     };
     let first = futures_util::stream::once(async move { Ok(first) });
     let halves = futures_util::StreamExt::chain(first, futures_util::stream::once(rest));
-    let sent = Client::new().post(format!("{}/v1/footage", server.base));
+    let sent = client().post(format!("{}/v1/footage", server.base));
     let answer = sent.body(reqwest::Body::wrap_stream(halves)).send().await;
     assert_eq!(answer.unwrap().status(), 201);
 }
@@ -242,7 +242,7 @@ async fn a_flag_wins_over_the_environment_that_over_the_file_and_that_over_the_d
     let largest = async |flags: &[&str], variables: &[(&str, &str)]| {
         let server = Server::start_in(&films.path("data"), flags, variables);
         let url = format!("{}/v1/uploads", server.base);
-        let answer = Client::new()
+        let answer = client()
             .request(reqwest::Method::OPTIONS, url)
             .send()
             .await

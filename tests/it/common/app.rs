@@ -17,7 +17,7 @@ use serde_json::Value;
 use tokio::net::TcpListener;
 use tokio_util::sync::CancellationToken;
 
-use super::Place;
+use super::{Place, client};
 
 /// The service under test.
 pub(crate) struct TestApp {
@@ -68,7 +68,7 @@ impl TestApp {
         ));
         TestApp {
             context,
-            client: Client::new(),
+            client: client(),
             base,
             place,
             stop,
@@ -109,7 +109,7 @@ impl TestApp {
 
     /// From now on requests carry nothing of their own.
     pub(crate) fn sign_out(&mut self) {
-        self.client = Client::new();
+        self.client = client();
     }
 
     pub(crate) fn request(&self, method: Method, path: &str) -> RequestBuilder {

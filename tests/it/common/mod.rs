@@ -9,7 +9,8 @@ pub(crate) mod process;
 pub(crate) use app::TestApp;
 pub(crate) use place::Place;
 
-/// A client of the service.
+/// A client of the service. `Client::new()` alone would ask for cryptography that nobody has chosen yet.
 pub(crate) fn client() -> reqwest::Client {
+    flockreel::store::tls::choose_cryptography();
     reqwest::Client::new()
 }

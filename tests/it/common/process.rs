@@ -26,9 +26,15 @@ pub(crate) struct WorkerProcess {
 impl WorkerProcess {
     /// Starts it over its things, with one worker.
     pub(crate) fn start(place: &Place) -> WorkerProcess {
+        WorkerProcess::start_with(place, &[])
+    }
+
+    /// The same with further flags.
+    pub(crate) fn start_with(place: &Place, flags: &[&str]) -> WorkerProcess {
         let mut child = Command::new(env!("CARGO_BIN_EXE_flockreel"))
             .args(["worker", "--workers", "1"])
             .args(place.flags())
+            .args(flags)
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();

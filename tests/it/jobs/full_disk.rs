@@ -7,10 +7,10 @@ use std::process::Command;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
-use crate::common::Place;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::{SWIM, TINY};
 use crate::common::process::Server;
+use crate::common::{Place, client};
 
 /// A small disk of memory over a folder, until dropped.
 struct SmallDisk(PathBuf);
@@ -29,10 +29,13 @@ impl SmallDisk {
 
     /// Fills it but for so many bytes.
     fn fill_but(&self, n_left: u64) {
-        let disk = rustix::fs::statvfs(&self.0).unwrap();
-        let room = disk.f_bavail * disk.f_frsize;
-        let filler = vec![7; room.saturating_sub(n_left) as usize];
+        let filler = vec![7; self.n_free_bytes().saturating_sub(n_left) as usize];
         std::fs::write(self.0.join("filler"), filler).unwrap();
+    }
+
+    fn n_free_bytes(&self) -> u64 {
+        let disk = rustix::fs::statvfs(&self.0).unwrap();
+        disk.f_bavail * disk.f_frsize
     }
 
     fn free(&self) {
@@ -58,6 +61,16 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     let server = Server::start_with(place.data(), &["--disk-reserve-bytes", &reserve]);
     let swim: Value = server.upload(SWIM.clone()).await.json().await.unwrap();
     let tiny: Value = server.upload(TINY.clone()).await.json().await.unwrap();
+
+    // A body that does not say how long it is, and would fit but for the reserve.
+    disk.fill_but(44 << 20);
+    let pieces = (0..41).map(|_| Ok::<_, std::io::Error>(vec![7_u8; 1 << 20]));
+    let endless = reqwest::Body::wrap_stream(futures_util::stream::iter(pieces));
+    let post = client().post(format!("{}/v1/footage", server.base));
+    let refused = post.body(endless).send().await.unwrap();
+    assert_eq!(code_of(refused, 507).await, "storage_full");
+    disk.free();
+    assert!(disk.n_free_bytes() > 43 << 20, "it leaves nothing");
 
     // Down to the reserve: nothing new comes in, all else works.
     disk.fill_but(8 << 20);

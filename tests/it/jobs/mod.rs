@@ -7,4 +7,5 @@ mod life_cycle;
 mod poison;
 mod races;
 mod steps;
+mod sweeps;
 mod uploads;

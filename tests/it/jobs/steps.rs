@@ -164,6 +164,18 @@ async fn a_job_that_takes_too_long_is_told_to_stop_and_fails() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_would_fill_the_disk_is_stopped_before_it_does() {
+    let (app, job, _) = with_job().await;
+    let mut context = app.context.clone();
+    context.least_room_bytes = u64::MAX;
+    let step = Worker::new(context)
+        .step_by(|_, attempt| wait_until_cancelled(attempt))
+        .await;
+    assert_eq!(step.unwrap(), Step::Failed(job, Code::StorageFull));
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_job_that_spins_and_does_not_listen_fails_all_the_same() {
     let (app, job, footage) = with_job().await;
     let ends = Arc::new(AtomicBool::new(false));
@@ -179,6 +191,10 @@ async fn a_job_that_spins_and_does_not_listen_fails_all_the_same() {
     ends.store(true, Ordering::Relaxed);
     let worker = Worker::new(app.context.clone());
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
+    // What it makes after all is kept by nobody.
+    tokio::time::sleep(Duration::from_millis(500)).await;
+    assert_eq!(app.n_folders("libraries").await, 0);
+    app.assert_sound().await;
 }
 
 #[tokio::test]

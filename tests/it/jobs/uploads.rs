@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 use flockreel::jobs::clock::now_ms;
 use flockreel::random::unit;
 use flockreel::store::Store;
-use reqwest::Client;
 use serde_json::Value;
 use tokio::sync::Mutex;
 
+use crate::common::client;
 use crate::common::process::{Server, numbered_film, processes_of, sha256};
 
 const SEED: u64 = 6;
@@ -24,7 +24,7 @@ type Accepted = Arc<Mutex<Vec<(String, String)>>>;
 
 /// Uploads one film after the other until the server is gone.
 async fn upload_on(base: String, next: Arc<AtomicUsize>, accepted: Accepted) {
-    let client = Client::new();
+    let client = client();
     loop {
         let bytes = numbered_film(next.fetch_add(1, Ordering::Relaxed));
         let sha256 = sha256(&bytes);
@@ -41,7 +41,7 @@ async fn upload_on(base: String, next: Arc<AtomicUsize>, accepted: Accepted) {
 }
 
 async fn assert_all_there(base: &str, accepted: &[(String, String)]) {
-    let client = Client::new();
+    let client = client();
     for (id, hash) in accepted {
         let answer = client.get(format!("{base}/v1/footage/{id}/file")).send();
         let bytes = answer.await.unwrap().bytes().await.unwrap();
@@ -72,7 +72,7 @@ async fn an_accepted_upload_survives_every_kill() {
     let mut server = Server::start(data.path());
     // A kill falls somewhere into the time of eight uploads, however long one takes on this machine.
     let start = Instant::now();
-    let first = Client::new().post(format!("{}/v1/footage", server.base));
+    let first = client().post(format!("{}/v1/footage", server.base));
     let first = first.body(numbered_film(0)).send().await;
     assert_eq!(first.unwrap().status(), 201);
     let longest = 8 * start.elapsed();

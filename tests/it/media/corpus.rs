@@ -41,6 +41,7 @@ pub(crate) fn corpus(films: &Films) -> Vec<Case> {
     corpus.of_texts_and_junk();
     corpus.of_odd_films();
     corpus.of_odd_but_good_films();
+    corpus.of_leaping_times();
     corpus.of_lying_headers();
     corpus.cases
 }
@@ -282,6 +283,32 @@ impl Corpus<'_> {
                 Code::NoVideoStream,
             ],
         );
+    }
+
+    /// A few kilobytes that claim billions of frames between two of theirs.
+    fn of_leaping_times(&mut self) {
+        self.film(40, "-c:v libx264 -bf 0 -pix_fmt yuv420p even.mp4");
+        let micro = "time_base=1/1000000 -video_track_timescale 1000000";
+        for (args, code) in [
+            (
+                "setts=ts=TS+gte(N\\,20)*100000000/TB leap.mkv",
+                Code::TooLong,
+            ),
+            (&*format!("setts=ts=N:{micro} tiny.mp4"), Code::TooFast),
+            (
+                &*format!("setts=ts=N+gte(N\\,20)*2000000000:{micro} tiny-leap.mp4"),
+                Code::TooFast,
+            ),
+            (
+                "setts=ts=N*2+gte(N\\,20)*3000000:time_base=1/1000 leap-of-frames.mkv",
+                Code::TooManyFrames,
+            ),
+        ] {
+            let film = self
+                .films
+                .run(&format!("-i even.mp4 -c copy -bsf:v {args}"));
+            self.refused(film, &[code]);
+        }
     }
 
     fn of_lying_headers(&mut self) {

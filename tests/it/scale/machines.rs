@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant, SystemTime};
 
+use flockreel::jobs::Context;
 use flockreel::jobs::admit::{Arrival, admit};
 use flockreel::jobs::clock::now_ms;
 use flockreel::store::Store;
@@ -32,7 +33,8 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
         sample: false,
         owner: Owner::local(),
     };
-    let (Added::New(footage) | Added::Known(footage)) = admit(store, arrival).await.unwrap();
+    let context = Context::new(store.clone(), 1);
+    let (Added::New(footage) | Added::Known(footage)) = admit(&context, arrival).await.unwrap();
     footage.id
 }
 

@@ -3,3 +3,4 @@
 
 mod machines;
 mod stall;
+mod watched;

@@ -21,7 +21,7 @@ pub(super) fn may_use(file: &str, module: &str, used: &str) -> bool {
             "store" => ["ids", "code", "scratch", "config"].contains(&used),
             "jobs" => !["api", "cli"].contains(&used),
             "api" => used != "cli",
-            "cli" => used != "api" || file == "cli/serve.rs",
+            "cli" => used != "api" || ["cli/serve.rs", "cli/worker.rs"].contains(&file),
             _ => false,
         }
 }

@@ -7,10 +7,13 @@
 #![expect(unsafe_code, reason = "vector loads and the call into code for AVX2")]
 
 use std::arch::x86_64::*;
+use std::ops::Range;
 
 use super::{LANES, SadTile, Tile};
 use crate::analysis::distance::group::{BLOCK, Block};
 
+/// Rows against two columns: their sums, two columns, a row and a difference fill the registers.
+const MOST_ROWS: usize = 6;
 /// Loads of 32 bytes in a block.
 const STEPS: usize = BLOCK / 32;
 
@@ -23,33 +26,76 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx2")]
 fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
-    // Groups are padded to 48 sprites, so blocks of 6 and 2 never leave them.
-    let corners = tile.corners::<6, 2>();
+    let strips = strips(&tile);
     for block in 0..tile.rows.n_blocks() {
-        for &[row, column] in &corners {
-            if tile.add_blank::<6, 2>([block, row, column], sums) {
+        for strip in &strips {
+            // Groups are padded to 48 sprites, so two columns never leave them.
+            let columns = strip.column..strip.column + 2;
+            if tile.add_blank(block, [&strip.rows, &columns], sums) {
                 continue;
             }
-            let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
-            let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
-            for (sums, of_row) in sums[row..row + 6].iter_mut().zip(sad_6x2(a, b)) {
-                for (sum, d) in sums[column..column + 2].iter_mut().zip(of_row) {
-                    *sum += u64::from(d);
-                }
+            match strip.rows.len() {
+                1 => add_strip::<1>(tile, block, strip, sums),
+                2 => add_strip::<2>(tile, block, strip, sums),
+                3 => add_strip::<3>(tile, block, strip, sums),
+                4 => add_strip::<4>(tile, block, strip, sums),
+                5 => add_strip::<5>(tile, block, strip, sums),
+                _ => add_strip::<MOST_ROWS>(tile, block, strip, sums),
             }
         }
     }
 }
 
-/// The sums of six blocks against two.
+/// Some rows in succession, at most [`MOST_ROWS`], against two columns.
+struct Strip {
+    rows: Range<usize>,
+    column: usize,
+}
+
+/// All rows of which two columns ask anything, in pieces about as long as each other: rows by rows, then columns.
+fn strips(tile: &Tile<'_>) -> Vec<Strip> {
+    let mut strips = Vec::new();
+    for column in (0..tile.columns.n_sprites).step_by(2) {
+        let asked = (0..).zip(tile.wanted);
+        let mut rest = asked.fold(0u64, |rows, (row, wanted)| {
+            rows | u64::from(wanted >> column & 3 != 0) << row
+        });
+        while rest != 0 {
+            let start = rest.trailing_zeros() as usize;
+            let n_rows = (!(rest >> start)).trailing_zeros() as usize;
+            rest &= !(((1 << n_rows) - 1) << start);
+            let n_pieces = n_rows.div_ceil(MOST_ROWS);
+            let cut = |k: usize| start + k * n_rows / n_pieces;
+            let pieces = (0..n_pieces).map(|k| cut(k)..cut(k + 1));
+            strips.extend(pieces.map(|rows| Strip { rows, column }));
+        }
+    }
+    strips.sort_by_key(|strip| (strip.rows.start, strip.column));
+    strips
+}
+
 #[inline]
 #[target_feature(enable = "avx2")]
-fn sad_6x2(a: [&Block; 6], b: [&Block; 2]) -> [[u32; 2]; 6] {
-    let mut sums = [[_mm256_setzero_si256(); 2]; 6];
+fn add_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: &mut SadTile) {
+    let (row, column) = (strip.rows.start, strip.column);
+    let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
+    let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
+    for (sums, of_row) in sums[row..row + R].iter_mut().zip(sad_rows::<R>(a, b)) {
+        for (sum, d) in sums[column..column + 2].iter_mut().zip(of_row) {
+            *sum += u64::from(d);
+        }
+    }
+}
+
+/// The sums of some blocks, at most six, against two.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn sad_rows<const R: usize>(a: [&Block; R], b: [&Block; 2]) -> [[u32; 2]; R] {
+    let mut sums = [[_mm256_setzero_si256(); 2]; R];
     for step in 0..STEPS {
         fetch_next(b[1], step);
         let b = [load(b[0], step), load(b[1], step)];
-        for row in 0..6 {
+        for row in 0..R {
             let a = load(a[row], step);
             for column in 0..2 {
                 let sad = _mm256_sad_epu8(a, b[column]);
@@ -57,13 +103,15 @@ fn sad_6x2(a: [&Block; 6], b: [&Block; 2]) -> [[u32; 2]; 6] {
             }
         }
     }
-    let two_rows = |k: usize| {
-        let [a, b, c, d] = totals([sums[k][0], sums[k][1], sums[k + 1][0], sums[k + 1][1]]);
-        [[a, b], [c, d]]
-    };
-    let [[first, second], [third, fourth], [fifth, sixth]] =
-        [two_rows(0), two_rows(2), two_rows(4)];
-    [first, second, third, fourth, fifth, sixth]
+    let mut each = [[0; 2]; R];
+    for (each, sums) in each.chunks_mut(2).zip(sums.chunks(2)) {
+        let (first, second) = (sums[0], sums.last().copied().unwrap_or(sums[0]));
+        let [a, b, c, d] = totals([first[0], first[1], second[0], second[1]]);
+        each.iter_mut()
+            .zip([[a, b], [c, d]])
+            .for_each(|(each, of_row)| *each = of_row);
+    }
+    each
 }
 
 /// Calls for one of the 32 cache lines of the two blocks after this one: the next two columns', mostly.

@@ -29,7 +29,8 @@ fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
     let corners = tile.corners::<4, 4>();
     for block in 0..tile.rows.n_blocks() {
         for &[row, column] in &corners {
-            if tile.add_blank::<4, 4>([block, row, column], sums) {
+            let pairs = [&(row..row + 4), &(column..column + 4)];
+            if tile.add_blank(block, pairs, sums) {
                 continue;
             }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));

@@ -9,6 +9,8 @@ mod avx512;
 mod neon;
 pub(super) mod scalar;
 
+use std::ops::Range;
+
 use super::group::{GROUP, Group};
 use crate::cpu::Level;
 
@@ -69,25 +71,26 @@ impl Tile<'_> {
         .collect()
     }
 
-    /// Adds d of `R` rows and `C` columns in a block that is blank in all those rows or in all those
-    /// columns: |a - 0| is a, whose sum is known. Returns false, and adds nothing, when it is neither.
+    /// Adds d of these rows and columns in a block that is blank in all those rows or in all those columns:
+    /// |a - 0| is a, whose sum is known. Returns false, and adds nothing, when it is neither.
     #[inline]
-    fn add_blank<const R: usize, const C: usize>(
+    fn add_blank(
         &self,
-        [block, row, column]: [usize; 3],
+        block: usize,
+        [rows, columns]: [&Range<usize>; 2],
         sums: &mut SadTile,
     ) -> bool {
-        let filled = |group: Group<'_>, first: usize, n: usize| {
-            group.filled(block) >> first & ((1 << n) - 1) != 0
+        let filled = |group: Group<'_>, sprites: &Range<usize>| {
+            group.filled(block) >> sprites.start & ((1 << sprites.len()) - 1) != 0
         };
-        if filled(self.rows, row, R) && filled(self.columns, column, C) {
+        if filled(self.rows, rows) && filled(self.columns, columns) {
             return false;
         }
-        let a: [u32; R] = std::array::from_fn(|r| self.rows.sum(block, row + r));
-        let b: [u32; C] = std::array::from_fn(|c| self.columns.sum(block, column + c));
-        for (r, a) in a.into_iter().enumerate() {
-            for (c, b) in b.into_iter().enumerate() {
-                sums[row + r][column + c] += u64::from(a + b);
+        for row in rows.clone() {
+            let of_row = self.rows.sum(block, row);
+            for column in columns.clone() {
+                let sum = of_row + self.columns.sum(block, column);
+                sums[row][column] += u64::from(sum);
             }
         }
         true

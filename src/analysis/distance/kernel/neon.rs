@@ -23,7 +23,8 @@ fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
     let corners = tile.corners::<2, 4>();
     for block in 0..tile.rows.n_blocks() {
         for &[row, column] in &corners {
-            if tile.add_blank::<2, 4>([block, row, column], sums) {
+            let pairs = [&(row..row + 2), &(column..column + 4)];
+            if tile.add_blank(block, pairs, sums) {
                 continue;
             }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));

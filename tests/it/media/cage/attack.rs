@@ -14,6 +14,10 @@ unsafe extern "C" {
     fn fork() -> c_int;
     fn pause() -> c_int;
     fn close(fd: c_int) -> c_int;
+    fn truncate(path: *const c_char, n_bytes: i64) -> c_int;
+    fn chmod(path: *const c_char, mode: c_int) -> c_int;
+    fn chown(path: *const c_char, user: c_int, group: c_int) -> c_int;
+    fn utimes(path: *const c_char, times: *const c_void) -> c_int;
     fn getppid() -> c_int;
     fn kill(process: c_int, signal: c_int) -> c_int;
     fn mmap(at: *mut c_void, n: usize, may: c_int, how: c_int, fd: c_int, from: i64)
@@ -86,6 +90,10 @@ fn attack(name: &str, target: &str, output: &str) -> Result<(), String> {
         "list" => done(fs::read_dir(target).map(drop)),
         "write" => done(File::create(target).map(drop)),
         "remove" => done(fs::remove_file(target)),
+        "truncate" => of_path(target, |path| unsafe { truncate(path, 0) }),
+        "chmod" => of_path(target, |path| unsafe { chmod(path, 0o600) }),
+        "chown" => of_path(target, |path| unsafe { chown(path, -1, -1) }),
+        "touch" => of_path(target, |path| unsafe { utimes(path, std::ptr::null()) }),
         "grow" => done(grow(output)),
         "tcp" => done(TcpStream::connect(target).map(drop)),
         "udp" => done(
@@ -108,6 +116,11 @@ fn attack(name: &str, target: &str, output: &str) -> Result<(), String> {
 
 fn done(tried: std::io::Result<()>) -> Result<(), String> {
     tried.map_err(|error| error.to_string())
+}
+
+fn of_path(path: &str, call: impl Fn(*const c_char) -> c_int) -> Result<(), String> {
+    let path = CString::new(path).unwrap();
+    is_zero(c_long::from(call(path.as_ptr())))
 }
 
 fn is_zero(answer: c_long) -> Result<(), String> {

@@ -116,7 +116,11 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
         attempt("memory", String::new(), alone(&[Limits])),
         attempt("trace", String::new(), traced),
         attempt("stop", String::new(), alone(&[Signals, Calls])),
-        attempt("stop-thread", String::new(), alone(&[Signals])),
+        attempt("stop-thread", String::new(), alone(&[Signals, Calls])),
+        attempt("truncate", path("secret"), alone(&[Files, Calls])),
+        attempt("chmod", path("secret"), alone(&[Calls])),
+        attempt("chown", path("secret"), alone(&[Calls])),
+        attempt("touch", path("secret"), alone(&[Calls])),
         attempt("slip", String::new(), alone(&[Calls])),
         attempt("raise", String::new(), raised),
     ]

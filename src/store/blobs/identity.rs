@@ -1,0 +1,148 @@
+//! Which rows and which files belong together: both bear the same random mark, from their first meeting on. A
+//! database that is not the files' own names none of them, so that a sweep for it would remove them all
+//! (RELIABILITY.md, store rules: no row without its blob, ever).
+
+use super::{Place, hex};
+use crate::store::tokens::random_key;
+use crate::store::{Error, Store, sql};
+
+impl Store {
+    /// Fails with [`Error::OtherFiles`] where the files are another database's. Where a mark is missing, on one side
+    /// or on both, it is made if the rows know of the files, or if there are none.
+    pub(in crate::store) async fn own_files(&self) -> Result<(), Error> {
+        let of_rows = self.mark_of_rows().await?;
+        let of_files = self.mark_of_files().await?;
+        if let (Some(of_rows), Some(of_files)) = (&of_rows, &of_files) {
+            return match hex(of_rows) == *of_files {
+                true => Ok(()),
+                false => Err(Error::OtherFiles),
+            };
+        }
+        if !self.knows_files().await? {
+            return Err(Error::OtherFiles);
+        }
+        let mark = match (of_rows, &of_files) {
+            (Some(mark), _) => mark,
+            (None, Some(of_files)) => self.mark_rows(&unhex(of_files)).await?,
+            (None, None) => self.mark_rows(&random_key()?).await?,
+        };
+        // Of several processes that start at once each has the rows' mark by now.
+        match of_files {
+            None => self.mark_files(&hex(&mark)).await,
+            Some(of_files) if of_files == hex(&mark) => Ok(()),
+            Some(_) => Err(Error::OtherFiles),
+        }
+    }
+
+    /// Whether the rows name any of the files, or there are none.
+    async fn knows_files(&self) -> Result<bool, Error> {
+        let folders = self.blobs.folders().await?;
+        for folder in &folders {
+            if self.is_folder_known(&folder.name).await? {
+                return Ok(true);
+            }
+        }
+        Ok(folders.is_empty())
+    }
+
+    async fn mark_of_rows(&self) -> Result<Option<Vec<u8>>, Error> {
+        let sql = "select secret from keys where name = 'store'";
+        Ok(sql::query_scalar(sql).fetch_optional(&self.reader).await?)
+    }
+
+    /// Gives the rows a mark, unless another process does; the one that they have then.
+    async fn mark_rows(&self, mark: &[u8]) -> Result<Vec<u8>, Error> {
+        sql::query("insert into keys (name, secret) values ('store', $1) on conflict do nothing")
+            .bind(mark)
+            .execute(&self.writer)
+            .await?;
+        let sql = "select secret from keys where name = 'store'";
+        Ok(sql::query_scalar(sql).fetch_one(&self.writer).await?)
+    }
+
+    async fn mark_of_files(&self) -> Result<Option<String>, Error> {
+        match &self.blobs.place {
+            Place::Shelf(shelf) => Ok(shelf.mark()?),
+            Place::Bucket(bucket) => bucket.mark().await,
+        }
+    }
+
+    async fn mark_files(&self, mark: &str) -> Result<(), Error> {
+        match &self.blobs.place {
+            Place::Shelf(shelf) => Ok(shelf.set_mark(mark)?),
+            Place::Bucket(bucket) => bucket.set_mark(mark).await,
+        }
+    }
+}
+
+/// The bytes of a hexadecimal text; what is none is no mark of ours.
+fn unhex(text: &str) -> Vec<u8> {
+    let pairs = text.as_bytes().chunks_exact(2);
+    let bytes = pairs.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());
+    bytes.flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    use super::*;
+    use crate::config::{Files, Storage};
+
+    /// Rows in a folder of their own, files in one that others may name too.
+    fn storage(rows: &Path, files: &Path) -> Storage {
+        Storage {
+            store: Some(Files::Folder(files.to_owned())),
+            ..Storage::from(rows)
+        }
+    }
+
+    async fn open(rows: &Path, files: &Path) -> Result<(), Error> {
+        let store = Store::open(storage(rows, files)).await?;
+        store.close().await;
+        Ok(())
+    }
+
+    #[tokio::test]
+    async fn rows_that_are_not_the_files_own_are_refused_before_anything_is_swept() {
+        let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+        open(own.path(), files.path()).await.unwrap();
+        let film = files.path().join("footage/a");
+        fs::create_dir(&film).unwrap();
+        let refused = open(other.path(), files.path()).await.unwrap_err();
+        assert!(matches!(refused, Error::OtherFiles), "{refused}");
+        assert!(film.is_dir());
+        open(own.path(), files.path()).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn files_without_a_mark_are_taken_over_by_rows_that_know_them_alone() {
+        let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+        let store = Store::open(storage(own.path(), files.path()))
+            .await
+            .unwrap();
+        sql::query("insert into blobs (folder, name, size_bytes, sha256) values ($1, $2, $3, $4)")
+            .bind("footage/a")
+            .bind("video")
+            .bind(0_i64)
+            .bind([0_u8; 32].as_slice())
+            .execute(&store.writer)
+            .await
+            .unwrap();
+        store.close().await;
+        drop(store);
+        fs::create_dir(files.path().join("footage/a")).unwrap();
+        fs::remove_file(files.path().join("store-id")).unwrap();
+        assert!(open(other.path(), files.path()).await.is_err());
+        open(own.path(), files.path()).await.unwrap();
+        assert!(files.path().join("store-id").is_file());
+    }
+
+    #[tokio::test]
+    async fn an_empty_place_for_files_is_anybodys() {
+        let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+        open(own.path(), files.path()).await.unwrap();
+        open(other.path(), files.path()).await.unwrap();
+    }
+}

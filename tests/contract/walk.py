@@ -1,0 +1,128 @@
+"""One walk through the whole API as a client makes it, each answer held against the document by schemathesis.
+
+Chance seldom finds what there is: here every operation is asked for something that is there, from the upload of a film to the
+deletion of all that came of it. What no operation of the document answered with success is told at the end.
+"""
+
+import json
+from collections import defaultdict
+
+import schemathesis
+
+# It never ends: tests/it/api/events.rs reads it.
+ENDLESS = {"GET /v1/events"}
+TUS = {"Tus-Resumable": "1.0.0"}
+STREAM, PIECE = "application/octet-stream", "application/offset+octet-stream"
+FORM, JSON = "multipart/form-data", "application/json"
+CHECKS = ["not_a_server_error", "status_code_conformance", "content_type_conformance",
+          "response_headers_conformance", "response_schema_conformance"]
+
+
+class Walk:
+    """Calls of operations by name, and the statuses that each has answered with."""
+
+    def __init__(self, address, film, token):
+        self.address, self.film, self.token = address, film.read_bytes(), token
+        self.document = schemathesis.openapi.from_url(f"{address}/openapi.json")
+        self.checks = list(schemathesis.checks.CHECKS.get_by_names(CHECKS))
+
+    def call(self, operation, path=None, body=None, media_type=None, **more):
+        """The answer, which must be a success that the document describes."""
+        method, template = operation.split(" ")
+        if body is not None:
+            more |= {"body": body, "media_type": media_type or JSON}
+        case = self.document[template][method].Case(path_parameters=path or {}, **more)
+        answer = case.call_and_validate(base_url=self.address, checks=self.checks, timeout=60)
+        assert 200 <= answer.status_code < 300, f"{operation}: {answer.status_code} {answer.text}"
+        return answer
+
+    def whole(self):
+        self.watch()
+        ids = self.make()
+        self.upload()
+        self.read(ids)
+        self.sign_in()
+        self.delete(ids)
+
+    def watch(self):
+        for path in ("/healthz", "/readyz", "/metrics"):
+            self.call(f"GET {path}")
+
+    def make(self):
+        """One of each kind, each by every form that its operation takes."""
+        footage = self.call("POST /v1/footage", body=self.film, media_type=STREAM).json()["id"]
+        same = self.call("POST /v1/footage", body={"video": self.film}, media_type=FORM)
+        assert same.status_code == 200 and same.json()["id"] == footage
+        wish = {"footage_id": footage, "params": {"preset": "papers"}}
+        self.call("POST /v1/analyses", body=wish)
+        self.call("POST /v1/analyses", body=self.film, media_type=STREAM)
+        analysis = self.call("POST /v1/analyses", body={"video": self.film, "params": "{}"}, media_type=FORM).json()
+        library = analysis["library_id"]
+        self.wait_for(analysis["job_id"])
+        asked = {"library_id": library, "count": 2, "frames": 10}
+        self.call("POST /v1/flocks/preview", body=asked)
+        flock = self.call("POST /v1/flocks", body=asked).json()
+        wish = {"footage": self.film, "params": '{"count": 2, "frames": 10}', "analysis": "{}"}
+        self.call("POST /v1/flocks", body=wish, media_type=FORM)
+        fish = self.call("POST /v1/fish", body={"library_id": library}).json()
+        self.wait_for(flock["job_id"])
+        self.wait_for(fish["job_id"])
+        return {"footage": footage, "library": library, "flock": flock["flock_id"], "fish": fish["fish_id"],
+                "job": flock["job_id"]}
+
+    def wait_for(self, job):
+        while True:
+            answer = self.call("GET /v1/jobs/{id}", {"id": job}, headers={"Prefer": "wait=5"}).json()
+            if answer["finished_at"]:
+                assert answer["state"] == "done", answer
+                return
+
+    def upload(self):
+        self.call("OPTIONS /v1/uploads")
+        lengths = TUS | {"Upload-Length": str(len(self.film))}
+        made = [self.call("POST /v1/uploads", headers=lengths) for _ in range(2)]
+        given_up, whole = [{"id": one.headers["location"][0].rsplit("/", 1)[1]} for one in made]
+        self.call("DELETE /v1/uploads/{id}", given_up, headers=TUS)
+        half = len(self.film) // 2
+        for offset, piece in ((0, self.film[:half]), (half, self.film[half:])):
+            asked = self.call("HEAD /v1/uploads/{id}", whole, headers=TUS)
+            assert asked.headers["upload-offset"] == [str(offset)]
+            at = TUS | {"Upload-Offset": str(offset)}
+            self.call("PATCH /v1/uploads/{id}", whole, body=piece, media_type=PIECE, headers=at)
+
+    def read(self, ids):
+        for nouns in ("footage", "libraries", "flocks", "fish", "jobs"):
+            assert self.call(f"GET /v1/{nouns}", query={"limit": 1}).json()["items"]
+        for noun, nouns, file in (("library", "libraries", "poses.json"), ("flock", "flocks", "video.mp4"), ("fish", "fish", "model.glb")):
+            self.call(f"GET /v1/{nouns}/{{id}}", {"id": ids[noun]})
+            self.call(f"GET /v1/{nouns}/{{id}}/{{file}}", {"id": ids[noun], "file": file})
+        part = self.call("GET /v1/footage/{id}/file", {"id": ids["footage"]}, headers={"Range": "bytes=0-9"})
+        assert part.status_code == 206 and part.content == self.film[:10]
+        self.call("GET /v1/footage/{id}", {"id": ids["footage"]})
+        self.call("GET /v1/jobs/{id}/events", {"id": ids["job"]})
+        self.call("POST /v1/flocks/{id}/links", {"id": ids["flock"]}, body={"file": "video.mp4"})
+
+    def sign_in(self):
+        begun = self.call("POST /v1/session", body={"token": self.token})
+        name, value = begun.headers["set-cookie"][0].split(";")[0].split("=", 1)
+        self.call("DELETE /v1/session", cookies={name: value})
+
+    def delete(self, ids):
+        asked = {"library_id": ids["library"], "count": 2, "frames": 10, "seed": 2}
+        queued = self.call("POST /v1/flocks", body=asked).json()["job_id"]
+        self.call("DELETE /v1/jobs/{id}", {"id": queued})
+        for noun, nouns in (("fish", "fish"), ("flock", "flocks"), ("library", "libraries"), ("footage", "footage")):
+            self.call(f"DELETE /v1/{nouns}/{{id}}", {"id": ids[noun]})
+
+
+def tell(seen, document):
+    """The statuses of every operation; those that never succeeded."""
+    statuses = defaultdict(set)
+    for line in seen.read_text().splitlines():
+        operation, status = line.rsplit(" ", 1)
+        statuses[operation].add(int(status))
+    operations = [f"{method.upper()} {path}" for path, item in document["paths"].items() for method in item]
+    print("contract tests: statuses seen")
+    for operation in operations:
+        print(f"  {operation:36} {' '.join(map(str, sorted(statuses[operation])))}")
+    return [one for one in operations if one not in ENDLESS and not any(status < 300 for status in statuses[one])]

@@ -1,0 +1,109 @@
+//! What is computed while one waits: a flock without its film, and a library's distances as numbers.
+
+use reqwest::StatusCode;
+use serde_json::json;
+
+use crate::common::TestApp;
+use crate::common::app::{code_of, json_of};
+use crate::common::clip::SWIM;
+
+/// A service with a library of a swimming fish: the library's path and id.
+async fn with_library() -> (TestApp, String, String) {
+    let app = TestApp::working().await;
+    let footage_id = app.upload(&SWIM).await;
+    let made = app
+        .accept("/v1/analyses", json!({"footage_id": footage_id}))
+        .await;
+    let job = app.ended_job(&made["job_id"]).await;
+    assert_eq!(job["state"], "done", "{job}");
+    let id = made["library_id"].as_str().unwrap().to_owned();
+    (app, format!("/v1/libraries/{id}"), id)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_preview_says_at_once_what_the_flock_will_be_and_leaves_nothing() {
+    let (app, _, library_id) = with_library().await;
+    let request = json!({"library_id": library_id, "count": 3, "frames": 20, "seed": 7});
+    let preview = app
+        .post("/v1/flocks/preview")
+        .json(&request)
+        .send()
+        .await
+        .unwrap();
+    let preview = json_of(preview, StatusCode::OK).await;
+    assert_eq!(app.json("/v1/flocks").await["items"], json!([]));
+
+    let made = app.accept("/v1/flocks", request).await;
+    let job = app.ended_job(&made["job_id"]).await;
+    assert_eq!(job["state"], "done", "{job}");
+    let path = format!(
+        "/v1/flocks/{}/flock.json",
+        made["flock_id"].as_str().unwrap()
+    );
+    assert_eq!(app.json(&path).await["individuals"], preview["individuals"]);
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_preview_of_too_many_of_nothing_or_of_what_is_not_there_is_refused() {
+    let (app, _, library_id) = with_library().await;
+    let other = uuid::Uuid::now_v7();
+    for (request, status, code) in [
+        (
+            json!({"library_id": library_id, "count": 1000, "frames": 201}),
+            422,
+            "invalid_params",
+        ),
+        (
+            json!({"library_id": library_id, "count": 0}),
+            422,
+            "invalid_params",
+        ),
+        (json!({"library_id": other, "count": 2}), 404, "not_found"),
+    ] {
+        let answer = app
+            .post("/v1/flocks/preview")
+            .json(&request)
+            .send()
+            .await
+            .unwrap();
+        assert_eq!(code_of(answer, status).await, code, "{request}");
+    }
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn distances_come_as_numbers_and_not_again_to_who_has_them() {
+    let (app, library, _) = with_library().await;
+    let path = format!("{library}/distance.npy");
+    let answer = app.get(&path).send().await.unwrap();
+    assert_eq!(answer.status(), StatusCode::OK);
+    let etag = answer.headers()["etag"].clone();
+    let length = answer.headers()["content-length"].clone();
+    let bytes = answer.bytes().await.unwrap();
+    assert_eq!(length, bytes.len().to_string().as_str());
+    let stored = app.json(&format!("{library}/library.json")).await;
+    // 300 frames have 301 - f clips.
+    let n = 301 - stored["params"]["clip_frames"].as_u64().unwrap_or(8) as usize;
+    let header = String::from_utf8_lossy(&bytes[..128]).into_owned();
+    assert!(header.contains(&format!("'shape': ({n}, {n})")), "{header}");
+    assert_eq!(bytes.len(), 128 + 4 * n * n);
+    let d = |i: usize, j: usize| {
+        let at = 128 + 4 * (i * n + j);
+        u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+    };
+    assert!((0..n).all(|i| d(i, i) == 0 && d(i, n - 1) == d(n - 1, i)));
+    let transition = &stored["transitions"][0];
+    assert!(transition.is_object(), "the fish has transitions");
+    let plain = stored["transitions"].as_array().unwrap().iter();
+    for t in plain.filter(|t| t["mirrored"] == false).take(9) {
+        let [from, to] = ["from", "to"].map(|end| t[end].as_u64().unwrap() as usize);
+        assert_eq!(u64::from(d(from, to)), t["distance"].as_u64().unwrap());
+    }
+    let again = app.get(&path).header("if-none-match", etag);
+    assert_eq!(
+        again.send().await.unwrap().status(),
+        StatusCode::NOT_MODIFIED
+    );
+    app.assert_sound().await;
+}
