@@ -155,7 +155,25 @@ where
     S: Stream<Item = Result<Bytes, E>> + Unpin,
     E: std::error::Error,
 {
-    let mut intake = Intake::create(draft, name, limit_bytes);
+    let mut intake = Intake::create(draft, name, limit_bytes).await?;
+    match take_all(state, &mut stream, &mut intake).await {
+        Ok(()) => Ok(intake.finish().await?),
+        Err(problem) => {
+            intake.give_up().await;
+            Err(problem)
+        }
+    }
+}
+
+async fn take_all<S, E>(
+    state: &AppState,
+    stream: &mut S,
+    intake: &mut Intake,
+) -> Result<(), Problem>
+where
+    S: Stream<Item = Result<Bytes, E>> + Unpin,
+    E: std::error::Error,
+{
     let mut n_unchecked = 0;
     loop {
         match timeout(PIECE, stream.next()).await {
@@ -171,7 +189,7 @@ where
                 tracing::debug!(%error, "a body was cut off");
                 return Err(of_broken_body(&error).into());
             }
-            Ok(None) => return Ok(intake.finish().await?),
+            Ok(None) => return Ok(()),
             Err(_) => return Err(Code::BodyTimeout.into()),
         }
     }

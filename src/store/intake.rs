@@ -22,8 +22,8 @@ pub struct Intake {
     limit_bytes: u64,
     pieces: Vec<Bytes>,
     n_gathered: usize,
-    /// What comes back when the pieces before these are on their way to the disk.
-    writer: JoinHandle<io::Result<Writer>>,
+    /// What comes back when the pieces before these are on their way to the disk; nothing once that failed.
+    writer: Option<JoinHandle<io::Result<Writer>>>,
 }
 
 struct Writer {
@@ -33,22 +33,24 @@ struct Writer {
 
 impl Intake {
     /// Starts the file `name` in the draft; at most `limit_bytes` will be taken.
-    pub fn create(draft: &Draft, name: &'static str, limit_bytes: u64) -> Intake {
-        let path = draft.path().join(name);
-        let writer = spawn_blocking(|| {
-            Ok(Writer {
-                file: File::create_new(path)?,
-                hasher: Sha256::new(),
-            })
-        });
-        Intake {
+    pub async fn create(
+        draft: &Draft,
+        name: &'static str,
+        limit_bytes: u64,
+    ) -> Result<Intake, Error> {
+        let file = tokio::fs::File::create_new(draft.path().join(name)).await?;
+        let writer = Writer {
+            file: file.into_std().await,
+            hasher: Sha256::new(),
+        };
+        Ok(Intake {
             name,
             size_bytes: 0,
             limit_bytes,
             pieces: Vec::new(),
             n_gathered: 0,
-            writer,
-        }
+            writer: Some(spawn_blocking(|| Ok(writer))),
+        })
     }
 
     /// Takes the next bytes; fails with [`Error::TooLarge`] before it stores one too many. What failed of bytes before
@@ -70,23 +72,29 @@ impl Intake {
 
     /// Begins to write what was gathered, once what came before is written.
     async fn write(&mut self) -> Result<(), Error> {
-        let mut writer = ended(&mut self.writer).await?;
+        let mut writer = self.idle_writer().await?;
         let pieces = std::mem::take(&mut self.pieces);
         self.n_gathered = 0;
-        self.writer = spawn_blocking(move || {
+        self.writer = Some(spawn_blocking(move || {
             for piece in pieces {
                 writer.hasher.update(&piece);
                 writer.file.write_all(&piece)?;
             }
             Ok(writer)
-        });
+        }));
         Ok(())
+    }
+
+    /// Closes the file, which its draft then takes along: what is still being written keeps its room until then.
+    pub async fn give_up(mut self) {
+        // What failed of it does not matter any more.
+        self.idle_writer().await.ok();
     }
 
     /// Syncs the file and says what it is.
     pub async fn finish(mut self) -> Result<BlobFile, Error> {
         self.write().await?;
-        let Writer { file, hasher } = ended(&mut self.writer).await?;
+        let Writer { file, hasher } = self.idle_writer().await?;
         spawn_blocking(move || file.sync_all())
             .await
             .map_err(io::Error::other)??;
@@ -96,8 +104,10 @@ impl Intake {
             sha256: hasher.finalize().to_vec(),
         })
     }
-}
 
-async fn ended(work: &mut JoinHandle<io::Result<Writer>>) -> Result<Writer, Error> {
-    Ok(work.await.map_err(io::Error::other)??)
+    async fn idle_writer(&mut self) -> Result<Writer, Error> {
+        let gone = || io::Error::other("what came before could not be written");
+        let writing = self.writer.take().ok_or_else(gone)?;
+        Ok(writing.await.map_err(io::Error::other)??)
+    }
 }

@@ -18,7 +18,7 @@ fn every_guard_stands_once_where_the_table_says() {
             if n != 1 {
                 faults.push(format!(
                     "{}: stands {n} times in {file}: {old}",
-                    guard["name"]
+                    guard["name"].as_str().unwrap_or_default()
                 ));
             }
         }
