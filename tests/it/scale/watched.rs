@@ -27,7 +27,7 @@ async fn a_worker_tells_of_its_own_jobs_and_not_of_everybodys() {
     let url = at.lines().next().unwrap();
     let told = client().get(url).send().await.unwrap();
     let told = told.text().await.unwrap();
-    for name in ["flockreel_job_attempts", "flockreel_build_info"] {
+    for name in ["flockreel_decoded_frames", "flockreel_build_info"] {
         assert!(told.contains(name), "{told}");
     }
     for name in ["flockreel_stored", "flockreel_queue", "flockreel_http"] {
