@@ -45,7 +45,7 @@ SCALE_TESTS = $(CARGO) test --locked --lib store:: && $(CARGO) test --locked --l
 scale-test: target/vendor ## the service on a PostgreSQL and an S3 store that are started for it, with workers that are killed
 	@scripts/with-servers.sh sh -c '$(SCALE_TESTS)'
 
-guards: target/vendor ## every guard of a promise taken out once: its test must fail (docs/GUARDS.md; half an hour)
+guards: target/vendor ## every guard of a promise taken out once: its test must fail (docs/GUARDS.md)
 	@scripts/system-packages.sh test contract-test
 	@scripts/venv.sh target/contract-venv tests/contract/requirements.txt
 	python3 -B tests/guards/run.py --write

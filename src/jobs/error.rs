@@ -49,8 +49,8 @@ pub enum Error {
     /// What it writes would fill the disk.
     #[error("there is too little room on the disk for what the job makes")]
     NoRoom,
-    /// As many films are being looked at as there is room for.
-    #[error("many films are coming in at once: ask again soon")]
+    /// As much is done for those who wait as there are places for.
+    #[error("too much is asked for at once: ask again soon")]
     Busy,
     /// Somebody cancelled, or the worker drains.
     #[error("the job was cancelled")]

@@ -10,8 +10,8 @@
 
 mod calls; // seccomp: the filter
 mod files; // Landlock: files, network, signals
-mod layer;
-mod refused; // which system calls it refuses, and why // the layers by name, and which of them this machine has
+mod layer; // the layers by name, and which of them this machine has
+mod refused; // which system calls the filter refuses, and why
 
 use std::io;
 use std::os::fd::OwnedFd;
