@@ -33,7 +33,7 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, plate, gain, rect);
     let mask = moved(silhouette, rect);
-    let solid = without_halo(&mask, &difference, plate);
+    let solid = without_halo(&mask, &difference, plate, band_px);
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
     let puller = Puller {
@@ -78,10 +78,11 @@ fn moved(mask: &Mask, rect: Rect) -> Mask {
     result
 }
 
-/// The mask less the soft shadow around the animal: pixels that differ by little of what the animal
-/// mostly differs by, look like the plate, only darker, and hang together with the outside. They
-/// get a fraction of alpha like the outline, so that a shadow on the floor stays a shadow.
-fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate) -> Mask {
+/// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
+/// differ by little of what the animal mostly differs by and that look like the plate, only darker. So a shadow on the
+/// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
+/// belly over a white floor: solid all the same.
+fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate, band_px: u32) -> Mask {
     /// Of what the starkest quarter of the animal differs by: a mean would sink with the shadow itself.
     const FAINT: f64 = 0.3;
     let mut levels: Vec<f64> = (difference.levels.iter().zip(&mask.bits))
@@ -90,17 +91,28 @@ fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate) -> Mask {
         .collect();
     let faint = FAINT * percentile(&mut levels, 0.75).unwrap_or(0.0);
     let mut solid = mask.clone();
-    let width = mask.width();
+    let (rect, width) = (mask.rect, mask.width());
+    let at = |x: usize, y: usize| {
+        (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x
+    };
     for k in 0..solid.bits.len() {
+        let level = difference.levels[k];
+        let (x, y) = (k % width, k / width);
         if solid.bits[k] == 1
-            && f64::from(difference.levels[k]) < faint
-            && shadow::has_darker_color(difference, plate, k % width, k / width, 0.45..=1.0)
+            && f64::from(level) < faint
+            && (level <= plate.weak_threshold(at(x, y))
+                || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0))
         {
             solid.bits[k] = 0;
         }
     }
-    // What was taken out of the middle of the animal is no halo.
-    solid.fill_holes();
+    // In the midst: walls thinner than two bands, as a tail and its shadow that meet, enclose nothing.
+    let mut midst = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
+    midst.fill_holes();
+    let midst = (0..band_px).fold(midst, |mask, _| mask.dilated());
+    for (bit, within) in solid.bits.iter_mut().zip(midst.bits) {
+        *bit |= within;
+    }
     solid.majority()
 }
 
@@ -197,7 +209,7 @@ impl Puller<'_> {
         let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
         let span_squared = dot(span, span);
         let alpha = if span_squared < (3.0 * sigma).powi(2) {
-            self.blurred_mask(x, y)
+            self.blurred_solid(x, y)
         } else {
             let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
             (dot(seen_span, span) / span_squared).clamp(0.0, 1.0)
@@ -215,24 +227,22 @@ impl Puller<'_> {
         [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
-    /// The animal's color near a band pixel: the mean of the inside pixels around the nearest one.
-    /// Where the animal is too thin to have an inside nearby, the solid pixel close by that differs
-    /// most from the plate; but a shadow takes its color from the animal however far that is.
+    /// The color that a band pixel has a share of: the animal's nearby; black outside of what is solid and of the
+    /// band around it, for there is only shadow.
     fn color_nearby(&self, x: usize, y: usize) -> Option<[f32; 3]> {
-        let near = |found: u32| {
-            let at = (found != NOWHERE).then_some(found as usize)?;
-            let (nx, ny) = (at % self.mask.width(), at / self.mask.width());
-            let is_near = nx.abs_diff(x).max(ny.abs_diff(y)) <= 2 * self.band_px as usize + 1;
-            Some((is_near, nx as i64, ny as i64))
-        };
-        let k = y * self.mask.width() + x;
-        let inside = near(self.nearest_inside[k]);
-        let solid = near(self.nearest_solid[k]);
-        match (inside, solid) {
-            (Some((true, nx, ny)), _) => Some(self.mean_inside(nx, ny)),
-            (_, Some((true, nx, ny))) => self.starkest(nx, ny),
-            (Some((_, nx, ny)), _) => Some(self.mean_inside(nx, ny)),
-            (None, _) => solid.and_then(|(_, nx, ny)| self.starkest(nx, ny)),
+        let width = self.mask.width();
+        let place = |found: u32| (found != NOWHERE).then_some(found as usize);
+        let steps = |at: usize| (at % width).abs_diff(x).max((at / width).abs_diff(y));
+        let (k, band) = (y * width + x, self.band_px as usize);
+        let solid = place(self.nearest_solid[k])?;
+        if steps(solid) > band {
+            return Some([0.0; 3]);
+        }
+        // A thin part has no inside of its own; what lies farther in is another part's.
+        let inside = place(self.nearest_inside[k]);
+        match inside.filter(|&at| steps(at) <= steps(solid) + band + 1) {
+            Some(at) => Some(self.mean_inside((at % width) as i64, (at / width) as i64)),
+            None => self.starkest((solid % width) as i64, (solid / width) as i64),
         }
     }
 
@@ -263,8 +273,8 @@ impl Puller<'_> {
             .map(|at| self.frame_color(at).map(f32::from))
     }
 
-    /// The mask blurred by a Gaussian of 0.7 pixels (5 x 5).
-    fn blurred_mask(&self, x: usize, y: usize) -> f32 {
+    /// What is solid, blurred by a Gaussian of 0.7 pixels (5 x 5).
+    fn blurred_solid(&self, x: usize, y: usize) -> f32 {
         // exp(-d^2 / (2 * 0.49)) for d = 0, 1, 2.
         const WEIGHTS: [f32; 3] = [1.0, 0.3604, 0.0169];
         let (mut sum, mut total) = (0.0, 0.0);
@@ -272,7 +282,7 @@ impl Puller<'_> {
             let weight = WEIGHTS[dx.unsigned_abs() as usize] * WEIGHTS[dy.unsigned_abs() as usize];
             total += weight;
             if let Some(at) = self.at(x as i64 + dx, y as i64 + dy) {
-                sum += weight * f32::from(self.mask.bits[at]);
+                sum += weight * f32::from(self.solid.bits[at]);
             }
         }
         sum / total
@@ -287,3 +297,6 @@ impl Puller<'_> {
 fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
+
+#[cfg(test)]
+mod tests;

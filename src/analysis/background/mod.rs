@@ -54,6 +54,13 @@ pub struct Plate {
     pub several_animals: bool,
 }
 
+impl Plate {
+    /// Least difference of a pixel that counts as the animal beside one that does for certain.
+    pub fn weak_threshold(&self, px: usize) -> u8 {
+        self.core_threshold[px] / 2
+    }
+}
+
 /// Estimates the plate, or takes the picture given and estimates its noise alone.
 ///
 /// Fails when the given picture has another size than the footage, or when the footage is too
@@ -189,7 +196,8 @@ fn given_plate(image: &RgbImage, samples: &Samples, params: &Params) -> Result<P
     Ok(plate_of(frame, vec![SIGMA_FLOOR; samples.n_px()], params))
 }
 
-fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
+/// A plate of a picture and the noise of its pixels.
+pub(super) fn plate_of(frame: Frame, sigma: Vec<f32>, params: &Params) -> Plate {
     let threshold = f32::from(params.threshold);
     let rgb = frame.to_rgb();
     Plate {

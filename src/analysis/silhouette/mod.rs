@@ -152,9 +152,8 @@ fn hysteresis(difference: &Difference, plate: &Plate) -> Vec<Component> {
     let row_length = rect.w as usize;
     for (k, &level) in difference.levels.iter().enumerate() {
         let px = (rect.y as usize + k / row_length) * width + rect.x as usize + k % row_length;
-        let threshold = plate.core_threshold[px];
-        weak.bits[k] = u8::from(level > threshold / 2);
-        core.bits[k] = u8::from(level > threshold);
+        weak.bits[k] = u8::from(level > plate.weak_threshold(px));
+        core.bits[k] = u8::from(level > plate.core_threshold[px]);
     }
     shadow::remove(&mut weak, &core, difference, plate);
     let has_core = |component: &Component| {

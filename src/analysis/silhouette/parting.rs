@@ -14,7 +14,7 @@ use crate::raster::Mask;
 use crate::raster::runs::{self, Component};
 
 /// A summit is at least this large, as a share of the animal's usual area.
-const LEAST_SHARE: f64 = 0.25;
+const LEAST_SHARE: f64 = 0.15;
 /// The pass lies below this share of the lower summit.
 const PASS: f64 = 0.7;
 /// How many heights are tried for the pass.

@@ -1,0 +1,155 @@
+//! What a matte is where the animal casts a shadow, and where the floor shows between its parts.
+
+use super::*;
+use crate::analysis::Params;
+use crate::analysis::background::plate_of;
+use crate::raster::{ColorSpec, RgbImage};
+
+const SIZE: [u32; 2] = [120, 90];
+const PAPER: u8 = 170;
+const FUR: u8 = 30;
+
+/// The matte of what is drawn on paper, for an animal 60 pixels long, with the place of each pixel in the frame.
+struct Drawn {
+    matte: Matte,
+    shade: fn(u32, u32) -> u8,
+}
+
+fn picture(shade: fn(u32, u32) -> u8) -> Frame {
+    let [width, height] = SIZE;
+    let pixels = (0..width * height).flat_map(|k| [shade(k % width, k / width); 3]);
+    let image = RgbImage {
+        width,
+        height,
+        pixels: pixels.collect(),
+    };
+    let mut frame = Frame::new(width, height, ColorSpec::default());
+    frame.draw_rgb(&image, Rect::of_size(width, height));
+    frame
+}
+
+fn drawn(shade: fn(u32, u32) -> u8) -> Drawn {
+    let [width, height] = SIZE;
+    let sigma = vec![1.5; (width * height) as usize];
+    let plate = plate_of(picture(|_, _| PAPER), sigma, &Params::default());
+    let mut silhouette = Mask::new(Rect::of_size(width, height));
+    for k in 0..width * height {
+        silhouette.bits[k as usize] = u8::from(PAPER - shade(k % width, k / width) > 9);
+    }
+    silhouette.fill_holes();
+    let matte = pull(&picture(shade), &plate, &Gain::ONE, &silhouette, 60.0);
+    Drawn { matte, shade }
+}
+
+impl Drawn {
+    /// Color and alpha at a place of the frame.
+    fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
+        let rect = self.matte.rect;
+        if !(rect.x..rect.right()).contains(&x) || !(rect.y..rect.bottom()).contains(&y) {
+            return [0; 4];
+        }
+        let k = 4 * ((y - rect.y) * rect.w + x - rect.x) as usize;
+        [0, 1, 2, 3].map(|c| self.matte.image.pixels[k + c])
+    }
+
+    /// What shows where the matte lies over something of that shade.
+    fn over(&self, back: u8, [x, y]: [u32; 2]) -> f64 {
+        let [shade, .., alpha] = self.pixel(x, y).map(f64::from);
+        f64::from(back) + (shade - f64::from(back)) * alpha / 255.0
+    }
+
+    fn gives_back_its_frame(&self) {
+        for (x, y) in (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (x, y))) {
+            let (shown, wanted) = (self.over(PAPER, [x, y]), f64::from((self.shade)(x, y)));
+            assert!(
+                (shown - wanted).abs() < 9.0,
+                "{shown} for {wanted} at {x}, {y}"
+            );
+        }
+    }
+}
+
+/// How many steps a pixel lies outside a box.
+fn away([x, y]: [u32; 2], body: Rect) -> u32 {
+    let beyond =
+        |at: u32, first: u32, n: u32| first.saturating_sub(at) + (at + 1).saturating_sub(first + n);
+    beyond(x, body.x, body.w).max(beyond(y, body.y, body.h))
+}
+
+/// A dark body, and around it a shadow that fades over ten pixels.
+const BODY: Rect = Rect {
+    x: 30,
+    y: 25,
+    w: 30,
+    h: 16,
+};
+
+fn with_shadow(x: u32, y: u32) -> u8 {
+    match away([x, y], BODY) {
+        0 => FUR,
+        d => PAPER - 38u8.saturating_sub(3 * (d.min(20) - 1) as u8),
+    }
+}
+
+#[test]
+fn a_shadow_darkens_whatever_it_falls_on_by_its_own_share() {
+    let drawn = drawn(with_shadow);
+    drawn.gives_back_its_frame();
+    for (x, y) in (15..23).flat_map(|y| (25..65).map(move |x| (x, y))) {
+        let share = f64::from(with_shadow(x, y)) / f64::from(PAPER);
+        if share < 0.93 {
+            for back in [40, 90, 240] {
+                let wanted = share * f64::from(back);
+                let shown = drawn.over(back, [x, y]);
+                assert!(
+                    (shown - wanted).abs() < 4.0,
+                    "{shown} for {wanted} at {x}, {y}"
+                );
+            }
+        }
+    }
+}
+
+/// A body with a spot as light as the paper; beside it two thin things that meet at both ends.
+fn with_gaps(x: u32, y: u32) -> u8 {
+    let body = Rect {
+        x: 20,
+        y: 20,
+        w: 40,
+        h: 30,
+    };
+    let spot = Rect {
+        x: 36,
+        y: 32,
+        w: 7,
+        h: 7,
+    };
+    let tail = Rect {
+        x: 60,
+        y: 30,
+        w: 45,
+        h: 16,
+    };
+    let between = Rect {
+        x: 60,
+        y: 34,
+        w: 41,
+        h: 8,
+    };
+    let is_in = |rect: Rect| away([x, y], rect) == 0;
+    match (is_in(spot) || is_in(between), is_in(body) || is_in(tail)) {
+        (false, true) => FUR,
+        _ => PAPER,
+    }
+}
+
+#[test]
+fn a_light_spot_on_the_body_covers_and_the_floor_between_two_thin_parts_does_not() {
+    let drawn = drawn(with_gaps);
+    drawn.gives_back_its_frame();
+    assert_eq!(drawn.pixel(39, 35)[3], 255, "the spot");
+    assert_eq!(drawn.pixel(75, 31)[3], 255, "a thin part");
+    for (x, y) in (36..40).flat_map(|y| (66..96).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "between, at {x}, {y}");
+    }
+}
