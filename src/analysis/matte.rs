@@ -238,9 +238,8 @@ impl Puller<'_> {
         if steps(solid) > band {
             return Some([0.0; 3]);
         }
-        // A thin part has no inside of its own; what lies farther in is another part's.
         let inside = place(self.nearest_inside[k]);
-        match inside.filter(|&at| steps(at) <= steps(solid) + band + 1) {
+        match inside.filter(|&at| steps(at) <= 2 * band + 1) {
             Some(at) => Some(self.mean_inside((at % width) as i64, (at / width) as i64)),
             None => self.starkest((solid % width) as i64, (solid / width) as i64),
         }
