@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use flockreel::jobs::clock::now_ms;
 use flockreel::random::unit;
 use flockreel::store::Store;
-use flockreel::store::jobs::JobState;
+use flockreel::store::jobs::{JobRow, JobState};
 use flockreel::store::owners::Reach;
 use futures_util::StreamExt;
 use futures_util::stream::once;
@@ -38,6 +38,13 @@ fn longest_orphan() -> Duration {
         Some(_) => Duration::from_secs(15 + 2),
         None => Duration::from_secs(2),
     }
+}
+
+/// A job as its row has it, while no service runs.
+async fn row_of(place: &Place, job: &Value) -> JobRow {
+    let store = Store::open(place.storage()).await.unwrap();
+    let id = job.as_str().unwrap().parse().unwrap();
+    store.job(id, &Reach::All).await.unwrap().unwrap()
 }
 
 async fn assert_sound(place: &Place) {
@@ -80,6 +87,12 @@ async fn a_server_told_to_stop_gives_its_job_back_unused() {
     assert_eq!(server.terminate(), Some(0));
     assert!(start.elapsed() < Duration::from_secs(20));
     assert_sound(&place).await;
+    let given_back = row_of(&place, &job).await;
+    assert_eq!(
+        given_back.state,
+        JobState::Queued,
+        "let go, not worked off while the service ends"
+    );
 
     let server = Server::start_at(&place);
     let ended = server.ended(&job).await;
@@ -196,8 +209,6 @@ async fn a_server_told_to_stop_refuses_what_is_new_and_ends_what_is_under_way() 
     );
     assert_eq!(processes_of(place.data()), Vec::<String>::new());
     assert_sound(&place).await;
-    let store = Store::open(place.storage()).await.unwrap();
-    let id = job.as_str().unwrap().parse().unwrap();
-    let row = store.job(id, &Reach::All).await.unwrap().unwrap();
+    let row = row_of(&place, &job).await;
     assert_eq!((row.state, row.attempt), (JobState::Queued, 0));
 }

@@ -58,7 +58,7 @@ fn every_attack_is_held_by_the_layers_that_are_meant_to() {
         .expect("this program");
     let said = String::from_utf8_lossy(&done.stdout);
     let complaint = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success(), "{said}{complaint}");
+    assert!(done.status.success(), "{complaint}{said}");
     println!("{said}");
 }
 
