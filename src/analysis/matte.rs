@@ -106,10 +106,11 @@ fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate, band_px: u3
             solid.bits[k] = 0;
         }
     }
-    // In the midst: walls thinner than two bands, as a tail and its shadow that meet, enclose nothing.
-    let mut midst = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
+    // In the midst: walls thinner than four bands, as a tail and its shadow that meet, enclose nothing.
+    let reach_px = 2 * band_px;
+    let mut midst = (0..reach_px).fold(solid.clone(), |mask, _| mask.eroded());
     midst.fill_holes();
-    let midst = (0..band_px).fold(midst, |mask, _| mask.dilated());
+    let midst = (0..reach_px).fold(midst, |mask, _| mask.dilated());
     for (bit, within) in solid.bits.iter_mut().zip(midst.bits) {
         *bit |= within;
     }
