@@ -146,6 +146,7 @@ def reason(said):
     anywhere = [at for at, line in enumerate(lines) if "panicked at " in line]
     for at in (at_home or anywhere)[:1]:
         words = " ".join(lines[at + 1 : at + 4]).split("note: run with")[0].split("stack backtrace")[0]
+        words = re.sub(r"(thread '[^']+') \(\d+\)", r"\1", words)
         return re.sub(r"\s+", " ", re.sub(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", "ID", words)).strip()[:160] or "failed"
     return "failed"
 
