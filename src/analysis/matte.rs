@@ -106,15 +106,24 @@ fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate, band_px: u3
             solid.bits[k] = 0;
         }
     }
-    // In the midst: walls thinner than four bands, as a tail and its shadow that meet, enclose nothing.
-    let reach_px = 2 * band_px;
+    add_midst(&mut solid, 2 * band_px);
+    solid.majority()
+}
+
+/// Adds what walls enclose that are more than twice `reach_px` thick. Thinner ones, as a tail and its shadow that meet,
+/// enclose nothing.
+fn add_midst(solid: &mut Mask, reach_px: u32) {
+    let mut filled = solid.clone();
+    filled.fill_holes();
+    if filled == *solid {
+        return;
+    }
     let mut midst = (0..reach_px).fold(solid.clone(), |mask, _| mask.eroded());
     midst.fill_holes();
     let midst = (0..reach_px).fold(midst, |mask, _| mask.dilated());
     for (bit, within) in solid.bits.iter_mut().zip(midst.bits) {
         *bit |= within;
     }
-    solid.majority()
 }
 
 /// No set pixel is known for this one.
