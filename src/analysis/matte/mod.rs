@@ -3,8 +3,8 @@
 //!
 //! Inside the silhouette alpha is 1; in a band around its outline alpha is how far the pixel lies
 //! from the plate toward the animal's color nearby, and the color is what remains when the plate's
-//! share is taken away. Computed in encoded values, as the compositor blends: putting the matte
-//! back over the plate returns the frame.
+//! share is taken away. What is only shadow is black with the share of light that it takes. Computed
+//! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame.
 
 use super::background::Plate;
 use super::light::Gain;

@@ -188,6 +188,24 @@ mod tests {
     }
 
     #[test]
+    fn so_is_the_part_of_an_image_that_the_frame_leaves() {
+        let (both, difference) = scene(|x, y| {
+            let image = y < 9.0 && (35.0..55.0).contains(&x);
+            let bridge = y < 50.0 && (42.0..48.0).contains(&x);
+            if animal(x, y) {
+                180.0
+            } else if image {
+                70.0
+            } else {
+                f64::from(u8::from(bridge)) * 25.0
+            }
+        });
+        let usual_area = std::f64::consts::PI * 25.0 * 12.0;
+        let part = part_at(&both, &difference, usual_area, [45.0, 58.0]).expect("two things");
+        assert!(part.rect.y > 8, "{:?}", part.rect);
+    }
+
+    #[test]
     fn an_animal_with_a_thin_tail_and_a_faint_fin_is_one_thing() {
         let (whole, difference) = scene(|x, y| {
             let tail = (70.0..88.0).contains(&x) && (58.0..62.0).contains(&y);
