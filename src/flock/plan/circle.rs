@@ -7,6 +7,7 @@
 //! the film has, at which only that state may be shown.
 
 use super::trellis::Trellis;
+use super::viterbi::{Block, FRAMES, Rows};
 
 /// What a plan that may not be costs at least. Three of these and all costs of a loop's plan stay below
 /// 2^31.
@@ -40,32 +41,44 @@ pub fn first_of(trellis: &Trellis, dwell: usize, states: &[u32]) -> Option<u32> 
     others.min_by_key(|other| other.abs_diff(first))
 }
 
-impl Ends {
-    /// Makes what may not be shown at frame `t` of `n_frames` too dear; `out`: the costs of the states from
-    /// `start` on. At frame `n_frames` nothing else costs anything.
+/// What each state costs in a plan that must begin and go on so.
+#[derive(Clone)]
+pub(super) struct Closed<R> {
+    pub(super) rows: R,
+    /// Nothing is asked of a plan that is no part of a loop.
+    pub(super) ends: Option<Ends>,
+    /// The frame after the film's last.
+    pub(super) n_frames: usize,
+    pub(super) dwell: usize,
+}
+
+impl<R: Rows> Rows for Closed<R> {
     #[inline(always)]
-    pub fn close<const LANES: usize>(
-        &self,
-        (t, n_frames, dwell): (usize, usize, usize),
-        start: usize,
-        out: &mut [[u32; LANES]],
-        lane: usize,
-    ) {
-        let only = match t {
-            _ if t == n_frames => self.next as usize,
-            _ if t == 0 || t == dwell - 1 => self.first as usize + t,
-            _ => return,
+    fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
+        self.rows.fill(block, first, out);
+        let Some(ends) = self.ends else {
+            return;
         };
-        for (state, out) in (start..).zip(out) {
-            if t == n_frames {
-                out[lane] = 0;
-            }
-            if state != only {
-                out[lane] += FORBIDDEN;
+        for (lane, &t) in block.times.iter().enumerate() {
+            let only = match t {
+                _ if t == self.n_frames => ends.next as usize,
+                _ if t == 0 || t == self.dwell - 1 => ends.first as usize + t,
+                _ => continue,
+            };
+            for (station, out) in (first..).zip(&mut *out) {
+                // Nothing else costs anything after the film.
+                if t == self.n_frames {
+                    out[lane] = 0;
+                }
+                if block.state(station) != only {
+                    out[lane] += FORBIDDEN;
+                }
             }
         }
     }
+}
 
+impl Ends {
     /// Whether a plan, with what follows it, is one.
     pub fn holds(&self, states: &[u32]) -> bool {
         states.first() == Some(&self.first) && states.last() == Some(&self.next)

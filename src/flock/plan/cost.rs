@@ -35,46 +35,21 @@ pub struct Feature {
     pub away: i16,
 }
 
-/// The features of all states of a trellis.
-#[derive(Clone, Debug)]
-pub struct Features {
-    all: Vec<Feature>,
-    /// The parts that are always compared, each side by side.
-    turns: Vec<u16>,
-    log_speeds: Vec<u16>,
-}
-
 /// The weights as integers: 256ths, and turns.
 #[derive(Clone, Copy, Debug)]
 pub struct Weights {
-    heading: u32,
-    rotation: u32,
-    speed: u32,
-    rho_turns: u16,
+    pub(super) heading: u32,
+    pub(super) rotation: u32,
+    pub(super) speed: u32,
+    pub(super) rho_turns: u16,
     jump_turns: f64,
     view: View,
-    by: MatchBy,
+    pub(super) by: MatchBy,
     /// Weight of what leads along the line of sight.
     away: f32,
     /// Whether it is known if the animal points away from the viewer or toward.
     is_signed: bool,
     v0_bl_per_s: f64,
-}
-
-impl Features {
-    /// Of every state, by state.
-    pub fn new(all: Vec<Feature>) -> Features {
-        Features {
-            turns: all.iter().map(|feature| feature.turns).collect(),
-            log_speeds: all.iter().map(|feature| feature.log_speed).collect(),
-            all,
-        }
-    }
-
-    /// What a state shows.
-    pub fn of(&self, state: usize) -> Feature {
-        self.all[state]
-    }
 }
 
 impl Weights {
@@ -122,7 +97,7 @@ impl Weights {
                 let [beyond, within] = self.parts(wanted.turns, state.turns);
                 let chord_turns = self.chord_turns(wanted, state, u32::from(beyond));
                 let speed = self.of_speeds(wanted.log_speed, state.log_speed);
-                [self.of_parts(chord_turns, within), speed]
+                [self.of_parts(chord_turns, u32::from(within)), speed]
             }
             _ => self.of_gaps(
                 [wanted.turns, state.turns],
@@ -136,7 +111,7 @@ impl Weights {
     fn of_gaps(&self, turns: [u16; 2], log_speeds: [u16; 2]) -> [u32; 2] {
         let [beyond, within] = self.parts(turns[0], turns[1]);
         [
-            self.of_parts(u32::from(beyond), within),
+            self.of_parts(u32::from(beyond), u32::from(within)),
             self.of_speeds(log_speeds[0], log_speeds[1]),
         ]
     }
@@ -150,8 +125,8 @@ impl Weights {
     }
 
     #[inline(always)]
-    fn of_parts(&self, beyond: u32, within: u16) -> u32 {
-        (self.heading * beyond + self.rotation * u32::from(within)) >> 8
+    fn of_parts(&self, beyond: u32, within: u32) -> u32 {
+        (self.heading * beyond + self.rotation * within) >> 8
     }
 
     #[inline(always)]
@@ -180,39 +155,6 @@ impl Weights {
     pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
         let [heading, speed] = self.of_state(wanted, state);
         (heading + speed).min(CEILING - 1)
-    }
-
-    /// The `total` of the states from `first` on, for several who want something.
-    #[inline(always)]
-    pub fn fill<const LANES: usize>(
-        &self,
-        wanted: &[Feature; LANES],
-        features: &Features,
-        first: usize,
-        out: &mut [[u32; LANES]],
-    ) {
-        let weights = *self;
-        let states = first..first + out.len();
-        if weights.by == MatchBy::Direction {
-            for (out, &state) in out.iter_mut().zip(&features.all[states]) {
-                for lane in 0..LANES {
-                    out[lane] = weights.total(wanted[lane], state);
-                }
-            }
-            return;
-        }
-        let wanted = wanted.map(|wanted| (wanted.turns, wanted.log_speed));
-        let (turns, log_speeds) = (
-            &features.turns[states.clone()],
-            &features.log_speeds[states],
-        );
-        for ((out, &turns), &log_speed) in out.iter_mut().zip(turns).zip(log_speeds) {
-            for lane in 0..LANES {
-                let turns = [wanted[lane].0, turns];
-                let [heading, speed] = weights.of_gaps(turns, [wanted[lane].1, log_speed]);
-                out[lane] = (heading + speed).min(CEILING - 1);
-            }
-        }
     }
 
     /// What a boid wants at every frame, from its track as the file holds it.

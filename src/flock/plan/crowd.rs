@@ -22,6 +22,9 @@ const ONE_BY_ONE: usize = 64;
 /// Individuals in a round.
 const ROUND: usize = 16;
 
+/// So many distances are computed side by side.
+pub const TOGETHER: usize = 32;
+
 /// Where a boid is, in 32nds of a body length.
 pub type Place = [i32; 3];
 
@@ -78,14 +81,30 @@ impl Crowd {
     /// What looking like one at `b` costs one at `a`, turns.
     #[inline(always)]
     pub fn cost_at(&self, a: Place, b: Place) -> u16 {
+        self.costs[self.step(a, b) as usize]
+    }
+
+    /// The same of several at `places`, at most `TOGETHER`.
+    #[inline(always)]
+    pub fn costs_at(&self, here: Place, places: &[Place]) -> [u16; TOGETHER] {
+        // First the arithmetic of all, then the table.
+        let mut steps = [0; TOGETHER];
+        for (step, &place) in steps.iter_mut().zip(places) {
+            *step = self.step(here, place);
+        }
+        steps.map(|step| self.costs[step as usize])
+    }
+
+    /// Where in the table two places are.
+    #[inline(always)]
+    fn step(&self, a: Place, b: Place) -> u32 {
         let mut square = 0;
         for axis in 0..3 {
             let gap = (a[axis] - b[axis]).clamp(-8191, 8191);
             square += gap * gap;
         }
         // 32 x 32 parts to the squared body length, 16 steps to it as well.
-        let step = (square >> 6) as usize;
-        self.costs[step.min(self.costs.len() - 1)]
+        (square as u32 >> 6).min(self.costs.len() as u32 - 1)
     }
 
     /// Whom to avoid looking like at frame `t`, of the planned others: (boid, states).

@@ -9,7 +9,7 @@
 
 use super::circle::FORBIDDEN;
 use super::trellis::Trellis;
-use super::viterbi::{Film, Rows};
+use super::viterbi::{Block, FRAMES, Film, Rows};
 
 /// Frames kept of each way found.
 const COMMITTED: usize = 10;
@@ -28,21 +28,21 @@ pub struct Horizon {
     future: Vec<Option<u32>>,
 }
 
-/// Where each plan has come to.
+/// Where a plan has come to: the state at the last frame kept, and for how many frames it must go on yet.
 #[derive(Clone, Copy, Debug)]
-struct Standing<const LANES: usize> {
-    /// The state at the last frame kept, and for how many frames it must go on yet.
-    states: [(u32, usize); LANES],
+struct Standing {
+    state: u32,
+    held: usize,
 }
 
 /// The costs of some frames of a film in a row.
 #[derive(Clone)]
-struct Window<'a, const LANES: usize, R> {
+struct Window<'a, R> {
     rows: R,
     /// The film's frame that is the first of these, and how many there are.
     first: usize,
     n_frames: usize,
-    from: Option<Standing<LANES>>,
+    from: Option<Standing>,
     /// What lies beyond; nothing at the end of the film.
     future: Option<&'a [Option<u32>]>,
 }
@@ -56,37 +56,30 @@ impl Horizon {
         }
     }
 
-    /// The states of `LANES` individuals at every frame. `None` when no path is long enough.
-    pub fn paths<const LANES: usize, R>(
+    /// The states at every frame. `None` when no path is long enough.
+    pub fn path(
         &self,
         film: &Film<'_>,
-        rows: &R,
-    ) -> Option<[Vec<u32>; LANES]>
-    where
-        R: Rows<LANES> + Clone + Send + Sync,
-    {
+        rows: &(impl Rows + Clone + Send + Sync),
+    ) -> Option<Vec<u32>> {
         let mut n_ahead = self.n_frames;
         while n_ahead < film.n_frames.min(MOST_FRAMES) {
-            if let Some(paths) = self.step_by_step(film, rows, n_ahead) {
-                return Some(paths);
+            if let Some(path) = self.step_by_step(film, rows, n_ahead) {
+                return Some(path);
             }
             n_ahead *= 2;
         }
-        let paths = film.cheapest_paths(rows)?;
-        Some(paths.map(|path| path.states))
+        Some(film.cheapest_path(rows)?.states)
     }
 
     /// The same, `n_ahead` frames at a time; `None` where one of them comes to a dead end.
-    fn step_by_step<const LANES: usize, R>(
+    fn step_by_step(
         &self,
         film: &Film<'_>,
-        rows: &R,
+        rows: &(impl Rows + Clone + Send + Sync),
         n_ahead: usize,
-    ) -> Option<[Vec<u32>; LANES]>
-    where
-        R: Rows<LANES> + Clone + Send + Sync,
-    {
-        let mut plans: [Vec<u32>; LANES] = std::array::from_fn(|_| Vec::new());
+    ) -> Option<Vec<u32>> {
+        let mut plan = Vec::new();
         let mut window = Window {
             rows: rows.clone(),
             first: 0,
@@ -101,11 +94,8 @@ impl Horizon {
                 n_frames: window.n_frames,
                 ..*film
             };
-            let paths = ahead.cheapest_paths(&window)?;
-            let all_hold = (0..)
-                .zip(&paths)
-                .all(|(lane, path)| window.holds(lane, &path.states));
-            if !all_hold {
+            let path = ahead.cheapest_path(&window)?;
+            if !window.holds(&path.states) {
                 return None;
             }
             let known = usize::from(window.from.is_some());
@@ -114,15 +104,11 @@ impl Horizon {
             } else {
                 COMMITTED + known
             };
-            for (plan, path) in plans.iter_mut().zip(&paths) {
-                plan.extend(&path.states[known..n_kept]);
-            }
+            plan.extend(&path.states[known..n_kept]);
             if is_last {
-                return Some(plans);
+                return Some(plan);
             }
-            window.from = Some(Standing {
-                states: std::array::from_fn(|lane| standing(&plans[lane], film.dwell)),
-            });
+            window.from = Some(Standing::after(&plan, film.dwell));
             // The last frame kept is the next window's first.
             window.first += n_kept - 1;
             window.n_frames = (n_ahead + 1).min(film.n_frames - window.first);
@@ -130,23 +116,24 @@ impl Horizon {
     }
 }
 
-/// The last state of a plan, and for how many frames it must go on after that: a jump may come `dwell` frames
-/// after another. As elsewhere a plan may begin in the middle of a run.
-fn standing(plan: &[u32], dwell: usize) -> (u32, usize) {
-    let steps = plan.windows(2).rev();
-    let since = 1 + steps.take_while(|step| step[1] == step[0] + 1).count();
-    let is_free = since == plan.len() || since >= dwell;
-    (
-        plan[plan.len() - 1],
-        if is_free { 0 } else { dwell - since },
-    )
+impl Standing {
+    /// The last state of a plan, and for how many frames it must go on after that: a jump may come `dwell` frames
+    /// after another. As elsewhere a plan may begin in the middle of a run.
+    fn after(plan: &[u32], dwell: usize) -> Standing {
+        let steps = plan.windows(2).rev();
+        let since = 1 + steps.take_while(|step| step[1] == step[0] + 1).count();
+        let is_free = since == plan.len() || since >= dwell;
+        Standing {
+            state: plan[plan.len() - 1],
+            held: if is_free { 0 } else { dwell - since },
+        }
+    }
 }
 
-impl<const LANES: usize, R> Window<'_, LANES, R> {
-    /// Whether a lane's way begins as it must, and ends where it can go on.
-    fn holds(&self, lane: usize, states: &[u32]) -> bool {
-        let begins = self.from.is_none_or(|from| {
-            let (state, held) = from.states[lane];
+impl<R> Window<'_, R> {
+    /// Whether a way begins as it must, and ends where it can go on.
+    fn holds(&self, states: &[u32]) -> bool {
+        let begins = self.from.is_none_or(|Standing { state, held }| {
             (0..=held.min(states.len() - 1)).all(|t| states[t] == state + t as u32)
         });
         let last = states[states.len() - 1] as usize;
@@ -154,24 +141,29 @@ impl<const LANES: usize, R> Window<'_, LANES, R> {
     }
 }
 
-impl<const LANES: usize, R: Rows<LANES>> Rows<LANES> for Window<'_, LANES, R> {
-    fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
-        self.rows.fill(self.first + t, first, out);
-        if let Some(from) = self.from {
-            for (lane, (state, held)) in from.states.into_iter().enumerate() {
-                // Where it stands, and where it has gone on to: between them there is but one way.
-                let held = held.min(self.n_frames - 1);
-                if t == 0 || t == held {
-                    let only = state as usize + t;
-                    let others = (first..).zip(&mut *out).filter(|(state, _)| *state != only);
-                    others.for_each(|(_, out)| out[lane] += FORBIDDEN);
-                }
+impl<R: Rows> Rows for Window<'_, R> {
+    fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
+        let in_film = Block {
+            times: block.times.map(|t| self.first + t),
+            ..*block
+        };
+        self.rows.fill(&in_film, first, out);
+        for (lane, &t) in block.times.iter().enumerate() {
+            // Where it stands, and where it has gone on to: between them there is but one way.
+            let only = |from: Standing| match from.held.min(self.n_frames - 1) {
+                held if t == 0 || t == held => Some(from.state as usize + t),
+                _ => None,
+            };
+            if let Some(only) = self.from.and_then(only) {
+                let others = (first..)
+                    .zip(&mut *out)
+                    .filter(|s| block.state(s.0) != only);
+                others.for_each(|(_, out)| out[lane] += FORBIDDEN);
             }
-        }
-        if let Some(future) = self.future.filter(|_| t + 1 == self.n_frames) {
-            for (out, future) in out.iter_mut().zip(&future[first..]) {
-                let later = future.unwrap_or(FORBIDDEN);
-                out.iter_mut().for_each(|out| *out += later);
+            if let Some(future) = self.future.filter(|_| t + 1 == self.n_frames) {
+                for (station, out) in (first..).zip(&mut *out) {
+                    out[lane] += future[block.state(station)].unwrap_or(FORBIDDEN);
+                }
             }
         }
     }
@@ -260,16 +252,10 @@ mod tests {
         let (trellis, shelf) = (trellis(), Shelf::default());
         let film = film(&trellis, &shelf, 300);
         // Each state is wanted when its run of forty comes to it.
-        let rows = |t: usize, first: usize, out: &mut [[u32; 1]]| {
-            for (state, out) in (first..).zip(out) {
-                *out = [u32::from(state != t % 40 + 1) * 100];
-            }
-        };
-        let found: [Vec<u32>; 1] = Horizon::new(60, &trellis, 4)
-            .paths(&film, &rows)
-            .expect("a path");
-        let exact = film.cheapest_paths(&rows).expect("a path");
-        assert_eq!(found[0], exact[0].states);
+        let rows = |t: usize, state: usize| u32::from(state != t % 40 + 1) * 100;
+        let found = Horizon::new(60, &trellis, 4).path(&film, &rows);
+        let exact = film.cheapest_path(&rows).expect("a path");
+        assert_eq!(found, Some(exact.states));
     }
 
     #[test]
@@ -281,15 +267,10 @@ mod tests {
             let cost = move |t: usize, state: usize| {
                 (random::bits(seed, &[t as u64 / 9, state as u64]) % 60) as u32
             };
-            let rows = move |t: usize, first: usize, out: &mut [[u32; 1]]| {
-                for (state, out) in (first..).zip(out) {
-                    *out = [cost(t, state)];
-                }
-            };
-            let exact = u64::from(film.cheapest_paths(&rows).expect("a path")[0].cost);
+            let exact = u64::from(film.cheapest_path(&cost).expect("a path").cost);
             for (total, n_frames) in totals.iter_mut().zip([15, 60, 250]) {
                 let horizon = Horizon::new(n_frames, &trellis, 4);
-                let [plan] = horizon.paths(&film, &rows).expect("a path");
+                let plan = horizon.path(&film, &cost).expect("a path");
                 let mut since = 4;
                 let mut paid = u64::from(cost(0, plan[0] as usize));
                 for t in 1..plan.len() {

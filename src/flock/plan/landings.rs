@@ -1,7 +1,12 @@
-//! The jumps of a trellis as the recursion takes them (ALGORITHMS.md 6): for each state that one lands
+//! The jumps of a trellis as the recursion takes them (ALGORITHMS.md 6): for each station that one lands
 //! on, where one comes from; once as time runs, and once against it.
 
+use std::ops::Range;
+
 /// Which way the frames of a plan are gone through.
+///
+/// Going on leads from each station to the next: stations are the states in their order as time
+/// runs, and against their order when going back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// As time runs.
@@ -10,103 +15,116 @@ pub enum Way {
     Back,
 }
 
-/// So many states are landed on side by side.
-pub const GROUP: usize = 8;
+impl Way {
+    /// The station of a state of `n_states`, or the state of a station.
+    pub fn station(self, n_states: usize, state: usize) -> usize {
+        match self {
+            Way::Ahead => state,
+            Way::Back => n_states - 1 - state,
+        }
+    }
 
-/// The states landed on in groups of about equally many jumps. Where a state has fewer jumps than its
-/// group, its last comes once more and once more; the last group is filled up with its last state.
+    /// The stations of states in a row, or the states of stations.
+    pub fn stations(self, n_states: usize, states: Range<usize>) -> Range<usize> {
+        match self {
+            Way::Ahead => states,
+            Way::Back => n_states - states.end..n_states - states.start,
+        }
+    }
+}
+
+/// The stations landed on, those of few jumps first.
 #[derive(Clone, Debug, Default)]
 pub struct Landings {
+    stations: Vec<u32>,
+    /// The jumps to each, one station after the other.
+    jumps: Vec<Origin>,
     groups: Vec<Group>,
-    jumps: Vec<Jumps>,
-    /// Where each state stands among all that are landed on; of no matter for others.
+    /// Where each station stands among those landed on; of no matter for others.
     order: Vec<u32>,
 }
 
-#[derive(Clone, Debug)]
-struct Group {
-    states: [u32; GROUP],
-    /// One past its last in `jumps`.
-    end: usize,
+/// Where a jump comes from, and what it costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// The station left; those of one landing rise.
+    pub from: u32,
+    /// Turns.
+    pub cost: u32,
 }
 
-/// A jump to each state of a group.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Jumps {
-    /// Where they come from; those of one state rise from `Jumps` to `Jumps`.
-    pub sources: [u32; GROUP],
-    /// Turns.
-    pub costs: [u32; GROUP],
+/// Stations that equally many jumps lead to.
+#[derive(Clone, Debug)]
+struct Group {
+    /// Jumps to each.
+    n_jumps: usize,
+    stations: Range<usize>,
+    /// The first of their jumps.
+    first: usize,
 }
 
 impl Landings {
-    /// From jumps (landing, source, cost), sorted, between states below `n_states`.
-    pub fn new(n_states: usize, jumps: &[(u32, u32, u32)]) -> Landings {
-        let inside = |state: u32| (state as usize) < n_states;
-        let all_inside = jumps.iter().all(|jump| inside(jump.0) && inside(jump.1));
-        assert!(all_inside, "a jump leads outside of the trellis");
+    /// From jumps (landing, from, cost), sorted, between stations below `n_stations`.
+    pub fn new(n_stations: usize, jumps: &[(u32, u32, u32)]) -> Landings {
         let mut into: Vec<&[(u32, u32, u32)]> = jumps.chunk_by(|a, b| a.0 == b.0).collect();
         into.sort_by_key(|into| into.len());
-        let order = vec![0; n_states];
         let mut landings = Landings {
-            order,
+            order: vec![0; n_stations],
             ..Landings::default()
         };
-        for (place, into) in (0..).zip(&into) {
-            landings.order[into[0].0 as usize] = place;
-        }
-        for group in into.chunks(GROUP) {
-            landings.add(group);
+        for alike in into.chunk_by(|a, b| a.len() == b.len()) {
+            let first = landings.stations.len();
+            landings.groups.push(Group {
+                n_jumps: alike[0].len(),
+                stations: first..first + alike.len(),
+                first: landings.jumps.len(),
+            });
+            for into in alike {
+                landings.order[into[0].0 as usize] = landings.stations.len() as u32;
+                landings.stations.push(into[0].0);
+                let origins = into.iter().map(|&(_, from, cost)| Origin { from, cost });
+                landings.jumps.extend(origins);
+            }
         }
         landings
     }
 
-    fn add(&mut self, group: &[&[(u32, u32, u32)]]) {
-        let into = |k: usize| group[k.min(group.len() - 1)];
-        for rank in 0..into(GROUP).len() {
-            let jump = |k: usize| into(k)[rank.min(into(k).len() - 1)];
-            self.jumps.push(Jumps {
-                sources: std::array::from_fn(|k| jump(k).1),
-                costs: std::array::from_fn(|k| jump(k).2),
-            });
-        }
-        self.groups.push(Group {
-            states: std::array::from_fn(|k| into(k)[0].0),
-            end: self.jumps.len(),
-        });
+    /// Number of stations that are landed on.
+    pub fn n_landings(&self) -> usize {
+        self.stations.len()
     }
 
-    /// Number of states, landed on or not; all that groups and jumps name are below.
-    pub fn n_states(&self) -> usize {
-        self.order.len()
-    }
-
-    /// Number of groups.
-    pub fn n_groups(&self) -> usize {
-        self.groups.len()
-    }
-
-    /// The states of each group and the jumps to them, groups of few jumps first.
-    #[inline(always)]
-    pub fn groups(&self) -> impl Iterator<Item = (&[u32; GROUP], &[Jumps])> {
-        let mut start = 0;
-        self.groups.iter().map(move |group| {
-            let jumps = &self.jumps[start..group.end];
-            start = group.end;
-            (&group.states, jumps)
+    /// Number of jumps to each of some stations, the stations, and the jumps to one after the other.
+    pub fn groups(&self) -> impl Iterator<Item = (usize, &[u32], &[Origin])> {
+        self.groups.iter().map(|group| {
+            let n_jumps = group.n_jumps * group.stations.len();
+            (
+                group.n_jumps,
+                &self.stations[group.stations.clone()],
+                &self.jumps[group.first..][..n_jumps],
+            )
         })
     }
 
-    /// Where a state landed on stands among all of them.
-    pub fn order(&self, state: usize) -> usize {
-        self.order[state] as usize
+    /// Each station landed on, and the jumps to it.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &[Origin])> {
+        self.groups().flat_map(|(n_jumps, stations, jumps)| {
+            let stations = stations.iter().map(|&station| station as usize);
+            stations.zip(jumps.chunks(n_jumps))
+        })
     }
 
-    /// The source of jump number `rank` to the state that stands at `order`.
-    pub fn source(&self, order: usize, rank: usize) -> usize {
-        let before = (order / GROUP).checked_sub(1);
-        let start = before.map_or(0, |before| self.groups[before].end);
-        self.jumps[start + rank].sources[order % GROUP] as usize
+    /// Where a station landed on stands among all of them.
+    pub fn order(&self, station: usize) -> usize {
+        self.order[station] as usize
+    }
+
+    /// The station that jump number `rank` to the one at `order` comes from.
+    pub fn origin(&self, order: usize, rank: usize) -> usize {
+        let group = self.groups.partition_point(|g| g.stations.end <= order);
+        let group = &self.groups[group];
+        let jump = group.first + (order - group.stations.start) * group.n_jumps + rank;
+        self.jumps[jump].from as usize
     }
 }
 
@@ -115,24 +133,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn states_with_few_jumps_come_first_and_keep_their_sources() {
-        let mut jumps: Vec<(u32, u32, u32)> = (10..20).map(|state| (state, state - 9, 4)).collect();
-        jumps.extend([(12, 4, 5), (12, 9, 6), (15, 8, 7)]);
+    fn stations_with_few_jumps_come_first_and_keep_their_origins() {
+        let mut jumps: Vec<(u32, u32, u32)> = (10..14).map(|to| (to, to - 9, 4)).collect();
+        jumps.extend([(12, 4, 5), (12, 9, 6), (10, 8, 7)]);
         jumps.sort_unstable();
         let landings = Landings::new(20, &jumps);
-        let groups: Vec<(&[u32; GROUP], &[Jumps])> = landings.groups().collect();
-        assert_eq!(groups[0].0, &[10, 11, 13, 14, 16, 17, 18, 19]);
-        assert_eq!(groups[1].0, &[15, 12, 12, 12, 12, 12, 12, 12]);
-        assert_eq!(
-            groups.iter().map(|group| group.1.len()).collect::<Vec<_>>(),
-            [1, 3]
-        );
-        assert_eq!(groups[1].1[2].sources, [8, 9, 9, 9, 9, 9, 9, 9]);
-        assert_eq!(groups[1].1[2].costs, [7, 6, 6, 6, 6, 6, 6, 6]);
-        assert_eq!(
-            [0, 1, 2].map(|rank| landings.source(landings.order(12), rank)),
-            [3, 4, 9]
-        );
-        assert_eq!(landings.source(landings.order(19), 0), 10);
+        let found: Vec<(usize, usize)> = (landings.iter())
+            .map(|(station, jumps)| (station, jumps.len()))
+            .collect();
+        assert_eq!(found, [(11, 1), (13, 1), (10, 2), (12, 3)]);
+        let origins = [0, 1, 2].map(|rank| landings.origin(landings.order(12), rank));
+        assert_eq!(origins, [3, 4, 9]);
+        assert_eq!(landings.origin(landings.order(11), 0), 2);
+    }
+
+    #[test]
+    fn a_way_back_turns_states_around() {
+        assert_eq!(Way::Back.station(10, 0), 9);
+        assert_eq!(Way::Back.stations(10, 2..5), 5..8);
+        assert_eq!(Way::Ahead.stations(10, 2..5), 2..5);
     }
 }

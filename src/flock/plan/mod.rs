@@ -5,6 +5,7 @@ pub mod certificate;
 pub mod circle;
 pub mod cost;
 pub mod crowd;
+mod fill;
 pub mod horizon;
 pub mod landings;
 pub mod memory;
@@ -15,12 +16,13 @@ pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::circle::Ends;
-use self::cost::{CEILING, Feature, Features, Weights};
+use self::circle::{Closed, Ends};
+use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Place, Settled};
 use self::horizon::Horizon;
 use self::memory::Memory;
 use self::round::Round;
+use self::rows::Alone;
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path, Shelf};
 use super::error::Error;
@@ -32,8 +34,6 @@ use crate::geometry::Turns;
 use crate::library::Library;
 use crate::progress::Progress;
 
-/// Individuals planned side by side.
-const LANES: usize = 8;
 /// What one individual shows, and what that costs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -72,7 +72,8 @@ impl Found {
 pub struct Planner<'a> {
     trellis: Trellis,
     weights: Weights,
-    features: Features,
+    /// By state.
+    features: Vec<Feature>,
     crowd: Crowd,
     memory: Memory,
     /// The states that look like each state.
@@ -104,7 +105,7 @@ impl<'a> Planner<'a> {
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let crowd = Crowd::new(params.matching.w_c, fps, length_px);
-        let features = Features::new(weights.features(&trellis, motion));
+        let features = weights.features(&trellis, motion);
         let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
         let place = |t| boids.iter().map(|boid| crowd.place(boid, t)).collect();
         let dwell = params
@@ -176,15 +177,20 @@ impl<'a> Planner<'a> {
         let (n_frames, dwell) = (wanted.len(), self.dwell);
         let wanted = [wanted, &heir[..dwell]].concat();
         let ends = Ends { first, next: 0 };
-        let rows = |t: usize, start: usize, out: &mut [[u32; 1]]| {
-            (self.weights).fill(&[wanted[t]], &self.features, start, out);
-            ends.close((t, usize::MAX, dwell), start, out, 0);
+        let rows = Closed {
+            rows: Alone {
+                planner: self,
+                wanted: &wanted,
+            },
+            ends: Some(ends),
+            n_frames: usize::MAX,
+            dwell,
         };
         let film = Film {
             n_frames: n_frames + dwell,
             ..self.film()
         };
-        let [path] = film.cheapest_paths(&rows)?;
+        let path = film.cheapest_path(&rows)?;
         circle::first_of(&self.trellis, dwell, &path.states[n_frames..])
     }
 
@@ -262,7 +268,7 @@ impl<'a> Planner<'a> {
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
         let states = self.film_of(path);
         for (&wanted, &state) in wanted.iter().zip(states) {
-            let feature = self.features.of(state as usize);
+            let feature = self.features[state as usize];
             let [h, s] = self.weights.of_state(wanted, feature);
             heading += h;
             speed += s;
@@ -312,7 +318,7 @@ impl<'a> Planner<'a> {
             let crowd: u32 = near
                 .map(|(_, &place)| u32::from(self.crowd.cost_at(places[id], place)))
                 .sum();
-            let alone = (self.weights).total(wanted[t], self.features.of(state as usize));
+            let alone = (self.weights).total(wanted[t], self.features[state as usize]);
             cost += (alone + crowd).min(CEILING - 1);
         }
         cost

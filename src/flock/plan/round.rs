@@ -1,15 +1,15 @@
-//! The plans of individuals that do not look out for one another: who looks out for the same others
-//! is planned side by side, eight in the lanes of one vector; the first 64 each alone
-//! (ALGORITHMS.md 6).
+//! The plans of individuals that do not look out for one another, each on whatever thread is free; the first
+//! 64 look out for all before them and come one by one (ALGORITHMS.md 6).
 
 use rayon::prelude::*;
 
+use super::circle::Closed;
 use super::cost::Feature;
 use super::crowd::Settled;
 use super::memory::N_REPLANS;
 use super::rows::{Alone, InCrowd};
 use super::viterbi::{Film, Path};
-use super::{Found, LANES, Planner};
+use super::{Found, Planner};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
@@ -25,110 +25,72 @@ pub(super) struct Round<'a> {
 impl Round<'_> {
     /// The cheapest path of each among those settled, or the best found where the cheapest repeats.
     pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Found>, Error> {
-        match self.wanted.len() {
-            1 => Ok(self.in_crowd([0], settled)?.into()),
-            _ => self.batches(|first| {
-                let paths = self.in_crowd(self.lanes::<LANES>(first), settled);
-                paths.map(Vec::from)
-            }),
-        }
+        let wanted = self.wanted.par_iter().enumerate();
+        wanted
+            .map(|(idx, wanted)| self.in_crowd(self.first + idx, wanted, settled))
+            .collect()
     }
 
     /// What the cheapest path of each costs alone, turns.
     pub(super) fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
-        self.batches(|first| match self.wanted.len() - first {
-            _ if progress.cancelled() => Err(Error::Cancelled),
-            ..=4 => self.alone(self.lanes::<4>(first)).map(Vec::from),
-            _ => self.alone(self.lanes::<LANES>(first)).map(Vec::from),
-        })
-    }
-
-    /// One result for each individual, of batches side by side.
-    fn batches<T: Send>(
-        &self,
-        batch: impl Fn(usize) -> Result<Vec<T>, Error> + Sync,
-    ) -> Result<Vec<T>, Error> {
-        let firsts: Vec<usize> = (0..self.wanted.len()).step_by(LANES).collect();
-        let batches: Result<Vec<_>, Error> = firsts.par_iter().map(|&first| batch(first)).collect();
-        Ok(batches?
-            .into_iter()
-            .flatten()
-            .take(self.wanted.len())
-            .collect())
-    }
-
-    /// The individuals in the lanes of a batch; the last stands in for those that are not.
-    fn lanes<const N: usize>(&self, first: usize) -> [usize; N] {
-        std::array::from_fn(|lane| (first + lane).min(self.wanted.len() - 1))
-    }
-
-    fn alone<const N: usize>(&self, idx: [usize; N]) -> Result<[u32; N], Error> {
-        let (planner, wanted) = (self.planner, idx.map(|idx| &self.wanted[idx][..]));
+        let planner = self.planner;
         let open = Film {
             n_frames: planner.places.len(),
             ..planner.film()
         };
-        let costs = open.least_costs(&mut Alone { planner, wanted });
-        costs.ok_or(Error::NoTransitions)
+        let least = |wanted: &Vec<Feature>| match progress.cancelled() {
+            true => Err(Error::Cancelled),
+            false => (open.least_cost(&mut Alone { planner, wanted })).ok_or(Error::NoTransitions),
+        };
+        self.wanted.par_iter().map(least).collect()
     }
 
-    fn in_crowd<const N: usize>(
-        &self,
-        idx: [usize; N],
-        settled: &Settled,
-    ) -> Result<[Found; N], Error> {
+    /// In a loop, the costs of plans that begin and go on as they must.
+    fn closed<'b>(&self, id: usize, rows: InCrowd<'b>) -> Closed<InCrowd<'b>> {
+        Closed {
+            rows,
+            ends: self.planner.ends.get(id).copied(),
+            n_frames: self.planner.places.len(),
+            dwell: self.planner.dwell,
+        }
+    }
+
+    fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Found, Error> {
         let (planner, memory) = (self.planner, self.planner.memory);
-        let ids = idx.map(|idx| self.first + idx);
-        let wanted = idx.map(|idx| &self.wanted[idx][..]);
-        let mut rows = InCrowd::new(planner, settled, ids, wanted);
-        if !planner.ends.is_empty() {
-            rows = rows.between(ids.map(|id| planner.ends[id]));
-        }
-        let film = planner.film();
+        let n_frames = planner.places.len();
+        let (film, ends) = (planner.film(), planner.ends.get(id).copied());
+        let rows = InCrowd::new(planner, settled, id, wanted);
+        let open = self.closed(id, rows.clone());
         if let Some(horizon) = &planner.horizon {
-            let least = film.least_costs(&mut rows.clone());
-            let plans = horizon.paths(&film, &rows).zip(least);
-            let (plans, least) = plans.ok_or(Error::NoTransitions)?;
-            let found = |lane: usize| {
-                let mut path = Path {
-                    states: plans[lane].clone(),
-                    cost: 0,
-                };
-                path.cost = planner.cost_among(ids[lane], wanted[lane], settled, &path);
-                Found {
-                    least: least[lane],
-                    ..planner.found(path)
-                }
-            };
-            return Ok(std::array::from_fn(found));
+            let least = film.least_cost(&mut open.clone());
+            let plan = horizon.path(&film, &open).zip(least);
+            let (states, least) = plan.ok_or(Error::NoTransitions)?;
+            let mut path = Path { states, cost: 0 };
+            path.cost = planner.cost_among(id, wanted, settled, &path);
+            return Ok(Found {
+                least,
+                ..planner.found(path)
+            });
         }
-        let paths = film.cheapest_paths(&rows).ok_or(Error::NoTransitions)?;
-        let is_closed = |(id, path): (&usize, &Path)| match planner.ends.get(*id) {
-            Some(ends) => ends.holds(&path.states),
-            None => true,
-        };
-        if !ids.iter().zip(&paths).all(is_closed) {
-            return Err(Error::LoopDoesNotClose(planner.places.len()));
+        let path = film.cheapest_path(&open).ok_or(Error::NoTransitions)?;
+        let is_closed = |path: &Path| ends.is_none_or(|ends| ends.holds(&path.states));
+        if !is_closed(&path) {
+            return Err(Error::LoopDoesNotClose(n_frames));
         }
-        let mut paths = paths.map(|path| planner.found(path));
-        let mut found = paths.clone();
-        let mut raised = [(); N].map(|()| memory.nothing_raised(planner.places.len()));
+        let mut last = planner.found(path);
+        let mut found = last.clone();
+        let mut raised = memory.nothing_raised(n_frames);
         for _ in 0..N_REPLANS {
-            if paths.iter().all(|found| found.repetition == 0) {
+            if last.repetition == 0 {
                 break;
             }
-            for (raised, found) in raised.iter_mut().zip(&paths) {
-                memory.raise(raised, planner.film_of(&found.path));
-            }
-            let dearer = rows.clone().raised(raised.each_ref());
-            let next = film.cheapest_paths(&dearer).ok_or(Error::NoTransitions)?;
-            paths = next.map(|path| planner.found(path));
-            for lane in 0..N {
-                let path = &mut paths[lane].path;
-                if is_closed((&ids[lane], &*path)) {
-                    path.cost = planner.cost_among(ids[lane], wanted[lane], settled, path);
-                    found[lane].keep_cheaper(&paths[lane]);
-                }
+            memory.raise(&mut raised, planner.film_of(&last.path));
+            let dearer = self.closed(id, rows.clone().raised(&raised));
+            let path = film.cheapest_path(&dearer).ok_or(Error::NoTransitions)?;
+            last = planner.found(path);
+            if is_closed(&last.path) {
+                last.path.cost = planner.cost_among(id, wanted, settled, &last.path);
+                found.keep_cheaper(&last);
             }
         }
         Ok(found)

@@ -4,7 +4,8 @@ use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
 use crate::flock::params::MatchBy;
-use crate::flock::plan::viterbi::Rows;
+use crate::flock::plan::landings::Way;
+use crate::flock::plan::viterbi::{Block, FRAMES, Rows};
 use crate::flock::synthetic;
 use crate::flock::{Flock, plan_flock};
 use crate::library::View;
@@ -98,15 +99,26 @@ fn the_plans_of_a_flock_hold_their_certificates() {
     let mut settled = Settled::new(boids[0].heading_rad.len());
     for (id, boid) in boids.iter().enumerate() {
         let wanted = planner.weights.wanted(boid, planner.fps);
-        let rows = || rows::InCrowd::new(&planner, &settled, [id], [&wanted]);
+        let rows = || rows::InCrowd::new(&planner, &settled, id, &wanted);
         let film = planner.film();
-        let [path] = film.cheapest_paths(&rows()).unwrap();
+        let path = film.cheapest_path(&rows()).unwrap();
         let columns = film.potentials(&mut rows());
         let (mut rows, n_states) = (rows(), planner.trellis.n_states());
-        let costs: Vec<Vec<[u32; 1]>> = (0..wanted.len())
+        let costs: Vec<Vec<[u32; FRAMES]>> = (0..wanted.len())
             .map(|t| {
-                let mut row = vec![[0]; n_states];
-                rows.fill(t, 0, &mut row);
+                let mut row = vec![[0; FRAMES]; n_states];
+                let (way, times) = (Way::Ahead, [t; FRAMES]);
+                let cpu = Level::detect();
+                rows.fill(
+                    &Block {
+                        way,
+                        cpu,
+                        n_states,
+                        times,
+                    },
+                    0,
+                    &mut row,
+                );
                 row
             })
             .collect();

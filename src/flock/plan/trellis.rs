@@ -20,7 +20,7 @@ pub struct Trellis {
     runs: Vec<u32>,
     /// How many states of its run come up to each state, itself counted: 0 for barriers.
     since: Vec<u32>,
-    /// How many come from it on.
+    /// How many come from it on, the last state first.
     until: Vec<u32>,
     /// States that some jump leads to, rising.
     targets: Vec<u32>,
@@ -111,7 +111,7 @@ impl Trellis {
         &self.sources[range]
     }
 
-    /// The jumps as the recursion takes them: by where they lead as time runs, or against it.
+    /// The jumps as the recursion takes them, from station to station: as time runs, or against it.
     pub fn landings(&self, way: Way) -> &Landings {
         match way {
             Way::Ahead => &self.ahead,
@@ -119,7 +119,7 @@ impl Trellis {
         }
     }
 
-    /// How many states of its run one has gone through to each state when going that way, itself
+    /// How many states of its run one has gone through to each station when going that way, itself
     /// counted; 0 for barriers.
     pub fn gone_through(&self, way: Way) -> &[u32] {
         match way {
@@ -160,16 +160,15 @@ impl Trellis {
         self.until = (self.frames.iter().rev())
             .map(|&f| count(&mut until, f))
             .collect();
-        self.until.reverse();
     }
 
     fn lay_jumps(&mut self, mut jumps: Vec<(u32, u32, u32)>) {
         jumps.sort_unstable();
         jumps.dedup_by_key(|jump| (jump.0, jump.1));
         self.ahead = Landings::new(self.n_states(), &jumps);
-        let mut back: Vec<_> = jumps
-            .iter()
-            .map(|&(to, from, cost)| (from, to, cost))
+        let station = |state| Way::Back.station(self.n_states(), state as usize) as u32;
+        let mut back: Vec<_> = (jumps.iter())
+            .map(|&(to, from, cost)| (station(from), station(to), cost))
             .collect();
         back.sort_unstable();
         self.back = Landings::new(self.n_states(), &back);

@@ -1,91 +1,75 @@
-//! The recursion itself, one frame at a time (ALGORITHMS.md 6).
+//! The recursion itself, a block of frames at a time (ALGORITHMS.md 6).
 //!
-//! What continues stays in its place: state `s` lies at `s + origin`, and the origin goes one place a
-//! frame, so a frame adds each state's cost to one sum along the diagonal. V is kept as that sum and a
-//! lead over it, which a landing lowers at once; who may jump is told by the leads of `dwell - 1` frames
-//! ago, which know nothing of later landings. The same portable code is compiled once plainly and once
-//! for AVX2; results are the same integers.
+//! First what goes on is followed from station to station, then all jumps of the block are taken; what
+//! they offer is kept until who landed may leave, `dwell` frames later. The same portable code is
+//! compiled once plainly and once for AVX2; results are the same integers.
 
-use super::landing;
-use super::walk::{Frame, Trace};
-use super::{Film, Rows, UNREACHED};
+use super::front::{Front, NO_LEAD, Stretch, Tally, lead};
+use super::landing::Landing;
+use super::offers::Offers;
+use super::walk::Steps;
+use super::{Block, FRAMES, Film, Rows, UNREACHED, block};
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;
-use crate::flock::plan::landings::{GROUP, Way};
+use crate::flock::plan::landings::Way;
 
-/// The lead of a state that no path leads to. Sums stay below 2^31, so V fits 32 bits.
-const NO_LEAD: i32 = UNREACHED as i32;
-/// States whose costs are filled in at a time, so that they stay in the nearest cache.
-const BLOCK: usize = 64;
-/// Frames that the origin can go before all is moved back.
-const ROOM: usize = 256;
+/// Stations whose costs are filled in at a time, so that they stay in the nearest cache.
+const STRETCH: usize = 64;
 
-/// The state of the recursion after one frame.
+/// The state of the recursion after a block.
 #[derive(Clone)]
-pub(super) struct Column<const LANES: usize> {
+pub(super) struct Column {
     way: Way,
     dwell: usize,
-    /// Frames gone since the first.
-    age: usize,
-    /// The place of state 0.
-    origin: usize,
-    /// `[age mod slots]`, by place: V less the sum, of the last `dwell` frames and at least two.
-    leads: Vec<Vec<[i32; LANES]>>,
-    /// Costs of continuing since the film began, by place.
-    sums: Vec<[u32; LANES]>,
-    /// V of each state that may jump, by state.
-    values: Vec<[u32; LANES]>,
-    /// V of each state just landed on, without its own cost, by state.
-    landed: Vec<[u32; LANES]>,
-    /// Costs of a block of states.
-    row: [[u32; LANES]; BLOCK],
-    /// States too soon in their runs to jump, by how soon: (states gone through, state).
-    soon: Vec<(u32, u32)>,
+    /// Frames in all.
+    n_frames: usize,
+    /// Frames in a block.
+    width: usize,
+    /// The clock of the block gone through next. Clocks count frames such that the last block is full: the
+    /// first frame's is `opening`, below `width`.
+    clock: usize,
+    opening: usize,
+    /// By station plus one; no path comes from before the first.
+    tallies: Vec<Tally>,
+    offers: Offers,
 }
 
-impl<const LANES: usize> Column<LANES> {
-    pub(super) fn start(film: &Film<'_>, way: Way, rows: &mut impl Rows<LANES>) -> Column<LANES> {
-        let (n_states, dwell) = (film.trellis.n_states(), film.dwell);
-        let gone = film.trellis.gone_through(way).iter().copied();
-        let mut soon: Vec<(u32, u32)> = gone.zip(0..).filter(|s| (s.0 as usize) < dwell).collect();
-        soon.sort_unstable();
-        let mut column = Column {
+impl Column {
+    /// Before the first of so many frames.
+    pub(super) fn new(film: &Film<'_>, way: Way, n_frames: usize) -> Column {
+        let (n_states, width) = (film.trellis.n_states(), block::width(film.dwell));
+        Column {
             way,
-            dwell,
-            age: 0,
-            origin: if way == Way::Ahead { ROOM } else { 0 },
-            leads: vec![vec![[0; LANES]; n_states + ROOM]; dwell.max(2)],
-            sums: vec![[0; LANES]; n_states + ROOM],
-            values: vec![[UNREACHED; LANES]; n_states],
-            landed: vec![[UNREACHED; LANES]; n_states],
-            row: [[0; LANES]; BLOCK],
-            soon,
-        };
-        column.close_barriers();
-        column.pay(film.time(way, 0), rows);
-        column
+            dwell: film.dwell,
+            n_frames,
+            width,
+            clock: 0,
+            opening: n_frames.next_multiple_of(width) - n_frames,
+            tallies: vec![Tally::NOWHERE; n_states + 1],
+            offers: Offers::new(n_states, film.dwell, width),
+        }
     }
 
-    /// Goes on by a frame.
-    pub(super) fn advance<R: Rows<LANES>>(
+    /// Blocks left to go through.
+    pub(super) fn n_left(&self) -> usize {
+        (self.opening + self.n_frames - self.clock) / self.width
+    }
+
+    /// Goes on by a block.
+    pub(super) fn advance<R: Rows>(&mut self, film: &Film<'_>, rows: &mut R, steps: Steps<'_>) {
+        self.advance_on::<R, true>(film, rows, steps);
+    }
+
+    /// Goes on by a block and keeps no way back.
+    pub(super) fn advance_untraced<R: Rows>(&mut self, film: &Film<'_>, rows: &mut R) {
+        self.advance_on::<R, false>(film, rows, Steps::default());
+    }
+
+    fn advance_on<R: Rows, const TRACED: bool>(
         &mut self,
         film: &Film<'_>,
         rows: &mut R,
-        trace: &mut Trace<'_, LANES>,
-    ) {
-        self.advance_on::<R, true>(film, rows, trace.next_frame());
-    }
-
-    /// Goes on by a frame and keeps no way back.
-    pub(super) fn advance_untraced<R: Rows<LANES>>(&mut self, film: &Film<'_>, rows: &mut R) {
-        self.advance_on::<R, false>(film, rows, (&mut [], &mut []));
-    }
-
-    fn advance_on<R: Rows<LANES>, const TRACED: bool>(
-        &mut self,
-        film: &Film<'_>,
-        rows: &mut R,
-        trace: Frame<'_, LANES>,
+        steps: Steps<'_>,
     ) {
         match film.cpu {
             #[cfg(target_arch = "x86_64")]
@@ -93,206 +77,147 @@ impl<const LANES: usize> Column<LANES> {
                 #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
                 // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
-                    self.advance_avx2::<R, TRACED>(film, rows, trace);
+                    self.advance_avx2::<R, TRACED>(film, rows, steps);
                 }
             }
-            _ => self.advance_with::<R, false, TRACED>(film, rows, trace),
+            _ => self.advance_with::<R, false, TRACED>(film, rows, steps),
         }
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn advance_avx2<R: Rows<LANES>, const TRACED: bool>(
+    fn advance_avx2<R: Rows, const TRACED: bool>(
         &mut self,
         film: &Film<'_>,
         rows: &mut R,
-        trace: Frame<'_, LANES>,
+        steps: Steps<'_>,
     ) {
-        self.advance_with::<R, true, TRACED>(film, rows, trace);
+        self.advance_with::<R, true, TRACED>(film, rows, steps);
     }
 
     #[inline(always)]
-    fn advance_with<R: Rows<LANES>, const AVX2: bool, const TRACED: bool>(
+    fn advance_with<R: Rows, const AVX2: bool, const TRACED: bool>(
         &mut self,
         film: &Film<'_>,
         rows: &mut R,
-        (ranks, wins): Frame<'_, LANES>,
+        steps: Steps<'_>,
     ) {
-        self.land::<AVX2, TRACED>(film, ranks);
-        self.slide();
-        self.settle::<TRACED>(wins);
-        self.close_barriers();
-        self.pay(film.time(self.way, self.age), rows);
+        self.go_on::<R, AVX2, TRACED>(film, rows, steps.wins);
+        self.land::<TRACED>(film, steps.ranks);
+        self.clock += self.width;
     }
 
-    /// The cheapest jump to each state that jumps lead to.
+    /// Every station from the one before it, or from a landing where that is cheaper.
     #[inline(always)]
-    fn land<const AVX2: bool, const TRACED: bool>(
+    fn go_on<R: Rows, const AVX2: bool, const TRACED: bool>(
         &mut self,
         film: &Film<'_>,
-        ranks: &mut [[u16; LANES]],
+        rows: &mut R,
+        wins: &mut [u8],
     ) {
-        let landings = film.trellis.landings(self.way);
-        let (values, n_states) = (&self.values[..], landings.n_states());
-        assert_eq!(values.len(), n_states, "one trellis all along");
-        let (mut ranks, mut nowhere) = (
-            ranks.as_chunks_mut::<GROUP>().0.iter_mut(),
-            [[0; LANES]; GROUP],
-        );
-        for (states, jumps) in landings.groups() {
-            let ranks = match ranks.next() {
-                Some(ranks) if TRACED => ranks,
-                _ => &mut nowhere,
+        let block = self.block(film);
+        let opening = (self.clock == 0).then_some(self.opening);
+        let mut front = Front::new(self.width, film.dwell, opening);
+        let mut costs = [[0; FRAMES]; STRETCH];
+        let mut scratch = [[NO_LEAD; FRAMES]; STRETCH];
+        let mut forgotten = [0; STRETCH];
+        let gone_through = film.trellis.gone_through(self.way).chunks(STRETCH);
+        let tallies = self.tallies[1..].chunks_mut(STRETCH).zip(gone_through);
+        for (first, (tallies, gone_through)) in (0..).step_by(STRETCH).zip(tallies) {
+            let n = tallies.len();
+            rows.fill(&block, first, &mut costs[..n]);
+            let stretch = Stretch {
+                tallies,
+                gone_through,
+                offers: (self.offers).of(first..first + n, self.clock, &mut scratch[..n]),
+                costs: &costs[..n],
+                wins: match TRACED {
+                    true => &mut wins[first..][..n],
+                    false => &mut forgotten[..n],
+                },
             };
             #[cfg(target_arch = "x86_64")]
-            if AVX2 && LANES == 1 {
-                let ranks = ranks.as_flattened_mut().try_into();
-                let ranks = ranks.expect("one rank for each state");
-                #[expect(unsafe_code, reason = "a kernel of AVX2 that looks at no bounds")]
-                // SAFETY: landings name states below `n_states`, all of which have values; and who
-                // says AVX2 has made sure of it.
-                let landed = unsafe { landing::alone_avx2(jumps, values.as_flattened(), ranks) };
-                for (&state, landed) in states.iter().zip(landed) {
-                    self.landed[state as usize] = [landed; LANES];
+            if AVX2 {
+                #[expect(unsafe_code, reason = "the same, for AVX2")]
+                // SAFETY: who says AVX2 has made sure of it.
+                unsafe {
+                    front.go_on_avx2(stretch);
                 }
                 continue;
             }
-            #[expect(unsafe_code, reason = "a kernel that looks at no bounds")]
-            // SAFETY: landings name states below `n_states`, all of which have values.
-            let landed = unsafe { landing::lanes::<LANES, TRACED>(jumps, values, ranks) };
-            for (&state, landed) in states.iter().zip(landed) {
-                self.landed[state as usize] = landed;
-            }
+            front.go_on(stretch);
         }
     }
 
-    /// Moves the origin by a place.
-    fn slide(&mut self) {
-        let n_states = self.values.len();
-        let (end, other) = match self.way {
-            Way::Ahead => (0, ROOM),
-            Way::Back => (ROOM, 0),
-        };
-        if self.origin == end {
-            let window = end..end + n_states;
-            self.sums.copy_within(window.clone(), other);
-            for leads in &mut self.leads {
-                leads.copy_within(window.clone(), other);
-            }
-            self.origin = other;
-        }
-        let coming = match self.way {
-            Way::Ahead => self.origin - 1,
-            Way::Back => self.origin + n_states,
-        };
-        self.origin = match self.way {
-            Way::Ahead => self.origin - 1,
-            Way::Back => self.origin + 1,
-        };
-        self.sums[coming] = [0; LANES];
-        let slot = self.slot(0);
-        self.leads[slot][coming] = [NO_LEAD; LANES];
-        self.age += 1;
-    }
-
-    /// Every state from the one before it, or from a landing where that is cheaper.
+    /// The cheapest jump to each station that jumps lead to.
     #[inline(always)]
-    fn settle<const TRACED: bool>(&mut self, wins: &mut [[u8; LANES]]) {
-        let window = self.window();
-        let slot = self.slot(0);
-        let mut leads = std::mem::take(&mut self.leads[slot]);
-        let before = self.leads[self.slot(1)][window.clone()].as_flattened();
-        let sums = self.sums[window.clone()].as_flattened();
-        let now = leads[window].as_flattened_mut().iter_mut();
-        let offers = self.landed.as_flattened().iter().zip(sums);
-        let places = now.zip(before).zip(offers);
-        if TRACED {
-            let wins = wins.as_flattened_mut().iter_mut();
-            for (((now, &before), (&landed, &sum)), win) in places.zip(wins) {
-                let lead = landed as i32 - sum as i32;
-                *win = u8::from(lead < before);
-                *now = lead.min(before);
-            }
-        } else {
-            for ((now, &before), (&landed, &sum)) in places {
-                *now = (landed as i32 - sum as i32).min(before);
+    fn land<const TRACED: bool>(&mut self, film: &Film<'_>, ranks: &mut [[u16; FRAMES]]) {
+        let mut landing = Landing {
+            tallies: &self.tallies,
+            offers: self.offers.block(self.clock),
+            ranks: ranks.iter_mut(),
+        };
+        for (n_jumps, stations, jumps) in film.trellis.landings(self.way).groups() {
+            // Most stations have but few jumps: loops of known length.
+            match n_jumps {
+                1 => landing.each::<TRACED>(stations, jumps.as_chunks::<1>().0),
+                2 => landing.each::<TRACED>(stations, jumps.as_chunks::<2>().0),
+                3 => landing.each::<TRACED>(stations, jumps.as_chunks::<3>().0),
+                _ => landing.each::<TRACED>(stations, jumps.chunks(n_jumps)),
             }
         }
-        self.leads[slot] = leads;
     }
 
-    fn close_barriers(&mut self) {
-        let slot = self.slot(0);
-        for &(gone, state) in &self.soon {
-            if gone > 0 {
-                break;
-            }
-            self.leads[slot][self.origin + state as usize] = [NO_LEAD; LANES];
+    fn block(&self, film: &Film<'_>) -> Block {
+        let age = |lane: usize| (self.clock + lane).saturating_sub(self.opening);
+        let time = |lane| film.time(self.way, age(lane).min(self.n_frames - 1));
+        Block {
+            way: self.way,
+            cpu: film.cpu,
+            n_states: self.tallies.len() - 1,
+            times: std::array::from_fn(time),
         }
     }
 
-    /// Adds what each state costs; then V of those that may jump.
-    #[inline(always)]
-    fn pay<R: Rows<LANES>>(&mut self, t: usize, rows: &mut R) {
-        let window = self.window();
-        let held = (self.dwell - 1).min(self.age);
-        let leads = &self.leads[self.slot(held)][window.clone()];
-        let blocks = self.sums[window].chunks_mut(BLOCK);
-        let blocks = blocks
-            .zip(leads.chunks(BLOCK))
-            .zip(self.values.chunks_mut(BLOCK));
-        for (first, ((sums, leads), values)) in (0..).step_by(BLOCK).zip(blocks) {
-            let row = &mut self.row[..sums.len()];
-            rows.fill(t, first, row);
-            let sums = sums.as_flattened_mut().iter_mut().zip(row.as_flattened());
-            let values = values.as_flattened_mut().iter_mut();
-            for (((sum, &cost), &lead), value) in sums.zip(leads.as_flattened()).zip(values) {
-                *sum += cost;
-                *value = (lead as u32).wrapping_add(*sum);
+    /// The clock of the next block.
+    pub(super) fn clock(&self) -> usize {
+        self.clock
+    }
+
+    /// The lanes of the last block that stand for frames.
+    pub(super) fn lanes(&self) -> std::ops::Range<usize> {
+        let is_first = self.clock == self.width;
+        (if is_first { self.opening } else { 0 })..self.width
+    }
+
+    /// V of who may jump in a lane of the last block, by station, turns.
+    pub(super) fn values(&self, lane: usize) -> impl Iterator<Item = u32> {
+        let stations = self.tallies[1..].iter();
+        stations.map(move |tally| tally.values[lane].min(UNREACHED))
+    }
+
+    /// `[ago][station]`: the least V, turns, at the last frame gone through of who landed so many frames
+    /// ago; the last of `dwell` is of all who landed before, and may jump.
+    pub(super) fn ends(&self, film: &Film<'_>) -> Vec<Vec<u32>> {
+        let gone_through = film.trellis.gone_through(self.way);
+        let last = self.width - 1;
+        let landed = |ago: usize| {
+            let mut values = vec![UNREACHED; gone_through.len()];
+            // Before the first frame nobody landed.
+            let Some(clock) = self.clock.checked_sub(ago + 2) else {
+                return values;
+            };
+            let stations = gone_through.iter().zip(&self.tallies[1..]).skip(ago);
+            let landings = values.iter_mut().skip(ago).zip(self.offers.after(clock));
+            for ((value, lead), (&gone, tally)) in landings.zip(stations) {
+                if gone as usize > ago {
+                    *value = (lead as u32).wrapping_add(tally.sums[last]).min(UNREACHED);
+                }
             }
-        }
-        for &(gone, state) in &self.soon {
-            if gone as usize > held {
-                break;
-            }
-            self.values[state as usize] = [UNREACHED; LANES];
-        }
-    }
-
-    fn window(&self) -> std::ops::Range<usize> {
-        self.origin..self.origin + self.values.len()
-    }
-
-    /// Where the leads of so many frames ago are.
-    fn slot(&self, ago: usize) -> usize {
-        // No more is asked for than there are slots, which may be one more than frames gone.
-        (self.age + self.leads.len() - ago) % self.leads.len()
-    }
-
-    /// V of every state that may jump, by state.
-    pub(super) fn values(&self) -> &[[u32; LANES]] {
-        &self.values
-    }
-
-    /// The least V of each state over paths whose last landing was at least `since - 1` frames ago, for
-    /// one individual: `UNREACHED` or more where there is none. 1 <= since <= max(dwell, 2).
-    pub(super) fn landed_since(
-        &self,
-        film: &Film<'_>,
-        since: usize,
-        lane: usize,
-    ) -> impl Iterator<Item = u32> {
-        let ago = (since - 1).min(self.age);
-        let leads = &self.leads[self.slot(ago)][self.window()];
-        let gone = film.trellis.gone_through(self.way).iter();
-        let places = leads.iter().zip(&self.sums[self.window()]);
-        places.zip(gone).map(move |((lead, sum), &gone)| {
-            let cost = (lead[lane] as u32).wrapping_add(sum[lane]);
-            if gone as usize > ago {
-                cost.min(UNREACHED)
-            } else {
-                UNREACHED
-            }
-        })
+            values
+        };
+        let mut ends: Vec<Vec<u32>> = (0..self.dwell - 1).map(landed).collect();
+        ends.push(self.values(last).collect());
+        ends
     }
 }

@@ -3,85 +3,80 @@
 //! played again from its checkpoint.
 
 use super::column::Column;
+use super::meeting::Stand;
 use super::walk::{Trace, Walk};
 use super::{Film, Rows};
 use crate::flock::plan::landings::Way;
 
 /// The recursion at its last frame, and how it came there.
-pub(super) struct Half<'a, const LANES: usize, R> {
+pub(super) struct Half<'a, R> {
     pub(super) film: &'a Film<'a>,
     way: Way,
     rows: R,
     n_frames: usize,
+    /// Blocks of a segment.
     segment: usize,
-    pub(super) column: Column<LANES>,
+    column: Column,
+    /// What its ends cost, as `Column::ends` has them.
+    pub(super) ends: Vec<Vec<u32>>,
     /// Of the last segment.
-    trace: Trace<'a, LANES>,
+    trace: Trace<'a>,
     /// Before each segment, if there are several.
-    checkpoints: Vec<Column<LANES>>,
+    checkpoints: Vec<Column>,
 }
 
-impl<'a, const LANES: usize, R: Rows<LANES>> Half<'a, LANES, R> {
-    /// Goes over `n_frames` > 0 frames, keeping what led where for `segment` of them at a time.
+impl<'a, R: Rows> Half<'a, R> {
+    /// Goes over `n_frames` > 0 frames, keeping what led where for `segment` blocks of them at a time.
     pub(super) fn run(
         film: &'a Film<'a>,
         way: Way,
-        mut rows: R,
+        rows: R,
         n_frames: usize,
         segment: usize,
-    ) -> Half<'a, LANES, R> {
-        let column = Column::start(film, way, &mut rows);
+    ) -> Half<'a, R> {
+        let column = Column::new(film, way, n_frames);
         let mut half = Half {
             film,
             way,
             rows,
             n_frames,
             segment,
+            ends: Vec::new(),
+            trace: Trace::new(film, way, segment.min(column.n_left())),
             column,
-            trace: Trace::new(film, way, segment.min(n_frames)),
             checkpoints: Vec::new(),
         };
-        for start in half.starts() {
-            if n_frames - 1 > segment {
+        let has_segments = half.column.n_left() > segment;
+        while half.column.n_left() > 0 {
+            if has_segments {
                 half.checkpoints.push(half.column.clone());
             }
-            half.play(start);
+            half.play();
         }
+        half.ends = half.column.ends(film);
         half
     }
 
-    /// The paths of all lanes by age, each from its last state, before which nothing landed for so many
-    /// frames.
-    pub(super) fn walk(mut self, ends: [(usize, usize); LANES]) -> [Vec<u32>; LANES] {
-        let mut walks = ends.map(|(state, held)| Walk::new(self.n_frames, state, held));
-        for (idx, start) in self
-            .starts()
-            .enumerate()
-            .collect::<Vec<_>>()
-            .into_iter()
-            .rev()
-        {
-            if idx + 1 < self.checkpoints.len() {
-                self.column = self.checkpoints.swap_remove(idx);
-                self.play(start);
-            }
-            for (lane, walk) in walks.iter_mut().enumerate() {
-                walk.back_to(start, self.film, self.way, &self.trace, lane);
-            }
+    /// The states of the path that ends so, by age.
+    pub(super) fn walk(mut self, end: Stand) -> Vec<u32> {
+        let mut walk = Walk::new(self.film, self.n_frames, end);
+        self.checkpoints.pop();
+        loop {
+            walk.back(self.film, self.way, &self.trace);
+            let Some(column) = self.checkpoints.pop() else {
+                return walk.finish();
+            };
+            self.column = column;
+            self.play();
         }
-        walks.map(Walk::finish)
     }
 
-    /// The ages at which segments begin.
-    fn starts(&self) -> impl Iterator<Item = usize> + use<LANES, R> {
-        (1..self.n_frames).step_by(self.segment)
-    }
-
-    fn play(&mut self, start: usize) {
-        self.trace.restart(start);
-        for _ in start..(start + self.segment).min(self.n_frames) {
-            self.column
-                .advance(self.film, &mut self.rows, &mut self.trace);
+    /// Goes over a segment.
+    fn play(&mut self) {
+        self.trace.restart(self.column.clock());
+        for _ in 0..self.segment.min(self.column.n_left()) {
+            let steps = self.trace.next_block();
+            self.column.advance(self.film, &mut self.rows, steps);
         }
     }
 }

@@ -1,18 +1,26 @@
-//! The exact plan: for each individual the cheapest path through the trellis (ALGORITHMS.md 6),
-//! by dynamic programming over frames with `LANES` individuals side by side.
+//! The exact plan: the cheapest path through the trellis (ALGORITHMS.md 6), by dynamic programming
+//! over frames.
 //!
 //! After a jump at least `dwell` frames are played; only the end of the plan may cut that run short, as
-//! its beginning may. So a plan read backward is a plan too, and is found from both ends at once: one half
-//! as time runs, the other against it, each on a thread of its own, until they meet. Ties go to continuing,
-//! then to the smaller state, seen from either end.
+//! its beginning may. So where a jump leads becomes known `dwell` frames before anything can
+//! leave from there, and a block of up to eight frames, if that is no more than `dwell`, is gone through
+//! in two strokes, its frames side by side in the lanes of a vector: first all that goes on
+//! (`column`), then all that jumps (`landing`).
+//!
+//! And a plan read backward is a plan too: it is found from both ends at once, one half
+//! as time runs, the other against it, each on a thread of its own, until they meet (`meeting`).
 
+mod block;
 mod column;
+mod front;
 mod half;
 mod landing;
 mod meeting;
+mod offers;
 mod shelf;
 mod walk;
 
+pub use self::block::{Block, FRAMES};
 use self::column::Column;
 use self::half::Half;
 use self::meeting::Meeting;
@@ -38,17 +46,19 @@ pub struct Path {
     pub cost: u32,
 }
 
-/// What showing each state costs each individual.
-pub trait Rows<const LANES: usize> {
-    /// Fills in the costs at frame `t` of the states from `first` on, turns below 2^17. Frames are asked
-    /// for in either order, each from state 0 up; barriers may cost anything below 2^17.
-    fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]);
+/// What showing each state costs an individual.
+pub trait Rows {
+    /// Fills in the costs at the frames of `block` of the stations from `first` on, turns below 2^17.
+    /// The stations of a block are asked for from 0 up; barriers may cost anything below 2^17.
+    fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]);
 }
 
-impl<const LANES: usize, F: FnMut(usize, usize, &mut [[u32; LANES]])> Rows<LANES> for F {
-    #[inline(always)]
-    fn fill(&mut self, t: usize, first: usize, out: &mut [[u32; LANES]]) {
-        self(t, first, out);
+/// From the cost of a frame and a state.
+impl<F: FnMut(usize, usize) -> u32> Rows for F {
+    fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
+        for (station, out) in (first..).zip(out) {
+            *out = block.times.map(|t| self(t, block.state(station)));
+        }
     }
 }
 
@@ -68,62 +78,48 @@ pub struct Film<'a> {
 }
 
 impl Film<'_> {
-    /// The cheapest paths of `LANES` individuals, each exactly. `None` when no path is long enough.
-    pub fn cheapest_paths<const LANES: usize, R>(&self, rows: &R) -> Option<[Path; LANES]>
-    where
-        R: Rows<LANES> + Clone + Send + Sync,
-    {
-        self.cheapest_paths_by_segments(rows, self.segment_frames::<LANES>())
+    /// The cheapest path, exactly. `None` when no path is long enough.
+    pub fn cheapest_path(&self, rows: &(impl Rows + Clone + Send + Sync)) -> Option<Path> {
+        self.cheapest_path_by_segments(rows, self.segment_blocks())
     }
 
-    /// What the cheapest paths of `LANES` individuals cost, turns. `None` when no path is long enough.
-    pub fn least_costs<const LANES: usize>(
-        &self,
-        rows: &mut impl Rows<LANES>,
-    ) -> Option<[u32; LANES]> {
-        let mut column = Column::start(self, Way::Ahead, rows);
-        for _ in 1..self.n_frames {
+    /// What the cheapest path costs, turns. `None` when no path is long enough.
+    pub fn least_cost(&self, rows: &mut impl Rows) -> Option<u32> {
+        let mut column = Column::new(self, Way::Ahead, self.n_frames);
+        while column.n_left() > 0 {
             column.advance_untraced(self, rows);
         }
-        let least = |lane| column.landed_since(self, 1, lane).min();
-        let costs = std::array::from_fn(|lane| least(lane).unwrap_or(UNREACHED));
-        (!costs.contains(&UNREACHED)).then_some(costs)
+        let end = meeting::end(self, &column.ends(self))?;
+        Some(end.cost)
     }
 
-    /// What the cheapest way costs to every state that may jump, at every frame, for one individual: what
+    /// What the cheapest way costs to every state that may jump, at every frame: what
     /// the certificate checks.
-    pub fn potentials(&self, rows: &mut impl Rows<1>) -> Vec<Vec<u32>> {
-        let mut column = Column::start(self, Way::Ahead, rows);
-        let mut trace = Trace::new(self, Way::Ahead, 1);
-        let values = |column: &Column<1>| {
-            let values = column.values().as_flattened().iter();
-            values.map(|&v| v.min(UNREACHED)).collect()
-        };
-        let mut columns = vec![values(&column)];
-        for _ in 1..self.n_frames {
-            column.advance(self, rows, &mut trace);
-            columns.push(values(&column));
+    pub fn potentials(&self, rows: &mut impl Rows) -> Vec<Vec<u32>> {
+        let mut column = Column::new(self, Way::Ahead, self.n_frames);
+        let mut columns = Vec::with_capacity(self.n_frames);
+        while column.n_left() > 0 {
+            column.advance_untraced(self, rows);
+            for lane in column.lanes() {
+                columns.push(column.values(lane).collect());
+            }
         }
         columns
     }
 
-    fn segment_frames<const LANES: usize>(&self) -> usize {
-        let frame_bytes = Trace::<LANES>::frame_bytes(self, Way::Ahead);
-        if frame_bytes * self.n_frames / 2 <= TRACE_BUDGET_BYTES {
-            self.n_frames
+    fn segment_blocks(&self) -> usize {
+        let n_blocks = self.n_frames.div_ceil(2 * block::width(self.dwell)).max(1);
+        if Trace::block_bytes(self, Way::Ahead) * n_blocks <= TRACE_BUDGET_BYTES {
+            n_blocks
         } else {
-            self.n_frames.isqrt() + 1
+            n_blocks.isqrt() + 1
         }
     }
 
-    /// As `cheapest_paths`, keeping what led where for `segment` frames at a time.
-    fn cheapest_paths_by_segments<const LANES: usize, R>(
-        &self,
-        rows: &R,
-        segment: usize,
-    ) -> Option<[Path; LANES]>
+    /// As `cheapest_path`, keeping what led where for `segment` blocks at a time.
+    fn cheapest_path_by_segments<R>(&self, rows: &R, segment: usize) -> Option<Path>
     where
-        R: Rows<LANES> + Clone + Send + Sync,
+        R: Rows + Clone + Send + Sync,
     {
         assert!(
             self.n_frames > 0 && self.dwell > 0 && segment > 0,
@@ -139,26 +135,16 @@ impl Film<'_> {
             || half(Way::Ahead, n_first),
             || (n_second > 0).then(|| half(Way::Back, n_second)),
         );
-        let mut meetings = Vec::with_capacity(LANES);
-        for lane in 0..LANES {
-            meetings.push(match &second {
-                Some(second) => meeting::across(&first, second, lane)?,
-                None => meeting::end(&first, lane)?,
-            });
+        let meeting: Meeting = match &second {
+            Some(second) => meeting::across(&first, second)?,
+            None => meeting::end(self, &first.ends)?,
+        };
+        let mut states = first.walk(meeting.first);
+        if let Some(second) = second {
+            states.extend(second.walk(meeting.second).iter().rev());
         }
-        let meetings: [Meeting; LANES] = meetings.try_into().ok()?;
-        let (mut firsts, seconds) = rayon::join(
-            || first.walk(meetings.map(|meeting| meeting.first)),
-            || second.map(|second| second.walk(meetings.map(|meeting| meeting.second))),
-        );
-        for (first, second) in firsts.iter_mut().zip(seconds.iter().flatten()) {
-            first.extend(second.iter().rev());
-        }
-        let mut costs = meetings.iter().map(|meeting| meeting.cost);
-        Some(firsts.map(|states| Path {
-            states,
-            cost: costs.next().unwrap_or(UNREACHED),
-        }))
+        let cost = meeting.cost;
+        Some(Path { states, cost })
     }
 
     /// The output frame that is gone to after `age` others.

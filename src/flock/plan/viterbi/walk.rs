@@ -1,81 +1,92 @@
-//! What led where, and the way back through it (ALGORITHMS.md 6): for each frame the source that won
-//! each landing, and the states that were landed on cheaper than continued to.
+//! What led where, and the way back through it (ALGORITHMS.md 6): for each block the jumps that won each
+//! landing, and the stations at which a landing was cheaper than going on.
 
-use super::Film;
+use super::meeting::Stand;
 use super::shelf::{Sheets, Shelf};
-use crate::flock::plan::landings::{GROUP, Way};
+use super::{FRAMES, Film, block};
+use crate::flock::plan::landings::Way;
 
-/// Places for a frame's ranks, and for its wins.
-pub(super) type Frame<'a, const LANES: usize> = (&'a mut [[u16; LANES]], &'a mut [[u8; LANES]]);
+/// Places for what led where in a block.
+#[derive(Default)]
+pub(super) struct Steps<'a> {
+    /// By the landings' order, which of a station's jumps is the cheapest after each frame.
+    pub(super) ranks: &'a mut [[u16; FRAMES]],
+    /// By station, in bits, the frames at which who landed `dwell - 1` frames ago is cheaper than who
+    /// may jump already.
+    pub(super) wins: &'a mut [u8],
+}
 
-/// What led where, for some frames in a row.
-pub(super) struct Trace<'a, const LANES: usize> {
+/// What led where, for some blocks in a row.
+pub(super) struct Trace<'a> {
     shelf: &'a Shelf,
-    /// The age of the first frame kept.
-    first: usize,
-    /// Frames kept, and how many there is room for; past those the last is overwritten.
-    n_frames: usize,
-    room: usize,
+    /// The clock at which the first block kept begins, and where the next will.
+    clocks: std::ops::Range<usize>,
+    width: usize,
     n_landings: usize,
-    n_states: usize,
-    /// By frame and the landings' order, which of a state's jumps; and by frame and state, whether
-    /// landing was cheaper than continuing.
+    n_stations: usize,
+    /// By block, as in `Steps`.
     sheets: Sheets,
 }
 
-impl<'a, const LANES: usize> Trace<'a, LANES> {
-    /// With room for so many frames, at least one.
-    pub(super) fn new(film: &Film<'a>, way: Way, room: usize) -> Trace<'a, LANES> {
-        let n_landings = film.trellis.landings(way).n_groups() * GROUP;
-        let n_states = film.trellis.n_states();
-        let room = room.max(1);
-        let (n_ranks, n_wins) = (room * n_landings * LANES, room * n_states * LANES);
-        let (first, n_frames, shelf) = (0, 0, film.shelf);
-        let sheets = shelf.take(n_ranks, n_wins);
+impl<'a> Trace<'a> {
+    /// With room for so many blocks.
+    pub(super) fn new(film: &Film<'a>, way: Way, n_blocks: usize) -> Trace<'a> {
+        let n_landings = film.trellis.landings(way).n_landings();
+        let (n_stations, shelf) = (film.trellis.n_states(), film.shelf);
+        let sheets = shelf.take(n_blocks * n_landings * FRAMES, n_blocks * n_stations);
         Trace {
             shelf,
-            first,
-            n_frames,
-            room,
+            clocks: 0..0,
+            width: block::width(film.dwell),
             n_landings,
-            n_states,
+            n_stations,
             sheets,
         }
     }
 
-    /// Bytes that a frame takes.
-    pub(super) fn frame_bytes(film: &Film<'_>, way: Way) -> usize {
-        LANES * (2 * film.trellis.landings(way).n_groups() * GROUP + film.trellis.n_states())
+    /// Bytes that a block takes.
+    pub(super) fn block_bytes(film: &Film<'_>, way: Way) -> usize {
+        2 * FRAMES * film.trellis.landings(way).n_landings() + film.trellis.n_states()
     }
 
-    /// Forgets all, to begin at the frame of age `first`.
-    pub(super) fn restart(&mut self, first: usize) {
-        (self.first, self.n_frames) = (first, 0);
+    /// Forgets all, to begin at `clock`.
+    pub(super) fn restart(&mut self, clock: usize) {
+        self.clocks = clock..clock;
     }
 
-    /// The next frame: the places for its ranks and its wins, all to be written.
+    /// The places of the next block, all to be written.
     #[inline(always)]
-    pub(super) fn next_frame(&mut self) -> Frame<'_, LANES> {
-        self.n_frames = (self.n_frames + 1).min(self.room);
-        let frame = self.n_frames - 1;
+    pub(super) fn next_block(&mut self) -> Steps<'_> {
+        let block = self.clocks.len() / self.width;
+        self.clocks.end += self.width;
         let (ranks, _) = self.sheets.ranks.as_chunks_mut();
-        let (wins, _) = self.sheets.wins.as_chunks_mut();
-        (
-            &mut ranks[frame * self.n_landings..][..self.n_landings],
-            &mut wins[frame * self.n_states..][..self.n_states],
-        )
+        Steps {
+            ranks: &mut ranks[block * self.n_landings..][..self.n_landings],
+            wins: &mut self.sheets.wins[block * self.n_stations..][..self.n_stations],
+        }
     }
 
-    /// Which of its jumps led to a state, if one did.
-    fn landing(&self, age: usize, state: usize, order: usize, lane: usize) -> Option<usize> {
-        let frame = age - self.first;
-        let won = self.sheets.wins[(frame * self.n_states + state) * LANES + lane] != 0;
-        let rank = (frame * self.n_landings + order) * LANES + lane;
-        won.then(|| usize::from(self.sheets.ranks[rank]))
+    /// The block and the lane of a clock.
+    fn place(&self, clock: usize) -> (usize, usize) {
+        let age = clock - self.clocks.start;
+        (age / self.width, age % self.width)
+    }
+
+    /// Whether who landed `dwell - 1` frames before `clock` won.
+    fn has_landed(&self, clock: usize, station: usize) -> bool {
+        let (block, lane) = self.place(clock);
+        self.sheets.wins[block * self.n_stations + station] >> lane & 1 != 0
+    }
+
+    /// Which jump to the station at `order` was the cheapest after `clock`.
+    fn rank(&self, clock: usize, order: usize) -> usize {
+        let (block, lane) = self.place(clock);
+        let place = (block * self.n_landings + order) * FRAMES + lane;
+        usize::from(self.sheets.ranks[place])
     }
 }
 
-impl<const LANES: usize> Drop for Trace<'_, LANES> {
+impl Drop for Trace<'_> {
     fn drop(&mut self) {
         self.shelf.give_back(std::mem::take(&mut self.sheets));
     }
@@ -85,52 +96,69 @@ impl<const LANES: usize> Drop for Trace<'_, LANES> {
 pub(super) struct Walk {
     /// The states gone through, by age.
     states: Vec<u32>,
-    age: usize,
-    state: usize,
-    /// Frames, this one counted, in which nothing landed.
-    held: usize,
+    /// The clock of the first of them.
+    opening: usize,
+    /// Frames whose states are not known yet.
+    n_left: usize,
+    at: At,
+}
+
+/// Where a walk stands at the last frame whose state is not known yet.
+#[derive(Clone, Copy)]
+enum At {
+    /// At a station, free to jump.
+    Free(usize),
+    /// At a station that was landed on so many frames before.
+    Landed(usize, usize),
+    /// Where the cheapest jump to the station at this order comes from.
+    Origin(usize),
 }
 
 impl Walk {
-    /// From a path's last state, before which nothing landed for `held` frames.
-    pub(super) fn new(n_frames: usize, state: usize, held: usize) -> Walk {
+    /// From a path's end.
+    pub(super) fn new(film: &Film<'_>, n_frames: usize, end: Stand) -> Walk {
         Walk {
             states: vec![0; n_frames],
-            age: n_frames - 1,
-            state,
-            held,
+            opening: n_frames.next_multiple_of(block::width(film.dwell)) - n_frames,
+            n_left: n_frames,
+            at: match end.ago + 1 == film.dwell {
+                true => At::Free(end.station),
+                false => At::Landed(end.station, end.ago),
+            },
         }
     }
 
-    /// Goes back to the age before `start`, or to the first frame.
-    pub(super) fn back_to<const LANES: usize>(
-        &mut self,
-        start: usize,
-        film: &Film<'_>,
-        way: Way,
-        trace: &Trace<'_, LANES>,
-        lane: usize,
-    ) {
+    /// Goes back through all that is traced.
+    pub(super) fn back(&mut self, film: &Film<'_>, way: Way, trace: &Trace<'_>) {
         let landings = film.trellis.landings(way);
-        while self.age >= start {
-            self.states[self.age] = self.state as u32;
-            let order = landings.order(self.state);
-            let landing = match self.held {
-                0 => trace.landing(self.age, self.state, order, lane),
-                _ => None,
+        while self.n_left > 0 && self.opening + self.n_left > trace.clocks.start {
+            let age = self.n_left - 1;
+            let clock = self.opening + age;
+            if let At::Origin(order) = self.at {
+                self.at = At::Free(landings.origin(order, trace.rank(clock, order)));
+            }
+            if let At::Free(station) = self.at
+                && age > 0
+                && trace.has_landed(clock, station)
+            {
+                self.at = At::Landed(station, film.dwell - 1);
+            }
+            let (station, before) = match self.at {
+                At::Landed(station, 0) => (station, At::Origin(landings.order(station))),
+                At::Landed(station, ago) => (station, At::Landed(station.wrapping_sub(1), ago - 1)),
+                At::Free(station) | At::Origin(station) => {
+                    (station, At::Free(station.wrapping_sub(1)))
+                }
             };
-            (self.state, self.held) = match (landing, way) {
-                (Some(rank), _) => (landings.source(order, rank), film.dwell - 1),
-                (None, Way::Ahead) => (self.state - 1, self.held.saturating_sub(1)),
-                (None, Way::Back) => (self.state + 1, self.held.saturating_sub(1)),
-            };
-            self.age -= 1;
+            self.states[age] = way.station(film.trellis.n_states(), station) as u32;
+            self.at = before;
+            self.n_left = age;
         }
     }
 
-    /// The states by age, all of which have been gone back through but the first.
-    pub(super) fn finish(mut self) -> Vec<u32> {
-        self.states[self.age] = self.state as u32;
+    /// The states by age, all of which have been gone back through.
+    pub(super) fn finish(self) -> Vec<u32> {
+        debug_assert_eq!(self.n_left, 0);
         self.states
     }
 }
