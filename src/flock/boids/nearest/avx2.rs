@@ -65,28 +65,25 @@ fn gather_avx2(grid: &Grid, (slot, radius_bl): (usize, f64), near: &mut Near) {
     for (from, to) in grid.rows(place, radius_bl) {
         near.make_room(to - from);
         let end = _mm256_set1_epi64x(to as i64);
-        let (xs, _) = grid.along(0)[from..to + BLOCK].as_chunks::<BLOCK>();
-        let (ys, _) = grid.along(1)[from..to + BLOCK].as_chunks::<BLOCK>();
-        let (zs, _) = grid.along(2)[from..to + BLOCK].as_chunks::<BLOCK>();
-        let mut at = from;
+        let blocks = from..from + (to - from).next_multiple_of(BLOCK);
+        let (xs, _) = grid.along(0)[blocks.clone()].as_chunks::<BLOCK>();
+        let (ys, _) = grid.along(1)[blocks.clone()].as_chunks::<BLOCK>();
+        let (zs, _) = grid.along(2)[blocks].as_chunks::<BLOCK>();
+        let mut slots = _mm256_add_epi64(_mm256_set1_epi64x(from as i64), lanes);
         for ((xs, ys), zs) in xs.iter().zip(ys).zip(zs) {
-            if at >= to {
-                break;
-            }
             let mut squares = _mm256_add_pd(square(xs, x), square(ys, y));
             if !is_flat {
                 squares = _mm256_add_pd(squares, square(zs, z));
             }
-            let slots = _mm256_add_epi64(_mm256_set1_epi64x(at as i64), lanes);
             let is_other = _mm256_andnot_si256(
                 _mm256_cmpeq_epi64(slots, own),
                 _mm256_cmpgt_epi64(end, slots),
             );
             let is_near = _mm256_cmp_pd::<_CMP_LT_OQ>(squares, most_bl2);
             let is_near = _mm256_and_pd(is_near, _mm256_castsi256_pd(is_other));
-            // SAFETY: there was room for the row and a block more, and at most `at - from` of it are kept.
+            // SAFETY: there was room for the row and a block more, and no more is kept than of the row before these.
             unsafe { keep(near, _mm256_movemask_pd(is_near) as usize, (squares, slots)) };
-            at += BLOCK;
+            slots = _mm256_add_epi64(slots, _mm256_set1_epi64x(BLOCK as i64));
         }
     }
 }
