@@ -2,6 +2,9 @@
 //! and velocities laid out in cell order (ALGORITHMS.md 7), so that a row of cells is one run of memory.
 //! `nearest` searches it.
 
+use rayon::prelude::*;
+
+use super::CHUNK;
 use super::vector::Vec3;
 
 /// Cells to the reach of the farthest rule, where there are boids enough to fill them.
@@ -29,8 +32,9 @@ pub struct Grid {
     axes: [Vec<f64>; 3],
 }
 
-/// A boid where its cell is.
+/// A boid where its cell is, all in one line of the cache.
 #[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
 pub struct Boid {
     /// Body lengths.
     pub position: Vec3,
@@ -86,16 +90,18 @@ impl Grid {
         }
         self.boids.resize(positions.len(), Boid::default());
         let [x, y, z] = &mut self.axes;
-        let axes = x.iter_mut().zip(y).zip(z);
-        for ((((x, y), z), boid), &id) in axes.zip(&mut self.boids).zip(&self.ids) {
-            let (position, velocity) = (positions[id as usize], velocities[id as usize]);
-            [*x, *y, *z] = position;
-            *boid = Boid {
-                position,
-                velocity,
-                id,
-            };
-        }
+        (&mut self.boids, &self.ids, x, y, z)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .for_each(|(boid, &id, x, y, z)| {
+                let (position, velocity) = (positions[id as usize], velocities[id as usize]);
+                [*x, *y, *z] = position;
+                *boid = Boid {
+                    position,
+                    velocity,
+                    id,
+                };
+            });
     }
 
     /// The boids in the order of their cells: who follows whom here is near it.
@@ -195,7 +201,7 @@ impl Grid {
         let mut cell = [0; 3];
         for axis in 0..3 {
             let at = (position[axis] - self.least[axis]) * self.cells_per_bl[axis];
-            cell[axis] = (at.max(0.0) as usize).min(self.n_cells[axis] - 1);
+            cell[axis] = (at.max(0.0) as u32 as usize).min(self.n_cells[axis] - 1);
         }
         cell
     }

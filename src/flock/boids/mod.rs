@@ -191,4 +191,6 @@ impl<'a> Boids<'a> {
 }
 
 #[cfg(test)]
+mod bits;
+#[cfg(test)]
 mod tests;

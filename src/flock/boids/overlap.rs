@@ -19,9 +19,14 @@ impl Boids<'_> {
     /// One relaxation: each pair that overlaps moves apart by half of what is missing. Nobody has moved farther
     /// than `farthest_bl` since the cells were filled.
     pub(super) fn push_apart(&self, room: &mut Room, farthest_bl: f64) {
+        // Who was farther off from all than two come nearer in a step overlaps with nobody.
+        let most_bl = (self.overlap_bl + 2.0 * farthest_bl) * (1.0 + 1e-9);
         let moved: Vec<(usize, Vec3, Vec3)> = (0..room.next.len())
             .into_par_iter()
             .fold_chunks(CHUNK, Vec::new, |mut moved, slot| {
+                if room.next[slot].nearest_bl2 > most_bl * most_bl {
+                    return moved;
+                }
                 let near = self.too_near(slot, room, farthest_bl);
                 if !near.is_empty() {
                     let id = room.grid.by_cell()[slot];
@@ -71,5 +76,38 @@ impl Boids<'_> {
         self.habitat.keep_out(&mut position, &mut velocity);
         let along = next.velocity;
         (position, self.within_limits(velocity, position, along))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::Params;
+    use crate::flock::boids::calibration::Calibration;
+    use crate::flock::boids::tank::Tank;
+    use crate::flock::boids::vector::norm;
+    use crate::flock::lens::Lens;
+
+    #[test]
+    fn two_that_only_meet_in_the_step_are_pushed_apart() {
+        let params = Params {
+            count: 2,
+            leaders: false,
+            ..Params::default()
+        };
+        let calibration = Calibration {
+            cruise_bl_per_s: 1.5,
+            speed_limits_bl_per_s: [1.5, 1.5],
+            turn_rad_per_s: 0.5,
+            wander_rad_per_s: 0.0,
+            slopes: None,
+        };
+        let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
+        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        boids.positions = vec![[5.0, 4.0, 0.0], [5.59, 4.0, 0.0]];
+        boids.velocities = vec![[1.5, 0.0, 0.0], [-1.5, 0.0, 0.0]];
+        boids.advance();
+        let apart_bl = norm(minus(boids.positions[1], boids.positions[0]));
+        assert!((apart_bl - boids.overlap_bl).abs() < 1e-9, "{apart_bl}");
     }
 }

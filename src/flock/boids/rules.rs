@@ -65,15 +65,15 @@ pub struct Steering<'a> {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     /// Who it sees.
-    n: u32,
+    n: f64,
     /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
     apart: Vec3,
     /// sum v_j over those nearer than r_a, and how many they are.
     along: Vec3,
-    n_along: u32,
+    n_along: f64,
     /// sum p_j - p_i over those nearer than r_c, and how many they are.
     toward: Vec3,
-    n_toward: u32,
+    n_toward: f64,
     /// sum of how fast they go across the picture.
     across: f64,
 }
@@ -180,13 +180,10 @@ impl Steering<'_> {
     /// mean v_j - v_i, in cruising speeds.
     #[inline(always)]
     fn alignment(&self, seen: &Seen, moment: &Moment) -> Vec3 {
-        if seen.n_along == 0 {
+        if seen.n_along == 0.0 {
             return [0.0; 3];
         }
-        let gap = minus(
-            scaled(1.0 / f64::from(seen.n_along), seen.along),
-            moment.velocity,
-        );
+        let gap = minus(scaled(1.0 / seen.n_along, seen.along), moment.velocity);
         scaled(1.0 / self.calibration.cruise_bl_per_s, gap)
     }
 
@@ -232,7 +229,7 @@ impl Steering<'_> {
             return [0.0; 3];
         }
         let cruise = self.calibration.cruise_bl_per_s;
-        let follow = 2.0 * self.params.rules.alignment.min(1.0) / f64::from(seen.n.max(1));
+        let follow = 2.0 * self.params.rules.alignment.min(1.0) / seen.n.max(1.0);
         let side = ((moment.velocity[0] + follow * seen.across) / cruise).clamp(-1.0, 1.0);
         // Not onto a wall: its push leads back.
         let across = [cruise.copysign(side), 0.0, 0.0];
@@ -278,17 +275,15 @@ impl Seen {
         let mut seen = Seen::default();
         for neighbor in neighbors {
             // Nothing is added instead of nothing being done: who is seen is not to be guessed.
-            let sees = is_seen(neighbor, ahead, cos_half_view);
-            let along = sees & (neighbor.square_bl2 < along_bl2);
-            let toward = sees & (neighbor.square_bl2 < toward_bl2);
-            seen.n += u32::from(sees);
-            seen.n_along += u32::from(along);
-            seen.n_toward += u32::from(toward);
-            seen.across += only_if(sees, neighbor.velocity[0]);
-            for axis in 0..3 {
-                seen.along[axis] += only_if(along, neighbor.velocity[axis]);
-                seen.toward[axis] += only_if(toward, neighbor.offset[axis]);
-            }
+            let sees = one_if(is_seen(neighbor, ahead, cos_half_view));
+            let along = sees * one_if(neighbor.square_bl2 < along_bl2);
+            let toward = sees * one_if(neighbor.square_bl2 < toward_bl2);
+            seen.n += sees;
+            seen.n_along += along;
+            seen.n_toward += toward;
+            seen.across += sees * neighbor.velocity[0];
+            seen.along = add_scaled(seen.along, along, neighbor.velocity);
+            seen.toward = add_scaled(seen.toward, toward, neighbor.offset);
         }
         let near = neighbors.iter().take_while(|n| n.square_bl2 < apart_bl2);
         for neighbor in near.filter(|n| is_seen(n, ahead, cos_half_view)) {
@@ -302,19 +297,16 @@ impl Seen {
     /// mean p_j - p_i over those nearer than r_c, in r_c.
     #[inline(always)]
     fn cohesion(&self, rules: &Rules) -> Vec3 {
-        if self.n_toward == 0 {
+        if self.n_toward == 0.0 {
             return self.toward;
         }
-        scaled(
-            1.0 / (f64::from(self.n_toward) * rules.cohesion_bl),
-            self.toward,
-        )
+        scaled(1.0 / (self.n_toward * rules.cohesion_bl), self.toward)
     }
 }
 
 #[inline(always)]
-fn only_if(is: bool, number: f64) -> f64 {
-    f64::from_bits(number.to_bits() & u64::from(is).wrapping_neg())
+fn one_if(is: bool) -> f64 {
+    if is { 1.0 } else { 0.0 }
 }
 
 #[inline(always)]

@@ -41,6 +41,8 @@ pub(super) struct Next {
     pub(super) position: Vec3,
     pub(super) velocity: Vec3,
     inner: Inner,
+    /// How far off the nearest other was before the step, squared; the reach when there was none.
+    pub(super) nearest_bl2: f64,
 }
 
 /// What is the same for all in one step.
@@ -191,8 +193,8 @@ impl Boids<'_> {
         let id = id as usize;
         let limit = self.params.rules.neighbors as usize;
         let guess_bl = FARTHER * before.sight_bl;
-        let neighbors = search.nearest(grid, slot, (limit, pace.reach_bl), guess_bl);
-        let last = neighbors.get(limit - 1);
+        let neighbors = search.nearest((grid, slot), (limit, pace.reach_bl), guess_bl, pace.cpu);
+        let (nearest, last) = (neighbors.first(), neighbors.get(limit - 1));
         let inner = Inner {
             wander: self.next_wander((id, before), pace),
             leads_for_s: self.next_lead((id, before), velocity, neighbors),
@@ -221,6 +223,7 @@ impl Boids<'_> {
             position: add_scaled(position, self.step_s, velocity),
             velocity,
             inner,
+            nearest_bl2: nearest.map_or(pace.reach_bl * pace.reach_bl, |near| near.square_bl2),
         };
         self.habitat
             .keep_out(&mut next.position, &mut next.velocity);
