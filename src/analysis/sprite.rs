@@ -149,9 +149,8 @@ fn draw(
     let size = [width, height];
     let room = Room { size, nearer: None };
     placed.draw(&matte, &place, room, Level::detect());
-    let rows = placed.pixels.chunks_exact(placed.rect.w.max(1) as usize);
-    for (row, y) in rows.zip(placed.rect.y as usize..) {
-        let at = (y * width as usize + placed.rect.x as usize) * 4;
+    for ([x, y], row) in placed.shown() {
+        let at = (y * width + x) as usize * 4;
         let out = &mut sprite[at..at + row.len() * 4];
         for (out, &pixel) in out.chunks_exact_mut(4).zip(row) {
             out.copy_from_slice(&visible(straight(pixel)));

@@ -3,7 +3,6 @@
 
 use super::resample::{Quad, Resampled, scaled};
 use crate::cpu::Level;
-use crate::geometry::Rect;
 
 /// `weight` of `second` (0..=1) and the rest of `main`, in `main`: its box grows to hold both. `memory` is
 /// lent; this machine must have the instructions of `cpu`.
@@ -11,17 +10,31 @@ pub fn mix(
     main: &mut Resampled,
     second: &Resampled,
     weight: f64,
-    memory: &mut Vec<Quad>,
+    memory: &mut Resampled,
     cpu: Level,
 ) {
-    let rect = main.rect.union(&second.rect);
-    memory.clear();
-    memory.resize(rect.area() as usize, [0; 4]);
+    memory.rect = main.rect.union(&second.rect);
+    memory.pixels.clear();
+    memory.pixels.resize(memory.rect.area() as usize, [0; 4]);
     let share = (weight * 32767.0).round() as i16;
-    add(memory, rect, (main, 32767 - share), cpu);
-    add(memory, rect, (second, share), cpu);
-    main.rect = rect;
-    std::mem::swap(&mut main.pixels, memory);
+    add(memory, (main, 32767 - share), cpu);
+    add(memory, (second, share), cpu);
+    memory.runs.clear();
+    memory.runs.extend(main.runs.iter().chain(&second.runs));
+    join_rows(&mut memory.runs);
+    std::mem::swap(main, memory);
+}
+
+/// Makes one run of all those in the same row.
+fn join_rows(runs: &mut Vec<[u32; 3]>) {
+    runs.sort_unstable();
+    runs.dedup_by(|next, run| {
+        let is_same = next[0] == run[0];
+        if is_same {
+            run[2] = run[2].max(next[2]);
+        }
+        is_same
+    });
 }
 
 /// Lets only `share` of a layer's color through (0..=1) and puts another, of alpha 1, in the place of the
@@ -39,14 +52,11 @@ pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
     }
 }
 
-fn add(pixels: &mut [Quad], rect: Rect, (layer, weight): (&Resampled, i16), cpu: Level) {
-    if layer.rect.is_empty() {
-        return;
-    }
-    let rows = layer.pixels.chunks_exact(layer.rect.w as usize);
-    for (row, y) in rows.zip(layer.rect.y..) {
-        let at = (y - rect.y) as usize * rect.w as usize + (layer.rect.x - rect.x) as usize;
-        let out = &mut pixels[at..at + row.len()];
+fn add(sum: &mut Resampled, (layer, weight): (&Resampled, i16), cpu: Level) {
+    let rect = sum.rect;
+    for ([x, y], row) in layer.shown() {
+        let first = ((y - rect.y) * rect.w + x - rect.x) as usize;
+        let out = &mut sum.pixels[first..first + row.len()];
         match cpu {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
@@ -78,12 +88,16 @@ fn add_row(out: &mut [Quad], row: &[Quad], weight: i16) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Rect;
 
     fn layer(rect: Rect, pixel: Quad) -> Resampled {
-        Resampled {
+        let mut layer = Resampled {
             rect,
             pixels: vec![pixel; rect.area() as usize],
-        }
+            runs: Vec::new(),
+        };
+        layer.show_whole();
+        layer
     }
 
     #[test]
@@ -96,7 +110,13 @@ mod tests {
         };
         let mut main = layer(rect, [6400, 3201, 1603, 8192]);
         let before = main.clone();
-        mix(&mut main, &before, 0.25, &mut Vec::new(), Level::detect());
+        mix(
+            &mut main,
+            &before,
+            0.25,
+            &mut Resampled::default(),
+            Level::detect(),
+        );
         assert_eq!(main.rect, before.rect);
         for (a, b) in main
             .pixels
@@ -135,7 +155,13 @@ mod tests {
         };
         let mut main = layer(at(0), [8000, 0, 0, 16384]);
         let second = layer(at(2), [0, 8000, 0, 16384]);
-        mix(&mut main, &second, 0.25, &mut Vec::new(), Level::Scalar);
+        mix(
+            &mut main,
+            &second,
+            0.25,
+            &mut Resampled::default(),
+            Level::Scalar,
+        );
         assert_eq!(
             main.pixels,
             [[6000, 0, 0, 12288], [0; 4], [0, 2000, 0, 4096]]
@@ -159,7 +185,13 @@ mod tests {
         };
         let mixed = |weight, cpu| {
             let mut main = drawn(3, 1);
-            mix(&mut main, &drawn(9, 2), weight, &mut Vec::new(), cpu);
+            mix(
+                &mut main,
+                &drawn(9, 2),
+                weight,
+                &mut Resampled::default(),
+                cpu,
+            );
             (main.rect, main.pixels)
         };
         for (cpu, weight) in Level::available()

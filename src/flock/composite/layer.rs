@@ -10,8 +10,8 @@ use super::view::View;
 use crate::cpu::Level;
 use crate::flock::individual::{Fade, Individual};
 use crate::library::Sprites;
-use crate::raster::Canvas;
 use crate::raster::blend::{haze, mix};
+use crate::raster::canvas::Cover;
 use crate::raster::resample::{Placement, Quad, Resampled, Room};
 
 /// What drawing needs besides the individual.
@@ -49,13 +49,13 @@ pub(super) struct Painter {
     /// What was drawn last.
     pub(super) layer: Resampled,
     second: Resampled,
-    mixed: Vec<Quad>,
+    mixed: Resampled,
 }
 
 impl Painter {
     /// Draws an individual's layer for a picture of the film.
     /// What is hidden by what is `nearer` may be left out.
-    pub(super) fn paint(&mut self, stage: &Stage, who: &Appearance, nearer: Option<&Canvas>) {
+    pub(super) fn paint(&mut self, stage: &Stage, who: &Appearance, nearer: Option<&Cover>) {
         let is_bent = who.fade.is_some() && stage.cut == Cut::Morph;
         let room = Room {
             size: stage.view.size_px,
@@ -81,13 +81,12 @@ impl Painter {
     /// What was painted last, as the ground truth needs it; the layer is used up.
     pub(super) fn drawn(&mut self, stage: &Stage, who: &Appearance) -> Drawn {
         let place = placement(stage, who);
-        let alpha = self.layer.pixels.iter().map(|pixel| pixel[3] as u16);
         let mut drawn = Drawn {
             id: who.individual.id,
             centroid_px: place.center_px,
             scale: place.scale,
             rect: self.layer.rect,
-            alpha: alpha.collect(),
+            alpha: self.layer.alpha(),
             whole: None,
         };
         if self.is_clipped(stage) {
@@ -113,8 +112,7 @@ impl Painter {
             .map(|px| i64::from(room) - px.floor() as i64);
         let room = Room { size, nearer: None };
         self.paint_shifted(stage, who, room, shift.map(|px| px as f64));
-        let alpha: Vec<u16> = self.layer.pixels.iter().map(|p| p[3] as u16).collect();
-        Whole::of(&alpha, self.layer.rect, shift)
+        Whole::of(&self.layer.alpha(), self.layer.rect, shift)
     }
 
     /// A box that ends inside of the picture on every side has not been clipped.

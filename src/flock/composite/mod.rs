@@ -3,7 +3,7 @@
 //!
 //! Sprites are drawn near to far, each under those before it, premultiplied, by Catmull-Rom interpolation:
 //! what is hidden costs nothing, and whole pixels without rotation come out as they are. A frame starts
-//! from the background already in the encoder's form; what is drawn is converted box by box, so the cost
+//! from the background already in the encoder's form; what is drawn is converted tile by tile, so the cost
 //! follows the area seen. The ground truth comes from the same layers.
 
 mod backdrop; // what lies behind
@@ -32,7 +32,7 @@ use super::individual::{Fade, Individual};
 use super::{Flock, Library};
 use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::canvas::opaque;
+use crate::raster::canvas::{Cover, opaque};
 use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock, any of them from any thread.
@@ -79,9 +79,10 @@ pub struct Shot {
 struct Desk {
     /// Everyone drawn so far, the nearest first, on nothing.
     canvas: Canvas,
-    /// The same before what lies behind.
-    shown: Canvas,
-    dirty: Vec<Rect>,
+    /// What of the canvas has been drawn on.
+    cover: Cover,
+    /// The boxes of everyone, where color is to go beyond edges.
+    boxes: Vec<Rect>,
     painter: Painter,
     drawn: Vec<Drawn>,
 }
@@ -163,15 +164,15 @@ impl<'a> Compositor<'a> {
     /// Draws one frame.
     pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
         let mut desk = self.take_desk();
-        self.clean(&mut desk, shot);
         desk.drawn.clear();
         let order = self.near_to_far(frame_idx);
-        for individual in &order {
-            self.draw(self.appearance(individual, frame_idx), &mut desk);
+        for who in &order {
+            self.draw(who, &mut desk);
         }
         if let Some(floor) = &self.floor {
-            for individual in &order {
-                self.shade(floor, self.appearance(individual, frame_idx), &mut desk);
+            for who in &order {
+                desk.painter.shade(floor, &self.stage(), who);
+                desk.put(self.cpu);
             }
         }
         if self.with_truth {
@@ -184,39 +185,30 @@ impl<'a> Compositor<'a> {
             .push(desk);
     }
 
-    /// Wipes what was drawn before off a desk, and lays out what lies behind the shot.
-    fn clean(&self, desk: &mut Desk, shot: &Shot) {
-        for rect in std::mem::take(&mut desk.dirty) {
-            desk.canvas.clear_box(rect);
-            desk.shown.copy_box(&self.backdrop.canvas, rect);
-        }
-        if !shot.behind.planes.is_empty() {
-            desk.shown = backdrop::filling(&shot.behind.to_rgb(), self.view.size_px);
-            desk.dirty.push(self.view.whole());
-        }
-    }
-
-    /// Turns what is on the desk into the form asked for.
+    /// Turns what is on the desk into the form asked for, and wipes it off.
     fn develop(&self, desk: &mut Desk, shot: &mut Shot) {
-        merge_overlapping(&mut desk.dirty);
         self.backdrop.begin(shot);
-        let is_plain = shot.behind.planes.is_empty();
-        for &rect in &desk.dirty {
-            if is_plain {
-                // Boxes may still overlap: what one has covered the next begins anew.
-                desk.shown.copy_box(&self.backdrop.canvas, rect);
-            }
-            desk.shown.over(&desk.canvas, rect, self.cpu);
+        let own = (!shot.behind.planes.is_empty())
+            .then(|| backdrop::filling(&shot.behind.to_rgb(), self.view.size_px));
+        if own.is_some() {
+            desk.cover.touch_all();
+        }
+        let behind = own.as_ref().unwrap_or(&self.backdrop.canvas);
+        for rect in desk.cover.take() {
+            desk.canvas.under_box(behind, rect, self.cpu);
             match self.form {
-                Form::Planar(_) => shot.frame.draw_canvas(&desk.shown, rect, self.cpu),
-                Form::Straight => desk.shown.straight_into(rect, &mut shot.rgba),
+                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect, self.cpu),
+                Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
             }
+            desk.canvas.clear_box(rect);
         }
         if self.form == Form::Straight && self.backdrop.is_clear {
-            for &rect in &desk.dirty {
+            merge_overlapping(&mut desk.boxes);
+            for &rect in &desk.boxes {
                 bleed(&mut shot.rgba, self.view.size_px, rect);
             }
         }
+        desk.boxes.clear();
     }
 
     /// Draws every frame in order on all threads and gives each to `sink`. Before a frame is drawn
@@ -264,31 +256,28 @@ impl<'a> Compositor<'a> {
             .pop();
         spare.unwrap_or_else(|| Desk {
             canvas: Canvas::new(self.view.size_px[0], self.view.size_px[1]),
-            shown: self.backdrop.canvas.clone(),
-            dirty: Vec::new(),
+            cover: Cover::none(self.view.size_px),
+            boxes: Vec::new(),
             painter: Painter::default(),
             drawn: Vec::new(),
         })
     }
 
     /// Ties by id: the greater one is nearer.
-    fn near_to_far(&self, frame_idx: usize) -> Vec<&'a Individual> {
+    fn near_to_far(&self, frame_idx: usize) -> Vec<Appearance<'a>> {
         let depth = |individual: &&Individual| match &individual.depth_m {
             Some(depth_m) => depth_m[frame_idx],
             None => individual.boid.position_px[frame_idx][2],
         };
         let mut order: Vec<&'a Individual> = self.flock.individuals.iter().collect();
         order.sort_by(|a, b| depth(a).total_cmp(&depth(b)).then(b.id.cmp(&a.id)));
-        order
-    }
-
-    fn appearance(&self, individual: &'a Individual, frame_idx: usize) -> Appearance<'a> {
-        let fade = self.fade_at[individual.id as usize][frame_idx];
-        Appearance {
+        let appearance = |individual: &'a Individual| Appearance {
             individual,
             frame_idx,
-            fade: fade.map(|idx| &individual.fades[idx as usize]),
-        }
+            fade: self.fade_at[individual.id as usize][frame_idx]
+                .map(|idx| &individual.fades[idx as usize]),
+        };
+        order.into_iter().map(appearance).collect()
     }
 
     fn stage(&self) -> Stage<'_> {
@@ -302,20 +291,15 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    fn draw(&self, who: Appearance, desk: &mut Desk) {
+    fn draw(&self, who: &Appearance, desk: &mut Desk) {
         // The truth asks for everyone whole.
-        let nearer = (!self.with_truth).then_some(&desk.canvas);
-        desk.painter.paint(&self.stage(), &who, nearer);
+        let nearer = (!self.with_truth).then_some(&desk.cover);
+        desk.painter.paint(&self.stage(), who, nearer);
         desk.put(self.cpu);
         if self.with_truth {
-            let drawn = desk.painter.drawn(&self.stage(), &who);
+            let drawn = desk.painter.drawn(&self.stage(), who);
             desk.drawn.push(drawn);
         }
-    }
-
-    fn shade(&self, floor: &Floor, who: Appearance, desk: &mut Desk) {
-        desk.painter.shade(floor, &self.stage(), &who);
-        desk.put(self.cpu);
     }
 }
 
@@ -324,8 +308,9 @@ impl Desk {
     fn put(&mut self, cpu: Level) {
         let layer = &self.painter.layer;
         self.canvas.under(layer, cpu);
+        self.cover.add(layer, &self.canvas);
         if !layer.rect.is_empty() {
-            self.dirty.push(layer.rect);
+            self.boxes.push(layer.rect);
         }
     }
 }
@@ -345,7 +330,7 @@ fn mark(fade_at: &mut [Option<u32>], fade: &Fade, idx: u32) {
     }
 }
 
-/// Boxes that overlap by much become one, so that few pixels are converted twice.
+/// Boxes that overlap by much become one, so that few pixels are gone over twice.
 fn merge_overlapping(rects: &mut Vec<Rect>) {
     let mut at = 0;
     while at < rects.len() {

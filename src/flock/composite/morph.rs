@@ -35,15 +35,17 @@ pub(super) fn bend(main: &mut Resampled, second: &mut Resampled, weight: f64) {
     // What is shown at x was at x less its share of the way.
     main.pixels = forth_sure.bent(&a, rect, weight as f32);
     second.pixels = back_sure.bent(&b, rect, 1.0 - weight as f32);
-    (main.rect, second.rect) = (rect, rect);
+    for layer in [main, second] {
+        layer.rect = rect;
+        layer.show_whole();
+    }
 }
 
 /// A layer's pixels in a larger box.
 fn grown(layer: &Resampled, rect: Rect) -> Vec<Quad> {
     let mut pixels = vec![[0; 4]; rect.area() as usize];
-    let rows = layer.pixels.chunks_exact(layer.rect.w as usize);
-    for (row, y) in rows.zip(layer.rect.y..) {
-        let at = ((y - rect.y) * rect.w + layer.rect.x - rect.x) as usize;
+    for ([x, y], row) in layer.shown() {
+        let at = ((y - rect.y) * rect.w + x - rect.x) as usize;
         pixels[at..at + row.len()].copy_from_slice(row);
     }
     pixels
@@ -218,7 +220,13 @@ mod tests {
                 [color, color / 2, alpha - color, alpha]
             })
             .collect();
-        Resampled { rect, pixels }
+        let mut disc = Resampled {
+            rect,
+            pixels,
+            runs: Vec::new(),
+        };
+        disc.show_whole();
+        disc
     }
 
     fn difference(a: &Resampled, b: &Resampled) -> f64 {

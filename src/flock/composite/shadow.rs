@@ -82,6 +82,7 @@ fn ellipse(
     let [right, bottom] = center.map(|px| (px + reach).ceil() as i64);
     layer.rect = Rect::clipped(left, top, right, bottom, width, height);
     let (cos, sin) = (libm::cos(turn_rad), libm::sin(turn_rad));
+    layer.show_whole();
     layer.pixels.clear();
     for y in layer.rect.y..layer.rect.bottom() {
         for x in layer.rect.x..layer.rect.right() {

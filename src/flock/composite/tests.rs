@@ -55,6 +55,24 @@ fn the_error_of_whoever_takes_the_frames_comes_back() {
 }
 
 #[test]
+fn without_what_is_hidden_the_film_is_the_same() {
+    for (view, haze_per_bl, size_px) in
+        [(View::Side, 0.0, None), (View::Top, 0.2, Some([900, 700]))]
+    {
+        let library = synthetic::library(view);
+        let mut flock = flock(&library, "swarm");
+        flock.params.render.size_px = size_px;
+        flock.params.render.haze_per_bl = haze_per_bl;
+        let film = Compositor::new(&library, &flock);
+        let mut shot = Shot::default();
+        for (idx, whole) in shots(&library, &flock).iter().enumerate() {
+            film.render(idx, &mut shot);
+            assert!(shot.frame == whole.frame, "frame {idx}");
+        }
+    }
+}
+
+#[test]
 fn nothing_changes_where_nobody_is() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "swarm");

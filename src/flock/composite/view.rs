@@ -42,11 +42,6 @@ impl View {
         ]
     }
 
-    /// All pixels of the film.
-    pub(super) fn whole(&self) -> Rect {
-        Rect::of_size(self.size_px[0], self.size_px[1])
-    }
-
     /// The pixels of the film that show the footage's picture.
     pub(super) fn rect(&self) -> Rect {
         let [width, height] = self.size_px;

@@ -8,17 +8,6 @@ use std::arch::x86_64::*;
 use crate::raster::color::FromQuads;
 use crate::raster::resample::{ONE, Quad};
 
-/// Premultiplied pixels over others.
-#[target_feature(enable = "avx2")]
-pub(super) fn over_row(row: &mut [Quad], sprite: &[Quad]) {
-    let (row_fours, row_rest) = row.as_chunks_mut::<4>();
-    let (sprite_fours, sprite_rest) = sprite.as_chunks::<4>();
-    for (below, above) in row_fours.iter_mut().zip(sprite_fours) {
-        store(below, four_over(load(above), load(below)));
-    }
-    super::over_row(row_rest, sprite_rest);
-}
-
 /// Premultiplied pixels under others.
 #[target_feature(enable = "avx2")]
 pub(super) fn under_row(row: &mut [Quad], sprite: &[Quad]) {

@@ -3,7 +3,10 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2; // rows, sixteen values at a time
+mod cover; // where anything has been drawn, and where nothing more shows
 mod planes; // to an encoder's planes
+
+pub use cover::Cover;
 
 use super::RgbImage;
 use super::resample::{ONE, Quad, Resampled, scaled};
@@ -41,13 +44,6 @@ impl Canvas {
         }
     }
 
-    /// Makes a box what it is on another canvas of the same size.
-    pub fn copy_box(&mut self, from: &Canvas, rect: Rect) {
-        for row in self.rows(rect) {
-            self.pixels[row.clone()].copy_from_slice(&from.pixels[row]);
-        }
-    }
-
     /// Makes a box what a whole canvas of the box's size is.
     pub fn put(&mut self, from: &Canvas, rect: Rect) {
         let from_rows = from.pixels.chunks_exact(from.width.max(1) as usize);
@@ -65,43 +61,20 @@ impl Canvas {
 
     /// Draws a placed sprite under what is there: nearer ones come first.
     pub fn under(&mut self, sprite: &Resampled, cpu: Level) {
-        if sprite.rect.is_empty() {
-            return;
-        }
-        let rows = self.rows(sprite.rect);
-        let sprite_rows = sprite.pixels.chunks_exact(sprite.rect.w as usize);
-        for (row, sprite_row) in rows.zip(sprite_rows) {
-            let row = &mut self.pixels[row];
-            match cpu {
-                #[cfg(target_arch = "x86_64")]
-                Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                    #[expect(unsafe_code, reason = "a kernel for AVX2")]
-                    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
-                    unsafe {
-                        avx2::under_row(row, sprite_row);
-                    }
-                }
-                _ => under_row(row, sprite_row),
-            }
+        for ([x, y], sprite_row) in sprite.shown() {
+            let first = y as usize * self.width as usize + x as usize;
+            put_under(
+                &mut self.pixels[first..first + sprite_row.len()],
+                sprite_row,
+                cpu,
+            );
         }
     }
 
-    /// Draws a box of another canvas of the same size over what is there.
-    pub fn over(&mut self, above: &Canvas, rect: Rect, cpu: Level) {
+    /// Draws a box of another canvas of the same size under what is there.
+    pub fn under_box(&mut self, below: &Canvas, rect: Rect, cpu: Level) {
         for row in self.rows(rect) {
-            let sprite_row = &above.pixels[row.clone()];
-            let row = &mut self.pixels[row];
-            match cpu {
-                #[cfg(target_arch = "x86_64")]
-                Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                    #[expect(unsafe_code, reason = "a kernel for AVX2")]
-                    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
-                    unsafe {
-                        avx2::over_row(row, sprite_row);
-                    }
-                }
-                _ => over_row(row, sprite_row),
-            }
+            put_under(&mut self.pixels[row.clone()], &below.pixels[row], cpu);
         }
     }
 
@@ -157,16 +130,23 @@ pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
     [color(r), color(g), color(b), alpha]
 }
 
-/// The definition of what vector instructions do.
-fn over_row(row: &mut [Quad], sprite: &[Quad]) {
-    for (below, above) in row.iter_mut().zip(sprite) {
-        *below = one_over(*above, *below);
+fn put_under(row: &mut [Quad], below: &[Quad], cpu: Level) {
+    match cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+            #[expect(unsafe_code, reason = "a kernel for AVX2")]
+            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            unsafe {
+                avx2::under_row(row, below);
+            }
+        }
+        _ => under_row(row, below),
     }
 }
 
-/// The same, the other way.
-fn under_row(row: &mut [Quad], sprite: &[Quad]) {
-    for (above, below) in row.iter_mut().zip(sprite) {
+/// The definition of what vector instructions do.
+fn under_row(row: &mut [Quad], below: &[Quad]) {
+    for (above, below) in row.iter_mut().zip(below) {
         *above = one_over(*above, *below);
     }
 }
@@ -184,10 +164,13 @@ mod tests {
     use proptest::prelude::*;
 
     fn layer(rect: Rect, pixel: Quad) -> Resampled {
-        Resampled {
+        let mut layer = Resampled {
             rect,
             pixels: vec![pixel; rect.area() as usize],
-        }
+            runs: Vec::new(),
+        };
+        layer.show_whole();
+        layer
     }
 
     #[test]
@@ -202,9 +185,10 @@ mod tests {
             for cpu in Level::available() {
                 let mut canvas = Canvas::new(1, 1);
                 canvas.under(&layer(rect, pixel), cpu);
-                let mut shown = Canvas::new(1, 1);
-                shown.pixels[0] = opaque([100; 3]);
-                shown.over(&canvas, rect, cpu);
+                let mut shown = canvas.clone();
+                let mut behind = Canvas::new(1, 1);
+                behind.pixels[0] = opaque([100; 3]);
+                shown.under_box(&behind, rect, cpu);
                 assert_eq!(straight(shown.pixels[0]), want, "{}", cpu.name());
                 canvas.under(&layer(rect, opaque([100; 3])), cpu);
                 assert_eq!(straight(canvas.pixels[0]), want, "{}", cpu.name());
@@ -276,7 +260,7 @@ mod tests {
             let with = |cpu: Level| {
                 let mut canvas = base.clone();
                 canvas.under(&sprite, cpu);
-                canvas.over(&anything(seed + 5, width, height), rect, cpu);
+                canvas.under_box(&anything(seed + 5, width, height), rect, cpu);
                 let mut frame = Frame::new(width, height, ColorSpec::default());
                 frame.draw_canvas(&canvas, rect, cpu);
                 (canvas, frame)

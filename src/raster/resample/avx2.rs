@@ -5,22 +5,17 @@
 
 use std::arch::x86_64::*;
 
-use super::catmull_rom::{HALF_PLACE, PLACES, WEIGHTS, WIDE, is_opaque};
+use super::catmull_rom::{HALF_PLACE, PLACES, WEIGHTS, WIDE};
 use super::{ONE, Premultiplied, Quad};
 
 impl Premultiplied {
     #[target_feature(enable = "avx2")]
-    pub(super) fn interpolate_avx2(
-        &self,
-        (row, hidden): (&mut [Quad], &[Quad]),
-        start: [i32; 2],
-        step: [i32; 2],
-    ) {
+    pub(super) fn interpolate_avx2(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
-        for (k, pixel) in row.iter_mut().enumerate() {
+        for pixel in row {
             let [from, to] = self.spans[(v >> 16) as usize];
-            if u > from && u < to && !is_opaque(hidden, k) {
+            *pixel = if u > from && u < to {
                 let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
                 let first = (y - 1) * stride + x - 1;
                 let down = &WEIGHTS[(v >> 8) as usize % PLACES];
@@ -36,8 +31,10 @@ impl Premultiplied {
                     _mm256_add_epi16(tap(0), tap(1)),
                     _mm256_add_epi16(tap(2), tap(3)),
                 );
-                *pixel = across(column, &WIDE[(u >> 8) as usize % PLACES]);
-            }
+                across(column, &WIDE[(u >> 8) as usize % PLACES])
+            } else {
+                [0; 4]
+            };
             u += step[0];
             v += step[1];
         }

@@ -17,11 +17,10 @@ pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
 
 impl Premultiplied {
     /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
-    /// padded pixels. All must lie within reach of the sprite's bounds. Where `hidden`, if it has anything,
-    /// is opaque, nothing is done.
+    /// padded pixels. All must lie within reach of the sprite's bounds.
     pub(super) fn interpolate(
         &self,
-        (row, hidden): (&mut [Quad], &[Quad]),
+        row: &mut [Quad],
         start: [i32; 2],
         step: [i32; 2],
         cpu: Level,
@@ -32,44 +31,35 @@ impl Premultiplied {
                 #[expect(unsafe_code, reason = "a kernel for AVX2")]
                 // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
                 unsafe {
-                    self.interpolate_avx2((row, hidden), start, step);
+                    self.interpolate_avx2(row, start, step);
                 }
             }
-            _ => self.interpolate_anywhere((row, hidden), start, step),
+            _ => self.interpolate_anywhere(row, start, step),
         }
     }
 
     /// The definition of what vector instructions do.
-    fn interpolate_anywhere(
-        &self,
-        (row, hidden): (&mut [Quad], &[Quad]),
-        start: [i32; 2],
-        step: [i32; 2],
-    ) {
+    fn interpolate_anywhere(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
         let taps = self.pixels.as_flattened();
-        for (k, pixel) in row.iter_mut().enumerate() {
+        for pixel in row {
             let [from, to] = self.spans[(v >> 16) as usize];
-            if u > from && u < to && !is_opaque(hidden, k) {
+            *pixel = if u > from && u < to {
                 let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
                 let first = 4 * ((y - 1) * stride + x - 1);
-                *pixel = blend(
+                blend(
                     std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
                     &WIDE[(u >> 8) as usize % PLACES],
                     &WEIGHTS[(v >> 8) as usize % PLACES],
-                );
-            }
+                )
+            } else {
+                [0; 4]
+            };
             u += step[0];
             v += step[1];
         }
     }
-}
-
-/// Whether a pixel of a row, which may be empty, lets nothing through.
-#[inline]
-pub(super) fn is_opaque(row: &[Quad], k: usize) -> bool {
-    row.get(k).is_some_and(|pixel| pixel[3] >= ONE)
 }
 
 /// Down the columns first, then along the row.

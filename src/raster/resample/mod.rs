@@ -15,7 +15,7 @@ pub(super) use catmull_rom::scaled;
 pub use premultiplied::{Premultiplied, bounds_of};
 
 use self::map::Map;
-use super::Canvas;
+use super::canvas::Cover;
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
@@ -43,8 +43,8 @@ pub struct Placement {
 pub struct Room<'a> {
     /// Width and height of the picture.
     pub size: [u32; 2],
-    /// What is nearer, on a canvas of that size: pixels that are opaque there are not drawn.
-    pub nearer: Option<&'a Canvas>,
+    /// What is nearer, in a picture of that size: what lets nothing through there hides the sprite.
+    pub nearer: Option<&'a Cover>,
 }
 
 /// A placed sprite: premultiplied pixels of a box of the picture.
@@ -54,6 +54,9 @@ pub struct Resampled {
     pub rect: Rect,
     /// Its pixels by rows.
     pub pixels: Vec<Quad>,
+    /// Where it may show, from top to bottom: a row of the picture and its columns, from and to. Pixels
+    /// elsewhere mean nothing.
+    pub runs: Vec<[u32; 3]>,
 }
 
 impl Resampled {
@@ -62,26 +65,61 @@ impl Resampled {
     pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, room: Room, cpu: Level) {
         let map = Map::new(sprite, place);
         self.rect = map.covered(sprite, room.size);
-        self.pixels.clear();
         self.pixels.resize(self.rect.area() as usize, [0; 4]);
-        if self.rect.is_empty() {
-            return;
-        }
+        self.runs.clear();
         let step = map.per_column.map(fixed);
-        let rows = self.pixels.chunks_exact_mut(self.rect.w as usize);
+        let rows = self.pixels.chunks_exact_mut(self.rect.w.max(1) as usize);
         for (row, y) in rows.zip(self.rect.y..) {
+            let open = |from: usize, to: usize| {
+                let columns = self.rect.x + from as u32..self.rect.x + to as u32;
+                room.nearer
+                    .map_or(columns.clone(), |nearer| nearer.next_open(y, columns))
+            };
+            if open(0, row.len()).is_empty() {
+                continue;
+            }
             let start = map.source(f64::from(self.rect.x) + 0.5, f64::from(y) + 0.5);
             let (from, to) = map.columns_within(sprite, row.len(), start);
-            if from < to {
-                let first: [f64; 2] =
-                    std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
-                let at = y as usize * room.size[0] as usize + self.rect.x as usize;
-                let hidden = room
-                    .nearer
-                    .map_or(&[][..], |c| &c.pixels[at + from..at + to]);
-                sprite.interpolate((&mut row[from..to], hidden), first.map(fixed), step, cpu);
+            let first: [f64; 2] =
+                std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
+            let first = first.map(fixed);
+            let mut run = open(from, to);
+            while !run.is_empty() {
+                self.runs.push([y, run.start, run.end]);
+                let [start, end] = [run.start, run.end].map(|x| (x - self.rect.x) as usize);
+                let ahead = (start - from) as i32;
+                let start_at = std::array::from_fn(|k| first[k] + step[k] * ahead);
+                sprite.interpolate(&mut row[start..end], start_at, step, cpu);
+                run = open(end, to);
             }
         }
+    }
+
+    /// Lets all of the box show.
+    pub fn show_whole(&mut self) {
+        let Rect { x, y, w, h } = self.rect;
+        self.runs.clear();
+        self.runs.extend((y..y + h).map(|y| [y, x, x + w]));
+    }
+
+    /// Where it may show: the first place of each run in the picture, and its pixels.
+    pub fn shown(&self) -> impl Iterator<Item = ([u32; 2], &[Quad])> {
+        self.runs.iter().map(|&[y, from, to]| {
+            let first = ((y - self.rect.y) * self.rect.w + from - self.rect.x) as usize;
+            ([from, y], &self.pixels[first..first + (to - from) as usize])
+        })
+    }
+
+    /// The alpha of the whole box, by rows, in 16384ths.
+    pub fn alpha(&self) -> Vec<u16> {
+        let mut alpha = vec![0; self.rect.area() as usize];
+        for ([x, y], row) in self.shown() {
+            let first = ((y - self.rect.y) * self.rect.w + x - self.rect.x) as usize;
+            for (alpha, pixel) in alpha[first..].iter_mut().zip(row) {
+                *alpha = pixel[3] as u16;
+            }
+        }
+        alpha
     }
 }
 

@@ -1,6 +1,7 @@
 //! What a placed sprite looks like: exact where it can be, smooth where it cannot.
 
 use super::*;
+use crate::raster::Canvas;
 
 fn checkered(width: u32, height: u32) -> Vec<u8> {
     (0..width * height)
@@ -177,18 +178,27 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
         rotation_rad: 0.4,
         ..place([20.0, 14.0])
     };
-    let mut nearer = Canvas::new(40, 30);
-    for (k, pixel) in nearer.pixels.iter_mut().enumerate() {
+    let mut canvas = Canvas::new(40, 30);
+    for (k, pixel) in canvas.pixels.iter_mut().enumerate() {
         pixel[3] = [0, ONE - 1, ONE][k % 3];
     }
+    let mut nearer = Cover::none([40, 30]);
+    let mut everywhere = Resampled {
+        rect: Rect::of_size(40, 30),
+        pixels: canvas.pixels.clone(),
+        runs: Vec::new(),
+    };
+    everywhere.show_whole();
+    nearer.add(&everywhere, &canvas);
     let bounds = Rect::of_size(12, 12);
     let sprite = Premultiplied::of(&square(), [12, 12], bounds, 1.0);
     for cpu in Level::available() {
         let (mut all, mut rest) = (Resampled::default(), Resampled::default());
         let size = [40, 30];
-        all.draw(&sprite, &turned, Room { size, nearer: None }, cpu);
+        let room = Room { size, nearer: None };
+        all.draw(&sprite, &turned, room, cpu);
         let nearer = Some(&nearer);
-        rest.draw(&sprite, &turned, Room { size, nearer }, cpu);
+        rest.draw(&sprite, &turned, Room { nearer, ..room }, cpu);
         assert_eq!(all.rect, rest.rect);
         let mut n_hidden = 0;
         let rect = all.rect;

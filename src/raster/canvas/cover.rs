@@ -1,0 +1,164 @@
+//! What of a canvas has been drawn on, by tiles, so that each is developed and wiped once however many
+//! sprites lie over each other there; and which of its pixels let nothing through, as bits, so that what
+//! is hidden is passed over 64 pixels at a time (ALGORITHMS.md 8, dirty rectangles).
+
+use std::ops::Range;
+
+use super::Canvas;
+use crate::geometry::Rect;
+use crate::raster::resample::{ONE, Quad, Resampled};
+
+/// Columns and rows of a tile: even, so that no block of chroma is parted.
+const TILE: usize = 16;
+
+/// What has been drawn on a canvas.
+#[derive(Clone, Debug)]
+pub struct Cover {
+    size: [u32; 2],
+    /// By rows of tiles: whether anything has been drawn there.
+    touched: Vec<bool>,
+    /// By rows of pixels, each beginning a word: those of alpha 1.
+    opaque: Vec<u64>,
+}
+
+impl Cover {
+    /// Nothing yet, on a canvas of `size` pixels.
+    pub fn none(size: [u32; 2]) -> Cover {
+        let [width, height] = size.map(|side| side as usize);
+        Cover {
+            size,
+            touched: vec![false; width.div_ceil(TILE) * height.div_ceil(TILE)],
+            opaque: vec![0; width.div_ceil(64) * height],
+        }
+    }
+
+    /// Counts everything as drawn on.
+    pub fn touch_all(&mut self) {
+        self.touched.fill(true);
+    }
+
+    /// Adds a layer, which has been put on the canvas.
+    pub fn add(&mut self, layer: &Resampled, canvas: &Canvas) {
+        let width = self.size[0] as usize;
+        let (n_tiles, n_words) = (width.div_ceil(TILE), width.div_ceil(64));
+        for ([x, y], row) in layer.shown() {
+            let (mut x, y, to) = (x as usize, y as usize, x as usize + row.len());
+            let line = y / TILE * n_tiles;
+            self.touched[line + x / TILE..line + to.div_ceil(TILE)].fill(true);
+            while x < to {
+                let next = (x / 64 * 64 + 64).min(to);
+                let drawn = &canvas.pixels[y * width + x..y * width + next];
+                self.opaque[y * n_words + x / 64] |= opaque_bits(drawn) << (x % 64);
+                x = next;
+            }
+        }
+    }
+
+    /// The first columns of `within`, in row `y`, that let something through; empty when there are none.
+    pub fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
+        let n_words = (self.size[0] as usize).div_ceil(64);
+        let row = &self.opaque[y as usize * n_words..][..n_words];
+        let start = find(within.clone(), |word| !row[word]);
+        start..find(start..within.end, |word| row[word])
+    }
+
+    /// Boxes that hold all that has been drawn on, none over another; then nothing has been.
+    pub fn take(&mut self) -> impl Iterator<Item = Rect> {
+        self.opaque.fill(0);
+        let [width, height] = self.size;
+        let lines = self
+            .touched
+            .chunks_exact_mut(width.div_ceil(TILE as u32) as usize);
+        lines.enumerate().flat_map(move |(line, tiles)| {
+            let mut at = 0;
+            std::iter::from_fn(move || {
+                let from = at + tiles[at..].iter().position(|&touched| touched)?;
+                at = from + tiles[from..].iter().take_while(|&&touched| touched).count();
+                tiles[from..at].fill(false);
+                let [left, top, right, bottom] =
+                    [from, line, at, line + 1].map(|tile| (tile * TILE) as i64);
+                Some(Rect::clipped(left, top, right, bottom, width, height))
+            })
+        })
+    }
+}
+
+/// Bit k: whether pixel k of at most 64 lets nothing through.
+fn opaque_bits(row: &[Quad]) -> u64 {
+    let shift_in = |bits, pixel: &Quad| bits << 1 | u64::from(pixel[3] >= ONE);
+    row.iter().rev().fold(0, shift_in)
+}
+
+/// The first place of a range whose bit is set in the words told; its end when there is none.
+fn find(within: Range<u32>, words: impl Fn(usize) -> u64) -> u32 {
+    let mut at = within.start;
+    while at < within.end {
+        let rest = words(at as usize / 64) >> (at % 64);
+        if rest != 0 {
+            return (at + rest.trailing_zeros()).min(within.end);
+        }
+        at = at / 64 * 64 + 64;
+    }
+    within.end
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cpu::Level;
+
+    fn rect(x: u32, y: u32, w: u32, h: u32) -> Rect {
+        Rect { x, y, w, h }
+    }
+
+    #[test]
+    fn every_tile_that_a_layer_shows_on_is_taken_once() {
+        let (mut cover, canvas) = (Cover::none([50, 40]), Canvas::new(50, 40));
+        let mut layer = Resampled {
+            rect: rect(10, 15, 8, 3),
+            pixels: vec![[1; 4]; 24],
+            // To the edge of a tile, nothing, and beyond it.
+            runs: vec![[15, 10, 16], [17, 15, 18]],
+        };
+        cover.add(&layer, &canvas);
+        cover.add(&layer, &canvas);
+        let boxes: Vec<Rect> = cover.take().collect();
+        assert_eq!(boxes, [rect(0, 0, 16, 16), rect(0, 16, 32, 16)]);
+        assert_eq!(cover.take().count(), 0);
+        layer.rect.x = 42;
+        layer.show_whole();
+        cover.add(&layer, &canvas);
+        let boxes: Vec<Rect> = cover.take().collect();
+        assert_eq!(boxes, [rect(32, 0, 18, 16), rect(32, 16, 18, 16)]);
+        cover.touch_all();
+        assert_eq!(cover.take().count(), 3);
+    }
+
+    #[test]
+    fn what_is_open_lies_between_what_lets_nothing_through() {
+        let (mut cover, mut canvas) = (Cover::none([200, 2]), Canvas::new(200, 2));
+        for (columns, alpha) in [
+            (0..3, ONE),
+            (60..70, ONE),
+            (70..75, ONE - 1),
+            (130..200, ONE),
+        ] {
+            let n = columns.len();
+            let layer = Resampled {
+                rect: rect(columns.start, 1, n as u32, 1),
+                pixels: vec![[0, 0, 0, alpha]; n],
+                runs: vec![[1, columns.start, columns.end]],
+            };
+            canvas.under(&layer, Level::Scalar);
+            cover.add(&layer, &canvas);
+        }
+        let open = |y, within: Range<u32>| cover.next_open(y, within);
+        assert_eq!(open(1, 0..200), 3..60);
+        assert_eq!(open(1, 20..50), 20..50);
+        assert_eq!(open(1, 60..200), 70..130);
+        assert!(open(1, 130..200).is_empty() && open(1, 61..64).is_empty());
+        assert_eq!(open(0, 0..200), 0..200);
+        assert!(cover.take().count() > 0);
+        assert_eq!(cover.next_open(1, 0..200), 0..200);
+    }
+}
