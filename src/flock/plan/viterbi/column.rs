@@ -4,7 +4,7 @@
 //! they offer is kept until who landed may leave, `dwell` frames later. The same portable code is
 //! compiled once plainly and once for AVX2; results are the same integers.
 
-use super::front::{Front, NO_LEAD, Stretch, Tally, lead};
+use super::front::{Front, NO_LEAD, Stretch, Tally};
 use super::landing::Landing;
 use super::offers::Offers;
 use super::walk::Steps;

@@ -22,7 +22,7 @@ impl Offers {
     /// None yet; blocks are of `width` frames.
     pub(super) fn new(n_stations: usize, dwell: usize, width: usize) -> Offers {
         let n_clocks = dwell.next_multiple_of(width);
-        let n_slots = n_clocks / width + usize::from(dwell % width > 0);
+        let n_slots = n_clocks / width + usize::from(!dwell.is_multiple_of(width));
         Offers {
             // Past the last station lie those who would have left the last run.
             leads: vec![[NO_LEAD; FRAMES]; (n_stations + dwell - 1) * n_slots],
