@@ -1,6 +1,6 @@
 //! How fast plans are made (ALGORITHMS.md 6 and 9), for `bench/plan.py`.
 //!
-//! Arguments: COUNT FRAMES RUNS [LIBRARY_DIR]. Without a folder the library is made here: 1200 frames
+//! Arguments: COUNT FRAMES RUNS [--one-side] [LIBRARY_DIR]. With one side nobody is mirrored. Without a folder the library is made here: 1200 frames
 //! of an animal that turns to and fro, with about 2000 jumps, half of them mirrored. The boids are
 //! simulated once; the plan alone is timed, on one thread and on all. Prints one line of JSON.
 
@@ -21,13 +21,12 @@ use flockreel::raster::RgbImage;
 use flockreel::scratch::InMemory;
 
 fn main() {
-    let arguments: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| a != "--bench")
-        .collect();
+    let (flags, arguments): (Vec<String>, Vec<String>) =
+        std::env::args().skip(1).partition(|a| a.starts_with("--"));
+    let mirror = !flags.iter().any(|flag| flag == "--one-side");
     let [count, frames, runs, folder @ ..] = &arguments[..] else {
         // `cargo test --benches` runs this without arguments.
-        return println!("arguments: COUNT FRAMES RUNS [LIBRARY_DIR]");
+        return println!("arguments: COUNT FRAMES RUNS [--one-side] [LIBRARY_DIR]");
     };
     let number = |text: &String| text.parse().expect("a number");
     let library = match folder.first() {
@@ -41,6 +40,7 @@ fn main() {
     let params = Params {
         count: number(count),
         frames: number(frames),
+        mirror,
         ..Params::default()
     };
     let flock = plan_flock(&library, &params, &Silent).expect("a good library");
@@ -53,12 +53,13 @@ fn main() {
         clone_share,
         ..
     } = flock.stats;
+    let n_sides = 1 + usize::from(mirror);
     println!(
         "{{\"count\":{count},\"frames\":{frames},\"states\":{},\"jumps\":{},\"level\":\"{}\",\
          \"one_thread_s\":{one:.6},\"threads\":{n_threads},\"all_threads_s\":{all:.6},\
          \"jumps_per_100_frames\":{jumps_per_100_frames},\"clone_share\":{clone_share}}}",
-        2 * library.playback.component.len(),
-        2 * library.playback.jumps.len(),
+        n_sides * library.playback.component.len(),
+        n_sides * library.playback.jumps.len(),
         Level::detect().name(),
     );
 }

@@ -24,6 +24,7 @@ const TURN_SPAN_S: f64 = 0.25;
 
 /// What is compared: of a state, or wanted by a boid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
 pub struct Feature {
     /// Heading; in top view the turn in a quarter second.
     pub turns: u16,

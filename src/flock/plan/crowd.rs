@@ -3,6 +3,7 @@
 //! the cost. Distances are whole 32nds of a body length, weights a table: the same on any machine.
 
 use super::trellis::Trellis;
+use super::viterbi::FRAMES;
 use crate::flock::individual::BoidTrack;
 use crate::geometry::Turns;
 
@@ -16,6 +17,8 @@ const REACH_BL: f64 = 8.0;
 const PARTS: f64 = 32.0;
 /// Steps of the table to a squared body length.
 const STEPS: usize = 16;
+/// Steps within reach; what comes after them costs nothing.
+const N_STEPS: usize = (REACH_BL * REACH_BL) as usize * STEPS;
 /// So many are planned one after the other, each looking out for all before it; after them
 /// `ROUND` at a time, who look out for the rounds before.
 const ONE_BY_ONE: usize = 64;
@@ -23,16 +26,22 @@ const ONE_BY_ONE: usize = 64;
 const ROUND: usize = 16;
 
 /// So many distances are computed side by side.
-pub const TOGETHER: usize = 32;
+const TOGETHER: usize = 32;
 
 /// Where a boid is, in 32nds of a body length.
 pub type Place = [i32; 3];
 
+/// Where boids are at one moment, by id, axis after axis.
+#[derive(Clone, Debug, Default)]
+pub struct Places {
+    axes: [Vec<i32>; 3],
+}
+
 /// The crowd term's measures, in frames, parts and turns.
 #[derive(Clone, Debug)]
 pub struct Crowd {
-    /// What looking alike costs by squared distance, turns.
-    costs: Vec<u16>,
+    /// What looking alike costs by squared distance, turns below 2^16.
+    costs: Box<[u32; N_STEPS + 1]>,
     /// Frames apart that still look alike.
     window: u32,
     length_px: f64,
@@ -44,20 +53,22 @@ pub struct Lookalike {
     /// The neighbor's state.
     pub state: u32,
     /// What looking like it costs, turns.
-    pub cost: u16,
+    pub cost: u32,
 }
 
 impl Crowd {
     /// `w_c` in radians; the animal's length in pixels.
     pub fn new(w_c: f64, fps: f64, length_px: f64) -> Crowd {
-        let n_steps = (REACH_BL * REACH_BL) as usize * STEPS;
         let cost = |step: usize| {
+            if step == N_STEPS {
+                return 0;
+            }
             let square_bl = (step as f64 + 0.5) / STEPS as f64;
             let near = libm::exp(-square_bl / (2.0 * WIDTH_BL * WIDTH_BL));
-            (w_c * Turns::PER_RAD * near).round() as u16
+            u32::from((w_c * Turns::PER_RAD * near).round() as u16)
         };
         Crowd {
-            costs: (0..n_steps).map(cost).chain([0]).collect(),
+            costs: Box::new(std::array::from_fn(cost)),
             window: ((LOOKALIKE_S * fps).ceil() as u32).saturating_sub(1),
             length_px,
         }
@@ -80,19 +91,25 @@ impl Crowd {
 
     /// What looking like one at `b` costs one at `a`, turns.
     #[inline(always)]
-    pub fn cost_at(&self, a: Place, b: Place) -> u16 {
+    pub fn cost_at(&self, a: Place, b: Place) -> u32 {
         self.costs[self.step(a, b) as usize]
     }
 
-    /// The same of several at `places`, at most `TOGETHER`.
+    /// The same of the first at `places`, at moment `moment` of what is told of each.
     #[inline(always)]
-    pub fn costs_at(&self, here: Place, places: &[Place]) -> [u16; TOGETHER] {
-        // First the arithmetic of all, then the table.
-        let mut steps = [0; TOGETHER];
-        for (step, &place) in steps.iter_mut().zip(places) {
-            *step = self.step(here, place);
+    pub fn costs_at(&self, id: usize, places: &Places, moment: usize, costs: &mut [[u32; FRAMES]]) {
+        let here = places.of(id);
+        let [x, y, z] = places.axes.each_ref().map(|axis| axis[..costs.len()].chunks(TOGETHER));
+        for (costs, ((x, y), z)) in costs.chunks_mut(TOGETHER).zip(x.zip(y).zip(z)) {
+            // First the arithmetic of all, then the table.
+            let mut steps = [0; TOGETHER];
+            for (step, ((&x, &y), &z)) in steps.iter_mut().zip(x.iter().zip(y).zip(z)) {
+                *step = self.step(here, [x, y, z]);
+            }
+            for (costs, step) in costs.iter_mut().zip(steps) {
+                costs[moment] = self.costs[step as usize];
+            }
         }
-        steps.map(|step| self.costs[step as usize])
     }
 
     /// Where in the table two places are.
@@ -104,7 +121,7 @@ impl Crowd {
             square += gap * gap;
         }
         // 32 x 32 parts to the squared body length, 16 steps to it as well.
-        (square as u32 >> 6).min(self.costs.len() as u32 - 1)
+        (square as u32 >> 6).min(N_STEPS as u32)
     }
 
     /// Whom to avoid looking like at frame `t`, of the planned others: (boid, states).
@@ -136,7 +153,7 @@ impl Crowd {
                     .shown(other.state as usize)
                     .is_some_and(|shown| shown.1 == side && shown.0.abs_diff(frame) <= self.window)
             })
-            .map(|other| u32::from(other.cost))
+            .map(|other| other.cost)
             .sum()
     }
 
@@ -165,30 +182,74 @@ impl Crowd {
     }
 }
 
-/// Plans that are final, frame by frame.
+impl Places {
+    /// How many they are.
+    pub fn len(&self) -> usize {
+        self.axes[0].len()
+    }
+
+    /// Whether there is nobody.
+    pub fn is_empty(&self) -> bool {
+        self.axes[0].is_empty()
+    }
+
+    /// Where one is.
+    pub fn of(&self, id: usize) -> Place {
+        self.axes.each_ref().map(|axis| axis[id])
+    }
+}
+
+impl FromIterator<Place> for Places {
+    fn from_iter<I: IntoIterator<Item = Place>>(places: I) -> Places {
+        let mut all = Places::default();
+        for place in places {
+            for (axis, at) in all.axes.iter_mut().zip(place) {
+                axis.push(at);
+            }
+        }
+        all
+    }
+}
+
+/// Plans that are final, as others look out for them.
 #[derive(Clone, Debug)]
 pub struct Settled {
-    /// `[t][id]`: state.
-    states: Vec<Vec<u32>>,
+    /// `[t][id]`.
+    shown: Vec<Vec<Shown>>,
+}
+
+/// What is shown at a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    /// The states that look like it: first, and one past the last.
+    pub alike: [u32; 2],
+    /// For how many frames from this one on, at most `FRAMES`, these move on by one a frame.
+    pub n_steady: u32,
 }
 
 impl Settled {
     /// Nobody's.
     pub fn new(n_frames: usize) -> Settled {
         Settled {
-            states: vec![Vec::new(); n_frames],
+            shown: vec![Vec::new(); n_frames],
         }
     }
 
-    /// The next individual's.
-    pub fn push(&mut self, states: &[u32]) {
-        for (at, &state) in self.states.iter_mut().zip(states) {
-            at.push(state);
+    /// The next individual's: what looks like what it shows, by frame.
+    pub fn push(&mut self, alike: impl DoubleEndedIterator<Item = [u32; 2]> + ExactSizeIterator) {
+        let mut after: Option<Shown> = None;
+        for (at, alike) in self.shown.iter_mut().zip(alike).rev() {
+            let goes_on = after.filter(|after| after.alike == alike.map(|state| state + 1));
+            let n_after = goes_on.map_or(0, |after| after.n_steady);
+            let n_steady = (1 + n_after).min(FRAMES as u32);
+            let shown = Shown { alike, n_steady };
+            at.push(shown);
+            after = Some(shown);
         }
     }
 
-    /// The states at frame `t`, by id.
-    pub fn at(&self, t: usize) -> &[u32] {
-        &self.states[t]
+    /// What is shown at frame `t`, by id.
+    pub fn at(&self, t: usize) -> &[Shown] {
+        &self.shown[t]
     }
 }

@@ -6,6 +6,8 @@
 use super::cost::{CEILING, Feature, Weights};
 use super::landings::Way;
 use super::viterbi::{Block, FRAMES};
+#[cfg(target_arch = "x86_64")]
+use super::lanes::store;
 use crate::cpu::Level;
 use crate::flock::params::MatchBy;
 
@@ -20,82 +22,133 @@ impl Weights {
         out: &mut [[u32; FRAMES]],
     ) {
         let features = &features[block.states(first..first + out.len())];
+        let (pairs, rest) = match block.way {
+            Way::Ahead => features.as_chunks::<2>(),
+            Way::Back => {
+                let (rest, pairs) = features.as_rchunks::<2>();
+                (pairs, rest)
+            }
+        };
+        let (of_pairs, of_rest) = out.split_at_mut(features.len() - rest.len());
+        let of_pairs = of_pairs.as_chunks_mut::<2>().0.iter_mut();
         match block.way {
-            Way::Ahead => self.fill_on(block.cpu, wanted, features.iter(), out),
-            Way::Back => self.fill_on(block.cpu, wanted, features.iter().rev(), out),
+            Way::Ahead => self.fill_pairs(block, wanted, pairs.iter().zip(of_pairs)),
+            Way::Back => self.fill_pairs(block, wanted, pairs.iter().rev().zip(of_pairs)),
+        }
+        for (out, &state) in of_rest.iter_mut().zip(rest) {
+            *out = wanted.map(|wanted| self.total(wanted, state));
         }
     }
 
+    /// Given two states in their order and the places of their stations.
     #[inline(always)]
-    fn fill_on<'a>(
+    fn fill_pairs<'a>(
         &self,
-        cpu: Level,
+        block: &Block,
         wanted: &[Feature; FRAMES],
-        features: impl Iterator<Item = &'a Feature>,
-        out: &mut [[u32; FRAMES]],
+        pairs: impl Iterator<Item = (&'a [Feature; 2], &'a mut [[u32; FRAMES]; 2])>,
     ) {
-        match cpu {
+        let [heading, rotation, speed] = [self.heading, self.rotation, self.speed].map(i64::from);
+        let fits = [heading, rotation - heading, speed, self.rho_turns.into()].map(i16::try_from);
+        match (block.cpu, fits) {
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512
+            (Level::Avx2 | Level::Avx512, [Ok(heading), Ok(rotation), Ok(speed), Ok(rho)])
                 if self.by != MatchBy::Direction && is_x86_feature_detected!("avx2") =>
             {
+                let weights = [heading, rotation, speed];
                 #[expect(unsafe_code, reason = "vectors of AVX2")]
                 // SAFETY: the line above made sure of AVX2.
                 unsafe {
-                    self.fill_avx2(wanted, features, out);
+                    fill_avx2(block.way, (weights, rho), wanted, pairs);
                 }
             }
             _ => {
-                for (out, &state) in out.iter_mut().zip(features) {
-                    *out = wanted.map(|wanted| self.total(wanted, state));
+                for (&states, out) in pairs {
+                    let [first, second] = block.way.stations_of(states);
+                    *out = [first, second].map(|state| wanted.map(|wanted| self.total(wanted, state)));
                 }
             }
         }
     }
+}
 
-    /// The same where no depth counts. Turns are shifted up, so that they wrap as they should.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    #[inline]
-    fn fill_avx2<'a>(
-        &self,
-        wanted: &[Feature; FRAMES],
-        features: impl Iterator<Item = &'a Feature>,
-        out: &mut [[u32; FRAMES]],
-    ) {
-        use std::arch::x86_64::*;
-        let lanes = |of: &dyn Fn(Feature) -> i32| {
-            let [a, b, c, d, e, f, g, h] = wanted.map(of);
-            _mm256_setr_epi32(a, b, c, d, e, f, g, h)
+/// The same where no depth counts, two stations side by side, by weights and a `rho` of 16 bits: of the whole
+/// gap; how much more of what is within `rho`; of speed.
+///
+/// Gaps are less by half of what they can be, that products of 16 bits hold them; what that takes off is a
+/// whole number of turns, and added again.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn fill_avx2<'a>(
+    way: Way,
+    ([whole, within, speed], rho): ([i16; 3], i16),
+    wanted: &[Feature; FRAMES],
+    pairs: impl Iterator<Item = (&'a [Feature; 2], &'a mut [[u32; FRAMES]; 2])>,
+) {
+    use std::arch::x86_64::*;
+    // All lanes of each station take two bytes of its feature, at 0 or 8 of a pair. Compilers that see the
+    // numbers take three instructions in the place of this one.
+    let spread = |byte: u8| {
+        let both = |at: u8| _mm_set1_epi16(i16::from_le_bytes([at + byte, at + byte + 1]));
+        let [first, second] = way.stations_of([0, 8]).map(both);
+        std::hint::black_box(_mm256_setr_m128i(first, second))
+    };
+    let lanes = |of: &dyn Fn(Feature) -> u16| {
+        let [a, b, c, d, e, f, g, h] = wanted.map(|wanted| of(wanted) as i16);
+        _mm256_broadcastsi128_si256(_mm_setr_epi16(a, b, c, d, e, f, g, h))
+    };
+    let (turns_of, speed_of) = (spread(0), spread(2));
+    let (turns, speeds) = (lanes(&|f| f.turns), lanes(&|f| f.log_speed));
+    let rho = _mm256_set1_epi16(rho);
+    let (half, top) = (_mm256_set1_epi16(1 << 14), _mm256_set1_epi16(i16::MIN));
+    let of_gaps = _mm256_unpacklo_epi16(_mm256_set1_epi16(whole), _mm256_set1_epi16(within));
+    let of_speed = _mm256_set1_epi16(speed);
+    let taken_off = (i32::from(whole) << (14 - 8)) + (i32::from(speed) << (15 - 8));
+    let (taken_off, ceiling) = (
+        _mm256_set1_epi32(taken_off),
+        _mm256_set1_epi32(CEILING as i32 - 1),
+    );
+    for (states, out) in pairs {
+        let states = _mm256_broadcastsi128_si256(load_pair(states));
+        let gap = _mm256_sub_epi16(turns, _mm256_shuffle_epi8(states, turns_of));
+        let gap = _mm256_abs_epi16(gap);
+        let within = _mm256_min_epu16(gap, rho);
+        let gap = _mm256_sub_epi16(gap, half);
+        let theirs = _mm256_shuffle_epi8(states, speed_of);
+        let apart = _mm256_sub_epi16(
+            _mm256_max_epu16(speeds, theirs),
+            _mm256_min_epu16(speeds, theirs),
+        );
+        let apart = _mm256_xor_si256(apart, top);
+        let total = |gaps: __m256i, apart: __m256i| {
+            let of_gaps = _mm256_srai_epi32::<8>(_mm256_madd_epi16(gaps, of_gaps));
+            let of_speed = _mm256_srai_epi32::<8>(_mm256_madd_epi16(apart, of_speed));
+            let total = _mm256_add_epi32(_mm256_add_epi32(of_gaps, of_speed), taken_off);
+            _mm256_min_epu32(total, ceiling)
         };
-        let all = |number: u32| _mm256_set1_epi32(number as i32);
-        let turns = lanes(&|wanted| i32::from(wanted.turns) << 16);
-        let log_speeds = lanes(&|wanted| i32::from(wanted.log_speed));
-        let (rho, ceiling) = (all(u32::from(self.rho_turns)), all(CEILING - 1));
-        let (heading, speed) = (all(self.heading), all(self.speed));
-        // heading * beyond + rotation * within, where beyond is the gap less what is within.
-        let rotation = all(self.rotation.wrapping_sub(self.heading));
-        for (out, state) in out.iter_mut().zip(features) {
-            let state = all(u32::from(state.turns) | u32::from(state.log_speed) << 16);
-            let gap = _mm256_abs_epi32(_mm256_sub_epi32(turns, _mm256_slli_epi32::<16>(state)));
-            let gap = _mm256_srli_epi32::<16>(gap);
-            let within = _mm256_min_epu32(gap, rho);
-            let of_heading = _mm256_add_epi32(
-                _mm256_mullo_epi32(gap, heading),
-                _mm256_mullo_epi32(within, rotation),
-            );
-            let speeds = _mm256_sub_epi32(log_speeds, _mm256_srli_epi32::<16>(state));
-            let of_speed = _mm256_mullo_epi32(_mm256_abs_epi32(speeds), speed);
-            let total = _mm256_add_epi32(
-                _mm256_srli_epi32::<8>(of_heading),
-                _mm256_srli_epi32::<8>(of_speed),
-            );
-            let total = _mm256_min_epu32(total, ceiling);
-            #[expect(unsafe_code, reason = "vectors of AVX2")]
-            // SAFETY: eight numbers are as long as a vector, which may lie anywhere.
-            unsafe {
-                _mm256_storeu_si256(std::ptr::from_mut(out).cast(), total);
-            }
-        }
+        // Of both stations the first four frames, and the last.
+        let zero = _mm256_setzero_si256();
+        let early = total(
+            _mm256_unpacklo_epi16(gap, within),
+            _mm256_unpacklo_epi16(apart, zero),
+        );
+        let late = total(
+            _mm256_unpackhi_epi16(gap, within),
+            _mm256_unpackhi_epi16(apart, zero),
+        );
+        store(&mut out[0], _mm256_permute2x128_si256::<0x20>(early, late));
+        store(&mut out[1], _mm256_permute2x128_si256::<0x31>(early, late));
     }
+}
+
+/// Two features in a row.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+#[expect(unsafe_code, reason = "vectors of AVX2")]
+fn load_pair(pair: &[Feature; 2]) -> std::arch::x86_64::__m128i {
+    const { assert!(size_of::<Feature>() == 8) };
+    // SAFETY: two features are as long as a vector, which may lie anywhere.
+    unsafe { std::arch::x86_64::_mm_loadu_si128(std::ptr::from_ref(pair).cast()) }
 }

@@ -24,6 +24,14 @@ impl Way {
         }
     }
 
+    /// What belongs to the stations of two states in a row, or to the states of two stations.
+    pub fn stations_of<T>(self, [first, second]: [T; 2]) -> [T; 2] {
+        match self {
+            Way::Ahead => [first, second],
+            Way::Back => [second, first],
+        }
+    }
+
     /// The stations of states in a row, or the states of stations.
     pub fn stations(self, n_states: usize, states: Range<usize>) -> Range<usize> {
         match self {

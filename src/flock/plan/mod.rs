@@ -1,6 +1,7 @@
 //! Which sprite when: for each individual the sequence of real frames that follows its boid best,
 //! exactly (O 5.1; ALGORITHMS.md 6).
 
+mod added;
 pub mod certificate;
 pub mod circle;
 pub mod cost;
@@ -8,6 +9,8 @@ pub mod crowd;
 mod fill;
 pub mod horizon;
 pub mod landings;
+#[cfg(target_arch = "x86_64")]
+mod lanes;
 pub mod memory;
 mod round;
 mod rows;
@@ -18,7 +21,7 @@ use rayon::prelude::*;
 
 use self::circle::{Closed, Ends};
 use self::cost::{CEILING, Feature, Weights};
-use self::crowd::{Crowd, Place, Settled};
+use self::crowd::{Crowd, Places, Settled};
 use self::horizon::Horizon;
 use self::memory::Memory;
 use self::round::Round;
@@ -78,8 +81,8 @@ pub struct Planner<'a> {
     memory: Memory,
     /// The states that look like each state.
     alike: Vec<[u32; 2]>,
-    /// `[t][id]`: where each boid is.
-    places: Vec<Vec<Place>>,
+    /// By frame, where each boid is.
+    places: Vec<Places>,
     dwell: usize,
     fps: f64,
     shelf: Shelf,
@@ -234,7 +237,7 @@ impl<'a> Planner<'a> {
             let end = first + (first..wanted.len()).take_while(alike).count();
             let round = self.round(wanted, first, end).paths(settled)?;
             for found in &round {
-                settled.push(self.film_of(&found.path));
+                settled.push(self.alike_of(&found.path));
             }
             paths.extend(round);
             progress.report("planning", paths.len() as f64 / wanted.len() as f64);
@@ -310,14 +313,12 @@ impl<'a> Planner<'a> {
         let mut cost = self.transition_cost(path);
         for (t, &state) in self.film_of(path).iter().enumerate() {
             let places = &self.places[t];
-            let others = settled.at(t)[..n_watched].iter().zip(places);
-            let near = others.filter(|(other, _)| {
-                let [first, end] = self.alike[**other as usize];
-                (first..end).contains(&state)
-            });
-            let crowd: u32 = near
-                .map(|(_, &place)| u32::from(self.crowd.cost_at(places[id], place)))
-                .sum();
+            let of_one = |other: usize| {
+                let [first, end] = settled.at(t)[other].alike;
+                let is_alike = (first..end).contains(&state);
+                is_alike.then(|| self.crowd.cost_at(places.of(id), places.of(other)))
+            };
+            let crowd: u32 = (0..n_watched).filter_map(of_one).sum();
             let alone = (self.weights).total(wanted[t], self.features[state as usize]);
             cost += (alone + crowd).min(CEILING - 1);
         }
@@ -327,6 +328,15 @@ impl<'a> Planner<'a> {
     /// What a path shows in the film.
     fn film_of<'b>(&self, path: &'b Path) -> &'b [u32] {
         &path.states[..self.places.len()]
+    }
+
+    /// The states that look like what a path shows in the film.
+    fn alike_of(
+        &self,
+        path: &Path,
+    ) -> impl DoubleEndedIterator<Item = [u32; 2]> + ExactSizeIterator {
+        let states = self.film_of(path).iter();
+        states.map(|&state| self.alike[state as usize])
     }
 
     /// What a path's jumps cost, turns, with that after the last frame of a loop.

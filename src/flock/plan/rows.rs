@@ -1,13 +1,12 @@
 //! What showing each state costs, a stretch of stations and a block of frames at a time
 //! (ALGORITHMS.md 6): alone, and among those whose plans are final.
 
-use std::ops::Range;
-
 use super::Planner;
-use super::cost::{CEILING, Feature};
-use super::crowd::{Settled, TOGETHER};
+use super::added::Added;
+use super::cost::Feature;
+use super::crowd::Settled;
 use super::memory::Raised;
-use super::viterbi::{Block, FRAMES, Rows};
+use super::viterbi::{Block, FRAMES, Moments, Rows};
 
 /// Heading, rotation and speed alone.
 #[derive(Clone)]
@@ -34,11 +33,9 @@ pub(super) struct InCrowd<'a> {
     id: usize,
     /// What is dearer for having been repeated.
     raised: Option<&'a Raised>,
-    /// What the crowd adds to each station filled in; of those after, by how much that is more than what
-    /// it adds to the one before. The first stands before the first station.
-    added: Vec<[u32; FRAMES]>,
-    /// Whether it adds anything in this block.
-    adds: bool,
+    added: Added,
+    /// What looking like each of those looked out for costs, by moment of a block.
+    near: Vec<[u32; FRAMES]>,
 }
 
 impl<'a> InCrowd<'a> {
@@ -53,8 +50,8 @@ impl<'a> InCrowd<'a> {
             settled,
             id,
             raised: None,
-            added: vec![[0; FRAMES]; planner.trellis.n_states() + 2],
-            adds: false,
+            added: Added::new(planner.trellis.n_states()),
+            near: vec![[0; FRAMES]; planner.crowd.n_watched(id)],
         }
     }
 
@@ -68,42 +65,39 @@ impl<'a> InCrowd<'a> {
 
     #[inline(always)]
     fn gather(&mut self, block: &Block) {
-        if std::mem::take(&mut self.adds) {
-            self.added.fill([0; FRAMES]);
-        }
+        self.added.clear();
         let planner = self.alone.planner;
-        let n_watched = planner.crowd.n_watched(self.id);
-        for (lane, &t) in block.times.iter().enumerate() {
-            let Some(places) = planner.places.get(t) else {
-                continue;
-            };
-            let others = self.settled.at(t)[..n_watched].chunks(TOGETHER);
-            for (states, there) in others.zip(places.chunks(TOGETHER)) {
-                let costs = planner.crowd.costs_at(places[self.id], there);
-                for (&state, cost) in states.iter().zip(costs) {
-                    if cost > 0 {
-                        let [low, high] = planner.alike[state as usize];
-                        self.add(block, low as usize..high as usize, lane, cost.into());
-                    }
-                }
-            }
-            if let Some(raised) = self.raised {
-                for &state in raised.at(t) {
-                    let states = state as usize..state as usize + 1;
-                    self.add(block, states, lane, raised.cost);
+        let moments = block.moments(planner.places.len());
+        self.gather_others(&moments);
+        if let Some(raised) = self.raised {
+            for moment in moments.range.clone() {
+                for &state in raised.at(moments.frame(moment)) {
+                    let states = [state, state + 1];
+                    self.added.add(states, moment, &[raised.cost]);
                 }
             }
         }
     }
 
-    /// Adds to the cost of some states in a row.
     #[inline(always)]
-    fn add(&mut self, block: &Block, states: Range<usize>, lane: usize, cost: u32) {
-        let stations = block.stations(states);
-        let [up, down] = [stations.start + 1, stations.end + 1];
-        self.added[up][lane] = self.added[up][lane].wrapping_add(cost);
-        self.added[down][lane] = self.added[down][lane].wrapping_sub(cost);
-        self.adds = true;
+    fn gather_others(&mut self, moments: &Moments) {
+        let Planner { crowd, places, .. } = self.alone.planner;
+        for moment in moments.range.clone() {
+            let places = &places[moments.frame(moment)];
+            crowd.costs_at(self.id, places, moment, &mut self.near);
+        }
+        for (other, costs) in self.near.iter().enumerate() {
+            if *costs == [0; FRAMES] {
+                continue;
+            }
+            let mut moment = moments.range.start;
+            while moment < moments.range.end {
+                let shown = self.settled.at(moments.frame(moment))[other];
+                let n = (shown.n_steady as usize).min(moments.range.end - moment);
+                (self.added).add(shown.alike, moment, &costs[moment..moment + n]);
+                moment += n;
+            }
+        }
     }
 }
 
@@ -114,15 +108,6 @@ impl Rows for InCrowd<'_> {
             self.gather(block);
         }
         self.alone.fill(block, first, out);
-        if !self.adds {
-            return;
-        }
-        let added = &mut self.added[first..][..=out.len()];
-        for (idx, out) in out.iter_mut().enumerate() {
-            let (before, more) = (added[idx], added[idx + 1]);
-            let now: [u32; FRAMES] = std::array::from_fn(|k| before[k].wrapping_add(more[k]));
-            *out = std::array::from_fn(|k| (out[k] + now[k]).min(CEILING - 1));
-            added[idx + 1] = now;
-        }
+        self.added.pass(block, first, out);
     }
 }

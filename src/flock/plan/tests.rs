@@ -96,7 +96,7 @@ fn the_plans_of_a_flock_hold_their_certificates() {
     let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
     let motion = motion_of(&library, &Lens::of(&library, &flock.params));
     let planner = Planner::new(&library, &motion, &boids, &flock.params);
-    let mut settled = Settled::new(boids[0].heading_rad.len());
+    let mut settled = Settled::new(planner.places.len());
     for (id, boid) in boids.iter().enumerate() {
         let wanted = planner.weights.wanted(boid, planner.fps);
         let rows = || rows::InCrowd::new(&planner, &settled, id, &wanted);
@@ -107,7 +107,8 @@ fn the_plans_of_a_flock_hold_their_certificates() {
         let costs: Vec<Vec<[u32; FRAMES]>> = (0..wanted.len())
             .map(|t| {
                 let mut row = vec![[0; FRAMES]; n_states];
-                let (way, times) = (Way::Ahead, [t; FRAMES]);
+                let frame = |lane: usize| (t + lane).saturating_sub(FRAMES - 1);
+                let (way, times) = (Way::Ahead, std::array::from_fn(frame));
                 let cpu = Level::detect();
                 rows.fill(
                     &Block {
@@ -122,11 +123,11 @@ fn the_plans_of_a_flock_hold_their_certificates() {
                 row
             })
             .collect();
-        let cost_at = |t: usize, state: usize| costs[t][state][0];
+        let cost_at = |t: usize, state: usize| costs[t][state][FRAMES - 1];
         let checked =
             certificate::check(&planner.trellis, planner.dwell, &cost_at, &columns, &path);
         assert_eq!(checked, Ok(()), "individual {id}");
-        settled.push(&path.states);
+        settled.push(planner.alike_of(&path));
     }
 }
 
@@ -138,7 +139,7 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
         if ends.is_some_and(|ends| path.last() != Some(&ends.next)) {
             return u32::MAX;
         }
-        let settled = Settled::new(wanted.len());
+        let settled = Settled::new(planner.places.len());
         let repetition = planner.memory.cost_of(&path[..wanted.len()]);
         let path = viterbi::Path {
             states: path.clone(),
@@ -240,7 +241,7 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
             let first = planner.trellis.state(frame, side);
             let first = first.expect("a frame of the component");
             planner.ends = vec![Ends { first, next: first }];
-            let mut settled = Settled::new(wanted[0].len());
+            let mut settled = Settled::new(planner.places.len());
             let found = planner.paths(&wanted, &mut settled, &Silent).unwrap();
             let least = least_by_brute_force(&planner, &wanted[0], &mut Vec::new());
             assert_eq!(found[0].cost(), least, "seed {seed}");

@@ -4,7 +4,7 @@
 //! they offer is kept until who landed may leave, `dwell` frames later. The same portable code is
 //! compiled once plainly and once for AVX2; results are the same integers.
 
-use super::front::{Front, NO_LEAD, Stretch, Tally};
+use super::front::{self, Front, NO_LEAD, Stretch, Tally};
 use super::landing::Landing;
 use super::offers::Offers;
 use super::walk::Steps;
@@ -103,7 +103,7 @@ impl Column {
         steps: Steps<'_>,
     ) {
         self.go_on::<R, AVX2, TRACED>(film, rows, steps.wins);
-        self.land::<TRACED>(film, steps.ranks);
+        self.land::<AVX2, TRACED>(film, steps.ranks);
         self.clock += self.width;
     }
 
@@ -141,7 +141,7 @@ impl Column {
                 #[expect(unsafe_code, reason = "the same, for AVX2")]
                 // SAFETY: who says AVX2 has made sure of it.
                 unsafe {
-                    front.go_on_avx2(stretch);
+                    front.go_on_avx2::<TRACED>(stretch);
                 }
                 continue;
             }
@@ -151,7 +151,7 @@ impl Column {
 
     /// The cheapest jump to each station that jumps lead to.
     #[inline(always)]
-    fn land<const TRACED: bool>(&mut self, film: &Film<'_>, ranks: &mut [[u16; FRAMES]]) {
+    fn land<const AVX2: bool, const TRACED: bool>(&mut self, film: &Film<'_>, ranks: &mut [[u16; FRAMES]]) {
         let mut landing = Landing {
             tallies: &self.tallies,
             offers: self.offers.block(self.clock),
@@ -160,10 +160,10 @@ impl Column {
         for (n_jumps, stations, jumps) in film.trellis.landings(self.way).groups() {
             // Most stations have but few jumps: loops of known length.
             match n_jumps {
-                1 => landing.each::<TRACED>(stations, jumps.as_chunks::<1>().0),
-                2 => landing.each::<TRACED>(stations, jumps.as_chunks::<2>().0),
-                3 => landing.each::<TRACED>(stations, jumps.as_chunks::<3>().0),
-                _ => landing.each::<TRACED>(stations, jumps.chunks(n_jumps)),
+                1 => landing.some::<AVX2, TRACED>(stations, jumps.as_chunks::<1>().0),
+                2 => landing.some::<AVX2, TRACED>(stations, jumps.as_chunks::<2>().0),
+                3 => landing.some::<AVX2, TRACED>(stations, jumps.as_chunks::<3>().0),
+                _ => landing.some::<AVX2, TRACED>(stations, jumps.chunks(n_jumps)),
             }
         }
     }
@@ -201,18 +201,18 @@ impl Column {
     pub(super) fn ends(&self, film: &Film<'_>) -> Vec<Vec<u32>> {
         let gone_through = film.trellis.gone_through(self.way);
         let last = self.width - 1;
+        let sums: Vec<u32> = self.tallies[1..].iter().map(|t| t.sums[last]).collect();
         let landed = |ago: usize| {
             let mut values = vec![UNREACHED; gone_through.len()];
             // Before the first frame nobody landed.
             let Some(clock) = self.clock.checked_sub(ago + 2) else {
                 return values;
             };
-            let stations = gone_through.iter().zip(&self.tallies[1..]).skip(ago);
+            let stations = gone_through.iter().zip(&sums).skip(ago);
             let landings = values.iter_mut().skip(ago).zip(self.offers.after(clock));
-            for ((value, lead), (&gone, tally)) in landings.zip(stations) {
-                if gone as usize > ago {
-                    *value = (lead as u32).wrapping_add(tally.sums[last]).min(UNREACHED);
-                }
+            for ((to, lead), (&gone, &sum)) in landings.zip(stations) {
+                let value = front::value(lead, sum).min(UNREACHED);
+                *to = if gone as usize > ago { value } else { UNREACHED };
             }
             values
         };

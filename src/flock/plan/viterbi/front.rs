@@ -3,8 +3,10 @@
 //! `Front::go_on` is the definition; the way for AVX2 is there to be fast, and gives the same.
 
 use super::{FRAMES, UNREACHED};
+#[cfg(target_arch = "x86_64")]
+use crate::flock::plan::lanes::{load, store};
 
-/// The lead of a station that no path leads to. Sums stay below 2^31, so V fits 32 bits.
+/// The lead that nobody offers. Sums stay below 2^31, so V fits 32 bits.
 pub(super) const NO_LEAD: i32 = UNREACHED as i32;
 
 /// A station at the frames of a block.
@@ -32,21 +34,21 @@ pub(super) struct Stretch<'a> {
 }
 
 /// V on its way from one station to the next, which it comes to a frame later: each lane's successor is
-/// the next lane of the next station. On that way costs add to the sum, and V, the sum of both parts, keeps
-/// its lead over it until a landing has a lower one.
+/// the next lane of the next station. On that way costs add to the sum and to V, until a landing has a lower one.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
-    leads: [i32; FRAMES],
-    sums: [u32; FRAMES],
-    /// Lead and sum at the end of the block before.
-    before: (i32, u32),
-    /// All bits of the lanes that stand for frames of the film, and of that in which it begins.
+    at: Tally,
+    /// At the station before, in the last block.
+    before: Tally,
+    /// All bits of the lanes that stand for frames of the film, and of those but that in which it begins.
     in_film: [u32; FRAMES],
-    begins: [i32; FRAMES],
+    goes_on: [u32; FRAMES],
     /// Frames of a block, at most `FRAMES`.
     width: usize,
     /// Frames after a landing in which none may jump.
-    landed: usize,
+    landed: u32,
+    /// Whether every lane stands for a frame, none of them the film's first.
+    is_plain: bool,
 }
 
 impl Tally {
@@ -55,10 +57,6 @@ impl Tally {
         values: [UNREACHED; FRAMES],
         sums: [0; FRAMES],
     };
-
-    fn parts(&self, lane: usize) -> (i32, u32) {
-        (lead(self.values[lane], self.sums[lane]), self.sums[lane])
-    }
 }
 
 impl Front {
@@ -66,87 +64,110 @@ impl Front {
     ///
     /// `opening`: the lane in which the film begins, if it does in this block.
     pub(super) fn new(width: usize, dwell: usize, opening: Option<usize>) -> Front {
-        let bits = |is_set: bool| -i32::from(is_set);
+        let bits = |is_set: bool| -i32::from(is_set) as u32;
         let first = opening.unwrap_or(0);
         Front {
-            in_film: std::array::from_fn(|lane| bits(lane >= first) as u32),
-            begins: std::array::from_fn(|lane| bits(Some(lane) == opening)),
-            leads: [NO_LEAD; FRAMES],
-            sums: [0; FRAMES],
-            before: (NO_LEAD, 0),
+            at: Tally::NOWHERE,
+            before: Tally::NOWHERE,
+            in_film: std::array::from_fn(|lane| bits(lane >= first)),
+            goes_on: std::array::from_fn(|lane| bits(Some(lane) != opening)),
             width,
-            landed: dwell - 1,
+            landed: dwell as u32 - 1,
+            is_plain: width == FRAMES && opening.is_none(),
         }
     }
 
     /// Goes on over a stretch.
     pub(super) fn go_on(&mut self, stretch: Stretch<'_>) {
+        let last = self.width - 1;
         let parts = stretch.offers.iter().zip(stretch.costs).zip(stretch.wins);
         let tallies = stretch.tallies.iter_mut().zip(stretch.gone_through);
         for ((tally, &gone), ((offers, costs), win)) in tallies.zip(parts) {
-            self.leads.rotate_right(1);
-            self.sums.rotate_right(1);
-            (self.leads[0], self.sums[0]) = self.before;
-            self.before = tally.parts(self.width - 1);
+            let (values, sums) = (&mut self.at.values, &mut self.at.sums);
+            values.rotate_right(1);
+            sums.rotate_right(1);
+            (values[0], sums[0]) = (self.before.values[last], self.before.sums[last]);
             *win = 0;
             for lane in 0..FRAMES {
-                // Lanes past the block's width stand for no frame, and may wrap.
-                self.sums[lane] = self.sums[lane].wrapping_add(costs[lane] & self.in_film[lane]);
-                self.leads[lane] &= !self.begins[lane];
-                if gone as usize > self.landed {
-                    *win |= u8::from(offers[lane] < self.leads[lane]) << lane;
-                    self.leads[lane] = self.leads[lane].min(offers[lane]);
+                // Lanes that stand for no frame may wrap.
+                let cost = costs[lane] & self.in_film[lane];
+                sums[lane] = sums[lane].wrapping_add(cost);
+                values[lane] = (values[lane] & self.goes_on[lane]).wrapping_add(cost);
+                if gone > self.landed {
+                    let offer = value(offers[lane], sums[lane]);
+                    *win |= u8::from(offer < values[lane]) << lane;
+                    values[lane] = values[lane].min(offer);
                 }
             }
             if gone == 0 {
-                self.leads = [NO_LEAD; FRAMES];
+                *values = [UNREACHED; FRAMES];
             }
-            tally.sums = self.sums;
-            for lane in 0..FRAMES {
-                tally.values[lane] = (self.leads[lane] as u32).wrapping_add(self.sums[lane]);
-            }
+            self.before = std::mem::replace(tally, self.at);
         }
     }
 
     /// The same.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
+    pub(super) fn go_on_avx2<const TRACED: bool>(&mut self, stretch: Stretch<'_>) {
+        match self.is_plain {
+            true => self.go_on_lanes::<TRACED, true>(stretch),
+            false => self.go_on_lanes::<TRACED, false>(stretch),
+        }
+    }
+
+    /// The same; if not `TRACED`, it is not told where an offer is lower.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
     #[inline(never)]
-    pub(super) fn go_on_avx2(&mut self, stretch: Stretch<'_>) {
+    fn go_on_lanes<const TRACED: bool, const PLAIN: bool>(&mut self, stretch: Stretch<'_>) {
         use std::arch::x86_64::*;
-        let no_lead = _mm256_set1_epi32(NO_LEAD);
-        let onward = _mm256_setr_epi32(7, 0, 1, 2, 3, 4, 5, 6);
-        let next = |lanes: __m256i, first: i32| {
-            let first = _mm256_castsi128_si256(_mm_cvtsi32_si128(first));
-            _mm256_blend_epi32::<1>(_mm256_permutevar8x32_epi32(lanes, onward), first)
+        let unreached = _mm256_set1_epi32(UNREACHED as i32);
+        let last = _mm256_set1_epi32(self.width as i32 - 1);
+        // The last lane of the block before, then all but the last.
+        let next = |lanes: __m256i, before: __m256i| {
+            let before = match PLAIN {
+                true => before,
+                false => _mm256_permutevar8x32_epi32(before, last),
+            };
+            let halves = _mm256_permute2x128_si256::<0x21>(before, lanes);
+            _mm256_alignr_epi8::<12>(lanes, halves)
         };
-        let (mut leads, mut sums) = (load(&self.leads), load_costs(&self.sums));
-        let (in_film, begins) = (load_costs(&self.in_film), load(&self.begins));
-        let (mut before, last) = (self.before, self.width - 1);
-        let landed = self.landed as u32;
+        let (in_film, goes_on) = (load(&self.in_film), load(&self.goes_on));
+        let (mut values, mut sums) = (load(&self.at.values), load(&self.at.sums));
+        let mut before = [load(&self.before.values), load(&self.before.sums)];
         let parts = stretch.offers.iter().zip(stretch.costs).zip(stretch.wins);
         let tallies = stretch.tallies.iter_mut().zip(stretch.gone_through);
         for ((tally, &gone), ((offers, costs), win)) in tallies.zip(parts) {
-            leads = _mm256_andnot_si256(begins, next(leads, before.0));
-            let costs = _mm256_and_si256(load_costs(costs), in_film);
-            sums = _mm256_add_epi32(next(sums, before.1 as i32), costs);
-            before = tally.parts(last);
-            let offers = match gone > landed {
-                true => load(offers),
-                false => no_lead,
-            };
-            let won = _mm256_cmpgt_epi32(leads, offers);
-            *win = _mm256_movemask_ps(_mm256_castsi256_ps(won)) as u8;
-            leads = _mm256_min_epi32(leads, offers);
-            if gone == 0 {
-                leads = no_lead;
+            (values, sums) = (next(values, before[0]), next(sums, before[1]));
+            before = [load(&tally.values), load(&tally.sums)];
+            let mut costs = load(costs);
+            if !PLAIN {
+                costs = _mm256_and_si256(costs, in_film);
+                values = _mm256_and_si256(values, goes_on);
             }
-            tally.sums = stored(sums);
-            tally.values = stored(_mm256_add_epi32(leads, sums));
+            sums = _mm256_add_epi32(sums, costs);
+            values = _mm256_add_epi32(values, costs);
+            let mut won = 0;
+            if gone > self.landed {
+                let least = _mm256_min_epu32(values, _mm256_add_epi32(load(offers), sums));
+                if TRACED {
+                    let same = _mm256_cmpeq_epi32(least, values);
+                    won = !_mm256_movemask_ps(_mm256_castsi256_ps(same));
+                }
+                values = least;
+            } else if gone == 0 {
+                values = unreached;
+            }
+            if TRACED {
+                *win = won as u8;
+            }
+            store(&mut tally.sums, sums);
+            store(&mut tally.values, values);
         }
-        self.before = before;
-        self.leads = stored(leads).map(|lead| lead as i32);
-        self.sums = stored(sums);
+        (store(&mut self.at.values, values), store(&mut self.at.sums, sums));
+        store(&mut self.before.values, before[0]);
+        store(&mut self.before.sums, before[1]);
     }
 }
 
@@ -156,37 +177,8 @@ pub(super) fn lead(value: u32, sum: u32) -> i32 {
     value.wrapping_sub(sum) as i32
 }
 
-#[cfg(target_arch = "x86_64")]
-use self::avx2::{load, load_costs, stored};
-
-/// Eight numbers and a vector of them.
-#[cfg(target_arch = "x86_64")]
-#[expect(unsafe_code, reason = "vectors of AVX2")]
-mod avx2 {
-    use std::arch::x86_64::*;
-
-    use super::FRAMES;
-
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    pub(super) fn load(lanes: &[i32; FRAMES]) -> __m256i {
-        // SAFETY: eight numbers are as long as a vector, which may lie anywhere.
-        unsafe { _mm256_loadu_si256(std::ptr::from_ref(lanes).cast()) }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    pub(super) fn load_costs(lanes: &[u32; FRAMES]) -> __m256i {
-        // SAFETY: eight numbers are as long as a vector, which may lie anywhere.
-        unsafe { _mm256_loadu_si256(std::ptr::from_ref(lanes).cast()) }
-    }
-
-    #[inline]
-    #[target_feature(enable = "avx2")]
-    pub(super) fn stored(vector: __m256i) -> [u32; FRAMES] {
-        let mut lanes = [0; FRAMES];
-        // SAFETY: eight numbers are as long as a vector, which may lie anywhere.
-        unsafe { _mm256_storeu_si256(lanes.as_mut_ptr().cast(), vector) };
-        lanes
-    }
+/// V of what has a lead over the sum.
+#[inline(always)]
+pub(super) fn value(lead: i32, sum: u32) -> u32 {
+    (lead as u32).wrapping_add(sum)
 }

@@ -4,6 +4,8 @@ use super::front::{Tally, lead};
 use super::offers::OffersOfBlock;
 use super::{FRAMES, UNREACHED};
 use crate::flock::plan::landings::Origin;
+#[cfg(target_arch = "x86_64")]
+use crate::flock::plan::lanes::{load, store, store_half};
 
 /// The landings of a block.
 pub(super) struct Landing<'a> {
@@ -17,7 +19,25 @@ pub(super) struct Landing<'a> {
 impl Landing<'_> {
     /// Lands on some stations, given the jumps to each; `RANKED`, or it is not kept which was the cheapest.
     #[inline(always)]
-    pub(super) fn each<const RANKED: bool>(
+    pub(super) fn some<const AVX2: bool, const RANKED: bool>(
+        &mut self,
+        stations: &[u32],
+        jumps: impl IntoIterator<Item = impl AsRef<[Origin]>>,
+    ) {
+        #[cfg(target_arch = "x86_64")]
+        if AVX2 {
+            #[expect(unsafe_code, reason = "the same, for AVX2")]
+            // SAFETY: who says AVX2 has made sure of it.
+            unsafe {
+                self.some_avx2::<RANKED>(stations, jumps);
+            }
+            return;
+        }
+        self.each::<RANKED>(stations, jumps);
+    }
+
+    /// The definition.
+    fn each<const RANKED: bool>(
         &mut self,
         stations: &[u32],
         jumps: impl IntoIterator<Item = impl AsRef<[Origin]>>,
@@ -55,5 +75,39 @@ impl Landing<'_> {
             }
         }
         (best, ranks)
+    }
+
+    /// The same.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    #[inline(never)]
+    fn some_avx2<const RANKED: bool>(
+        &mut self,
+        stations: &[u32],
+        jumps: impl IntoIterator<Item = impl AsRef<[Origin]>>,
+    ) {
+        use std::arch::x86_64::*;
+        let all = |number: u32| _mm256_set1_epi32(number as i32);
+        for (&station, jumps) in stations.iter().zip(jumps) {
+            let (mut best, mut ranks) = (all(UNREACHED), _mm256_setzero_si256());
+            for (rank, jump) in (0u32..).zip(jumps.as_ref()) {
+                let values = load(&self.tallies[jump.from as usize + 1].values);
+                let least = _mm256_min_epu32(_mm256_add_epi32(values, all(jump.cost)), best);
+                if RANKED && rank > 0 {
+                    let same = _mm256_cmpeq_epi32(least, best);
+                    ranks = _mm256_blendv_epi8(all(rank), ranks, same);
+                }
+                best = least;
+            }
+            if RANKED && let Some(out) = self.ranks.next() {
+                let packed = _mm256_packus_epi32(ranks, ranks);
+                let packed = _mm256_permute4x64_epi64::<0b1000>(packed);
+                store_half(out, _mm256_castsi256_si128(packed));
+            }
+            let sums = load(&self.tallies[station as usize].sums);
+            let mut leads = [0; FRAMES];
+            store(&mut leads, _mm256_sub_epi32(best, sums));
+            self.offers.put(station as usize, leads);
+        }
     }
 }

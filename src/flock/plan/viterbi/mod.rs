@@ -20,7 +20,7 @@ mod offers;
 mod shelf;
 mod walk;
 
-pub use self::block::{Block, FRAMES};
+pub use self::block::{Block, FRAMES, Moments};
 use self::column::Column;
 use self::half::Half;
 use self::meeting::Meeting;

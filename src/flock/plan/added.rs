@@ -1,0 +1,154 @@
+//! What is added to the costs of some states at the frames of a block (ALGORITHMS.md 6): by the crowd, and
+//! for what was repeated.
+//!
+//! It is added to states in a row, so only where it begins and where it ends is noted; the sums are taken
+//! as the stations are filled in. Who plays on moves such a row by a state a frame.
+
+use super::cost::CEILING;
+#[cfg(target_arch = "x86_64")]
+use super::lanes::{load, store};
+use super::landings::Way;
+use super::viterbi::{Block, FRAMES};
+#[cfg(target_arch = "x86_64")]
+use crate::cpu::Level;
+
+/// What is added to each state of a trellis at the frames of one block.
+#[derive(Clone)]
+pub(super) struct Added {
+    /// By state, and one past the last: how much more is added than to the state before, at each frame of the
+    /// block, in the order of time; modulo 2^32.
+    more: Vec<[u32; FRAMES]>,
+    /// What is added to the station filled in last.
+    now: [u32; FRAMES],
+    /// Whether anything is.
+    is_any: bool,
+}
+
+impl Added {
+    /// Nothing.
+    pub(super) fn new(n_states: usize) -> Added {
+        Added {
+            more: vec![[0; FRAMES]; n_states + 1],
+            now: [0; FRAMES],
+            is_any: false,
+        }
+    }
+
+    /// Nothing again, after all stations were passed.
+    #[inline(always)]
+    pub(super) fn clear(&mut self) {
+        // What ends with the last state, or begins with the first, is not passed.
+        let n_states = self.more.len() - 1;
+        self.more[0] = [0; FRAMES];
+        self.more[n_states] = [0; FRAMES];
+        self.now = [0; FRAMES];
+        self.is_any = false;
+    }
+
+    /// Adds to states in a row, [first, one past the last], that move on by one a frame: `costs[k]` at moment
+    /// `first + k`.
+    #[inline(always)]
+    pub(super) fn add(&mut self, [low, high]: [u32; 2], first: usize, costs: &[u32]) {
+        self.is_any = true;
+        let n = costs.len();
+        if let Ok(costs) = <&[u32; FRAMES]>::try_from(costs) {
+            let up = self.more[low as usize..].first_chunk_mut::<FRAMES>();
+            let up = up.expect("states in a row");
+            for k in 0..FRAMES {
+                up[k][k] = up[k][k].wrapping_add(costs[k]);
+            }
+            let down = self.more[high as usize..].first_chunk_mut::<FRAMES>();
+            let down = down.expect("states in a row");
+            for k in 0..FRAMES {
+                down[k][k] = down[k][k].wrapping_sub(costs[k]);
+            }
+            return;
+        }
+        for (at, sign) in [(low as usize, 1), (high as usize, u32::MAX)] {
+            let more = &mut self.more[at..at + n];
+            for ((more, &cost), moment) in more.iter_mut().zip(costs).zip(first..) {
+                more[moment] = more[moment].wrapping_add(cost.wrapping_mul(sign));
+            }
+        }
+    }
+
+    /// Adds all of it to the stations from `first` on; forgets what it passes.
+    #[inline(always)]
+    pub(super) fn pass(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
+        if !self.is_any {
+            return;
+        }
+        let states = block.states(first..first + out.len());
+        match block.way {
+            Way::Ahead => {
+                let more = self.more[states].iter_mut();
+                pass_on::<false>(block, &mut self.now, more, out);
+            }
+            Way::Back => {
+                let more = self.more[states.start + 1..states.end + 1].iter_mut();
+                pass_on::<true>(block, &mut self.now, more.rev(), out);
+            }
+        }
+    }
+}
+
+/// Going back, sums are those of the state after less what begins there, and lanes run against time.
+#[inline(always)]
+fn pass_on<'a, const BACK: bool>(
+    block: &Block,
+    now: &mut [u32; FRAMES],
+    more: impl Iterator<Item = &'a mut [u32; FRAMES]>,
+    out: &mut [[u32; FRAMES]],
+) {
+    match block.cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+            #[expect(unsafe_code, reason = "vectors of AVX2")]
+            // SAFETY: the line above made sure of AVX2.
+            unsafe {
+                pass_avx2::<BACK>(now, more, out);
+            }
+        }
+        _ => {
+            for (more, out) in more.zip(out) {
+                for (moment, more) in more.iter_mut().enumerate() {
+                    let more = std::mem::take(more);
+                    now[moment] = match BACK {
+                        false => now[moment].wrapping_add(more),
+                        true => now[moment].wrapping_sub(more),
+                    };
+                    let lane = if BACK { FRAMES - 1 - moment } else { moment };
+                    out[lane] = out[lane].wrapping_add(now[moment]).min(CEILING - 1);
+                }
+            }
+        }
+    }
+}
+
+/// The same.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn pass_avx2<'a, const BACK: bool>(
+    now: &mut [u32; FRAMES],
+    more: impl Iterator<Item = &'a mut [u32; FRAMES]>,
+    out: &mut [[u32; FRAMES]],
+) {
+    use std::arch::x86_64::*;
+    let against = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
+    let ceiling = _mm256_set1_epi32(CEILING as i32 - 1);
+    let mut sums = load(now);
+    for (more, out) in more.zip(out) {
+        let lanes = if BACK {
+            sums = _mm256_sub_epi32(sums, load(more));
+            _mm256_permutevar8x32_epi32(sums, against)
+        } else {
+            sums = _mm256_add_epi32(sums, load(more));
+            sums
+        };
+        store(more, _mm256_setzero_si256());
+        let total = _mm256_add_epi32(load(out), lanes);
+        store(out, _mm256_min_epu32(total, ceiling));
+    }
+    store(now, sums);
+}
