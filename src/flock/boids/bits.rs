@@ -30,7 +30,7 @@ fn digest(params: &Params, depth_bl: f64) -> u64 {
     );
     let mut boids = Boids::at_random(params, &calibration, (&lens, &tank), 30.0);
     (0..40).for_each(|_| boids.advance());
-    let numbers = boids.positions.iter().chain(&boids.velocities).flatten();
+    let numbers = boids.positions().iter().chain(boids.velocities()).flatten();
     numbers.fold(0, |digest, number| {
         random::bits(digest, &[number.to_bits()])
     })
