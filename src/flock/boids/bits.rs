@@ -18,11 +18,9 @@ const DIGESTS: [(&str, [u64; 2]); 6] = [
 
 fn digest(params: &Params, depth_bl: f64) -> u64 {
     let calibration = Calibration {
-        cruise_bl_per_s: 1.0,
-        speed_limits_bl_per_s: [0.5, 1.5],
         turn_rad_per_s: 3.0,
         wander_rad_per_s: 1.5,
-        slopes: None,
+        ..Calibration::default()
     };
     let (lens, tank) = (
         Lens::flat(40.0),

@@ -160,7 +160,8 @@ impl Grid {
             (least, [0, 1, 2].map(|axis| a.1[axis].max(b.1[axis])))
         };
         let place = |boid: &T| (boid.as_ref().position, boid.as_ref().position);
-        let (least, greatest) = (boids.par_iter().with_min_len(CHUNK).map(place)).reduce(nowhere, both);
+        let (least, greatest) =
+            (boids.par_iter().with_min_len(CHUNK).map(place)).reduce(nowhere, both);
         let span: Vec3 = std::array::from_fn(|axis| (greatest[axis] - least[axis]).max(0.0));
         let most = CELLS_PER_BOID * boids.len() as f64 + 8.0;
         let cells = |cell_bl: f64| span.map(|bl| (bl / cell_bl).floor() + 1.0);

@@ -76,7 +76,10 @@ impl Boids<'_> {
             position = add_scaled(position, 0.5 * (self.overlap_bl - distance), away);
         }
         self.habitat.keep_out(&mut position, &mut velocity);
-        (position, self.within_limits(velocity, position, boid.velocity))
+        (
+            position,
+            self.within_limits(velocity, position, boid.velocity),
+        )
     }
 }
 
@@ -100,8 +103,7 @@ mod tests {
             cruise_bl_per_s: 1.5,
             speed_limits_bl_per_s: [1.5, 1.5],
             turn_rad_per_s: 0.5,
-            wander_rad_per_s: 0.0,
-            slopes: None,
+            ..Calibration::default()
         };
         let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
         let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);

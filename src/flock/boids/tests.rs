@@ -107,11 +107,10 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
     };
     params.rules.circling = 0.0;
     let calibration = Calibration {
-        cruise_bl_per_s: 1.0,
         speed_limits_bl_per_s: [0.1, 1.5],
-        turn_rad_per_s: 2.0,
         wander_rad_per_s: 0.7,
         slopes,
+        ..Calibration::default()
     };
     (params, calibration)
 }
@@ -216,7 +215,7 @@ fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
         speed_limits_bl_per_s: [3.0, 3.0],
         turn_rad_per_s: 40f64.to_radians(),
         wander_rad_per_s: 40f64.to_radians(),
-        slopes: None,
+        ..Calibration::default()
     };
     (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
 }
