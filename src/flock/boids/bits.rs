@@ -14,7 +14,7 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         [
             0xdfea_3783_0491_c69a,
             0x450f_c029_b7e6_539e,
-            0xfa58_8377_0899_392f,
+            0x34cf_147d_02f9_6ff5,
         ],
     ),
     (
@@ -22,7 +22,7 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         [
             0xe40c_f14c_cb83_6e9a,
             0x76b6_bdc7_dfc6_4ec5,
-            0xb82e_156a_4b43_81fd,
+            0xe366_4556_6975_b82f,
         ],
     ),
     (
@@ -30,7 +30,7 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         [
             0xae83_51aa_8055_2ee6,
             0x136d_fec5_39fa_a72d,
-            0x2faf_a6dd_9d4d_3185,
+            0x7553_fc14_f539_c80a,
         ],
     ),
     (
@@ -38,7 +38,7 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         [
             0x6264_4d79_e63d_a3a1,
             0x874e_d9fb_9a3f_2bf0,
-            0xeb73_d289_77e9_23b9,
+            0x2b05_7e6a_a22d_932b,
         ],
     ),
     (
@@ -46,7 +46,7 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         [
             0x1c09_d152_c0cf_5923,
             0xd265_db4f_6c24_0514,
-            0xce90_f9c8_f5b6_18cb,
+            0x0393_11ed_8d69_3514,
         ],
     ),
     (
@@ -54,7 +54,7 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         [
             0xcfba_75f2_c14b_8423,
             0x8ddc_ab51_7b57_b0ad,
-            0xc654_686c_556e_17f5,
+            0xbf61_ea4e_276d_b5bb,
         ],
     ),
 ];

@@ -273,7 +273,7 @@ impl Boids<'_> {
     /// stands.
     pub(super) fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
         if let Some([up, down]) = self.calibration.slopes.map(|slopes| slopes.limits) {
-            let level = velocity[0].hypot(velocity[2]);
+            let level = norm([velocity[0], 0.0, velocity[2]]);
             velocity[1] = velocity[1].clamp(-up * level, down * level);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;
