@@ -40,11 +40,9 @@ fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
         ..Params::default()
     };
     let calibration = Calibration {
-        cruise_bl_per_s: 1.0,
-        speed_limits_bl_per_s: [0.5, 1.5],
         turn_rad_per_s: 3.0,
         wander_rad_per_s: 1.5,
-        slopes: None,
+        ..Calibration::default()
     };
     let side = (f64::from(count) * ROOM_BL2).sqrt();
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [side, side, 0.0]));

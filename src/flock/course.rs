@@ -104,7 +104,7 @@ impl Course {
             ..BoidTrack::default()
         };
         Course {
-            tracks: vec![track; boids.positions.len()],
+            tracks: vec![track; boids.positions().len()],
             orders: Vec::new(),
             predator_px: Vec::new(),
             heirs: None,
@@ -130,7 +130,7 @@ fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
 
 /// A boid's moment, as it is seen.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
-    let (place, velocity) = (boids.positions[id], boids.velocities[id]);
+    let (place, velocity) = (boids.positions()[id], boids.velocities()[id]);
     track.position_px.push(seen(place, lens, boids));
     if let Some(forward) = &mut track.forward {
         forward.push(unit(velocity).map(|part| rounded(part, 5)));

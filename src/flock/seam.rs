@@ -121,8 +121,8 @@ impl Moment {
     /// The boids' present one.
     pub(super) fn of(boids: &Boids) -> Moment {
         Moment {
-            positions: boids.positions.clone(),
-            velocities: boids.velocities.clone(),
+            positions: boids.positions().to_vec(),
+            velocities: boids.velocities().to_vec(),
             hunter: boids.predator(),
         }
     }

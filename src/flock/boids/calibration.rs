@@ -40,19 +40,34 @@ const SLOWEST: f64 = 0.05;
 const LEAST_STEEP_RAD: f64 = 0.05;
 const MOST_STEEP_RAD: f64 = 1.2;
 
+impl Default for Calibration {
+    /// Of an animal that nothing is known of: it goes straight on.
+    fn default() -> Calibration {
+        Calibration {
+            cruise_bl_per_s: 1.0,
+            speed_limits_bl_per_s: [0.5, 1.5],
+            turn_rad_per_s: 2.0,
+            wander_rad_per_s: 0.0,
+            slopes: None,
+        }
+    }
+}
+
 impl Calibration {
     /// Measured on the frames that may be shown. `flat`: without depth, where there is no way to turn round
     /// but through the vertical.
     pub fn of(library: &Library, motion: &[FrameMotion], flat: bool) -> Calibration {
         let shown = || (library.playback.component.iter()).map(|&frame| &motion[frame as usize]);
         let mut paces: Vec<f64> = shown().filter_map(|m| m.pace_bl_per_s).collect();
-        let [slow, cruise, fast] = [(SLOWEST, 0.5), (0.5, 1.0), (FASTEST, 1.5)]
+        let unknown = Calibration::default();
+        let (cruise, [slow, fast]) = (unknown.cruise_bl_per_s, unknown.speed_limits_bl_per_s);
+        let [slow, cruise, fast] = [(SLOWEST, slow), (0.5, cruise), (FASTEST, fast)]
             .map(|(share, usual)| percentile(&mut paces, share).unwrap_or(usual));
         // An animal that mostly sits still would make a flock of statues: a quarter of its best.
         let cruise = cruise.max(0.25 * fast).max(0.05);
         let mut swings: Vec<f64> = shown().filter_map(|m| m.swing_rad_per_s).collect();
-        let turn_rad_per_s =
-            percentile(&mut swings, FASTEST).map_or(2.0, |rate| rate.clamp(0.5, 6.0));
+        let turn_rad_per_s = percentile(&mut swings, FASTEST)
+            .map_or(unknown.turn_rad_per_s, |rate| rate.clamp(0.5, 6.0));
         Calibration {
             cruise_bl_per_s: cruise,
             speed_limits_bl_per_s: [slow.max(0.25 * cruise).min(cruise), fast.max(cruise)],

@@ -24,9 +24,10 @@ pub struct Grid {
     n_cells: [usize; 3],
     /// `first[c]..first[c + 1]` are the boids of cell c.
     first: Vec<u32>,
-    /// The cell of each boid, by id; then where it stands in cell order.
+    /// The cell of each boid as they were given; then where it stands in cell order.
     slots: Vec<u32>,
-    ids: Vec<u32>,
+    /// The way back: whom of those given each slot holds.
+    given: Vec<u32>,
     boids: Vec<Boid>,
     /// Their positions once more, axis by axis.
     axes: [Vec<f64>; 3],
@@ -42,6 +43,12 @@ pub struct Boid {
     pub velocity: Vec3,
     /// Its number.
     pub id: u32,
+}
+
+impl AsRef<Boid> for Boid {
+    fn as_ref(&self) -> &Boid {
+        self
+    }
 }
 
 /// Rows of cells beside one another.
@@ -76,41 +83,37 @@ impl Iterator for Rows<'_> {
 }
 
 impl Grid {
-    /// Sorts boids into cells for rules that reach so far; what was sorted before is forgotten.
-    pub fn sort(&mut self, positions: &[Vec3], velocities: &[Vec3], reach_bl: f64) {
-        self.lay_cells(positions, reach_bl);
-        self.count(positions);
-        self.ids.resize(positions.len(), 0);
-        for (id, &slot) in (0..).zip(&self.slots) {
-            self.ids[slot as usize] = id;
+    /// Sorts boids into cells for rules that reach so far; what was sorted before is forgotten. It is the faster the
+    /// nearer to one another they are given.
+    pub fn sort<T: AsRef<Boid> + Sync>(&mut self, boids: &[T], reach_bl: f64) {
+        self.lay_cells(boids, reach_bl);
+        self.count(boids);
+        self.given.resize(boids.len(), 0);
+        for (given, &slot) in (0..).zip(&self.slots) {
+            self.given[slot as usize] = given;
         }
         for axis in &mut self.axes {
             axis.clear();
-            axis.resize(positions.len() + BLOCK, f64::INFINITY);
+            axis.resize(boids.len() + BLOCK, f64::INFINITY);
         }
-        self.boids.resize(positions.len(), Boid::default());
+        self.boids.resize(boids.len(), Boid::default());
         let [x, y, z] = &mut self.axes;
-        (&mut self.boids, &self.ids, x, y, z)
+        (&mut self.boids, &self.given, x, y, z)
             .into_par_iter()
             .with_min_len(CHUNK)
-            .for_each(|(boid, &id, x, y, z)| {
-                let (position, velocity) = (positions[id as usize], velocities[id as usize]);
-                [*x, *y, *z] = position;
-                *boid = Boid {
-                    position,
-                    velocity,
-                    id,
-                };
+            .for_each(|(boid, &given, x, y, z)| {
+                *boid = *boids[given as usize].as_ref();
+                [*x, *y, *z] = boid.position;
             });
     }
 
-    /// The boids in the order of their cells: who follows whom here is near it.
+    /// Whom of those given each slot holds, in the order of cells: who follows whom here is near it.
     #[inline(always)]
-    pub fn by_cell(&self) -> &[u32] {
-        &self.ids
+    pub fn given(&self) -> &[u32] {
+        &self.given
     }
 
-    /// Where each boid stands in the order of cells, by id.
+    /// Where each boid stands in the order of cells, as they were given.
     pub fn slots(&self) -> &[u32] {
         &self.slots
     }
@@ -150,17 +153,17 @@ impl Grid {
     }
 
     /// Cells as wide along each axis, as small as the reach asks for and the number of boids allows.
-    fn lay_cells(&mut self, positions: &[Vec3], reach_bl: f64) {
-        let mut least = [f64::INFINITY; 3];
-        let mut greatest = [f64::NEG_INFINITY; 3];
-        for position in positions {
-            for axis in 0..3 {
-                least[axis] = least[axis].min(position[axis]);
-                greatest[axis] = greatest[axis].max(position[axis]);
-            }
-        }
+    fn lay_cells<T: AsRef<Boid> + Sync>(&mut self, boids: &[T], reach_bl: f64) {
+        let nowhere = || ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| {
+            let least = [0, 1, 2].map(|axis| a.0[axis].min(b.0[axis]));
+            (least, [0, 1, 2].map(|axis| a.1[axis].max(b.1[axis])))
+        };
+        let place = |boid: &T| (boid.as_ref().position, boid.as_ref().position);
+        let (least, greatest) =
+            (boids.par_iter().with_min_len(CHUNK).map(place)).reduce(nowhere, both);
         let span: Vec3 = std::array::from_fn(|axis| (greatest[axis] - least[axis]).max(0.0));
-        let most = CELLS_PER_BOID * positions.len() as f64 + 8.0;
+        let most = CELLS_PER_BOID * boids.len() as f64 + 8.0;
         let cells = |cell_bl: f64| span.map(|bl| (bl / cell_bl).floor() + 1.0);
         let mut cell_bl = reach_bl / FINEST;
         while cells(cell_bl).iter().product::<f64>() > most {
@@ -172,10 +175,10 @@ impl Grid {
     }
 
     /// Where each boid stands, and where cells begin.
-    fn count(&mut self, positions: &[Vec3]) {
+    fn count<T: AsRef<Boid> + Sync>(&mut self, boids: &[T]) {
         let mut slots = std::mem::take(&mut self.slots);
-        slots.clear();
-        slots.extend((positions.iter()).map(|&place| self.index(self.cell_of(place)) as u32));
+        let cell = |boid: &T| self.index(self.cell_of(boid.as_ref().position)) as u32;
+        (boids.par_iter().with_min_len(CHUNK).map(cell)).collect_into_vec(&mut slots);
         let n = self.n_cells.iter().product::<usize>();
         self.first.clear();
         self.first.resize(n + 1, 0);

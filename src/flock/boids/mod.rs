@@ -24,7 +24,7 @@ pub mod zones;
 use self::calibration::Calibration;
 use self::habitat::{Habitat, Hunter};
 pub use self::meeting::Meeting;
-use self::step::{Inner, Room};
+use self::step::Room;
 use self::tank::Tank;
 use self::vector::{Vec3, scaled};
 use super::lens::Lens;
@@ -62,11 +62,8 @@ pub struct Boids<'a> {
     step_idx: u64,
     /// Of the film; negative before it.
     time_s: f64,
-    /// Positions, body lengths.
-    pub positions: Vec<Vec3>,
-    /// Velocities, body lengths a second.
-    pub velocities: Vec<Vec3>,
-    inner: Vec<Inner>,
+    positions: Vec<Vec3>,
+    velocities: Vec<Vec3>,
     room: Room,
     hunter: Option<Hunter>,
     meeting: Option<Meeting>,
@@ -116,8 +113,7 @@ impl<'a> Boids<'a> {
             time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],
-            inner: vec![Inner::default(); n],
-            room: Room::default(),
+            room: Room::of(n),
             hunter: None,
             meeting: None,
         };
@@ -130,6 +126,16 @@ impl<'a> Boids<'a> {
         Some(self.hunter?.position)
     }
 
+    /// Where everybody is, by id, body lengths.
+    pub fn positions(&self) -> &[Vec3] {
+        &self.positions
+    }
+
+    /// How fast everybody is, by id, body lengths a second.
+    pub fn velocities(&self) -> &[Vec3] {
+        &self.velocities
+    }
+
     /// Lets the film begin so many frames later.
     pub fn set_back(&mut self, n_frames: usize) {
         self.time_s -= n_frames as f64 * f64::from(self.n_substeps) * self.step_s;
@@ -140,9 +146,10 @@ impl<'a> Boids<'a> {
         self.meeting = Some(meeting);
     }
 
-    /// Puts everybody into a moment.
+    /// Puts everybody into a moment, by id.
     pub fn show(&mut self, positions: Vec<Vec3>, velocities: Vec<Vec3>, hunter: Option<Vec3>) {
         (self.positions, self.velocities) = (positions, velocities);
+        self.swim_from_here();
         if let (Some(hunter), Some(position)) = (&mut self.hunter, hunter) {
             hunter.position = position;
         }
@@ -187,6 +194,7 @@ impl<'a> Boids<'a> {
             self.habitat
                 .keep_out(&mut self.positions[id], &mut self.velocities[id]);
         }
+        self.swim_from_here();
     }
 }
 

@@ -5,7 +5,8 @@
 
 use rayon::prelude::*;
 
-use super::step::{Next, Room};
+use super::grid::Boid;
+use super::step::Room;
 use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 use super::{Boids, CHUNK};
 
@@ -29,8 +30,7 @@ impl Boids<'_> {
                 }
                 let near = self.too_near(slot, room, farthest_bl);
                 if !near.is_empty() {
-                    let id = room.grid.by_cell()[slot];
-                    let (position, velocity) = self.apart(id, &room.next[slot], &near);
+                    let (position, velocity) = self.apart(&room.next[slot].boid, &near);
                     moved.push((slot, position, velocity));
                 }
                 moved
@@ -38,21 +38,23 @@ impl Boids<'_> {
             .flatten_iter()
             .collect();
         for (slot, position, velocity) in moved {
-            (room.next[slot].position, room.next[slot].velocity) = (position, velocity);
+            let boid = &mut room.next[slot].boid;
+            (boid.position, boid.velocity) = (position, velocity);
         }
     }
 
     /// The others that overlap with whoever stands at `slot`, nearest first, equal distances by id.
     fn too_near(&self, slot: usize, room: &Room, farthest_bl: f64) -> Vec<Near> {
-        let place = room.next[slot].position;
+        let place = room.next[slot].boid.position;
         let most_bl2 = self.overlap_bl * self.overlap_bl;
         let mut near = Vec::new();
         for (from, to) in (room.grid).rows(place, self.overlap_bl + farthest_bl) {
             for other in from..to {
-                let offset = minus(room.next[other].position, place);
+                let boid = &room.next[other].boid;
+                let offset = minus(boid.position, place);
                 let square_bl2 = dot(offset, offset);
                 if square_bl2 < most_bl2 && other != slot {
-                    near.push((square_bl2, room.grid.by_cell()[other], offset));
+                    near.push((square_bl2, boid.id, offset));
                 }
             }
         }
@@ -62,20 +64,22 @@ impl Boids<'_> {
     }
 
     /// Where one goes that others are too near to.
-    fn apart(&self, id: u32, next: &Next, near: &[Near]) -> (Vec3, Vec3) {
-        let (mut position, mut velocity) = (next.position, next.velocity);
+    fn apart(&self, boid: &Boid, near: &[Near]) -> (Vec3, Vec3) {
+        let (mut position, mut velocity) = (boid.position, boid.velocity);
         for &(square_bl2, other, offset) in near {
             let distance = square_bl2.sqrt();
             let away = match distance > 1e-9 {
                 true => scaled(-1.0 / distance, offset),
                 // In one place: apart along x, by id.
-                false => [if id < other { -1.0 } else { 1.0 }, 0.0, 0.0],
+                false => [if boid.id < other { -1.0 } else { 1.0 }, 0.0, 0.0],
             };
             position = add_scaled(position, 0.5 * (self.overlap_bl - distance), away);
         }
         self.habitat.keep_out(&mut position, &mut velocity);
-        let along = next.velocity;
-        (position, self.within_limits(velocity, position, along))
+        (
+            position,
+            self.within_limits(velocity, position, boid.velocity),
+        )
     }
 }
 
@@ -99,15 +103,15 @@ mod tests {
             cruise_bl_per_s: 1.5,
             speed_limits_bl_per_s: [1.5, 1.5],
             turn_rad_per_s: 0.5,
-            wander_rad_per_s: 0.0,
-            slopes: None,
+            ..Calibration::default()
         };
         let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
         let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
-        boids.positions = vec![[5.0, 4.0, 0.0], [5.59, 4.0, 0.0]];
-        boids.velocities = vec![[1.5, 0.0, 0.0], [-1.5, 0.0, 0.0]];
+        let positions = vec![[5.0, 4.0, 0.0], [5.59, 4.0, 0.0]];
+        let velocities = vec![[1.5, 0.0, 0.0], [-1.5, 0.0, 0.0]];
+        boids.show(positions, velocities, None);
         boids.advance();
-        let apart_bl = norm(minus(boids.positions[1], boids.positions[0]));
+        let apart_bl = norm(minus(boids.positions()[1], boids.positions()[0]));
         assert!((apart_bl - boids.overlap_bl).abs() < 1e-9, "{apart_bl}");
     }
 }

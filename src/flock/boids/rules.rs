@@ -252,7 +252,7 @@ impl Steering<'_> {
         };
         let [x, y, z] = moment.velocity;
         let wished = slopes.usual + slopes.spread * moment.wander[1];
-        add_scaled(turn, (wished * x.hypot(z) - y) / LEVEL_S, up)
+        add_scaled(turn, (wished * norm([x, 0.0, z]) - y) / LEVEL_S, up)
     }
 
     /// Back to cruising speed; leaders are faster.

@@ -28,21 +28,48 @@ pub(super) struct Inner {
     sight_bl: f64,
 }
 
-/// Memory of a step that the next one uses again.
+/// All boids, in the order of the cells that they were in a step ago: who is near whom in the tank is so in memory.
 #[derive(Default)]
 pub(super) struct Room {
+    pub(super) now: Vec<Member>,
+    /// Where each stands in `now`, by id.
+    pub(super) places: Vec<u32>,
+    /// In the order of the cells that they are in before the step.
+    pub(super) next: Vec<Member>,
     pub(super) grid: Grid,
-    pub(super) next: Vec<Next>,
 }
 
-/// What a boid is after a step.
+/// A boid with all that the next step asks for.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Next {
-    pub(super) position: Vec3,
-    pub(super) velocity: Vec3,
+pub(super) struct Member {
+    pub(super) boid: Boid,
     inner: Inner,
     /// How far off the nearest other was before the step, squared; the reach when there was none.
     pub(super) nearest_bl2: f64,
+}
+
+impl AsRef<Boid> for Member {
+    fn as_ref(&self) -> &Boid {
+        &self.boid
+    }
+}
+
+impl Room {
+    /// Boids that have not swum yet, by id.
+    pub(super) fn of(n: usize) -> Room {
+        let member = |id| Member {
+            boid: Boid {
+                id,
+                ..Boid::default()
+            },
+            ..Member::default()
+        };
+        Room {
+            now: (0..n as u32).map(member).collect(),
+            places: (0..n as u32).collect(),
+            ..Room::default()
+        }
+    }
 }
 
 /// What is the same for all in one step.
@@ -75,28 +102,38 @@ impl Boids<'_> {
                 .advance(hunter, time_s, step_s, &self.positions, self.calibration);
         }
         let mut room = std::mem::take(&mut self.room);
-        let Room { grid, next } = &mut room;
+        let Room {
+            now, next, grid, ..
+        } = &mut room;
         let pace = self.pace();
-        grid.sort(&self.positions, &self.velocities, pace.reach_bl);
-        next.resize(self.positions.len(), Next::default());
+        grid.sort(now, pace.reach_bl);
+        next.resize(now.len(), Member::default());
         let farthest_bl2 = (next.par_chunks_mut(CHUNK).enumerate())
             .map_init(Search::default, |search, (chunk, next)| {
-                self.go_on(chunk * CHUNK, next, (grid, search), &pace)
+                self.go_on(chunk * CHUNK, next, (now, grid, search), &pace)
             })
             .reduce(|| 0.0, f64::max);
         self.push_apart(&mut room, farthest_bl2.sqrt());
         let (slots, next) = (room.grid.slots(), &room.next);
-        let by_id = (self.positions.par_iter_mut())
-            .zip(&mut self.velocities)
-            .zip(&mut self.inner)
-            .zip(slots)
-            .with_min_len(CHUNK);
-        by_id.for_each(|(((position, velocity), inner), &slot)| {
-            let next = &next[slot as usize];
-            (*position, *velocity, *inner) = (next.position, next.velocity, next.inner);
-        });
+        (&mut self.positions, &mut self.velocities, &mut room.places)
+            .into_par_iter()
+            .with_min_len(CHUNK)
+            .for_each(|(position, velocity, place)| {
+                *place = slots[*place as usize];
+                let boid = &next[*place as usize].boid;
+                (*position, *velocity) = (boid.position, boid.velocity);
+            });
+        std::mem::swap(&mut room.now, &mut room.next);
         self.room = room;
         self.step_idx += 1;
+    }
+
+    /// Has everybody swim on from where `positions` and `velocities` say.
+    pub(super) fn swim_from_here(&mut self) {
+        for Member { boid, .. } in &mut self.room.now {
+            let id = boid.id as usize;
+            (boid.position, boid.velocity) = (self.positions[id], self.velocities[id]);
+        }
     }
 
     fn pace(&self) -> Pace<'_> {
@@ -125,8 +162,8 @@ impl Boids<'_> {
     fn go_on(
         &self,
         first: usize,
-        next: &mut [Next],
-        near: (&Grid, &mut Search),
+        next: &mut [Member],
+        near: (&[Member], &Grid, &mut Search),
         pace: &Pace,
     ) -> f64 {
         match pace.cpu {
@@ -147,8 +184,8 @@ impl Boids<'_> {
     fn go_on_avx2(
         &self,
         first: usize,
-        next: &mut [Next],
-        near: (&Grid, &mut Search),
+        next: &mut [Member],
+        near: (&[Member], &Grid, &mut Search),
         pace: &Pace,
     ) -> f64 {
         self.go_on_with(first, next, near, pace)
@@ -158,19 +195,15 @@ impl Boids<'_> {
     fn go_on_with(
         &self,
         first: usize,
-        next: &mut [Next],
-        (grid, search): (&Grid, &mut Search),
+        next: &mut [Member],
+        (now, grid, search): (&[Member], &Grid, &mut Search),
         pace: &Pace,
     ) -> f64 {
-        let ids = &grid.by_cell()[first..];
-        for (next, &id) in next.iter_mut().zip(ids) {
-            // All at once: they lie far apart.
-            next.inner = self.inner[id as usize];
-        }
         let mut farthest_bl2 = 0.0f64;
         for (slot, next) in (first..).zip(next) {
-            *next = self.next(slot, &next.inner, (grid, search), pace);
-            let way = minus(next.position, grid.at(slot).position);
+            let before = &now[grid.given()[slot] as usize].inner;
+            *next = self.next(slot, before, (grid, search), pace);
+            let way = minus(next.boid.position, grid.at(slot).position);
             farthest_bl2 = farthest_bl2.max(dot(way, way));
         }
         farthest_bl2
@@ -184,13 +217,13 @@ impl Boids<'_> {
         before: &Inner,
         (grid, search): (&Grid, &mut Search),
         pace: &Pace,
-    ) -> Next {
+    ) -> Member {
         let &Boid {
             position,
             velocity,
-            id,
+            id: own_id,
         } = grid.at(slot);
-        let id = id as usize;
+        let id = own_id as usize;
         let limit = self.params.rules.neighbors as usize;
         let guess_bl = FARTHER * before.sight_bl;
         let neighbors = search.nearest((grid, slot), (limit, pace.reach_bl), guess_bl, pace.cpu);
@@ -219,16 +252,20 @@ impl Boids<'_> {
         };
         let turned = turned_at_most(velocity, wished, pace.cos_sin, aside);
         let velocity = self.within_limits(turned, position, velocity);
-        let mut next = Next {
-            position: add_scaled(position, self.step_s, velocity),
-            velocity,
+        let mut next = Member {
+            boid: Boid {
+                position: add_scaled(position, self.step_s, velocity),
+                velocity,
+                id: own_id,
+            },
             inner,
             nearest_bl2: nearest.map_or(pace.reach_bl * pace.reach_bl, |near| near.square_bl2),
         };
+        let boid = &mut next.boid;
         self.habitat
-            .keep_out(&mut next.position, &mut next.velocity);
+            .keep_out(&mut boid.position, &mut boid.velocity);
         // A slanting wall reflects more steeply than the animal swims.
-        next.velocity = self.within_limits(next.velocity, position, velocity);
+        boid.velocity = self.within_limits(boid.velocity, position, velocity);
         next
     }
 
@@ -236,7 +273,7 @@ impl Boids<'_> {
     /// stands.
     pub(super) fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
         if let Some([up, down]) = self.calibration.slopes.map(|slopes| slopes.limits) {
-            let level = velocity[0].hypot(velocity[2]);
+            let level = norm([velocity[0], 0.0, velocity[2]]);
             velocity[1] = velocity[1].clamp(-up * level, down * level);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;

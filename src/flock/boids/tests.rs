@@ -28,8 +28,8 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
         mean.polarization += now.polarization / n_frames as f64;
         mean.milling += now.milling / n_frames as f64;
         mean.nearest_bl += now.nearest_bl / n_frames as f64;
-        positions.push(boids.positions.clone());
-        velocities.push(boids.velocities.clone());
+        positions.push(boids.positions().to_vec());
+        velocities.push(boids.velocities().to_vec());
     }
     (positions, velocities, mean)
 }
@@ -107,11 +107,10 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
     };
     params.rules.circling = 0.0;
     let calibration = Calibration {
-        cruise_bl_per_s: 1.0,
         speed_limits_bl_per_s: [0.1, 1.5],
-        turn_rad_per_s: 2.0,
         wander_rad_per_s: 0.7,
         slopes,
+        ..Calibration::default()
     };
     (params, calibration)
 }
@@ -123,19 +122,18 @@ fn who_heads_for_a_wall_turns_aside_and_does_not_dawdle_before_it() {
     // Head-on, and on a slant either way.
     for y_speed in [0.0, 0.5, -0.5] {
         let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
-        boids.positions[0] = [9.0, 4.5, 0.0];
-        boids.velocities[0] = unit([1.0, y_speed, 0.0]);
+        boids.show(vec![[9.0, 4.5, 0.0]], vec![unit([1.0, y_speed, 0.0])], None);
         let mut slowest = f64::INFINITY;
         for _ in 0..150 {
             boids.advance();
-            slowest = slowest.min(norm(boids.velocities[0]));
+            slowest = slowest.min(norm(boids.velocities()[0]));
         }
         assert!(slowest > 0.8, "{y_speed}: slows down to {slowest} BL/s");
-        let [outward, along, _] = boids.velocities[0];
+        let [outward, along, _] = boids.velocities()[0];
         assert!(
             outward < 0.5 * along.abs(),
             "{y_speed}: {:?}",
-            boids.velocities[0]
+            boids.velocities()[0]
         );
     }
 }
@@ -151,14 +149,13 @@ fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [60.0, 60.0, 60.0]));
     for steep in [1.4, -1.4, 0.0] {
         let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
-        boids.positions[0] = [30.0; 3];
-        boids.velocities[0] = unit([1.0, steep, 0.2]);
+        boids.show(vec![[30.0; 3]], vec![unit([1.0, steep, 0.2])], None);
         (0..90).for_each(|_| boids.advance());
         let slope = |v: Vec3| v[1] / v[0].hypot(v[2]);
         let mut seen = Vec::new();
         for _ in 0..300 {
             boids.advance();
-            seen.push(slope(boids.velocities[0]));
+            seen.push(slope(boids.velocities()[0]));
         }
         let mean = seen.iter().sum::<f64>() / seen.len() as f64;
         assert!((mean - slopes.usual).abs() < 0.08, "from {steep}: {mean}");
@@ -218,7 +215,7 @@ fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
         speed_limits_bl_per_s: [3.0, 3.0],
         turn_rad_per_s: 40f64.to_radians(),
         wander_rad_per_s: 40f64.to_radians(),
-        slopes: None,
+        ..Calibration::default()
     };
     (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
 }
@@ -228,25 +225,27 @@ fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
     let (params, calibration, tank) = at_sea(orientation_bl);
     let lens = Lens::flat(40.0);
     let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
-    for id in 0..boids.positions.len() {
-        let draw = |word| 2.0 * random::unit(7, &[id as u64, word]) - 1.0;
-        boids.positions[id] = [0, 1, 2].map(|axis| 5.0 * draw(axis));
-        boids.velocities[id] = scaled(3.0, unit([3, 4, 5].map(draw)));
-    }
+    let heap = (0..u64::from(params.count)).map(|id| {
+        let draw = |word| 2.0 * random::unit(7, &[id, word]) - 1.0;
+        let position = [0, 1, 2].map(|axis| 5.0 * draw(axis));
+        (position, scaled(3.0, unit([3, 4, 5].map(draw))))
+    });
+    let (positions, velocities) = heap.unzip();
+    boids.show(positions, velocities, None);
     let (mut polarization, mut rotation) = (0.0, 0.0);
     for frame in 0..n_frames {
         boids.advance();
         if frame >= n_frames / 2 {
-            let n = boids.positions.len() as f64;
+            let n = boids.positions().len() as f64;
             let sum = |of: &dyn Fn(usize) -> Vec3| {
-                (0..boids.positions.len()).fold([0.0; 3], |sum, id| add_scaled(sum, 1.0, of(id)))
+                (0..boids.positions().len()).fold([0.0; 3], |sum, id| add_scaled(sum, 1.0, of(id)))
             };
-            let middle = scaled(1.0 / n, sum(&|id| boids.positions[id]));
+            let middle = scaled(1.0 / n, sum(&|id| boids.positions()[id]));
             let spin = |id: usize| {
-                let out = vector::minus(boids.positions[id], middle);
-                vector::cross(unit(out), unit(boids.velocities[id]))
+                let out = vector::minus(boids.positions()[id], middle);
+                vector::cross(unit(out), unit(boids.velocities()[id]))
             };
-            polarization += norm(sum(&|id| unit(boids.velocities[id]))) / n;
+            polarization += norm(sum(&|id| unit(boids.velocities()[id]))) / n;
             rotation += norm(sum(&spin)) / n;
         }
     }
@@ -273,7 +272,7 @@ fn with(params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Option<Vec3>>)
     let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
     let frame = |_| {
         boids.advance();
-        (boids.positions.clone(), boids.predator())
+        (boids.positions().to_vec(), boids.predator())
     };
     (0..n_frames).map(frame).unzip()
 }

@@ -112,7 +112,7 @@ impl Search {
         order.clear();
         order.extend(0..near.n as u32);
         order.sort_unstable_by(|&a, &b| {
-            let id = |at: u32| grid.by_cell()[near.slots[at as usize] as usize];
+            let id = |at: u32| grid.at(near.slots[at as usize] as usize).id;
             let [nearer, farther] = [a, b].map(|at| near.squares_bl2[at as usize]);
             nearer.total_cmp(&farther).then_with(|| id(a).cmp(&id(b)))
         });
@@ -158,6 +158,7 @@ fn rank(cpu: Level, near: &mut Near) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flock::boids::grid::Boid;
     use crate::flock::boids::vector::dot;
     use proptest::prelude::*;
 
@@ -201,9 +202,12 @@ mod tests {
                 .iter()
                 .map(|&(x, y, z)| [at(x), at(y), if flat { 0.0 } else { at(z) }])
                 .collect();
-            let velocities: Vec<Vec3> = positions.iter().map(|p| p.map(|x| 2.0 * x)).collect();
+            let boids: Vec<Boid> = (0..)
+                .zip(&positions)
+                .map(|(id, &position)| Boid { position, velocity: position.map(|x| 2.0 * x), id })
+                .collect();
             let mut grid = Grid::default();
-            grid.sort(&positions, &velocities, reach);
+            grid.sort(&boids, reach);
             let mut search = Search::default();
             for (id, &slot) in (0..).zip(grid.slots()) {
                 let all = all_by_brute_force(&positions, id, (limit, reach));
