@@ -14,6 +14,8 @@ pub(super) const HALF_PLACE: i32 = (1 << 16) / (2 * PLACES as i32);
 pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
 /// The same, each weight once for every value of a pixel.
 pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
+/// The same, each weight twice in its 32 bits: those a register is filled with at once.
+pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
 
 impl Premultiplied {
     /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
@@ -44,18 +46,13 @@ impl Premultiplied {
         let stride = self.stride();
         let taps = self.pixels.as_flattened();
         for pixel in row {
-            let [from, to] = self.spans[(v >> 16) as usize];
-            *pixel = if u > from && u < to {
-                let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
-                let first = 4 * ((y - 1) * stride + x - 1);
-                blend(
-                    std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
-                    &WIDE[(u >> 8) as usize % PLACES],
-                    &WEIGHTS[(v >> 8) as usize % PLACES],
-                )
-            } else {
-                [0; 4]
-            };
+            let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
+            let first = 4 * ((y - 1) * stride + x - 1);
+            *pixel = blend(
+                std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
+                &WIDE[(u >> 8) as usize % PLACES],
+                &WEIGHTS[(v >> 8) as usize % PLACES],
+            );
             u += step[0];
             v += step[1];
         }
@@ -140,6 +137,22 @@ const fn widened() -> [[i16; 16]; PLACES] {
         place += 1;
     }
     wide
+}
+
+const fn doubled() -> [[i32; 4]; PLACES] {
+    let narrow = all_weights();
+    let mut twice = [[0; 4]; PLACES];
+    let mut place = 0;
+    while place < PLACES {
+        let mut tap = 0;
+        while tap < 4 {
+            let weight = narrow[place][tap];
+            twice[place][tap] = (weight as i32) << 16 | (weight as u16 as i32);
+            tap += 1;
+        }
+        place += 1;
+    }
+    twice
 }
 
 #[cfg(test)]

@@ -12,6 +12,40 @@ pub(super) struct Map {
     place: Placement,
 }
 
+/// The steps that a row of the picture makes through a sprite, in 65536ths of its pixels.
+pub(super) struct Way {
+    pub(super) step: [i32; 2],
+    /// Steps to go one 65536th.
+    per_unit: [f64; 2],
+}
+
+impl Way {
+    fn of(step: [i32; 2]) -> Way {
+        Way {
+            step,
+            per_unit: step.map(|step| 1.0 / f64::from(step).abs()),
+        }
+    }
+
+    /// The same the other way round.
+    pub(super) fn back(&self) -> Way {
+        Way {
+            step: self.step.map(|step| -step),
+            per_unit: self.per_unit,
+        }
+    }
+
+    /// Where `n` steps from a place lead to.
+    pub(super) fn along(&self, from: [i32; 2], n: i32) -> [i32; 2] {
+        std::array::from_fn(|k| from[k] + self.step[k] * n)
+    }
+
+    /// Steps to go farther than a distance, at most 2^31 - 1.
+    pub(super) fn n_until_beyond(&self, distance: f64, axis: usize) -> i32 {
+        ((distance * self.per_unit[axis]) as i32).saturating_add(1)
+    }
+}
+
 impl Map {
     pub(super) fn new(sprite: &Premultiplied, place: &Placement) -> Map {
         // One pixel of the level is so many of the sprite.
@@ -35,6 +69,11 @@ impl Map {
             per_row,
             place: *place,
         }
+    }
+
+    /// The way of a row through the sprite.
+    pub(super) fn way(&self) -> Way {
+        Way::of(self.per_column.map(fixed))
     }
 
     /// The place in the sprite of a point of the picture.
@@ -110,4 +149,9 @@ impl Map {
             (0, 0)
         }
     }
+}
+
+/// A coordinate in 65536ths.
+pub(super) fn fixed(coordinate: f64) -> i32 {
+    (coordinate * 65536.0).round() as i32
 }

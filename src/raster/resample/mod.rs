@@ -14,7 +14,7 @@ mod premultiplied; // a sprite as it is interpolated
 pub(super) use catmull_rom::scaled;
 pub use premultiplied::{Premultiplied, bounds_of};
 
-use self::map::Map;
+use self::map::{Map, fixed};
 use super::canvas::Cover;
 use crate::cpu::Level;
 use crate::geometry::Rect;
@@ -67,7 +67,7 @@ impl Resampled {
         self.rect = map.covered(sprite, room.size);
         self.pixels.resize(self.rect.area() as usize, [0; 4]);
         self.runs.clear();
-        let step = map.per_column.map(fixed);
+        let way = map.way();
         let rows = self.pixels.chunks_exact_mut(self.rect.w.max(1) as usize);
         for (row, y) in rows.zip(self.rect.y..) {
             let open = |from: usize, to: usize| {
@@ -83,13 +83,14 @@ impl Resampled {
             let first: [f64; 2] =
                 std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
             let first = first.map(fixed);
-            let mut run = open(from, to);
+            let seen = sprite.seen(first, &way, to - from);
+            let to = from + seen.end;
+            let mut run = open(from + seen.start, to);
             while !run.is_empty() {
                 self.runs.push([y, run.start, run.end]);
                 let [start, end] = [run.start, run.end].map(|x| (x - self.rect.x) as usize);
-                let ahead = (start - from) as i32;
-                let start_at = std::array::from_fn(|k| first[k] + step[k] * ahead);
-                sprite.interpolate(&mut row[start..end], start_at, step, cpu);
+                let start_at = way.along(first, (start - from) as i32);
+                sprite.interpolate(&mut row[start..end], start_at, way.step, cpu);
                 run = open(end, to);
             }
         }
@@ -121,11 +122,6 @@ impl Resampled {
         }
         alpha
     }
-}
-
-/// A coordinate in 65536ths.
-fn fixed(coordinate: f64) -> i32 {
-    (coordinate * 65536.0).round() as i32
 }
 
 #[cfg(test)]

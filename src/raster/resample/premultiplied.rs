@@ -1,6 +1,10 @@
 //! A sprite as interpolation takes it: premultiplied, in a transparent border so that no edge is a
 //! special case, halved as often as its scale asks (ALGORITHMS.md 8).
 
+use std::ops::Range;
+
+use super::catmull_rom::HALF_PLACE;
+use super::map::Way;
 use super::{ONE, Quad};
 use crate::geometry::Rect;
 
@@ -49,6 +53,44 @@ impl Premultiplied {
             level += 1;
         }
         level
+    }
+
+    /// Which of `n` places on a way that begins at `start` lie between the first and the last that find
+    /// anything; empty where none does.
+    pub(super) fn seen(&self, start: [i32; 2], way: &Way, n: usize) -> Range<usize> {
+        let first = self.n_blank(start, way, n);
+        let last = way.along(start, n as i32 - 1);
+        let n_after = self.n_blank(last, &way.back(), n - first);
+        first..n - n_after
+    }
+
+    /// How many of `n` places find nothing before one does. Goes from row to row of the sprite, in each to
+    /// where its span begins.
+    fn n_blank(&self, start: [i32; 2], way: &Way, n: usize) -> usize {
+        let (mut at, n) = (0, n as i32);
+        while at < n {
+            let [u, v] = way.along(start, at).map(|place| place + HALF_PLACE);
+            let [from, to] = self.spans[(v >> 16) as usize];
+            if u > from && u < to {
+                break;
+            }
+            let in_row = v & 0xffff;
+            let row_left = if way.step[1] > 0 {
+                0xffff - in_row
+            } else {
+                in_row
+            };
+            let before_span = match way.step[0] > 0 {
+                true => f64::from(from) - f64::from(u),
+                false => f64::from(u) - f64::from(to),
+            };
+            let n_in_row = way.n_until_beyond(f64::from(row_left), 1);
+            at += match before_span >= 0.0 {
+                true => n_in_row.min(way.n_until_beyond(before_span, 0)),
+                false => n_in_row,
+            };
+        }
+        at.min(n) as usize
     }
 
     /// Memory that it takes.
