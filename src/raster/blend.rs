@@ -3,6 +3,7 @@
 
 use super::resample::{Quad, Resampled, scaled};
 use crate::cpu::Level;
+use crate::geometry::Rect;
 
 /// `weight` of `second` (0..=1) and the rest of `main`, in `main`: its box grows to hold both. `memory` is
 /// lent; this machine must have the instructions of `cpu`.
@@ -13,28 +14,35 @@ pub fn mix(
     memory: &mut Resampled,
     cpu: Level,
 ) {
-    memory.rect = main.rect.union(&second.rect);
-    memory.pixels.clear();
-    memory.pixels.resize(memory.rect.area() as usize, [0; 4]);
+    memory.begin(main.rect.union(&second.rect));
+    memory.runs.extend(main.runs.iter().chain(&second.runs));
+    join(&mut memory.runs);
+    clear_runs(memory);
     let share = (weight * 32767.0).round() as i16;
     add(memory, (main, 32767 - share), cpu);
     add(memory, (second, share), cpu);
-    memory.runs.clear();
-    memory.runs.extend(main.runs.iter().chain(&second.runs));
-    join_rows(&mut memory.runs);
     std::mem::swap(main, memory);
 }
 
-/// Makes one run of all those in the same row.
-fn join_rows(runs: &mut Vec<[u32; 3]>) {
+/// Makes one run of those that touch.
+fn join(runs: &mut Vec<[u32; 3]>) {
     runs.sort_unstable();
     runs.dedup_by(|next, run| {
-        let is_same = next[0] == run[0];
-        if is_same {
+        let is_touching = next[0] == run[0] && next[1] <= run[2];
+        if is_touching {
             run[2] = run[2].max(next[2]);
         }
-        is_same
+        is_touching
     });
+}
+
+/// Makes transparent what a layer may show.
+fn clear_runs(layer: &mut Resampled) {
+    let Rect { x, y, w, .. } = layer.rect;
+    for &[row, from, to] in &layer.runs {
+        let first = ((row - y) * w + from - x) as usize;
+        layer.pixels[first..first + (to - from) as usize].fill([0; 4]);
+    }
 }
 
 /// Lets only `share` of a layer's color through (0..=1) and puts another, of alpha 1, in the place of the
@@ -88,7 +96,6 @@ fn add_row(out: &mut [Quad], row: &[Quad], weight: i16) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Rect;
 
     fn layer(rect: Rect, pixel: Quad) -> Resampled {
         let mut layer = Resampled {

@@ -52,7 +52,9 @@ impl Cover {
             let drawn = &canvas.pixels[y * width..][..width];
             for block in x / BLOCK..to.div_ceil(BLOCK) {
                 let pixels = &drawn[block * BLOCK..width.min((block + 1) * BLOCK)];
-                let is_opaque = pixels.iter().all(|pixel| pixel[3] >= ONE);
+                // Alpha goes to ONE, a power of two, which no lesser one has a bit of.
+                let all = pixels.iter().fold(ONE, |all, pixel| all & pixel[3]);
+                let is_opaque = all == ONE;
                 words[block / 64] |= u64::from(is_opaque) << (block % 64);
             }
         }

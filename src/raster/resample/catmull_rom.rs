@@ -3,7 +3,6 @@
 //! for AVX2 computes.
 
 use super::{ONE, Premultiplied, Quad};
-use crate::cpu::Level;
 
 /// Places told apart between two pixels.
 pub(super) const PLACES: usize = 256;
@@ -19,29 +18,9 @@ pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
 
 impl Premultiplied {
     /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
-    /// padded pixels. All must lie within reach of the sprite's bounds.
-    pub(super) fn interpolate(
-        &self,
-        row: &mut [Quad],
-        start: [i32; 2],
-        step: [i32; 2],
-        cpu: Level,
-    ) {
-        match cpu {
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                #[expect(unsafe_code, reason = "a kernel for AVX2")]
-                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
-                unsafe {
-                    self.interpolate_avx2(row, start, step);
-                }
-            }
-            _ => self.interpolate_anywhere(row, start, step),
-        }
-    }
-
-    /// The definition of what vector instructions do.
-    fn interpolate_anywhere(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+    /// padded pixels. All must lie within reach of the sprite's bounds. The definition of what vector
+    /// instructions do.
+    pub(super) fn interpolate(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
         let taps = self.pixels.as_flattened();

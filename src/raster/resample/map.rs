@@ -15,15 +15,15 @@ pub(super) struct Map {
 /// The steps that a row of the picture makes through a sprite, in 65536ths of its pixels.
 pub(super) struct Way {
     pub(super) step: [i32; 2],
-    /// Steps to go one 65536th.
-    per_unit: [f64; 2],
+    /// Steps to go one 65536th, in 2^32ths, rounded down.
+    per_unit: [u64; 2],
 }
 
 impl Way {
     fn of(step: [i32; 2]) -> Way {
         Way {
             step,
-            per_unit: step.map(|step| 1.0 / f64::from(step).abs()),
+            per_unit: step.map(|step| (1 << 32) / u64::from(step.unsigned_abs().max(1))),
         }
     }
 
@@ -36,13 +36,15 @@ impl Way {
     }
 
     /// Where `n` steps from a place lead to.
+    #[inline(always)]
     pub(super) fn along(&self, from: [i32; 2], n: i32) -> [i32; 2] {
         std::array::from_fn(|k| from[k] + self.step[k] * n)
     }
 
-    /// Steps to go farther than a distance, at most 2^31 - 1.
-    pub(super) fn n_until_beyond(&self, distance: f64, axis: usize) -> i32 {
-        ((distance * self.per_unit[axis]) as i32).saturating_add(1)
+    /// Steps after which a distance may be exceeded, and before which it is not; at least one.
+    #[inline(always)]
+    pub(super) fn n_beyond(&self, distance: u32, axis: usize) -> usize {
+        ((u64::from(distance) * self.per_unit[axis]) >> 32) as usize + 1
     }
 }
 

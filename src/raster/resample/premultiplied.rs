@@ -57,6 +57,7 @@ impl Premultiplied {
 
     /// Which of `n` places on a way that begins at `start` lie between the first and the last that find
     /// anything; empty where none does.
+    #[inline(always)]
     pub(super) fn seen(&self, start: [i32; 2], way: &Way, n: usize) -> Range<usize> {
         let first = self.n_blank(start, way, n);
         let last = way.along(start, n as i32 - 1);
@@ -66,31 +67,32 @@ impl Premultiplied {
 
     /// How many of `n` places find nothing before one does. Goes from row to row of the sprite, in each to
     /// where its span begins.
+    #[inline(always)]
     fn n_blank(&self, start: [i32; 2], way: &Way, n: usize) -> usize {
-        let (mut at, n) = (0, n as i32);
+        let mut at = 0;
         while at < n {
-            let [u, v] = way.along(start, at).map(|place| place + HALF_PLACE);
+            let [u, v] = way.along(start, at as i32).map(|place| place + HALF_PLACE);
             let [from, to] = self.spans[(v >> 16) as usize];
             if u > from && u < to {
                 break;
             }
-            let in_row = v & 0xffff;
-            let row_left = if way.step[1] > 0 {
-                0xffff - in_row
-            } else {
-                in_row
-            };
-            let before_span = match way.step[0] > 0 {
-                true => f64::from(from) - f64::from(u),
-                false => f64::from(u) - f64::from(to),
-            };
-            let n_in_row = way.n_until_beyond(f64::from(row_left), 1);
-            at += match before_span >= 0.0 {
-                true => n_in_row.min(way.n_until_beyond(before_span, 0)),
+            let in_row = v as u32 & 0xffff;
+            let [row_left, before_span] = [
+                if way.step[1] > 0 {
+                    0xffff - in_row
+                } else {
+                    in_row
+                },
+                (if way.step[0] > 0 { from - u } else { u - to }) as u32,
+            ];
+            let n_in_row = way.n_beyond(row_left, 1);
+            // Behind the span there is nothing more in this row.
+            at += match before_span as i32 >= 0 {
+                true => n_in_row.min(way.n_beyond(before_span, 0)),
                 false => n_in_row,
             };
         }
-        at.min(n) as usize
+        at.min(n)
     }
 
     /// Memory that it takes.
@@ -156,7 +158,7 @@ impl Premultiplied {
         let stride = self.stride();
         let n_rows = self.pixels.len() / stride;
         self.spans.clear();
-        self.spans.resize(n_rows, [i32::MAX, i32::MIN]);
+        self.spans.resize(n_rows, [i32::MAX, 0]);
         for (y, row) in self.pixels.chunks_exact(stride).enumerate() {
             let shows = |pixel: &Quad| pixel[3] > 0;
             let (Some(first), Some(last)) =
