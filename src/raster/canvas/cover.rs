@@ -62,6 +62,7 @@ impl Cover {
 
     /// The first columns of `within`, in row `y`, that may let something through; empty when there are
     /// none. What is left out lets nothing through.
+    #[inline]
     pub fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
         let n_words = words_of(self.size[0] as usize);
         let row = &self.opaque[y as usize * n_words..][..n_words];

@@ -5,7 +5,7 @@
 
 use std::arch::x86_64::*;
 
-use super::catmull_rom::{HALF_PLACE, PLACES, TWICE, WIDE};
+use super::catmull_rom::{HALF_PLACE, TWICE, WIDE};
 use super::map::Map;
 use super::{ONE, Premultiplied, Quad, Resampled};
 use crate::raster::canvas::Cover;
@@ -23,31 +23,42 @@ pub(super) fn draw_rows(
     });
 }
 
-#[inline]
+/// A run of pixels. Not inlined: the loop needs all registers.
+#[inline(never)]
 #[target_feature(enable = "avx2")]
 fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
     // The first of a place's taps lies a pixel to the left and above.
-    let mut at = start.map(|at| at + HALF_PLACE - (1 << 16));
+    let first = start.map(|at| at + HALF_PLACE - (1 << 16));
     let n_steps = row.len() as i64 - 1;
-    let last = [0, 1].map(|k| i64::from(at[k]) + i64::from(step[k]) * n_steps);
-    assert!(sprite.holds_taps(at.map(i64::from)) && sprite.holds_taps(last));
-    let mut next = || {
-        // SAFETY: it lies between the first place and the last, of which the line above made sure.
-        let taps = unsafe { weighted(sprite, at) };
-        at = [at[0].wrapping_add(step[0]), at[1].wrapping_add(step[1])];
-        taps
-    };
+    let last = [0, 1].map(|k| i64::from(first[k]) + i64::from(step[k]) * n_steps);
+    assert!(sprite.holds_taps(first.map(i64::from)) && sprite.holds_taps(last));
+    let (pixels, stride) = (sprite.pixels.as_ptr(), sprite.stride());
+    let numbers = _mm_setr_epi32(0, 1, 2, 3);
+    let [mut u, mut v] = [0, 1].map(|k| {
+        let ahead = _mm_mullo_epi32(_mm_set1_epi32(step[k]), numbers);
+        _mm_add_epi32(_mm_set1_epi32(first[k]), ahead)
+    });
+    let four_on = step.map(|step| _mm_set1_epi32(step.wrapping_mul(4)));
     let (fours, rest) = row.as_chunks_mut::<4>();
     for four in fours {
-        let taps = [next(), next(), next(), next()];
+        let places = Places::of(u, v, stride);
+        // SAFETY: all four lie between the first place and the last, whose taps the sprite holds.
+        let taps = unsafe {
+            let tap = |k| places.weighted(k, pixels, stride);
+            [tap(0), tap(1), tap(2), tap(3)]
+        };
         store(four, summed(taps));
+        u = _mm_add_epi32(u, four_on[0]);
+        v = _mm_add_epi32(v, four_on[1]);
     }
     if rest.is_empty() {
         return;
     }
+    let places = Places::of(u, v, stride);
     let mut taps = [_mm256_setzero_si256(); 4];
-    for taps in &mut taps[..rest.len()] {
-        *taps = next();
+    for (k, taps) in taps[..rest.len()].iter_mut().enumerate() {
+        // SAFETY: as above; those beyond the last are not touched.
+        *taps = unsafe { places.weighted(k, pixels, stride) };
     }
     let mut four = [[0; 4]; 4];
     store(&mut four, summed(taps));
@@ -63,31 +74,58 @@ impl Premultiplied {
     }
 }
 
-/// Four taps, of each the column weighted and summed, and its weight across.
-///
-/// # Safety
-/// The sprite must hold the taps of the place.
-#[inline]
-#[target_feature(enable = "avx2")]
-unsafe fn weighted(sprite: &Premultiplied, [u, v]: [i32; 2]) -> __m256i {
-    let stride = sprite.stride();
-    let first = (v >> 16) as usize * stride + (u >> 16) as usize;
-    let down = &TWICE[(v >> 8) as usize % PLACES];
-    let tap = |k: usize| {
-        // SAFETY: the caller made sure that row k of four, k at most 3, has four pixels there.
-        let taps = unsafe { sprite.pixels.as_ptr().add(first + k * stride) };
-        // SAFETY: four pixels are 32 bytes that can be read.
-        let taps = unsafe { _mm256_loadu_si256(taps.cast()) };
-        _mm256_mulhrs_epi16(taps, _mm256_set1_epi32(down[k]))
-    };
-    let column = _mm256_add_epi16(
-        _mm256_add_epi16(tap(0), tap(1)),
-        _mm256_add_epi16(tap(2), tap(3)),
-    );
-    let across = WIDE[(u >> 8) as usize % PLACES].as_ptr();
-    // SAFETY: sixteen weights are 32 bytes that can be read.
-    let across = unsafe { _mm256_loadu_si256(across.cast()) };
-    _mm256_mulhrs_epi16(column, across)
+/// Four places in a sprite, each given by the first of its taps.
+struct Places {
+    /// Where that lies among the pixels.
+    first: [i32; 4],
+    /// The place between two pixels is the lowest byte.
+    across: [i32; 4],
+    down: [i32; 4],
+}
+
+impl Places {
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn of(u: __m128i, v: __m128i, stride: usize) -> Places {
+        let [x, y] = [_mm_srai_epi32::<16>(u), _mm_srai_epi32::<16>(v)];
+        let above = _mm_mullo_epi32(y, _mm_set1_epi32(stride as i32));
+        let numbers = |values: __m128i| {
+            let mut numbers = [0; 4];
+            // SAFETY: `numbers` is 16 bytes that are ours to write.
+            unsafe { _mm_storeu_si128(numbers.as_mut_ptr().cast(), values) };
+            numbers
+        };
+        Places {
+            first: numbers(_mm_add_epi32(above, x)),
+            across: numbers(_mm_srai_epi32::<8>(u)),
+            down: numbers(_mm_srai_epi32::<8>(v)),
+        }
+    }
+
+    /// Four taps of a place, of each the column weighted and summed, and its weight across.
+    ///
+    /// # Safety
+    /// `pixels`, in rows of `stride`, must hold the taps of place `k`.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    unsafe fn weighted(&self, k: usize, pixels: *const Quad, stride: usize) -> __m256i {
+        let down = &TWICE[usize::from(self.down[k] as u8)];
+        // SAFETY: the caller made sure that the first of the taps is there.
+        let first = unsafe { pixels.add(self.first[k] as usize) };
+        let tap = |row: usize| {
+            // SAFETY: and that four rows are, of four pixels or 32 bytes each.
+            let taps = unsafe { _mm256_loadu_si256(first.add(row * stride).cast()) };
+            _mm256_mulhrs_epi16(taps, _mm256_set1_epi32(down[row]))
+        };
+        let column = _mm256_add_epi16(
+            _mm256_add_epi16(tap(0), tap(1)),
+            _mm256_add_epi16(tap(2), tap(3)),
+        );
+        let across = WIDE[usize::from(self.across[k] as u8)].as_ptr();
+        // SAFETY: sixteen weights are 32 bytes that can be read.
+        let across = unsafe { _mm256_loadu_si256(across.cast()) };
+        _mm256_mulhrs_epi16(column, across)
+    }
 }
 
 /// The sums of four pixels' taps, none more than opaque and no color without its alpha.
