@@ -49,7 +49,8 @@ fn clear_runs(layer: &mut Resampled) {
 /// rest; alpha stays.
 pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
     let kept = (share * 32767.0).round() as i16;
-    for pixel in &mut layer.pixels {
+    let area = layer.rect.area() as usize;
+    for pixel in &mut layer.pixels[..area] {
         let alpha = pixel[3];
         for channel in 0..3 {
             // Twice, because a color goes to 16384 and a weight to 32768.
@@ -173,6 +174,27 @@ mod tests {
             main.pixels,
             [[6000, 0, 0, 12288], [0; 4], [0, 2000, 0, 4096]]
         );
+    }
+
+    #[test]
+    fn what_was_in_the_memory_lent_is_not_seen() {
+        let rect = Rect::of_size(4, 2);
+        let half = Resampled {
+            rect,
+            pixels: vec![[4000; 4]; 8],
+            runs: vec![[0, 0, 2], [1, 3, 4]],
+        };
+        let other = Resampled {
+            runs: vec![[0, 1, 3]],
+            ..half.clone()
+        };
+        let (mut main, mut memory) = (half, layer(rect, [9999; 4]));
+        mix(&mut main, &other, 0.5, &mut memory, Level::Scalar);
+        assert_eq!(main.runs, [[0, 0, 3], [1, 3, 4]]);
+        let shown: Vec<i16> = (main.shown().flat_map(|(_, row)| row))
+            .map(|pixel| pixel[3])
+            .collect();
+        assert_eq!(shown, [2000, 4000, 2000, 2000]);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::Canvas;
 use crate::geometry::Rect;
-use crate::raster::resample::{ONE, Resampled};
+use crate::raster::resample::{ONE, Quad, Resampled};
 
 /// Columns and rows of a tile: even, so that no block of chroma is parted.
 const TILE: usize = 16;
@@ -51,10 +51,11 @@ impl Cover {
             let words = &mut self.opaque[y * n_words..][..n_words];
             let drawn = &canvas.pixels[y * width..][..width];
             for block in x / BLOCK..to.div_ceil(BLOCK) {
-                let pixels = &drawn[block * BLOCK..width.min((block + 1) * BLOCK)];
-                // Alpha goes to ONE, a power of two, which no lesser one has a bit of.
-                let all = pixels.iter().fold(ONE, |all, pixel| all & pixel[3]);
-                let is_opaque = all == ONE;
+                let rest = &drawn[block * BLOCK..];
+                let is_opaque = match rest.first_chunk::<BLOCK>() {
+                    Some(pixels) => are_opaque(pixels),
+                    None => are_opaque(rest),
+                };
                 words[block / 64] |= u64::from(is_opaque) << (block % 64);
             }
         }
@@ -91,6 +92,13 @@ impl Cover {
             })
         })
     }
+}
+
+/// Whether all pixels let nothing through.
+#[inline(always)]
+fn are_opaque(pixels: &[Quad]) -> bool {
+    // Alpha goes to ONE, a power of two, which no lesser one has a bit of.
+    pixels.iter().fold(ONE, |all, pixel| all & pixel[3]) == ONE
 }
 
 /// Words for the blocks of a row.

@@ -20,7 +20,7 @@ pub(super) struct Way {
 }
 
 impl Way {
-    fn of(step: [i32; 2]) -> Way {
+    pub(super) fn of(step: [i32; 2]) -> Way {
         Way {
             step,
             per_unit: step.map(|step| (1 << 32) / u64::from(step.unsigned_abs().max(1))),
