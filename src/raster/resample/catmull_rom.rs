@@ -14,6 +14,7 @@ pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
 /// The same, each weight once for every value of a pixel.
 pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
 /// The same, each weight twice in its 32 bits: those a register is filled with at once.
+#[cfg(target_arch = "x86_64")]
 pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
 
 impl Premultiplied {
@@ -118,6 +119,7 @@ const fn widened() -> [[i16; 16]; PLACES] {
     wide
 }
 
+#[cfg(target_arch = "x86_64")]
 const fn doubled() -> [[i32; 4]; PLACES] {
     let narrow = all_weights();
     let mut twice = [[0; 4]; PLACES];
