@@ -3,6 +3,7 @@
 
 use super::resample::{Quad, Resampled, scaled};
 use crate::cpu::Level;
+use crate::geometry::Rect;
 
 /// `weight` of `second` (0..=1) and the rest of `main`, in `main`: its box grows to hold both. `memory` is
 /// lent; this machine must have the instructions of `cpu`.
@@ -13,35 +14,43 @@ pub fn mix(
     memory: &mut Resampled,
     cpu: Level,
 ) {
-    memory.rect = main.rect.union(&second.rect);
-    memory.pixels.clear();
-    memory.pixels.resize(memory.rect.area() as usize, [0; 4]);
+    memory.begin(main.rect.union(&second.rect));
+    memory.runs.extend(main.runs.iter().chain(&second.runs));
+    join(&mut memory.runs);
+    clear_runs(memory);
     let share = (weight * 32767.0).round() as i16;
     add(memory, (main, 32767 - share), cpu);
     add(memory, (second, share), cpu);
-    memory.runs.clear();
-    memory.runs.extend(main.runs.iter().chain(&second.runs));
-    join_rows(&mut memory.runs);
     std::mem::swap(main, memory);
 }
 
-/// Makes one run of all those in the same row.
-fn join_rows(runs: &mut Vec<[u32; 3]>) {
+/// Makes one run of those that touch.
+fn join(runs: &mut Vec<[u32; 3]>) {
     runs.sort_unstable();
     runs.dedup_by(|next, run| {
-        let is_same = next[0] == run[0];
-        if is_same {
+        let is_touching = next[0] == run[0] && next[1] <= run[2];
+        if is_touching {
             run[2] = run[2].max(next[2]);
         }
-        is_same
+        is_touching
     });
+}
+
+/// Makes transparent what a layer may show.
+fn clear_runs(layer: &mut Resampled) {
+    let Rect { x, y, w, .. } = layer.rect;
+    for &[row, from, to] in &layer.runs {
+        let first = ((row - y) * w + from - x) as usize;
+        layer.pixels[first..first + (to - from) as usize].fill([0; 4]);
+    }
 }
 
 /// Lets only `share` of a layer's color through (0..=1) and puts another, of alpha 1, in the place of the
 /// rest; alpha stays.
 pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
     let kept = (share * 32767.0).round() as i16;
-    for pixel in &mut layer.pixels {
+    let area = layer.rect.area() as usize;
+    for pixel in &mut layer.pixels[..area] {
         let alpha = pixel[3];
         for channel in 0..3 {
             // Twice, because a color goes to 16384 and a weight to 32768.
@@ -88,7 +97,6 @@ fn add_row(out: &mut [Quad], row: &[Quad], weight: i16) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Rect;
 
     fn layer(rect: Rect, pixel: Quad) -> Resampled {
         let mut layer = Resampled {
@@ -166,6 +174,27 @@ mod tests {
             main.pixels,
             [[6000, 0, 0, 12288], [0; 4], [0, 2000, 0, 4096]]
         );
+    }
+
+    #[test]
+    fn what_was_in_the_memory_lent_is_not_seen() {
+        let rect = Rect::of_size(4, 2);
+        let half = Resampled {
+            rect,
+            pixels: vec![[4000; 4]; 8],
+            runs: vec![[0, 0, 2], [1, 3, 4]],
+        };
+        let other = Resampled {
+            runs: vec![[0, 1, 3]],
+            ..half.clone()
+        };
+        let (mut main, mut memory) = (half, layer(rect, [9999; 4]));
+        mix(&mut main, &other, 0.5, &mut memory, Level::Scalar);
+        assert_eq!(main.runs, [[0, 0, 3], [1, 3, 4]]);
+        let shown: Vec<i16> = (main.shown().flat_map(|(_, row)| row))
+            .map(|pixel| pixel[3])
+            .collect();
+        assert_eq!(shown, [2000, 4000, 2000, 2000]);
     }
 
     #[test]

@@ -16,7 +16,22 @@ pub(super) fn under_row(row: &mut [Quad], sprite: &[Quad]) {
     for (above, below) in row_fours.iter_mut().zip(sprite_fours) {
         store(above, four_over(load(above), load(below)));
     }
-    super::under_row(row_rest, sprite_rest);
+    let n_rest = row_rest.len().min(sprite_rest.len());
+    let rest = first_of_four(n_rest);
+    let [above, below] = [&*row_rest, sprite_rest].map(|pixels| {
+        // SAFETY: `pixels` holds the `n_rest` pixels that are read, of 8 bytes each.
+        unsafe { _mm256_maskload_epi64(pixels.as_ptr().cast(), rest) }
+    });
+    let drawn = four_over(above, below);
+    // SAFETY: `row_rest` holds the `n_rest` pixels that are written, of 8 bytes each.
+    unsafe { _mm256_maskstore_epi64(row_rest.as_mut_ptr().cast(), rest, drawn) };
+}
+
+/// A mask of the first `n` pixels of four.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn first_of_four(n: usize) -> __m256i {
+    _mm256_cmpgt_epi64(_mm256_set1_epi64x(n as i64), _mm256_setr_epi64x(0, 1, 2, 3))
 }
 
 #[target_feature(enable = "avx2")]

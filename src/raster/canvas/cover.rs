@@ -1,6 +1,7 @@
 //! What of a canvas has been drawn on, by tiles, so that each is developed and wiped once however many
-//! sprites lie over each other there; and which of its pixels let nothing through, as bits, so that what
-//! is hidden is passed over 64 pixels at a time (ALGORITHMS.md 8, dirty rectangles).
+//! sprites lie over each other there; and which of its pixels let nothing through, as bits, a bit for
+//! eight of them, so that what is hidden is passed over 512 pixels at a time, and is not drawn around in
+//! runs too short to be worth it (ALGORITHMS.md 8, dirty rectangles).
 
 use std::ops::Range;
 
@@ -10,6 +11,8 @@ use crate::raster::resample::{ONE, Quad, Resampled};
 
 /// Columns and rows of a tile: even, so that no block of chroma is parted.
 const TILE: usize = 16;
+/// Columns of a block.
+const BLOCK: usize = 8;
 
 /// What has been drawn on a canvas.
 #[derive(Clone, Debug)]
@@ -17,7 +20,7 @@ pub struct Cover {
     size: [u32; 2],
     /// By rows of tiles: whether anything has been drawn there.
     touched: Vec<bool>,
-    /// By rows of pixels, each beginning a word: those of alpha 1.
+    /// By rows of pixels, each beginning a word: the blocks whose pixels all have alpha 1.
     opaque: Vec<u64>,
 }
 
@@ -28,7 +31,7 @@ impl Cover {
         Cover {
             size,
             touched: vec![false; width.div_ceil(TILE) * height.div_ceil(TILE)],
-            opaque: vec![0; width.div_ceil(64) * height],
+            opaque: vec![0; words_of(width) * height],
         }
     }
 
@@ -40,26 +43,34 @@ impl Cover {
     /// Adds a layer, which has been put on the canvas.
     pub fn add(&mut self, layer: &Resampled, canvas: &Canvas) {
         let width = self.size[0] as usize;
-        let (n_tiles, n_words) = (width.div_ceil(TILE), width.div_ceil(64));
+        let (n_tiles, n_words) = (width.div_ceil(TILE), words_of(width));
         for ([x, y], row) in layer.shown() {
-            let (mut x, y, to) = (x as usize, y as usize, x as usize + row.len());
+            let (x, y, to) = (x as usize, y as usize, x as usize + row.len());
             let line = y / TILE * n_tiles;
             self.touched[line + x / TILE..line + to.div_ceil(TILE)].fill(true);
-            while x < to {
-                let next = (x / 64 * 64 + 64).min(to);
-                let drawn = &canvas.pixels[y * width + x..y * width + next];
-                self.opaque[y * n_words + x / 64] |= opaque_bits(drawn) << (x % 64);
-                x = next;
+            let words = &mut self.opaque[y * n_words..][..n_words];
+            let drawn = &canvas.pixels[y * width..][..width];
+            for block in x / BLOCK..to.div_ceil(BLOCK) {
+                let rest = &drawn[block * BLOCK..];
+                let is_opaque = match rest.first_chunk::<BLOCK>() {
+                    Some(pixels) => are_opaque(pixels),
+                    None => are_opaque(rest),
+                };
+                words[block / 64] |= u64::from(is_opaque) << (block % 64);
             }
         }
     }
 
-    /// The first columns of `within`, in row `y`, that let something through; empty when there are none.
+    /// The first columns of `within`, in row `y`, that may let something through; empty when there are
+    /// none. What is left out lets nothing through.
+    #[inline]
     pub fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
-        let n_words = (self.size[0] as usize).div_ceil(64);
+        let n_words = words_of(self.size[0] as usize);
         let row = &self.opaque[y as usize * n_words..][..n_words];
-        let start = find(within.clone(), |word| !row[word]);
-        start..find(start..within.end, |word| row[word])
+        let columns = |block: u32| (block * BLOCK as u32).clamp(within.start, within.end);
+        let last = within.end.div_ceil(BLOCK as u32);
+        let start = find(within.start / BLOCK as u32..last, |word| !row[word]);
+        columns(start)..columns(find(start..last, |word| row[word]))
     }
 
     /// Boxes that hold all that has been drawn on, none over another; then nothing has been.
@@ -83,10 +94,16 @@ impl Cover {
     }
 }
 
-/// Bit k: whether pixel k of at most 64 lets nothing through.
-fn opaque_bits(row: &[Quad]) -> u64 {
-    let shift_in = |bits, pixel: &Quad| bits << 1 | u64::from(pixel[3] >= ONE);
-    row.iter().rev().fold(0, shift_in)
+/// Whether all pixels let nothing through.
+#[inline(always)]
+fn are_opaque(pixels: &[Quad]) -> bool {
+    // Alpha goes to ONE, a power of two, which no lesser one has a bit of.
+    pixels.iter().fold(ONE, |all, pixel| all & pixel[3]) == ONE
+}
+
+/// Words for the blocks of a row.
+fn words_of(width: usize) -> usize {
+    width.div_ceil(BLOCK * 64)
 }
 
 /// The first place of a range whose bit is set in the words told; its end when there is none.
@@ -139,6 +156,7 @@ mod tests {
         let (mut cover, mut canvas) = (Cover::none([200, 2]), Canvas::new(200, 2));
         for (columns, alpha) in [
             (0..3, ONE),
+            (14..25, ONE),
             (60..70, ONE),
             (70..75, ONE - 1),
             (130..200, ONE),
@@ -153,10 +171,12 @@ mod tests {
             cover.add(&layer, &canvas);
         }
         let open = |y, within: Range<u32>| cover.next_open(y, within);
-        assert_eq!(open(1, 0..200), 3..60);
-        assert_eq!(open(1, 20..50), 20..50);
-        assert_eq!(open(1, 60..200), 70..130);
-        assert!(open(1, 130..200).is_empty() && open(1, 61..64).is_empty());
+        // Only whole blocks count: 16..24 and 136..200.
+        assert_eq!(open(1, 0..200), 0..16);
+        assert_eq!(open(1, 3..10), 3..10);
+        assert_eq!(open(1, 17..200), 24..136);
+        assert_eq!(open(1, 50..130), 50..130);
+        assert!(open(1, 140..200).is_empty() && open(1, 17..23).is_empty());
         assert_eq!(open(0, 0..200), 0..200);
         assert!(cover.take().count() > 0);
         assert_eq!(cover.next_open(1, 0..200), 0..200);

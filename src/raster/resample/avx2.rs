@@ -5,57 +5,148 @@
 
 use std::arch::x86_64::*;
 
-use super::catmull_rom::{HALF_PLACE, PLACES, WEIGHTS, WIDE};
-use super::{ONE, Premultiplied, Quad};
+use super::catmull_rom::{HALF_PLACE, TWICE, WIDE};
+use super::map::Map;
+use super::{ONE, Premultiplied, Quad, Resampled};
+use crate::raster::canvas::Cover;
+
+/// All rows of a layer.
+#[target_feature(enable = "avx2")]
+pub(super) fn draw_rows(
+    layer: &mut Resampled,
+    sprite: &Premultiplied,
+    map: &Map,
+    nearer: Option<&Cover>,
+) {
+    layer.draw_rows(sprite, map, nearer, |sprite, row, start, step| {
+        interpolate(sprite, row, start, step);
+    });
+}
+
+/// A run of pixels. Not inlined: the loop needs all registers.
+#[inline(never)]
+#[target_feature(enable = "avx2")]
+fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+    // The first of a place's taps lies a pixel to the left and above.
+    let first = start.map(|at| at + HALF_PLACE - (1 << 16));
+    let n_steps = row.len() as i64 - 1;
+    let last = [0, 1].map(|k| i64::from(first[k]) + i64::from(step[k]) * n_steps);
+    assert!(sprite.holds_taps(first.map(i64::from)) && sprite.holds_taps(last));
+    let (pixels, stride) = (sprite.pixels.as_ptr(), sprite.stride());
+    let numbers = _mm_setr_epi32(0, 1, 2, 3);
+    let [mut u, mut v] = [0, 1].map(|k| {
+        let ahead = _mm_mullo_epi32(_mm_set1_epi32(step[k]), numbers);
+        _mm_add_epi32(_mm_set1_epi32(first[k]), ahead)
+    });
+    let four_on = step.map(|step| _mm_set1_epi32(step.wrapping_mul(4)));
+    let (fours, rest) = row.as_chunks_mut::<4>();
+    for four in fours {
+        let places = Places::of(u, v, stride);
+        // SAFETY: all four lie between the first place and the last, whose taps the sprite holds.
+        let taps = unsafe {
+            let tap = |k| places.weighted(k, pixels, stride);
+            [tap(0), tap(1), tap(2), tap(3)]
+        };
+        store(four, summed(taps));
+        u = _mm_add_epi32(u, four_on[0]);
+        v = _mm_add_epi32(v, four_on[1]);
+    }
+    if rest.is_empty() {
+        return;
+    }
+    let places = Places::of(u, v, stride);
+    let mut taps = [_mm256_setzero_si256(); 4];
+    for (k, taps) in taps[..rest.len()].iter_mut().enumerate() {
+        // SAFETY: as above; those beyond the last are not touched.
+        *taps = unsafe { places.weighted(k, pixels, stride) };
+    }
+    let mut four = [[0; 4]; 4];
+    store(&mut four, summed(taps));
+    rest.copy_from_slice(&four[..rest.len()]);
+}
 
 impl Premultiplied {
-    #[target_feature(enable = "avx2")]
-    pub(super) fn interpolate_avx2(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
-        let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
-        let stride = self.stride();
-        for pixel in row {
-            let [from, to] = self.spans[(v >> 16) as usize];
-            *pixel = if u > from && u < to {
-                let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
-                let first = (y - 1) * stride + x - 1;
-                let down = &WEIGHTS[(v >> 8) as usize % PLACES];
-                let block = &self.pixels[first..first + 3 * stride + 4];
-                let tap = |k: usize| {
-                    // SAFETY: k is at most 3, so the four pixels read lie within `block`.
-                    let taps = unsafe { block.as_ptr().add(k * stride) };
-                    // SAFETY: four pixels are 32 bytes that can be read.
-                    let taps = unsafe { _mm256_loadu_si256(taps.cast()) };
-                    _mm256_mulhrs_epi16(taps, _mm256_set1_epi16(down[k]))
-                };
-                let column = _mm256_add_epi16(
-                    _mm256_add_epi16(tap(0), tap(1)),
-                    _mm256_add_epi16(tap(2), tap(3)),
-                );
-                across(column, &WIDE[(u >> 8) as usize % PLACES])
-            } else {
-                [0; 4]
-            };
-            u += step[0];
-            v += step[1];
-        }
+    /// Whether all sixteen taps of a place, given by its first one, are there.
+    fn holds_taps(&self, [u, v]: [i64; 2]) -> bool {
+        let (stride, n_rows) = (self.stride(), self.spans.len());
+        let is_held = |first: i64, n: usize| first >= 0 && (first >> 16) + 4 <= n as i64;
+        is_held(u, stride) && is_held(v, n_rows) && stride * n_rows <= self.pixels.len()
     }
 }
 
-/// The weighted sum of four taps, no more than opaque and no color without its alpha.
+/// Four places in a sprite, each given by the first of its taps.
+struct Places {
+    /// Where that lies among the pixels.
+    first: [i32; 4],
+    /// The place between two pixels is the lowest byte.
+    across: [i32; 4],
+    down: [i32; 4],
+}
+
+impl Places {
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn of(u: __m128i, v: __m128i, stride: usize) -> Places {
+        let [x, y] = [_mm_srai_epi32::<16>(u), _mm_srai_epi32::<16>(v)];
+        let above = _mm_mullo_epi32(y, _mm_set1_epi32(stride as i32));
+        let numbers = |values: __m128i| {
+            let mut numbers = [0; 4];
+            // SAFETY: `numbers` is 16 bytes that are ours to write.
+            unsafe { _mm_storeu_si128(numbers.as_mut_ptr().cast(), values) };
+            numbers
+        };
+        Places {
+            first: numbers(_mm_add_epi32(above, x)),
+            across: numbers(_mm_srai_epi32::<8>(u)),
+            down: numbers(_mm_srai_epi32::<8>(v)),
+        }
+    }
+
+    /// Four taps of a place, of each the column weighted and summed, and its weight across.
+    ///
+    /// # Safety
+    /// `pixels`, in rows of `stride`, must hold the taps of place `k`.
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    unsafe fn weighted(&self, k: usize, pixels: *const Quad, stride: usize) -> __m256i {
+        let down = &TWICE[usize::from(self.down[k] as u8)];
+        // SAFETY: the caller made sure that the first of the taps is there.
+        let first = unsafe { pixels.add(self.first[k] as usize) };
+        let tap = |row: usize| {
+            // SAFETY: and that four rows are, of four pixels or 32 bytes each.
+            let taps = unsafe { _mm256_loadu_si256(first.add(row * stride).cast()) };
+            _mm256_mulhrs_epi16(taps, _mm256_set1_epi32(down[row]))
+        };
+        let column = _mm256_add_epi16(
+            _mm256_add_epi16(tap(0), tap(1)),
+            _mm256_add_epi16(tap(2), tap(3)),
+        );
+        let across = WIDE[usize::from(self.across[k] as u8)].as_ptr();
+        // SAFETY: sixteen weights are 32 bytes that can be read.
+        let across = unsafe { _mm256_loadu_si256(across.cast()) };
+        _mm256_mulhrs_epi16(column, across)
+    }
+}
+
+/// The sums of four pixels' taps, none more than opaque and no color without its alpha.
+#[inline]
 #[target_feature(enable = "avx2")]
-fn across(column: __m256i, weights: &[i16; 16]) -> Quad {
-    // SAFETY: sixteen weights are 32 bytes that can be read.
-    let weights = unsafe { _mm256_loadu_si256(weights.as_ptr().cast()) };
-    let weighted = _mm256_mulhrs_epi16(column, weights);
-    let halves = _mm_add_epi16(
-        _mm256_castsi256_si128(weighted),
-        _mm256_extracti128_si256::<1>(weighted),
+fn summed([a, b, c, d]: [__m256i; 4]) -> __m256i {
+    // The first two taps of each pixel in the lower half, the last two in the upper.
+    let ab = _mm256_add_epi16(_mm256_unpacklo_epi64(a, b), _mm256_unpackhi_epi64(a, b));
+    let cd = _mm256_add_epi16(_mm256_unpacklo_epi64(c, d), _mm256_unpackhi_epi64(c, d));
+    let sum = _mm256_add_epi16(
+        _mm256_permute2x128_si256::<0x20>(ab, cd),
+        _mm256_permute2x128_si256::<0x31>(ab, cd),
     );
-    let sum = _mm_add_epi16(halves, _mm_unpackhi_epi64(halves, halves));
-    let visible = _mm_max_epi16(sum, _mm_setzero_si128());
-    let alpha = _mm_min_epi16(_mm_shufflelo_epi16::<0xff>(visible), _mm_set1_epi16(ONE));
-    let mut pixel = [0; 4];
-    // SAFETY: `pixel` is 8 bytes that are ours to write.
-    unsafe { _mm_storel_epi64(pixel.as_mut_ptr().cast(), _mm_min_epi16(visible, alpha)) };
-    pixel
+    let visible = _mm256_max_epi16(sum, _mm256_setzero_si256());
+    let alpha = _mm256_shufflehi_epi16::<0xff>(_mm256_shufflelo_epi16::<0xff>(visible));
+    _mm256_min_epi16(visible, _mm256_min_epi16(alpha, _mm256_set1_epi16(ONE)))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn store(pixels: &mut [Quad; 4], values: __m256i) {
+    // SAFETY: `pixels` is 32 bytes that are ours to write.
+    unsafe { _mm256_storeu_si256(pixels.as_mut_ptr().cast(), values) };
 }

@@ -3,7 +3,6 @@
 //! for AVX2 computes.
 
 use super::{ONE, Premultiplied, Quad};
-use crate::cpu::Level;
 
 /// Places told apart between two pixels.
 pub(super) const PLACES: usize = 256;
@@ -14,48 +13,26 @@ pub(super) const HALF_PLACE: i32 = (1 << 16) / (2 * PLACES as i32);
 pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
 /// The same, each weight once for every value of a pixel.
 pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
+/// The same, each weight twice in its 32 bits: those a register is filled with at once.
+#[cfg(target_arch = "x86_64")]
+pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
 
 impl Premultiplied {
     /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
-    /// padded pixels. All must lie within reach of the sprite's bounds.
-    pub(super) fn interpolate(
-        &self,
-        row: &mut [Quad],
-        start: [i32; 2],
-        step: [i32; 2],
-        cpu: Level,
-    ) {
-        match cpu {
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                #[expect(unsafe_code, reason = "a kernel for AVX2")]
-                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
-                unsafe {
-                    self.interpolate_avx2(row, start, step);
-                }
-            }
-            _ => self.interpolate_anywhere(row, start, step),
-        }
-    }
-
-    /// The definition of what vector instructions do.
-    fn interpolate_anywhere(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
+    /// padded pixels. All must lie within reach of the sprite's bounds. The definition of what vector
+    /// instructions do.
+    pub(super) fn interpolate(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
         let taps = self.pixels.as_flattened();
         for pixel in row {
-            let [from, to] = self.spans[(v >> 16) as usize];
-            *pixel = if u > from && u < to {
-                let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
-                let first = 4 * ((y - 1) * stride + x - 1);
-                blend(
-                    std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
-                    &WIDE[(u >> 8) as usize % PLACES],
-                    &WEIGHTS[(v >> 8) as usize % PLACES],
-                )
-            } else {
-                [0; 4]
-            };
+            let (x, y) = ((u >> 16) as usize, (v >> 16) as usize);
+            let first = 4 * ((y - 1) * stride + x - 1);
+            *pixel = blend(
+                std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
+                &WIDE[(u >> 8) as usize % PLACES],
+                &WEIGHTS[(v >> 8) as usize % PLACES],
+            );
             u += step[0];
             v += step[1];
         }
@@ -140,6 +117,23 @@ const fn widened() -> [[i16; 16]; PLACES] {
         place += 1;
     }
     wide
+}
+
+#[cfg(target_arch = "x86_64")]
+const fn doubled() -> [[i32; 4]; PLACES] {
+    let narrow = all_weights();
+    let mut twice = [[0; 4]; PLACES];
+    let mut place = 0;
+    while place < PLACES {
+        let mut tap = 0;
+        while tap < 4 {
+            let weight = narrow[place][tap];
+            twice[place][tap] = (weight as i32) << 16 | (weight as u16 as i32);
+            tap += 1;
+        }
+        place += 1;
+    }
+    twice
 }
 
 #[cfg(test)]

@@ -12,6 +12,42 @@ pub(super) struct Map {
     place: Placement,
 }
 
+/// The steps that a row of the picture makes through a sprite, in 65536ths of its pixels.
+pub(super) struct Way {
+    pub(super) step: [i32; 2],
+    /// Steps to go one 65536th, in 2^32ths, rounded down.
+    per_unit: [u64; 2],
+}
+
+impl Way {
+    pub(super) fn of(step: [i32; 2]) -> Way {
+        Way {
+            step,
+            per_unit: step.map(|step| (1 << 32) / u64::from(step.unsigned_abs().max(1))),
+        }
+    }
+
+    /// The same the other way round.
+    pub(super) fn back(&self) -> Way {
+        Way {
+            step: self.step.map(|step| -step),
+            per_unit: self.per_unit,
+        }
+    }
+
+    /// Where `n` steps from a place lead to.
+    #[inline(always)]
+    pub(super) fn along(&self, from: [i32; 2], n: i32) -> [i32; 2] {
+        std::array::from_fn(|k| from[k] + self.step[k] * n)
+    }
+
+    /// Steps after which a distance may be exceeded, and before which it is not; at least one.
+    #[inline(always)]
+    pub(super) fn n_beyond(&self, distance: u32, axis: usize) -> usize {
+        ((u64::from(distance) * self.per_unit[axis]) >> 32) as usize + 1
+    }
+}
+
 impl Map {
     pub(super) fn new(sprite: &Premultiplied, place: &Placement) -> Map {
         // One pixel of the level is so many of the sprite.
@@ -35,6 +71,11 @@ impl Map {
             per_row,
             place: *place,
         }
+    }
+
+    /// The way of a row through the sprite.
+    pub(super) fn way(&self) -> Way {
+        Way::of(self.per_column.map(fixed))
     }
 
     /// The place in the sprite of a point of the picture.
@@ -110,4 +151,9 @@ impl Map {
             (0, 0)
         }
     }
+}
+
+/// A coordinate in 65536ths.
+pub(super) fn fixed(coordinate: f64) -> i32 {
+    (coordinate * 65536.0).round() as i32
 }

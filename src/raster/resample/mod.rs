@@ -14,7 +14,7 @@ mod premultiplied; // a sprite as it is interpolated
 pub(super) use catmull_rom::scaled;
 pub use premultiplied::{Premultiplied, bounds_of};
 
-use self::map::Map;
+use self::map::{Map, fixed};
 use super::canvas::Cover;
 use crate::cpu::Level;
 use crate::geometry::Rect;
@@ -52,7 +52,7 @@ pub struct Room<'a> {
 pub struct Resampled {
     /// The box.
     pub rect: Rect,
-    /// Its pixels by rows.
+    /// Its pixels by rows, and perhaps more behind them.
     pub pixels: Vec<Quad>,
     /// Where it may show, from top to bottom: a row of the picture and its columns, from and to. Pixels
     /// elsewhere mean nothing.
@@ -64,32 +64,65 @@ impl Resampled {
     /// placement's scale.
     pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, room: Room, cpu: Level) {
         let map = Map::new(sprite, place);
-        self.rect = map.covered(sprite, room.size);
-        self.pixels.resize(self.rect.area() as usize, [0; 4]);
+        self.begin(map.covered(sprite, room.size));
+        match cpu {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+                #[expect(unsafe_code, reason = "a kernel for AVX2")]
+                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                unsafe {
+                    avx2::draw_rows(self, sprite, &map, room.nearer);
+                }
+            }
+            _ => self.draw_rows(sprite, &map, room.nearer, Premultiplied::interpolate),
+        }
+    }
+
+    /// Nothing yet, in a box.
+    pub(super) fn begin(&mut self, rect: Rect) {
+        self.rect = rect;
         self.runs.clear();
-        let step = map.per_column.map(fixed);
-        let rows = self.pixels.chunks_exact_mut(self.rect.w.max(1) as usize);
-        for (row, y) in rows.zip(self.rect.y..) {
+        let area = rect.area() as usize;
+        if self.pixels.len() < area {
+            self.pixels.resize(area, [0; 4]);
+        }
+    }
+
+    /// Draws with a kernel, for whose instructions this is compiled too.
+    #[inline(always)]
+    fn draw_rows(
+        &mut self,
+        sprite: &Premultiplied,
+        map: &Map,
+        nearer: Option<&Cover>,
+        interpolate: impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
+    ) {
+        let (left, width, way) = (self.rect.x, self.rect.w as usize, map.way());
+        let rows = self.pixels.chunks_exact_mut(width.max(1));
+        for (row, y) in rows.zip(self.rect.y..self.rect.bottom()) {
             let open = |from: usize, to: usize| {
-                let columns = self.rect.x + from as u32..self.rect.x + to as u32;
-                room.nearer
-                    .map_or(columns.clone(), |nearer| nearer.next_open(y, columns))
+                let columns = left + from as u32..left + to as u32;
+                match nearer {
+                    Some(nearer) => nearer.next_open(y, columns),
+                    None => columns,
+                }
             };
-            if open(0, row.len()).is_empty() {
+            if open(0, width).is_empty() {
                 continue;
             }
-            let start = map.source(f64::from(self.rect.x) + 0.5, f64::from(y) + 0.5);
-            let (from, to) = map.columns_within(sprite, row.len(), start);
+            let start = map.source(f64::from(left) + 0.5, f64::from(y) + 0.5);
+            let (from, to) = map.columns_within(sprite, width, start);
             let first: [f64; 2] =
                 std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
             let first = first.map(fixed);
-            let mut run = open(from, to);
+            let seen = sprite.seen(first, &way, to - from);
+            let to = from + seen.end;
+            let mut run = open(from + seen.start, to);
             while !run.is_empty() {
                 self.runs.push([y, run.start, run.end]);
-                let [start, end] = [run.start, run.end].map(|x| (x - self.rect.x) as usize);
-                let ahead = (start - from) as i32;
-                let start_at = std::array::from_fn(|k| first[k] + step[k] * ahead);
-                sprite.interpolate(&mut row[start..end], start_at, step, cpu);
+                let [start, end] = [run.start, run.end].map(|x| (x - left) as usize);
+                let place = way.along(first, (start - from) as i32);
+                interpolate(sprite, &mut row[start..end], place, way.step);
                 run = open(end, to);
             }
         }
@@ -121,11 +154,6 @@ impl Resampled {
         }
         alpha
     }
-}
-
-/// A coordinate in 65536ths.
-fn fixed(coordinate: f64) -> i32 {
-    (coordinate * 65536.0).round() as i32
 }
 
 #[cfg(test)]

@@ -1,6 +1,10 @@
 //! A sprite as interpolation takes it: premultiplied, in a transparent border so that no edge is a
 //! special case, halved as often as its scale asks (ALGORITHMS.md 8).
 
+use std::ops::Range;
+
+use super::catmull_rom::HALF_PLACE;
+use super::map::Way;
 use super::{ONE, Quad};
 use crate::geometry::Rect;
 
@@ -49,6 +53,46 @@ impl Premultiplied {
             level += 1;
         }
         level
+    }
+
+    /// Which of `n` places on a way that begins at `start` lie between the first and the last that find
+    /// anything; empty where none does.
+    #[inline(always)]
+    pub(super) fn seen(&self, start: [i32; 2], way: &Way, n: usize) -> Range<usize> {
+        let first = self.n_blank(start, way, n);
+        let last = way.along(start, n as i32 - 1);
+        let n_after = self.n_blank(last, &way.back(), n - first);
+        first..n - n_after
+    }
+
+    /// How many of `n` places find nothing before one does. Goes from row to row of the sprite, in each to
+    /// where its span begins.
+    #[inline(always)]
+    fn n_blank(&self, start: [i32; 2], way: &Way, n: usize) -> usize {
+        let mut at = 0;
+        while at < n {
+            let [u, v] = way.along(start, at as i32).map(|place| place + HALF_PLACE);
+            let [from, to] = self.spans[(v >> 16) as usize];
+            if u > from && u < to {
+                break;
+            }
+            let in_row = v as u32 & 0xffff;
+            let [row_left, before_span] = [
+                if way.step[1] > 0 {
+                    0xffff - in_row
+                } else {
+                    in_row
+                },
+                (if way.step[0] > 0 { from - u } else { u - to }) as u32,
+            ];
+            let n_in_row = way.n_beyond(row_left, 1);
+            // Behind the span there is nothing more in this row.
+            at += match before_span as i32 >= 0 {
+                true => n_in_row.min(way.n_beyond(before_span, 0)),
+                false => n_in_row,
+            };
+        }
+        at.min(n)
     }
 
     /// Memory that it takes.
@@ -114,7 +158,7 @@ impl Premultiplied {
         let stride = self.stride();
         let n_rows = self.pixels.len() / stride;
         self.spans.clear();
-        self.spans.resize(n_rows, [i32::MAX, i32::MIN]);
+        self.spans.resize(n_rows, [i32::MAX, 0]);
         for (y, row) in self.pixels.chunks_exact(stride).enumerate() {
             let shows = |pixel: &Quad| pixel[3] > 0;
             let (Some(first), Some(last)) =

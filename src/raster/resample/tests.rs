@@ -180,7 +180,9 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
     };
     let mut canvas = Canvas::new(40, 30);
     for (k, pixel) in canvas.pixels.iter_mut().enumerate() {
-        pixel[3] = [0, ONE - 1, ONE][k % 3];
+        // Whole blocks are hidden, and in the others a pixel here and there.
+        let hides = k / 8 % 2 == 1 || k % 3 == 2;
+        pixel[3] = if hides { ONE } else { ONE - 1 };
     }
     let mut nearer = Cover::none([40, 30]);
     let mut everywhere = Resampled {
@@ -204,7 +206,7 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
         let rect = all.rect;
         for (k, (all, rest)) in (0u32..).zip(all.pixels.iter().zip(&rest.pixels)) {
             let at = (rect.y + k / rect.w) * 40 + rect.x + k % rect.w;
-            let is_hidden = at % 3 == 2;
+            let is_hidden = at / 8 % 2 == 1;
             assert_eq!(*rest, if is_hidden { [0; 4] } else { *all });
             n_hidden += usize::from(is_hidden && all[3] > 0);
         }
@@ -227,4 +229,41 @@ fn every_instruction_set_gives_the_same_pixels() {
             assert_eq!(plain.pixels, other.pixels, "{}", cpu.name());
         }
     }
+}
+
+#[test]
+fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
+    // A bow: its rows begin and end elsewhere, and some are empty.
+    let mut rgba = vec![0; 40 * 30 * 4];
+    for k in 0..40 * 30 {
+        let (x, y) = (k % 40, k / 40);
+        let is_shown = !(12..15).contains(&y) && (x + y * y / 9) % 40 < 9;
+        rgba[k * 4 + 3] = if is_shown { 200 } else { 0 };
+    }
+    let bounds = bounds_of(&rgba, 40);
+    let sprite = Premultiplied::of(&cut(&rgba, 40, bounds), [40, 30], bounds, 1.0);
+    let within =
+        |at: [i32; 2]| (3..35).contains(&(at[0] >> 16)) && (3..30).contains(&(at[1] >> 16));
+    let mut n_empty = 0;
+    for k in 0..4000 {
+        let random = |salt| (crate::random::bits(salt, &[k]) % (1 << 22)) as i32;
+        let start = [random(1), random(2)].map(|at| at % (30 << 16) + (4 << 16));
+        let step = [random(3), random(4) / 4].map(|step| (step - (1 << 20)) >> (k % 20));
+        let way = map::Way::of(step);
+        let n = (0..60).take_while(|&k| within(way.along(start, k))).count();
+        let finds = |k: &usize| {
+            let [u, v] = way
+                .along(start, *k as i32)
+                .map(|at| at + catmull_rom::HALF_PLACE);
+            let [from, to] = sprite.spans[(v >> 16) as usize];
+            from < u && u < to
+        };
+        let seen = sprite.seen(start, &way, n);
+        match (0..n).find(finds) {
+            Some(first) => assert_eq!(Some(seen), (0..n).rfind(finds).map(|last| first..last + 1)),
+            None => assert!(seen.is_empty()),
+        }
+        n_empty += usize::from(n > 1 && (0..n).find(finds).is_none());
+    }
+    assert!(n_empty > 50, "{n_empty}");
 }
