@@ -5,9 +5,9 @@
 //! as the stations are filled in. Who plays on moves such a row by a state a frame.
 
 use super::cost::CEILING;
+use super::landings::Way;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::{load, store};
-use super::landings::Way;
 use super::viterbi::{Block, FRAMES};
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;

@@ -2,6 +2,8 @@
 //! for those of smaller id whose plans were final when its own was made, so that anyone can recompute
 //! the cost. Distances are whole 32nds of a body length, weights a table: the same on any machine.
 
+use std::ops::Range;
+
 use super::trellis::Trellis;
 use super::viterbi::FRAMES;
 use crate::flock::individual::BoidTrack;
@@ -95,11 +97,18 @@ impl Crowd {
         self.costs[self.step(a, b) as usize]
     }
 
-    /// The same of the first at `places`, at moment `moment` of what is told of each.
+    /// The same of some others at `places`, at moment `moment` of what is told of each.
     #[inline(always)]
-    pub fn costs_at(&self, id: usize, places: &Places, moment: usize, costs: &mut [[u32; FRAMES]]) {
+    pub fn costs_at(
+        &self,
+        (id, others): (usize, Range<usize>),
+        places: &Places,
+        moment: usize,
+        costs: &mut [[u32; FRAMES]],
+    ) {
         let here = places.of(id);
-        let [x, y, z] = places.axes.each_ref().map(|axis| axis[..costs.len()].chunks(TOGETHER));
+        let axes = places.axes.each_ref();
+        let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(TOGETHER));
         for (costs, ((x, y), z)) in costs.chunks_mut(TOGETHER).zip(x.zip(y).zip(z)) {
             // First the arithmetic of all, then the table.
             let mut steps = [0; TOGETHER];
@@ -214,42 +223,41 @@ impl FromIterator<Place> for Places {
 /// Plans that are final, as others look out for them.
 #[derive(Clone, Debug)]
 pub struct Settled {
-    /// `[t][id]`.
-    shown: Vec<Vec<Shown>>,
-}
-
-/// What is shown at a frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Shown {
-    /// The states that look like it: first, and one past the last.
-    pub alike: [u32; 2],
-    /// For how many frames from this one on, at most `FRAMES`, these move on by one a frame.
-    pub n_steady: u32,
+    /// `[t][id]`: the state shown.
+    states: Vec<Vec<u32>>,
+    /// `[t][id]`: for how many frames from this one on, at most `FRAMES`, what looks like it moves on by one a
+    /// frame.
+    n_steady: Vec<Vec<u8>>,
 }
 
 impl Settled {
     /// Nobody's.
     pub fn new(n_frames: usize) -> Settled {
         Settled {
-            shown: vec![Vec::new(); n_frames],
+            states: vec![Vec::new(); n_frames],
+            n_steady: vec![Vec::new(); n_frames],
         }
     }
 
-    /// The next individual's: what looks like what it shows, by frame.
-    pub fn push(&mut self, alike: impl DoubleEndedIterator<Item = [u32; 2]> + ExactSizeIterator) {
-        let mut after: Option<Shown> = None;
-        for (at, alike) in self.shown.iter_mut().zip(alike).rev() {
-            let goes_on = after.filter(|after| after.alike == alike.map(|state| state + 1));
-            let n_after = goes_on.map_or(0, |after| after.n_steady);
-            let n_steady = (1 + n_after).min(FRAMES as u32);
-            let shown = Shown { alike, n_steady };
-            at.push(shown);
-            after = Some(shown);
+    /// The next individual's states, given what looks like each.
+    pub fn push(&mut self, states: &[u32], alike: &[[u32; 2]]) {
+        let alike = |t: usize| alike[states[t] as usize];
+        let mut n_steady = 0;
+        for (t, &state) in states.iter().enumerate().rev() {
+            let goes_on = t + 1 < states.len() && alike(t + 1) == alike(t).map(|end| end + 1);
+            n_steady = if goes_on { n_steady + 1 } else { 1 }.min(FRAMES as u8);
+            self.states[t].push(state);
+            self.n_steady[t].push(n_steady);
         }
     }
 
-    /// What is shown at frame `t`, by id.
-    pub fn at(&self, t: usize) -> &[Shown] {
-        &self.shown[t]
+    /// The states shown at frame `t`, by id.
+    pub fn at(&self, t: usize) -> &[u32] {
+        &self.states[t]
+    }
+
+    /// For how many frames from `t` on, at most `FRAMES`, what looks like them moves on by one a frame.
+    pub fn steady_at(&self, t: usize) -> &[u8] {
+        &self.n_steady[t]
     }
 }

@@ -5,9 +5,9 @@
 
 use super::cost::{CEILING, Feature, Weights};
 use super::landings::Way;
-use super::viterbi::{Block, FRAMES};
 #[cfg(target_arch = "x86_64")]
 use super::lanes::store;
+use super::viterbi::{Block, FRAMES};
 use crate::cpu::Level;
 use crate::flock::params::MatchBy;
 
@@ -65,7 +65,8 @@ impl Weights {
             _ => {
                 for (&states, out) in pairs {
                     let [first, second] = block.way.stations_of(states);
-                    *out = [first, second].map(|state| wanted.map(|wanted| self.total(wanted, state)));
+                    *out =
+                        [first, second].map(|state| wanted.map(|wanted| self.total(wanted, state)));
                 }
             }
         }

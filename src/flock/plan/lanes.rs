@@ -6,7 +6,7 @@ use std::arch::x86_64::*;
 use super::viterbi::FRAMES;
 
 /// Numbers of 32 bits.
-pub(super) trait Number: {}
+pub(super) trait Number {}
 
 impl Number for u32 {}
 impl Number for i32 {}

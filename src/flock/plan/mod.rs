@@ -237,7 +237,7 @@ impl<'a> Planner<'a> {
             let end = first + (first..wanted.len()).take_while(alike).count();
             let round = self.round(wanted, first, end).paths(settled)?;
             for found in &round {
-                settled.push(self.alike_of(&found.path));
+                settled.push(self.film_of(&found.path), &self.alike);
             }
             paths.extend(round);
             progress.report("planning", paths.len() as f64 / wanted.len() as f64);
@@ -314,7 +314,7 @@ impl<'a> Planner<'a> {
         for (t, &state) in self.film_of(path).iter().enumerate() {
             let places = &self.places[t];
             let of_one = |other: usize| {
-                let [first, end] = settled.at(t)[other].alike;
+                let [first, end] = self.alike[settled.at(t)[other] as usize];
                 let is_alike = (first..end).contains(&state);
                 is_alike.then(|| self.crowd.cost_at(places.of(id), places.of(other)))
             };
@@ -328,15 +328,6 @@ impl<'a> Planner<'a> {
     /// What a path shows in the film.
     fn film_of<'b>(&self, path: &'b Path) -> &'b [u32] {
         &path.states[..self.places.len()]
-    }
-
-    /// The states that look like what a path shows in the film.
-    fn alike_of(
-        &self,
-        path: &Path,
-    ) -> impl DoubleEndedIterator<Item = [u32; 2]> + ExactSizeIterator {
-        let states = self.film_of(path).iter();
-        states.map(|&state| self.alike[state as usize])
     }
 
     /// What a path's jumps cost, turns, with that after the last frame of a loop.

@@ -1,12 +1,17 @@
 //! What showing each state costs, a stretch of stations and a block of frames at a time
 //! (ALGORITHMS.md 6): alone, and among those whose plans are final.
 
+use std::ops::Range;
+
 use super::Planner;
 use super::added::Added;
 use super::cost::Feature;
 use super::crowd::Settled;
 use super::memory::Raised;
 use super::viterbi::{Block, FRAMES, Moments, Rows};
+
+/// So many others are looked at together: what is known of them stays in the nearest cache.
+const TOGETHER: usize = 256;
 
 /// Heading, rotation and speed alone.
 #[derive(Clone)]
@@ -34,8 +39,6 @@ pub(super) struct InCrowd<'a> {
     /// What is dearer for having been repeated.
     raised: Option<&'a Raised>,
     added: Added,
-    /// What looking like each of those looked out for costs, by moment of a block.
-    near: Vec<[u32; FRAMES]>,
 }
 
 impl<'a> InCrowd<'a> {
@@ -51,7 +54,6 @@ impl<'a> InCrowd<'a> {
             id,
             raised: None,
             added: Added::new(planner.trellis.n_states()),
-            near: vec![[0; FRAMES]; planner.crowd.n_watched(id)],
         }
     }
 
@@ -68,7 +70,10 @@ impl<'a> InCrowd<'a> {
         self.added.clear();
         let planner = self.alone.planner;
         let moments = block.moments(planner.places.len());
-        self.gather_others(&moments);
+        let n_watched = planner.crowd.n_watched(self.id);
+        for first in (0..n_watched).step_by(TOGETHER) {
+            self.gather_some(&moments, first..n_watched.min(first + TOGETHER));
+        }
         if let Some(raised) = self.raised {
             for moment in moments.range.clone() {
                 for &state in raised.at(moments.frame(moment)) {
@@ -79,22 +84,30 @@ impl<'a> InCrowd<'a> {
         }
     }
 
+    /// What some of those looked out for add.
     #[inline(always)]
-    fn gather_others(&mut self, moments: &Moments) {
-        let Planner { crowd, places, .. } = self.alone.planner;
+    fn gather_some(&mut self, moments: &Moments, others: Range<usize>) {
+        let planner = self.alone.planner;
+        let mut costs = [[0; FRAMES]; TOGETHER];
+        let costs = &mut costs[..others.len()];
         for moment in moments.range.clone() {
-            let places = &places[moments.frame(moment)];
-            crowd.costs_at(self.id, places, moment, &mut self.near);
+            let (places, pair) = (
+                &planner.places[moments.frame(moment)],
+                (self.id, others.clone()),
+            );
+            planner.crowd.costs_at(pair, places, moment, costs);
         }
-        for (other, costs) in self.near.iter().enumerate() {
+        for (other, costs) in others.zip(costs) {
             if *costs == [0; FRAMES] {
                 continue;
             }
             let mut moment = moments.range.start;
             while moment < moments.range.end {
-                let shown = self.settled.at(moments.frame(moment))[other];
-                let n = (shown.n_steady as usize).min(moments.range.end - moment);
-                (self.added).add(shown.alike, moment, &costs[moment..moment + n]);
+                let t = moments.frame(moment);
+                let alike = planner.alike[self.settled.at(t)[other] as usize];
+                let n_steady = usize::from(self.settled.steady_at(t)[other]);
+                let n = n_steady.min(moments.range.end - moment);
+                (self.added).add(alike, moment, &costs[moment..moment + n]);
                 moment += n;
             }
         }

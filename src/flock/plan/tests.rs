@@ -127,7 +127,7 @@ fn the_plans_of_a_flock_hold_their_certificates() {
         let checked =
             certificate::check(&planner.trellis, planner.dwell, &cost_at, &columns, &path);
         assert_eq!(checked, Ok(()), "individual {id}");
-        settled.push(planner.alike_of(&path));
+        settled.push(&path.states, &planner.alike);
     }
 }
 

@@ -151,7 +151,11 @@ impl Column {
 
     /// The cheapest jump to each station that jumps lead to.
     #[inline(always)]
-    fn land<const AVX2: bool, const TRACED: bool>(&mut self, film: &Film<'_>, ranks: &mut [[u16; FRAMES]]) {
+    fn land<const AVX2: bool, const TRACED: bool>(
+        &mut self,
+        film: &Film<'_>,
+        ranks: &mut [[u16; FRAMES]],
+    ) {
         let mut landing = Landing {
             tallies: &self.tallies,
             offers: self.offers.block(self.clock),
@@ -212,7 +216,11 @@ impl Column {
             let landings = values.iter_mut().skip(ago).zip(self.offers.after(clock));
             for ((to, lead), (&gone, &sum)) in landings.zip(stations) {
                 let value = front::value(lead, sum).min(UNREACHED);
-                *to = if gone as usize > ago { value } else { UNREACHED };
+                *to = if gone as usize > ago {
+                    value
+                } else {
+                    UNREACHED
+                };
             }
             values
         };
