@@ -1,8 +1,8 @@
 //! How fast plans are made (ALGORITHMS.md 6 and 9), for `bench/plan.py`.
 //!
-//! Arguments: COUNT FRAMES RUNS [--one-side] [LIBRARY_DIR]. With one side nobody is mirrored. Without a folder the library is made here: 1200 frames
-//! of an animal that turns to and fro, with about 2000 jumps, half of them mirrored. The boids are
-//! simulated once; the plan alone is timed, on one thread and on all. Prints one line of JSON.
+//! Arguments: COUNT FRAMES RUNS [--one-side] [LIBRARY_DIR]. With one side nobody is mirrored. Without a
+//! folder the library is made here: 1200 frames of an animal that turns to and fro, with about 2000 jumps, half
+//! of them mirrored. The boids are simulated once; the plan alone is timed, on one thread and on all. Prints one line of JSON.
 
 use std::path::Path;
 use std::sync::Arc;

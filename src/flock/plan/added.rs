@@ -152,3 +152,48 @@ fn pass_avx2<'a, const BACK: bool>(
     }
     store(now, sums);
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const N_STATES: usize = 60;
+
+    proptest! {
+        #[test]
+        fn a_block_gets_all_that_was_added_to_its_states_and_the_next_nothing_of_it(
+            rows in proptest::collection::vec((0u32..40, 0u32..12, 0..FRAMES, 1..=FRAMES, 1u32..900), 0..20),
+            stretch in 1usize..70,
+        ) {
+            let ways = |cpu| [(cpu, Way::Ahead), (cpu, Way::Back)];
+            for (cpu, way) in Level::available().into_iter().flat_map(ways) {
+                let block = Block { way, cpu, n_states: N_STATES, times: [0; FRAMES] };
+                let mut added = Added::new(N_STATES);
+                let mut expected = [[7; FRAMES]; N_STATES];
+                for &(low, n_states, first, n, cost) in &rows {
+                    let n = n.min(FRAMES - first);
+                    added.add([low, low + n_states], first, &vec![cost; n]);
+                    for k in 0..n {
+                        let lane = if way == Way::Back { FRAMES - 1 - first - k } else { first + k };
+                        for state in low as usize + k..(low + n_states) as usize + k {
+                            expected[way.station(N_STATES, state)][lane] += cost;
+                        }
+                    }
+                }
+                let pass = |added: &mut Added| {
+                    let mut found = vec![[7; FRAMES]; N_STATES];
+                    for (first, out) in (0..).step_by(stretch).zip(found.chunks_mut(stretch)) {
+                        added.pass(&block, first, out);
+                    }
+                    added.clear();
+                    found
+                };
+                prop_assert_eq!(pass(&mut added), expected);
+                added.add([0, 0], 0, &[1]);
+                prop_assert_eq!(pass(&mut added), [[7; FRAMES]; N_STATES]);
+            }
+        }
+    }
+}

@@ -1,10 +1,10 @@
 //! Plans that play into one another: the last frame of each into the first of whom it becomes
 //! (ALGORITHMS.md 6, loop).
 //!
-//! Plans without that give each individual its first state, that of an heir from the plan before it; from there on the plan is found anew, exact among
-//! all that begin so, jump no sooner than a dwell after the first frame (as if it had just been jumped
-//! to), and end where the heir's first state follows. The recursion sees one frame more than
-//! the film has, at which only that state may be shown.
+//! Plans without that give each individual its first state, that of an heir from the plan before it; from
+//! there on the plan is found anew, exact among all that begin so, jump no sooner than a dwell after the first
+//! frame (as if it had just been jumped to), and end where the heir's first state follows. The recursion
+//! sees one frame more than the film has, at which only that state may be shown.
 
 use super::trellis::Trellis;
 use super::viterbi::{Block, FRAMES, Rows};

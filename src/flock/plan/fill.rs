@@ -153,3 +153,59 @@ fn load_pair(pair: &[Feature; 2]) -> std::arch::x86_64::__m128i {
     // SAFETY: two features are as long as a vector, which may lie anywhere.
     unsafe { std::arch::x86_64::_mm_loadu_si128(std::ptr::from_ref(pair).cast()) }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::flock::params::Matching;
+    use crate::flock::synthetic::library;
+    use crate::library::View;
+
+    fn features(n: usize) -> impl Strategy<Value = Vec<Feature>> {
+        let any_turns = prop_oneof![Just(0), Just(1 << 15), any::<u16>()];
+        let feature = (any_turns, any::<u16>()).prop_map(|(turns, log_speed)| Feature {
+            turns,
+            log_speed,
+            ..Feature::default()
+        });
+        proptest::collection::vec(feature, n)
+    }
+
+    /// Some that fit 16 bits, and some that do not.
+    fn weights() -> impl Strategy<Value = Weights> {
+        let weight = || prop_oneof![0u32..600, Just(32_767), Just(40_000)];
+        let rho = prop_oneof![Just(0), 0u16..4000, Just(32_767), Just(1 << 15)];
+        let usual = Weights::new(&Matching::default(), &library(View::Side));
+        (weight(), weight(), weight(), rho).prop_map(
+            move |(heading, rotation, speed, rho_turns)| Weights {
+                heading,
+                rotation,
+                speed,
+                rho_turns,
+                ..usual
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn stations_are_filled_in_with_what_the_definition_says(
+            all in features(41), wanted in features(FRAMES), weights in weights(),
+            first in 0usize..30, n in 1usize..12,
+        ) {
+            let wanted: [Feature; FRAMES] = wanted.try_into().expect("as many");
+            let ways = |cpu| [(cpu, Way::Ahead), (cpu, Way::Back)];
+            for (cpu, way) in Level::available().into_iter().flat_map(ways) {
+                let block = Block { way, cpu, n_states: all.len(), times: [0; FRAMES] };
+                let mut found = vec![[0; FRAMES]; n];
+                weights.fill(&wanted, &all, (&block, first), &mut found);
+                for (station, found) in (first..).zip(found) {
+                    let state = all[block.state(station)];
+                    prop_assert_eq!(found, wanted.map(|wanted| weights.total(wanted, state)));
+                }
+            }
+        }
+    }
+}
