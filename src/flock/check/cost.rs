@@ -196,7 +196,7 @@ impl<'a> Ledger<'a> {
             let before = frame.checked_sub(gap).filter(|_| gap > 0);
             for frame in before.into_iter().chain([frame + gap]) {
                 if let Some(state) = graph.state(frame, side) {
-                    crowd[state] += u32::from(near.cost);
+                    crowd[state] += near.cost;
                 }
             }
         }

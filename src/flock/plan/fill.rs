@@ -178,15 +178,13 @@ mod tests {
         let weight = || prop_oneof![0u32..600, Just(32_767), Just(40_000)];
         let rho = prop_oneof![Just(0), 0u16..4000, Just(32_767), Just(1 << 15)];
         let usual = Weights::new(&Matching::default(), &library(View::Side));
-        (weight(), weight(), weight(), rho).prop_map(
-            move |(heading, rotation, speed, rho_turns)| Weights {
-                heading,
-                rotation,
-                speed,
-                rho_turns,
-                ..usual
-            },
-        )
+        let weights = [weight(), weight(), weight()];
+        (weights, rho).prop_map(move |([heading, rotation, speed], rho_turns)| {
+            let mut weights = usual;
+            (weights.heading, weights.rotation) = (heading, rotation);
+            (weights.speed, weights.rho_turns) = (speed, rho_turns);
+            weights
+        })
     }
 
     proptest! {

@@ -165,10 +165,8 @@ impl Front {
             store(&mut tally.sums, sums);
             store(&mut tally.values, values);
         }
-        (
-            store(&mut self.at.values, values),
-            store(&mut self.at.sums, sums),
-        );
+        store(&mut self.at.values, values);
+        store(&mut self.at.sums, sums);
         store(&mut self.before.values, before[0]);
         store(&mut self.before.sums, before[1]);
     }
