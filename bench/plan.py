@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """How long plans take: 20 individuals x 400 frames over 1200 frames with both mirrors; 1000 x 1000 over the same,
-and over 1200 frames of one side.
+and over 1200 frames of one side; 20 x 400 over 50 000 frames, exactly as well.
 
     bench/plan.py [--engine PROGRAM] [--library DIR] [--small-only]
 
@@ -12,8 +12,9 @@ import json
 import subprocess
 import sys
 
-# Individuals, frames, runs, what else to say, and the most seconds on all threads.
-CASES = [(20, 400, 30, [], 0.030), (1000, 1000, 1, [], 3.0), (1000, 1000, 1, ["--one-side"], 3.0)]
+# Individuals, frames, runs, what else to say, and the most seconds wanted on all threads.
+CASES = [(20, 400, 30, [], 0.030), (1000, 1000, 1, [], 3.0), (1000, 1000, 1, ["--one-side"], 3.0),
+         (20, 400, 1, ["--of=50000"], None)]
 
 
 def main():
@@ -28,7 +29,7 @@ def main():
         words = [*command, str(count), str(frames), str(runs), *flags, *([args.library] if args.library else [])]
         done = subprocess.run(words, check=True, stdout=subprocess.PIPE)
         result = json.loads(done.stdout.splitlines()[-1])
-        result.update(bar_s=bar_s, within=result["all_threads_s"] < bar_s)
+        result.update(bar_s=bar_s, within=bar_s is None or result["all_threads_s"] < bar_s)
         missed |= not result["within"]
         print(json.dumps(result), flush=True)
     return int(missed)

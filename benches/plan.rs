@@ -1,8 +1,9 @@
 //! How fast plans are made (ALGORITHMS.md 6 and 9), for `bench/plan.py`.
 //!
-//! Arguments: COUNT FRAMES RUNS [--one-side] [LIBRARY_DIR]. With one side nobody is mirrored. Without a
-//! folder the library is made here: 1200 frames of an animal that turns to and fro, with about 2000 jumps, half
-//! of them mirrored. The boids are simulated once; the plan alone is timed, on one thread and on all. Prints one line of JSON.
+//! Arguments: COUNT FRAMES RUNS [--one-side] [--of=N] [LIBRARY_DIR]. With one side nobody is mirrored. Without
+//! a folder the library is made here: N frames, 1200 if it is not said, of an animal that turns to and fro, with
+//! about five jumps for three frames, half of them mirrored. The boids are simulated once; the plan alone is
+//! timed, on one thread and on all. Prints one line of JSON.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -23,10 +24,12 @@ use flockreel::scratch::InMemory;
 fn main() {
     let (flags, arguments): (Vec<String>, Vec<String>) =
         std::env::args().skip(1).partition(|a| a.starts_with("--"));
+    let n_frames = flags.iter().find_map(|flag| flag.strip_prefix("--of="));
+    let n_frames = n_frames.map_or(1200, |n| n.parse().expect("a number"));
     let mirror = !flags.iter().any(|flag| flag == "--one-side");
     let [count, frames, runs, folder @ ..] = &arguments[..] else {
         // `cargo test --benches` runs this without arguments.
-        return println!("arguments: COUNT FRAMES RUNS [--one-side] [LIBRARY_DIR]");
+        return println!("arguments: COUNT FRAMES RUNS [--one-side] [--of=N] [LIBRARY_DIR]");
     };
     let number = |text: &String| text.parse().expect("a number");
     let library = match folder.first() {
@@ -35,7 +38,7 @@ fn main() {
                 .expect("a library")
                 .library
         }
-        None => made_library(),
+        None => made_library(n_frames),
     };
     let params = Params {
         count: number(count),
@@ -88,13 +91,11 @@ fn time(
         .fold(f64::INFINITY, f64::min)
 }
 
-const N_FRAMES: u32 = 1200;
-const N_JUMPS: u64 = 2000;
 const LENGTH_PX: f64 = 80.0;
 const EPSILON: u64 = 1000;
 
 /// An animal that swims to and fro, and jumps between places where it points alike.
-fn made_library() -> Library {
+fn made_library(n_frames: u32) -> Library {
     let wave = |frame: u32, period: f64| (f64::from(frame) / period).sin();
     let heading = |frame: u32| {
         let side = if wave(frame, 29.0) > 0.0 {
@@ -105,7 +106,7 @@ fn made_library() -> Library {
         side + 0.5 * wave(frame, 11.0) + 0.3 * wave(frame, 47.0)
     };
     let mut centroid_px = [320.0, 240.0];
-    let frames = (0..N_FRAMES)
+    let frames = (0..n_frames)
         .map(|frame| {
             centroid_px[0] += 3.0 * heading(frame).cos();
             centroid_px[1] += 3.0 * heading(frame).sin();
@@ -119,7 +120,7 @@ fn made_library() -> Library {
             }
         })
         .collect();
-    let jumps = made_jumps(heading);
+    let jumps = made_jumps(n_frames, heading);
     Library {
         poses: Poses {
             tail_beat: None,
@@ -131,7 +132,7 @@ fn made_library() -> Library {
             frames,
         },
         background: RgbImage::new(640, 480),
-        sprites: Sprites::missing(96, 64, N_FRAMES as usize),
+        sprites: Sprites::missing(96, 64, n_frames as usize),
         clip_frames: 8,
         epsilon: EPSILON,
         natural_step: EPSILON / 2,
@@ -139,12 +140,12 @@ fn made_library() -> Library {
         transitions: Vec::new(),
         patches: Vec::new(),
         playback: Playback {
-            component: (0..N_FRAMES).collect(),
+            component: (0..n_frames).collect(),
             jumps,
         },
         stats: LibraryStats {
-            n_frames: N_FRAMES as usize,
-            n_detected: N_FRAMES as usize,
+            n_frames: n_frames as usize,
+            n_detected: n_frames as usize,
             component_share: 1.0,
             speed_bl_per_s: Some([0.5, 1.1, 2.0]),
             turn_rate_rad_per_s: Some(2.0),
@@ -154,8 +155,8 @@ fn made_library() -> Library {
     }
 }
 
-fn made_jumps(heading: impl Fn(u32) -> f64) -> Vec<Jump> {
-    let frame = |draw: u64, which: u64| (unit(5, &[which, draw]) * f64::from(N_FRAMES)) as u32;
+fn made_jumps(n_frames: u32, heading: impl Fn(u32) -> f64) -> Vec<Jump> {
+    let frame = |draw: u64, which: u64| (unit(5, &[which, draw]) * f64::from(n_frames)) as u32;
     let jump = |draw: u64| {
         let (from, to) = (frame(draw, 1), frame(draw, 2));
         let mirrored = unit(5, &[3, draw]) < 0.5;
@@ -172,7 +173,8 @@ fn made_jumps(heading: impl Fn(u32) -> f64) -> Vec<Jump> {
             mirrored,
         })
     };
-    let mut jumps: Vec<Jump> = (0..).filter_map(jump).take(N_JUMPS as usize).collect();
+    let n_jumps = n_frames as usize * 5 / 3;
+    let mut jumps: Vec<Jump> = (0..).filter_map(jump).take(n_jumps).collect();
     jumps.sort_unstable();
     jumps.dedup_by_key(|jump| (jump.from, jump.to, jump.mirrored));
     jumps
