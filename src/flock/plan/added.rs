@@ -51,19 +51,6 @@ impl Added {
     pub(super) fn add(&mut self, [low, high]: [u32; 2], first: usize, costs: &[u32]) {
         self.is_any = true;
         let n = costs.len();
-        if let Ok(costs) = <&[u32; FRAMES]>::try_from(costs) {
-            let up = self.more[low as usize..].first_chunk_mut::<FRAMES>();
-            let up = up.expect("states in a row");
-            for k in 0..FRAMES {
-                up[k][k] = up[k][k].wrapping_add(costs[k]);
-            }
-            let down = self.more[high as usize..].first_chunk_mut::<FRAMES>();
-            let down = down.expect("states in a row");
-            for k in 0..FRAMES {
-                down[k][k] = down[k][k].wrapping_sub(costs[k]);
-            }
-            return;
-        }
         for (at, sign) in [(low as usize, 1), (high as usize, u32::MAX)] {
             let more = &mut self.more[at..at + n];
             for ((more, &cost), moment) in more.iter_mut().zip(costs).zip(first..) {

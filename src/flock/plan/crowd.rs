@@ -27,8 +27,8 @@ const ONE_BY_ONE: usize = 64;
 /// Individuals in a round.
 const ROUND: usize = 16;
 
-/// So many distances are computed side by side.
-const TOGETHER: usize = 32;
+/// So many distances are computed before any is looked up.
+const IN_A_ROW: usize = 32;
 
 /// Where a boid is, in 32nds of a body length.
 pub type Place = [i32; 3];
@@ -108,10 +108,10 @@ impl Crowd {
     ) {
         let here = places.of(id);
         let axes = places.axes.each_ref();
-        let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(TOGETHER));
-        for (costs, ((x, y), z)) in costs.chunks_mut(TOGETHER).zip(x.zip(y).zip(z)) {
+        let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(IN_A_ROW));
+        for (costs, ((x, y), z)) in costs.chunks_mut(IN_A_ROW).zip(x.zip(y).zip(z)) {
             // First the arithmetic of all, then the table.
-            let mut steps = [0; TOGETHER];
+            let mut steps = [0; IN_A_ROW];
             for (step, ((&x, &y), &z)) in steps.iter_mut().zip(x.iter().zip(y).zip(z)) {
                 *step = self.step(here, [x, y, z]);
             }
@@ -192,16 +192,6 @@ impl Crowd {
 }
 
 impl Places {
-    /// How many they are.
-    pub fn len(&self) -> usize {
-        self.axes[0].len()
-    }
-
-    /// Whether there is nobody.
-    pub fn is_empty(&self) -> bool {
-        self.axes[0].is_empty()
-    }
-
     /// Where one is.
     pub fn of(&self, id: usize) -> Place {
         self.axes.each_ref().map(|axis| axis[id])
