@@ -15,7 +15,7 @@ use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::analysis::Advice;
 use crate::jobs::overlay;
 use crate::library::Library;
-use crate::media::{Limits, Video, read_image};
+use crate::media::{self, Limits, Tool, Video, read_image};
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
@@ -77,6 +77,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             Error::Usage(format!("cannot be read: {cause}: {}", path.display()))
         })?;
     }
+    media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
     let limits = Limits::default();
     let media = |error: crate::media::Error| Error::work(error.code(), &error);
     let video = Video::open(&args.video, &limits).map_err(media)?;

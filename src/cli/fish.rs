@@ -9,7 +9,7 @@ use super::{Error, Listener, Summary};
 use crate::fish::{self, Film, Motion, Palette, Params, side_by_side};
 use crate::formats::glb;
 use crate::library::Library;
-use crate::media::{VideoFormat, VideoWriter};
+use crate::media::{self, Tool, VideoFormat, VideoWriter};
 use crate::progress::Progress;
 use crate::raster::{ColorSpec, Frame};
 
@@ -36,6 +36,7 @@ pub struct Args {
 /// Makes the virtual fish.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
+    media::look_for(&[Tool::Ffmpeg]);
     let stored = super::read_library(&args.library, &args.output)?;
     let motion =
         fish::drive(&stored.library.poses, &params).map_err(|e| Error::work(e.code(), &e))?;

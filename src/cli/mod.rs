@@ -36,7 +36,7 @@ pub use progress::Listener;
 
 use crate::config;
 use crate::formats::library_dir::{self, StoredLibrary};
-use crate::media;
+use crate::media::{self, Tool};
 use crate::scratch::Scratch;
 use crate::store::Spill;
 
@@ -200,6 +200,7 @@ fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
 /// Refuses to start a command that takes strangers' films where the sandbox is not as demanded; what is
 /// missing otherwise is logged.
 fn check_walls() -> Result<(), Error> {
+    media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
     match media::demanded_walls() {
         Err(error @ media::Error::SandboxIncomplete { .. }) => Err(Error::Usage(error.to_string())),
         // That there is no ffmpeg is said where it is looked for.

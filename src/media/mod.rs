@@ -19,8 +19,8 @@ mod packets; // when each packet is shown
 mod probe; // what a file holds
 mod sandbox; // what the child may do
 mod timeline; // presentation times -> a constant rate
-mod tools;
-mod wanted; // which frames a decoder is asked for // where the tools lie, and in which walls they work
+mod tools; // where the tools lie, and in which walls they work
+mod wanted; // which frames a decoder is asked for
 
 pub use coders::Coders;
 pub use decode::Video;
@@ -29,4 +29,4 @@ pub use error::Error;
 pub use image::{decode_image, read_image};
 pub use limits::Limits;
 pub use sandbox::{Layer, Layers};
-pub use tools::{Walls, demanded_walls, set_up, tool_version, walls};
+pub use tools::{Tool, Walls, demanded_walls, look_for, set_up, tool_version, walls};

@@ -4,7 +4,7 @@
 //! `--sandbox strict` nothing is started then.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::error::Error;
 use super::gate::{Child, Order};
@@ -14,7 +14,7 @@ use crate::config::{Media, Sandbox};
 
 /// The two programs that may be started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Tool {
+pub enum Tool {
     /// Reads headers and packet times.
     Ffprobe,
     /// Decodes and encodes.
@@ -50,9 +50,16 @@ struct Found {
     lacks: Vec<(Layer, String)>,
 }
 
+/// The search for a tool.
+struct Search {
+    outcome: OnceLock<Result<Found, String>>,
+    /// Held by who searches, so that whoever comes meanwhile waits instead of searching too.
+    turn: Mutex<()>,
+}
+
 static SETTINGS: OnceLock<Media> = OnceLock::new();
-static FFMPEG: OnceLock<Result<Found, String>> = OnceLock::new();
-static FFPROBE: OnceLock<Result<Found, String>> = OnceLock::new();
+static FFMPEG: Search = Search::new();
+static FFPROBE: Search = Search::new();
 
 /// Folders of libraries where the loader tells none: a program in one piece, or another loader.
 const USUAL_FOLDERS: [&str; 5] = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib"];
@@ -65,6 +72,16 @@ const MAX_ANSWER_BYTES: usize = 1 << 20;
 pub fn set_up(settings: &Media) {
     // A second call finds the first one's choice.
     SETTINGS.set(settings.clone()).ok();
+}
+
+/// Begins to look for tools beside what comes next: to start one and ask its version takes a while, and whoever
+/// needs it later need not wait so long.
+pub fn look_for(tools: &[Tool]) {
+    for &tool in tools {
+        // Where no thread can be had, or nothing is found, it is looked for again where it is needed, and said.
+        let thread = std::thread::Builder::new();
+        thread.spawn(move || found(tool).is_ok()).ok();
+    }
 }
 
 /// What stands around every media child here. Fails when a tool is missing or does not run at all.
@@ -118,24 +135,36 @@ fn mode() -> Sandbox {
 }
 
 fn found(tool: Tool) -> Result<&'static Found, Error> {
-    let cell = match tool {
+    let search = match tool {
         Tool::Ffmpeg => &FFMPEG,
         Tool::Ffprobe => &FFPROBE,
     };
-    if cell.get().is_none() {
+    (search.outcome(tool)?.as_ref()).map_err(|why| Error::ToolMissing(why.clone()))
+}
+
+impl Search {
+    const fn new() -> Search {
+        Search {
+            outcome: OnceLock::new(),
+            turn: Mutex::new(()),
+        }
+    }
+
+    /// What came of it; searches where nobody has. What is only of the moment is no outcome.
+    fn outcome(&self, tool: Tool) -> Result<&Result<Found, String>, Error> {
+        let _turn = match self.outcome.get() {
+            Some(outcome) => return Ok(outcome),
+            None => self.turn.lock().unwrap_or_else(PoisonError::into_inner),
+        };
+        if let Some(outcome) = self.outcome.get() {
+            return Ok(outcome);
+        }
         let found = match find(tool) {
             Err(error) if is_of_the_moment(&error) => return Err(error),
             found => found.map_err(|error| error.to_string()),
         };
-        // Whoever was first has found the same.
-        cell.set(found).ok();
+        Ok(self.outcome.get_or_init(|| found))
     }
-    let found = cell
-        .get()
-        .ok_or_else(|| Error::ToolMissing(format!("{tool:?}")))?;
-    found
-        .as_ref()
-        .map_err(|why| Error::ToolMissing(why.clone()))
 }
 
 fn find(tool: Tool) -> Result<Found, Error> {

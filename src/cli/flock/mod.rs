@@ -14,6 +14,7 @@ use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, params, svg};
 use crate::jobs::flock::film::Film;
 use crate::library::Library;
+use crate::media::{self, Tool};
 
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]
@@ -62,6 +63,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = args.params()?;
     let behind = args.outputs.behind()?;
     let targets = args.outputs.targets(&params.render)?;
+    media::look_for(&[Tool::Ffmpeg]);
     let library = super::read_library(&args.library, &args.outputs.output)?.library;
     let progress = Listener::new();
     let flock = match &args.from {
