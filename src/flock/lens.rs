@@ -103,6 +103,16 @@ impl Lens {
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
     }
 
+    /// How fast one that otherwise moves at `velocity` must sink to be seen level, and how much faster or slower to be
+    /// seen at 45 degrees.
+    pub fn seen_level(&self, place: Vec3, velocity: Vec3) -> [f64; 2] {
+        let recedes =
+            |camera: Pinhole| velocity[2] / camera.medium_index / camera.apparent_bl(place[2]);
+        let receding = self.camera.map_or(0.0, recedes);
+        let across = velocity[0] - place[0] * receding;
+        [place[1] * receding, across.abs()]
+    }
+
     /// The depth, body lengths from the camera, at which a body length has so many pixels; 0 when flat.
     pub fn depth_at_bl(&self, px_per_bl: f64) -> f64 {
         self.camera.map_or(0.0, |camera| {
@@ -234,6 +244,24 @@ mod tests {
             for axis in 0..2 {
                 let rate = (to[axis] - from[axis]) / dt / 90.0;
                 prop_assert!((rate - velocity[axis]).abs() < 1e-3, "{rate} {velocity:?}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn who_sinks_as_it_should_is_seen_level_or_at_45_degrees(
+            x in -4.0..4.0f64, y in -4.0..4.0f64, z in 7.0..14.0f64,
+            v in prop::array::uniform3(-2.0..2.0f64), n in 1.0..1.5f64,
+        ) {
+            for lens in [lens(n), Lens::flat(90.0)] {
+                let [level, across] = lens.seen_level([x, y, z], v);
+                let seen = |sinks| lens.picture_velocity([x, y, z], [v[0], sinks, v[2]]);
+                prop_assert!(seen(level)[1].abs() < 1e-9);
+                for sinks in [level - across, level + across] {
+                    let [right, down] = seen(sinks).map(f64::abs);
+                    prop_assert!((right - down).abs() < 1e-9);
+                }
             }
         }
     }

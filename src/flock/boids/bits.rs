@@ -63,6 +63,7 @@ const SLOPES: Slopes = Slopes {
     limits: [0.5, 0.6],
     usual: 0.05,
     spread: 0.2,
+    in_picture: 1e9,
 };
 
 fn digest(params: &Params, depth_bl: f64, slopes: Option<Slopes>) -> u64 {

@@ -29,10 +29,16 @@ pub struct Slopes {
     pub usual: f64,
     /// Standard deviation, from the middle two thirds.
     pub spread: f64,
+    /// Greatest slope in the picture, up or down. Who swims nearly along the line of sight is seen to head steeply
+    /// when it rises a little, or keeps its height far above the camera or below.
+    pub in_picture: f64,
 }
 
 /// Share of the frames that the steepest directions, and the fastest turns, may leave out.
 const STEEPEST: f64 = 0.98;
+/// Share of the frames that are steeper in the picture than a boid may be seen: few frames, for which no plan finds
+/// one that follows.
+const STEEPER_IN_PICTURE: f64 = 0.1;
 const FASTEST: f64 = 0.95;
 /// And the slowest.
 const SLOWEST: f64 = 0.05;
@@ -75,7 +81,8 @@ impl Calibration {
             wander_rad_per_s: root_mean_square(&swings, turn_rad_per_s),
             slopes: (library.poses.view == View::Side && !flat).then(|| {
                 let pitches = shown().map(|m| libm::asin(m.forward[1].clamp(-1.0, 1.0)));
-                Slopes::of(pitches.collect())
+                let elevations = shown().map(|m| libm::asin(libm::sin(m.heading_rad).abs()));
+                Slopes::of(pitches.collect(), elevations.collect())
             }),
         }
     }
@@ -93,16 +100,17 @@ impl Calibration {
 }
 
 impl Slopes {
-    /// Of an animal seen at these pitches.
-    fn of(mut pitches: Vec<f64>) -> Slopes {
+    /// Of an animal seen at these pitches in space, and at these angles to the horizontal in the picture.
+    fn of(mut pitches: Vec<f64>, mut elevations: Vec<f64>) -> Slopes {
         let mut at = |share| percentile(&mut pitches, share).unwrap_or(0.0);
-        let limits = [-at(1.0 - STEEPEST), at(STEEPEST)]
-            .map(|pitch_rad| libm::tan(pitch_rad.clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD)));
+        let limit = |rad: f64| libm::tan(rad.clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD));
+        let limits = [-at(1.0 - STEEPEST), at(STEEPEST)].map(limit);
         let [low, usual, high] = [0.1587, 0.5, 0.8413].map(|share| libm::tan(at(share)));
         Slopes {
             limits,
             usual,
             spread: 0.5 * (high - low),
+            in_picture: limit(percentile(&mut elevations, 1.0 - STEEPER_IN_PICTURE).unwrap_or(0.0)),
         }
     }
 }

@@ -20,7 +20,7 @@ const FLEE_WEIGHT: f64 = 3.0;
 /// Goals and obstacles, and how the picture tells where they are.
 #[derive(Clone, Debug)]
 pub struct Habitat<'a> {
-    lens: &'a Lens,
+    pub(super) lens: &'a Lens,
     tank: &'a Tank,
     goals: &'a [Goal],
     obstacles: &'a [Obstacle],

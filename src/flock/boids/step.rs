@@ -272,9 +272,14 @@ impl Boids<'_> {
     /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
     /// stands.
     pub(super) fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
-        if let Some([up, down]) = self.calibration.slopes.map(|slopes| slopes.limits) {
-            let level = norm([velocity[0], 0.0, velocity[2]]);
-            velocity[1] = velocity[1].clamp(-up * level, down * level);
+        if let Some(slopes) = &self.calibration.slopes {
+            let [level, across] = self.habitat.lens.seen_level(position, velocity);
+            let most = slopes.in_picture * across;
+            let seen = velocity[1].clamp(level - most, level + most);
+            let [up, down] = slopes
+                .limits
+                .map(|limit| limit * norm([velocity[0], 0.0, velocity[2]]));
+            velocity[1] = seen.clamp(-up, down);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;
         let flees = self.habitat.flee(position, self.hunter.as_ref()).is_some();
