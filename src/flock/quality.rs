@@ -1,5 +1,7 @@
 //! How good a flock is: the measures of ALGORITHMS.md 9 that need no pixels.
 
+use rayon::prelude::*;
+
 use super::boids::measures::Order;
 use super::boids::vector::angle_between;
 use super::individual::{Individual, rounded};
@@ -174,22 +176,27 @@ fn repeats_per_100_frames(individuals: &[Individual], fps: f64) -> f64 {
 }
 
 fn clone_share(individuals: &[Individual], within_px: f64, within_frames: f64) -> f64 {
-    let (mut near, mut clones) = (0u64, 0u64);
-    for (k, a) in individuals.iter().enumerate() {
-        for b in &individuals[k + 1..] {
-            for t in 0..a.source_frame.len() {
-                let (p, q) = (a.boid.position_px[t], b.boid.position_px[t]);
-                let square: f64 = p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum();
-                if square > within_px * within_px {
-                    continue;
-                }
-                let (one, other) = (shown(a, t), shown(b, t));
-                let apart = f64::from(one.0.abs_diff(other.0));
-                near += 1;
-                clones += u64::from(one.1 == other.1 && apart < within_frames);
+    let of_pair = |(a, b): (&Individual, &Individual)| {
+        let (mut near, mut clones) = (0u64, 0u64);
+        for (t, (p, q)) in (a.boid.position_px.iter().zip(&b.boid.position_px)).enumerate() {
+            let square: f64 = p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum();
+            if square > within_px * within_px {
+                continue;
             }
+            let (one, other) = (shown(a, t), shown(b, t));
+            let apart = f64::from(one.0.abs_diff(other.0));
+            near += 1;
+            clones += u64::from(one.1 == other.1 && apart < within_frames);
         }
-    }
+        [near, clones]
+    };
+    let sum = |[a, b]: [u64; 2], [c, d]: [u64; 2]| [a + c, b + d];
+    let with_later = |(k, a): (usize, &Individual)| {
+        let pairs = individuals[k + 1..].iter().map(|b| of_pair((a, b)));
+        pairs.fold([0; 2], sum)
+    };
+    let all = individuals.par_iter().enumerate().map(with_later);
+    let [near, clones] = all.reduce(|| [0; 2], sum);
     clones as f64 / near.max(1) as f64
 }
 

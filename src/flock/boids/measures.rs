@@ -39,18 +39,45 @@ fn mean_nearest(positions: &[Vec3]) -> f64 {
     if positions.len() < 2 {
         return 0.0;
     }
-    let nearest = |id: usize| {
-        let others = positions.iter().enumerate().filter(|other| other.0 != id);
-        others
-            .map(|(_, &other)| norm(minus(other, positions[id])))
-            .fold(f64::INFINITY, f64::min)
-    };
-    (0..positions.len()).map(nearest).sum::<f64>() / positions.len() as f64
+    let mut by_x: Vec<usize> = (0..positions.len()).collect();
+    by_x.sort_unstable_by(|&a, &b| positions[a][0].total_cmp(&positions[b][0]));
+    let mut nearest_bl2 = vec![f64::INFINITY; positions.len()];
+    for (rank, &id) in by_x.iter().enumerate() {
+        let here = positions[id];
+        let nearest = &mut nearest_bl2[id];
+        let mut look_at = |&other: &usize| {
+            let offset = minus(positions[other], here);
+            // Who is too far along x is too far, and so is who comes after.
+            let may_be_nearer = offset[0] * offset[0] < *nearest;
+            may_be_nearer.then(|| *nearest = nearest.min(dot(offset, offset)))
+        };
+        (by_x[rank + 1..].iter()).try_for_each(&mut look_at);
+        (by_x[..rank].iter().rev()).try_for_each(look_at);
+    }
+    let sum: f64 = nearest_bl2.into_iter().map(f64::sqrt).sum();
+    sum / positions.len() as f64
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn the_nearest_is_the_nearest_of_all(
+            positions in prop::collection::vec(prop::array::uniform3(-3i8..3).prop_map(|p| p.map(|c| 0.25 * f64::from(c))), 2..40),
+        ) {
+            let nearest = |id: usize| {
+                let others = positions.iter().enumerate().filter(|other| other.0 != id);
+                let distances = others.map(|(_, &other)| norm(minus(other, positions[id])));
+                distances.fold(f64::INFINITY, f64::min)
+            };
+            let mean = (0..positions.len()).map(nearest).sum::<f64>() / positions.len() as f64;
+            prop_assert_eq!(mean_nearest(&positions), mean);
+        }
+    }
 
     #[test]
     fn a_column_is_polarized_and_a_ring_mills() {
