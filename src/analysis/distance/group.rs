@@ -167,6 +167,16 @@ impl<'a> Group<'a> {
         self.filled[block]
     }
 
+    /// What all bytes of each sprite add up to.
+    pub(super) fn totals(&self) -> [u64; GROUP] {
+        let mut totals = [0; GROUP];
+        for sums in self.sums.as_chunks::<GROUP>().0 {
+            let each = totals.iter_mut().zip(sums);
+            each.for_each(|(total, &sum)| *total += u64::from(sum));
+        }
+        totals
+    }
+
     /// What the bytes of that block add up to.
     #[inline]
     pub(super) fn sum(&self, block: usize, sprite: usize) -> u32 {

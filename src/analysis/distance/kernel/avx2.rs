@@ -26,21 +26,22 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx2")]
 fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
+    *sums = tile.apart();
     let strips = strips(&tile);
     for block in 0..tile.rows.n_blocks() {
         for strip in &strips {
             // Groups are padded to 48 sprites, so two columns never leave them.
             let columns = strip.column..strip.column + 2;
-            if tile.add_blank(block, [&strip.rows, &columns], sums) {
+            if !tile.meet(block, [&strip.rows, &columns]) {
                 continue;
             }
             match strip.rows.len() {
-                1 => add_strip::<1>(tile, block, strip, sums),
-                2 => add_strip::<2>(tile, block, strip, sums),
-                3 => add_strip::<3>(tile, block, strip, sums),
-                4 => add_strip::<4>(tile, block, strip, sums),
-                5 => add_strip::<5>(tile, block, strip, sums),
-                _ => add_strip::<MOST_ROWS>(tile, block, strip, sums),
+                1 => put_strip::<1>(tile, block, strip, sums),
+                2 => put_strip::<2>(tile, block, strip, sums),
+                3 => put_strip::<3>(tile, block, strip, sums),
+                4 => put_strip::<4>(tile, block, strip, sums),
+                5 => put_strip::<5>(tile, block, strip, sums),
+                _ => put_strip::<MOST_ROWS>(tile, block, strip, sums),
             }
         }
     }
@@ -76,13 +77,13 @@ fn strips(tile: &Tile<'_>) -> Vec<Strip> {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn add_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: &mut SadTile) {
+fn put_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: &mut SadTile) {
     let (row, column) = (strip.rows.start, strip.column);
     let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
     let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
-    for (sums, of_row) in sums[row..row + R].iter_mut().zip(sad_rows::<R>(a, b)) {
-        for (sum, d) in sums[column..column + 2].iter_mut().zip(of_row) {
-            *sum += u64::from(d);
+    for (row, of_row) in (row..).zip(sad_rows::<R>(a, b)) {
+        for (column, d) in (column..).zip(of_row) {
+            tile.put(block, [row, column], d.into(), sums);
         }
     }
 }

@@ -71,29 +71,33 @@ impl Tile<'_> {
         .collect()
     }
 
-    /// Adds d of these rows and columns in a block that is blank in all those rows or in all those columns:
-    /// |a - 0| is a, whose sum is known. Returns false, and adds nothing, when it is neither.
+    /// Whether most pairs are asked for.
+    #[cfg(target_arch = "x86_64")]
+    fn is_dense(&self) -> bool {
+        let n_wanted: u32 = self.wanted.iter().map(|bits| bits.count_ones()).sum();
+        2 * n_wanted as usize > self.rows.n_sprites * self.columns.n_sprites
+    }
+
+    /// d of all pairs as if no two sprites had anything in the same block: |a - 0| is a, whose sum is known.
+    fn apart(&self) -> SadTile {
+        let (rows, columns) = (self.rows.totals(), self.columns.totals());
+        rows.map(|row| columns.map(|column| row + column))
+    }
+
+    /// Whether some of these rows and some of these columns have anything in a block.
     #[inline]
-    fn add_blank(
-        &self,
-        block: usize,
-        [rows, columns]: [&Range<usize>; 2],
-        sums: &mut SadTile,
-    ) -> bool {
+    fn meet(&self, block: usize, [rows, columns]: [&Range<usize>; 2]) -> bool {
         let filled = |group: Group<'_>, sprites: &Range<usize>| {
             group.filled(block) >> sprites.start & ((1 << sprites.len()) - 1) != 0
         };
-        if filled(self.rows, rows) && filled(self.columns, columns) {
-            return false;
-        }
-        for row in rows.clone() {
-            let of_row = self.rows.sum(block, row);
-            for column in columns.clone() {
-                let sum = of_row + self.columns.sum(block, column);
-                sums[row][column] += u64::from(sum);
-            }
-        }
-        true
+        filled(self.rows, rows) && filled(self.columns, columns)
+    }
+
+    /// Puts right what was summed as if apart: in a block a row and a column differ by `d`.
+    #[inline]
+    fn put(&self, block: usize, [row, column]: [usize; 2], d: u64, sums: &mut SadTile) {
+        let apart = self.rows.sum(block, row) + self.columns.sum(block, column);
+        sums[row][column] = sums[row][column] + d - u64::from(apart);
     }
 }
 
@@ -104,9 +108,9 @@ pub(super) fn sad_tile(cpu: Level, tile: Tile<'_>) -> Box<SadTile> {
     let mut sums = Box::new([[0; GROUP]; GROUP]);
     match cpu {
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => avx2::sad_tile(tile, &mut sums),
+        Level::Avx512 if tile.is_dense() => avx512::sad_tile(tile, &mut sums),
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => avx512::sad_tile(tile, &mut sums),
+        Level::Avx2 | Level::Avx512 => avx2::sad_tile(tile, &mut sums),
         #[cfg(target_arch = "aarch64")]
         Level::Neon => neon::sad_tile(tile, &mut sums),
         _ => scalar::sad_tile(tile, &mut sums),

@@ -19,19 +19,20 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "neon")]
 fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
+    *sums = tile.apart();
     // Groups are padded to 48 sprites, so blocks of 2 and 4 never leave them.
     let corners = tile.corners::<2, 4>();
     for block in 0..tile.rows.n_blocks() {
         for &[row, column] in &corners {
             let pairs = [&(row..row + 2), &(column..column + 4)];
-            if tile.add_blank(block, pairs, sums) {
+            if !tile.meet(block, pairs) {
                 continue;
             }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
             for (r, totals) in sad_2x4(a, b).into_iter().enumerate() {
                 for (k, total) in totals.into_iter().enumerate() {
-                    sums[row + r][column + k] += u64::from(total);
+                    tile.put(block, [row + r, column + k], total.into(), sums);
                 }
             }
         }
