@@ -32,7 +32,12 @@ BARS = [
     ("cut_above_natural_p99", 0.0),
     ("faded_median", 1.3),
     ("faded_above_natural_p99", 0.0),
+    ("path_deviation_p95_bl", 0.25),
+    ("slip_median_rad", 0.05),
 ]
+
+# What a preset is known by: its least polarization and milling, and their greatest.
+PRESETS = {"school": ((0.65, 0), (1, 1)), "mill": ((0, 0.65), (0.35, 1)), "swarm": ((0, 0), (0.35, 0.35))}
 
 # Frames either side of a jump that a fade may change, and one more.
 AROUND = 3
@@ -52,6 +57,9 @@ def main():
             print(f"{library.name:28} {figures}", flush=True)
             continue
         words = [f"{name} {figures[name]:.4g}{'*' if figures[name] > bar else ''}" for name, bar in BARS]
+        least, most = PRESETS.get(args.preset, ((0, 0), (1, 1)))
+        for name, low, high in zip(("polarization", "milling"), least, most):
+            words.append(f"{name} {figures[name]:.2f}{'' if low <= figures[name] <= high else '*'}")
         print(f"{library.name:28} component {figures['component']} of {figures['n_frames']} frames, {', '.join(words)}, "
               f"natural_window {figures['natural_window']:.3f}, variety {figures['variety']:.2f}, bound gap {figures['gap']:.3f}", flush=True)
 
