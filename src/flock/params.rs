@@ -193,7 +193,8 @@ impl Params {
             "school" => Some(Params::default()),
             "swarm" => Some(with_rules(Rules {
                 alignment: 0.0,
-                cohesion: 1.2,
+                // Who seeks the others more swims to and fro with them in a narrow tank.
+                cohesion: 0.4,
                 wander: 2.5,
                 ..Rules::default()
             })),

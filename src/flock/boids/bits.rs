@@ -20,25 +20,25 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
     (
         "swarm",
         [
-            0xe40c_f14c_cb83_6e9a,
-            0x76b6_bdc7_dfc6_4ec5,
-            0xe366_4556_6975_b82f,
+            0xe734_5c0f_c9b7_11c1,
+            0x1940_b59a_6069_73d0,
+            0xa55e_006e_fca6_6d8d,
         ],
     ),
     (
         "mill",
         [
-            0xae83_51aa_8055_2ee6,
-            0x136d_fec5_39fa_a72d,
-            0x7553_fc14_f539_c80a,
+            0x9819_68b8_66fc_93b4,
+            0x7430_977b_0cab_69df,
+            0x5723_ce03_26c9_2cb8,
         ],
     ),
     (
         "scatter",
         [
-            0x6264_4d79_e63d_a3a1,
-            0x874e_d9fb_9a3f_2bf0,
-            0x2b05_7e6a_a22d_932b,
+            0xd11d_096f_0764_abb1,
+            0x1376_cb80_2ce7_8f89,
+            0x7f52_4765_b857_8f39,
         ],
     ),
     (

@@ -124,8 +124,8 @@ impl Steering<'_> {
     }
 
     /// A push as a turn: who is only slowed down by a wall dawdles before it. What of the push would brake leads to
-    /// the side instead that the rest of it points to, or, head-on, to the one where the neighbors turn and where
-    /// the tank's middle lies, or its circle leads.
+    /// the side instead that the rest of it points to, or, head-on, to the one where the neighbors turn, as far as
+    /// it aligns, and where the tank's middle lies, or its circle leads.
     fn aside(&self, push: Vec3, moment: &Moment) -> Vec3 {
         let ahead = unit(moment.velocity);
         let brake = -dot(push, ahead);
@@ -135,12 +135,13 @@ impl Steering<'_> {
         let side = unit(cross(self.tank.up(), ahead));
         let velocities = (moment.neighbors.iter()).map(|n| n.velocity);
         let turned: f64 = velocities.map(|velocity| dot(unit(velocity), side)).sum();
-        let turned = turned / moment.neighbors.len().max(1) as f64;
+        // Who does not align does not follow others either.
+        let follow = self.params.rules.alignment.min(1.0) / moment.neighbors.len().max(1) as f64;
         let home = match self.params.rules.circling > 0.0 {
             true => self.circling(moment),
             false => minus(self.tank.middle, moment.position),
         };
-        let chosen = dot(push, side) / brake + turned + dot(unit(home), side);
+        let chosen = dot(push, side) / brake + follow * turned + dot(unit(home), side);
         let turn = scaled(brake.copysign(chosen), side);
         add_scaled(add_scaled(push, BRAKED * brake, ahead), 1.0, turn)
     }
