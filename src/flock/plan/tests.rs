@@ -187,7 +187,7 @@ fn a_plan_that_repeats_lies_between_its_bound_and_the_cheapest_that_knew_of_no_r
         ..Params::default()
     };
     let (mut n_better, mut n_best) = (0, 0);
-    for seed in 0..12 {
+    for seed in 0..30 {
         params.seed = seed;
         params.matching.w_p = 0.0;
         let unaware = plan_flock(&library, &params, &Silent).unwrap();
@@ -219,7 +219,8 @@ fn a_plan_that_repeats_lies_between_its_bound_and_the_cheapest_that_knew_of_no_r
 #[test]
 fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
     let library = synthetic::few_looks();
-    for seed in 0..12 {
+    let mut n_closed = 0;
+    for seed in 0..16 {
         let params = Params {
             count: 1,
             // Its frames come back after whole beats of ten only.
@@ -229,7 +230,12 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
             dwell_frames: Some(1 + seed as u32 % 4),
             ..Params::default()
         };
-        let flock = plan_flock(&library, &params, &Silent).unwrap();
+        // From what begins best a film of this length may not lead back.
+        let flock = match plan_flock(&library, &params, &Silent) {
+            Err(Error::LoopDoesNotClose(_)) => continue,
+            flock => flock.unwrap(),
+        };
+        n_closed += 1;
         let one = &flock.individuals[0];
         let boids = [one.boid.clone()];
         let motion = motion_of(&library, &Lens::of(&library, &flock.params));
@@ -251,6 +257,7 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
             }
         }
     }
+    assert!(n_closed >= 12, "{n_closed} of 16 loops close");
 }
 
 #[test]
