@@ -1,13 +1,20 @@
 //! Plans that play into one another: the last frame of each into the first of whom it becomes
 //! (ALGORITHMS.md 6, loop).
 //!
-//! Plans without that give each individual its first state, that of an heir from the plan before it; from
-//! there on the plan is found anew, exact among all that begin so, jump no sooner than a dwell after the first
-//! frame (as if it had just been jumped to), and end where the heir's first state follows. The recursion
-//! sees one frame more than the film has, at which only that state may be shown.
+//! Plans without that give a leader its first state, that of an heir follows from the plan before it, until
+//! one is the leader's own again; from there on the plan is found anew, exact among all that begin so, jump
+//! no sooner than a dwell after the first frame (as if it had just been jumped to), and end where the heir's
+//! first state follows. The recursion sees one frame more than the film has, at which only that state may
+//! be shown.
 
-use super::trellis::Trellis;
-use super::viterbi::{Block, FRAMES, Rows};
+use std::iter;
+
+use super::cost::Feature;
+use super::rows::Alone;
+use super::viterbi::{Block, FRAMES, Film, Rows};
+use super::{Found, Planner};
+use crate::flock::error::Error;
+use crate::progress::Progress;
 
 /// What a plan that may not be costs at least. Three of these and all costs of a loop's plan stay below
 /// 2^31.
@@ -22,58 +29,66 @@ pub struct Ends {
     pub next: u32,
 }
 
-/// The state that a loop's plan begins with, given one that is none: its own first, if that goes on for
-/// `dwell` frames; else the one that would have led to where it jumps; else the nearest that goes on
-/// so long. `None` when no run is so long.
-pub fn first_of(trellis: &Trellis, dwell: usize, states: &[u32]) -> Option<u32> {
-    let goes_on = |state: u32| trellis.continues(state as usize, dwell - 1);
-    let jump = (1..states.len()).find(|&t| states[t] != states[t - 1] + 1);
-    let first = match jump {
-        Some(t) if t < dwell => (states[t].checked_sub(t as u32))
-            .filter(|&first| goes_on(first))
-            .unwrap_or(states[0]),
-        _ => states[0],
-    };
-    if goes_on(first) {
-        return Some(first);
-    }
-    let others = (0..trellis.n_states() as u32).filter(|&state| goes_on(state));
-    others.min_by_key(|other| other.abs_diff(first))
+/// What a loop asks of a plan.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    /// To begin with it and go on for a dwell.
+    pub(super) first: Option<u32>,
+    pub(super) then: Then<'a>,
 }
 
-/// What each state costs in a plan that must begin and go on so.
+/// What may be shown after the last frame.
+#[derive(Clone, Copy)]
+pub(super) enum Then<'a> {
+    Only(u32),
+    /// What each state costs there.
+    Any(&'a [u32]),
+}
+
+/// What each state costs in a plan of which something is asked.
 #[derive(Clone)]
-pub(super) struct Closed<R> {
-    pub(super) rows: R,
+pub(super) struct Closed<'a, R> {
+    rows: R,
     /// Nothing is asked of a plan that is no part of a loop.
-    pub(super) ends: Option<Ends>,
+    asked: Option<Asked<'a>>,
     /// The frame after the film's last.
-    pub(super) n_frames: usize,
-    pub(super) dwell: usize,
+    n_frames: usize,
+    dwell: usize,
 }
 
-impl<R: Rows> Rows for Closed<R> {
+impl<R: Rows> Rows for Closed<'_, R> {
     #[inline(always)]
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         self.rows.fill(block, first, out);
-        let Some(ends) = self.ends else {
+        let Some(asked) = self.asked else {
             return;
         };
         for (lane, &t) in block.times.iter().enumerate() {
-            let only = match t {
-                _ if t == self.n_frames => ends.next as usize,
-                _ if t == 0 || t == self.dwell - 1 => ends.first as usize + t,
-                _ => continue,
-            };
-            for (station, out) in (first..).zip(&mut *out) {
-                // Nothing else costs anything after the film.
-                if t == self.n_frames {
-                    out[lane] = 0;
+            if t == self.n_frames {
+                for (station, out) in (first..).zip(&mut *out) {
+                    out[lane] = asked.then.cost(block.state(station));
                 }
-                if block.state(station) != only {
-                    out[lane] += FORBIDDEN;
+            } else if let Some(begun) = asked.first
+                && (t == 0 || t == self.dwell - 1)
+            {
+                let only = begun as usize + t;
+                for (station, out) in (first..).zip(&mut *out) {
+                    if block.state(station) != only {
+                        out[lane] += FORBIDDEN;
+                    }
                 }
             }
+        }
+    }
+}
+
+impl Then<'_> {
+    #[inline(always)]
+    fn cost(self, state: usize) -> u32 {
+        match self {
+            Then::Only(next) if state == next as usize => 0,
+            Then::Only(_) => FORBIDDEN,
+            Then::Any(costs) => costs[state],
         }
     }
 }
@@ -85,28 +100,124 @@ impl Ends {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::library::{Jump, Playback};
+impl Planner<'_> {
+    pub(super) fn closed<'b, R>(&self, rows: R, asked: Option<Asked<'b>>) -> Closed<'b, R> {
+        Closed {
+            rows,
+            asked,
+            n_frames: self.places.len(),
+            dwell: self.dwell,
+        }
+    }
 
-    #[test]
-    fn a_first_state_goes_on_for_a_dwell_and_is_the_plans_own_where_it_may_be() {
-        let jump = Jump {
-            from: 4,
-            to: 11,
-            cost: 7,
-            mirrored: false,
+    /// The states that a loop's plans begin with, by id. Not from every state does a film of this length lead
+    /// back; if it does from any, then from one that is jumped to: where the leader of a circle of heirs
+    /// cannot begin as in its open plan, all those are tried, the cheapest first.
+    pub(super) fn firsts(
+        &self,
+        open: &[Found],
+        wanted: &[Vec<Feature>],
+        heirs: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<u32>, Error> {
+        let mut firsts = vec![None; heirs.len()];
+        for (leader, found) in open.iter().enumerate() {
+            if firsts[leader].is_some() {
+                continue;
+            }
+            let heir = |&id: &usize| Some(heirs[id] as usize).filter(|&heir| heir != leader);
+            let ids: Vec<usize> = iter::successors(Some(leader), heir).collect();
+            let of_circle: Vec<&[Feature]> = ids.iter().map(|&id| &wanted[id][..]).collect();
+            let circle = |first| match progress.cancelled() {
+                true => None,
+                false => self.circle(first, &of_circle),
+            };
+            let others = || self.beginnings(&wanted[leader]).into_iter();
+            let own = found.path.states[0];
+            let circle = circle(own).or_else(|| others().find_map(circle));
+            let circle = circle.ok_or_else(|| self.no_circle(progress))?;
+            for (id, first) in ids.into_iter().zip(circle) {
+                firsts[id] = Some(first);
+            }
+        }
+        Ok(firsts.into_iter().flatten().collect())
+    }
+
+    fn no_circle(&self, progress: &dyn Progress) -> Error {
+        match progress.cancelled() {
+            true => Error::Cancelled,
+            false => Error::LoopDoesNotClose(self.places.len()),
+        }
+    }
+
+    /// The states that are jumped to, by what the cheapest plan that begins with each costs.
+    fn beginnings(&self, wanted: &[Feature]) -> Vec<u32> {
+        let costs = self.costs_before(wanted, &vec![0; self.trellis.n_states()]);
+        let mut targets = self.trellis.targets().to_vec();
+        targets.sort_by_key(|&target| costs[target as usize]);
+        targets
+    }
+
+    /// The cheapest that each of a circle can begin with, each the heir of the one before, when the first
+    /// of them begins with `first` and the last leads back to that; `None` if none does.
+    fn circle(&self, first: u32, wanted: &[&[Feature]]) -> Option<Vec<u32>> {
+        let mut back = vec![FORBIDDEN; self.trellis.n_states()];
+        back[first as usize] = 0;
+        let mut then = vec![back];
+        for wanted in wanted.iter().rev() {
+            then.push(self.costs_before(wanted, &then[then.len() - 1]));
+        }
+        if then.pop()?[first as usize] >= FORBIDDEN {
+            return None;
+        }
+        let mut firsts = vec![first];
+        for (&wanted, then) in wanted.iter().zip(then.iter().rev().take(wanted.len() - 1)) {
+            firsts.push(self.next_after(firsts[firsts.len() - 1], wanted, then)?);
+        }
+        Some(firsts)
+    }
+
+    /// What it costs to begin with each state and go on for a dwell, when what comes after the last frame costs
+    /// `then`; the cheapest 0, `FORBIDDEN` where no plan begins.
+    fn costs_before(&self, wanted: &[Feature], then: &[u32]) -> Vec<u32> {
+        let mut costs = self
+            .film_and_next()
+            .costs_from(&mut self.asking(wanted, None, then));
+        let least = costs.iter().copied().min().unwrap_or(0);
+        for cost in &mut costs {
+            *cost = match *cost {
+                FORBIDDEN.. => FORBIDDEN,
+                cost => cost - least,
+            };
+        }
+        costs
+    }
+
+    /// What comes after the cheapest plan that begins with `first`.
+    fn next_after(&self, first: u32, wanted: &[Feature], then: &[u32]) -> Option<u32> {
+        let rows = self.asking(wanted, Some(first), then);
+        let path = self.film_and_next().cheapest_path(&rows)?;
+        path.states.last().copied()
+    }
+
+    fn asking<'b>(
+        &'b self,
+        wanted: &'b [Feature],
+        first: Option<u32>,
+        then: &'b [u32],
+    ) -> Closed<'b, Alone<'b>> {
+        let alone = Alone {
+            planner: self,
+            wanted,
         };
-        let playback = Playback {
-            jumps: vec![jump],
-            component: vec![3, 4, 10, 11, 12, 13],
-        };
-        // States: barrier, 3, 4, barrier, 10, 11, 12, 13.
-        let trellis = Trellis::new(&playback, false, |d| d as u32);
-        assert_eq!(first_of(&trellis, 3, &[4, 5, 6, 7]), Some(4));
-        assert_eq!(first_of(&trellis, 3, &[2, 5, 6, 7]), Some(4), "led to 5");
-        assert_eq!(first_of(&trellis, 3, &[1, 2, 5, 6]), Some(4), "the nearest");
-        assert_eq!(first_of(&trellis, 5, &[4, 5, 6, 7]), None);
+        let then = Then::Any(then);
+        self.closed(alone, Some(Asked { first, then }))
+    }
+
+    fn film_and_next(&self) -> Film<'_> {
+        Film {
+            n_frames: self.places.len() + 1,
+            ..self.film()
+        }
     }
 }

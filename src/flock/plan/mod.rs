@@ -19,13 +19,12 @@ pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::circle::{Closed, Ends};
+use self::circle::Ends;
 use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Places, Settled};
 use self::horizon::Horizon;
 use self::memory::Memory;
 use self::round::Round;
-use self::rows::Alone;
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path, Shelf};
 use super::error::Error;
@@ -141,60 +140,12 @@ impl<'a> Planner<'a> {
         let wanted = self.wanted();
         let mut settled = Settled::new(self.places.len());
         let open = self.paths(&wanted, &mut settled, progress)?;
-        let firsts = self.firsts(&open, &wanted, heirs)?;
+        let firsts = self.firsts(&open, &wanted, heirs, progress)?;
         let next = heirs.iter().map(|&heir| firsts[heir as usize]);
         self.ends = (firsts.iter().zip(next))
             .map(|(&first, next)| Ends { first, next })
             .collect();
         self.plan(progress)
-    }
-
-    /// The states that a loop's plans begin with. Some footage comes back to where it was after whole
-    /// beats only: what an heir begins with therefore follows from the plan before it.
-    fn firsts(
-        &self,
-        open: &[Found],
-        wanted: &[Vec<Feature>],
-        heirs: &[u32],
-    ) -> Result<Vec<u32>, Error> {
-        let mut firsts = vec![None; heirs.len()];
-        for (leader, found) in open.iter().enumerate() {
-            let mut id = leader;
-            let mut first = circle::first_of(&self.trellis, self.dwell, &found.path.states);
-            while firsts[id].is_none() {
-                let state = first.ok_or(Error::NoTransitions)?;
-                firsts[id] = Some(state);
-                let heir = heirs[id] as usize;
-                first = self.first_after(state, &wanted[id], &wanted[heir]);
-                id = heir;
-            }
-        }
-        firsts
-            .into_iter()
-            .collect::<Option<_>>()
-            .ok_or(Error::NoTransitions)
-    }
-
-    /// What comes best after a plan that begins with `first`.
-    fn first_after(&self, first: u32, wanted: &[Feature], heir: &[Feature]) -> Option<u32> {
-        let (n_frames, dwell) = (wanted.len(), self.dwell);
-        let wanted = [wanted, &heir[..dwell]].concat();
-        let ends = Ends { first, next: 0 };
-        let rows = Closed {
-            rows: Alone {
-                planner: self,
-                wanted: &wanted,
-            },
-            ends: Some(ends),
-            n_frames: usize::MAX,
-            dwell,
-        };
-        let film = Film {
-            n_frames: n_frames + dwell,
-            ..self.film()
-        };
-        let path = film.cheapest_path(&rows)?;
-        circle::first_of(&self.trellis, dwell, &path.states[n_frames..])
     }
 
     fn wanted(&self) -> Vec<Vec<Feature>> {

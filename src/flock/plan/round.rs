@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::circle::Closed;
+use super::circle::{Asked, Closed, Then};
 use super::cost::Feature;
 use super::crowd::Settled;
 use super::memory::N_REPLANS;
@@ -46,13 +46,13 @@ impl Round<'_> {
     }
 
     /// In a loop, the costs of plans that begin and go on as they must.
-    fn closed<'b>(&self, id: usize, rows: InCrowd<'b>) -> Closed<InCrowd<'b>> {
-        Closed {
-            rows,
-            ends: self.planner.ends.get(id).copied(),
-            n_frames: self.planner.places.len(),
-            dwell: self.planner.dwell,
-        }
+    fn closed<'b>(&self, id: usize, rows: InCrowd<'b>) -> Closed<'b, InCrowd<'b>> {
+        let ends = self.planner.ends.get(id);
+        let asked = ends.map(|ends| Asked {
+            first: Some(ends.first),
+            then: Then::Only(ends.next),
+        });
+        self.planner.closed(rows, asked)
     }
 
     fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Found, Error> {

@@ -93,6 +93,20 @@ impl Film<'_> {
         Some(end.cost)
     }
 
+    /// What the cheapest path costs that begins with each state as if just jumped to, by state, turns;
+    /// `UNREACHED` where none does.
+    pub fn costs_from(&self, rows: &mut impl Rows) -> Vec<u32> {
+        let mut column = Column::new(self, Way::Back, self.n_frames);
+        while column.n_left() > 0 {
+            column.advance_untraced(self, rows);
+        }
+        // The first frame gone through comes last, and stations against the states.
+        let last = column.lanes().end - 1;
+        let mut costs: Vec<u32> = column.values(last).collect();
+        costs.reverse();
+        costs
+    }
+
     /// What the cheapest way costs to every state that may jump, at every frame: what
     /// the certificate checks.
     pub fn potentials(&self, rows: &mut impl Rows) -> Vec<Vec<u32>> {

@@ -135,6 +135,18 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, ..ProptestConfig::default() })]
 
     #[test]
+    fn no_path_that_begins_with_a_state_as_if_jumped_to_is_cheaper(case in case(7, 9)) {
+        let trellis = case.trellis();
+        let costs = case.film(&trellis, Level::detect()).costs_from(&mut case.rows());
+        for (state, &found) in costs.iter().enumerate() {
+            let is_shown = trellis.shown(state).is_some();
+            let least = is_shown.then(|| case.cheapest_from(&trellis, 0, state, 1)).flatten();
+            let found = (found < UNREACHED).then_some(u64::from(found));
+            prop_assert_eq!(found, least, "{}", state);
+        }
+    }
+
+    #[test]
     fn no_path_of_a_small_graph_is_cheaper(case in case(7, 9)) {
         let found = case.plan().map(|path| u64::from(path.cost));
         prop_assert_eq!(found, case.by_brute_force());
