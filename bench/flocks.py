@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How good flocks are: the measures of ALGORITHMS.md 9 on libraries that `flockreel analyze` made.
 
-    bench/flocks.py PROGRAM LIBRARY_DIR... [--count 20] [--frames 400] [--seed 1] [--preset school] [--match BY]
+    bench/flocks.py PROGRAM LIBRARY_DIR... [--count 20] [--frames 400] [--seed 1] [--preset school] [--match BY] [--matching JSON]
 
 For each library plans a flock, and prints what flock.json's stats say with their bars (* = missed), how far headings
 shown in the picture are from the boids' (with a camera the stats tell directions in space), how many frames
@@ -47,7 +47,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program")
     parser.add_argument("libraries", nargs="+", type=pathlib.Path)
-    for name, default in [("count", "20"), ("frames", "400"), ("seed", "1"), ("preset", "school"), ("match", None)]:
+    for name, default in [("count", "20"), ("frames", "400"), ("seed", "1"), ("preset", "school"), ("match", None), ("matching", None)]:
         parser.add_argument(f"--{name}", default=default)
     args = parser.parse_args()
     for library in args.libraries:
@@ -66,7 +66,9 @@ def main():
 
 def measure(args, library, folder):
     plan = folder / "flock.json"
-    words = [args.program, "flock", library, "-o", folder / "x.mp4", "--plan", plan] + (["--match", args.match] if args.match else [])
+    words = [args.program, "flock", library, "-o", folder / "x.mp4", "--plan", plan]
+    for name in ("match", "matching"):
+        words += [f"--{name}", getattr(args, name)] if getattr(args, name) else []
     for name in ("count", "frames", "seed", *(["preset"] if args.preset != "school" else [])):
         words += [f"--{name}", getattr(args, name)]
     done = subprocess.run(words, capture_output=True, text=True)

@@ -145,8 +145,8 @@ impl Default for Matching {
             w_r: 0.1,
             rho_deg: 10.0,
             w_v: 0.1,
-            wx: 0.8,
-            w_c: 0.3,
+            wx: 1.2,
+            w_c: 0.45,
             w_p: 0.0,
             horizon_frames: None,
         }
