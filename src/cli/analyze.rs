@@ -79,13 +79,13 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     }
     media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
     let limits = Limits::default();
-    let media = |error: crate::media::Error| Error::work(error.code(), &error);
-    let video = Video::open(&args.video, &limits).map_err(media)?;
+    let unreadable = |error: media::Error| Error::work(error.code(), &error);
+    let video = Video::open(&args.video, &limits).map_err(unreadable)?;
     let background = args
         .background
         .as_deref()
         .map(|path| read_image(path, &limits));
-    let background = background.transpose().map_err(media)?;
+    let background = background.transpose().map_err(unreadable)?;
     let progress = Listener::new();
     let level = cpu::Level::detect();
     let scratch = super::scratch_beside(&args.output);

@@ -97,17 +97,15 @@ impl Lens {
         let Some(camera) = &self.camera else {
             return [velocity[0], velocity[1]];
         };
-        let apparent = camera.apparent_bl(place[2]);
-        let receding = velocity[2] / camera.medium_index / apparent;
-        let px = camera.focal_px / apparent / self.length_px;
+        let receding = camera.receding(place, velocity);
+        let px = camera.focal_px / camera.apparent_bl(place[2]) / self.length_px;
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
     }
 
     /// How fast one that otherwise moves at `velocity` must sink to be seen level, and how much faster or slower to be
     /// seen at 45 degrees.
     pub fn seen_level(&self, place: Vec3, velocity: Vec3) -> [f64; 2] {
-        let recedes =
-            |camera: Pinhole| velocity[2] / camera.medium_index / camera.apparent_bl(place[2]);
+        let recedes = |camera: Pinhole| camera.receding(place, velocity);
         let receding = self.camera.map_or(0.0, recedes);
         let across = velocity[0] - place[0] * receding;
         [place[1] * receding, across.abs()]
@@ -171,6 +169,11 @@ impl Pinhole {
 
     fn apparent_bl(&self, depth_bl: f64) -> f64 {
         (self.pane_bl + (depth_bl - self.pane_bl) / self.medium_index).max(0.05)
+    }
+
+    /// The share of its apparent depth that is gained a second by what moves at `velocity`.
+    fn receding(&self, place: Vec3, velocity: Vec3) -> f64 {
+        velocity[2] / self.medium_index / self.apparent_bl(place[2])
     }
 }
 
