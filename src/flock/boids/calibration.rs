@@ -38,7 +38,7 @@ pub struct Slopes {
 const STEEPEST: f64 = 0.98;
 /// Share of the frames that are steeper in the picture than a boid may be seen: few frames, for which no plan finds
 /// one that follows.
-const STEEPER_IN_PICTURE: f64 = 0.1;
+const STEEPER_IN_PICTURE: f64 = 0.2;
 const FASTEST: f64 = 0.95;
 /// And the slowest.
 const SLOWEST: f64 = 0.05;
