@@ -44,7 +44,7 @@ pub struct Args {
     /// What frames and boids are matched by: heading (the default), direction (in space) or position.
     #[arg(long = "match", value_name = "BY")]
     match_by: Option<String>,
-    /// Weights of the plan to override, as JSON: '{"wx": 1.2, "w_p": 0.05}'.
+    /// Weights of the plan to override, as JSON: '{"wx": 2.0, "w_p": 0.05}'.
     #[arg(long, value_name = "JSON")]
     matching: Option<String>,
     /// Write the plan, flock.json, here.

@@ -128,14 +128,14 @@ impl Planner<'_> {
             let heir = |&id: &usize| Some(heirs[id] as usize).filter(|&heir| heir != leader);
             let ids: Vec<usize> = iter::successors(Some(leader), heir).collect();
             let of_circle: Vec<&[Feature]> = ids.iter().map(|&id| &wanted[id][..]).collect();
-            let circle = |first| match progress.cancelled() {
+            let led_back = |first| match progress.cancelled() {
                 true => None,
                 false => self.circle(first, &of_circle),
             };
             let others = || self.beginnings(&wanted[leader]).into_iter();
-            let own = found.path.states[0];
-            let circle = circle(own).or_else(|| others().find_map(circle));
-            let circle = circle.ok_or_else(|| self.no_circle(progress))?;
+            let circle = led_back(found.path.states[0])
+                .or_else(|| others().find_map(led_back))
+                .ok_or_else(|| self.no_circle(progress))?;
             for (id, first) in ids.into_iter().zip(circle) {
                 firsts[id] = Some(first);
             }
@@ -143,6 +143,7 @@ impl Planner<'_> {
         Ok(firsts.into_iter().flatten().collect())
     }
 
+    /// Why there is none.
     fn no_circle(&self, progress: &dyn Progress) -> Error {
         match progress.cancelled() {
             true => Error::Cancelled,
