@@ -8,7 +8,8 @@ shown in the picture are from the boids' (with a camera the stats tell direction
 the component has, and how visible the cuts are: for each jump that the flock plays, the step across it between
 the sprites as exported (RGB times alpha, and alpha; ALGORITHMS.md 5), over the median step between consecutive
 sprites, hard as if nothing were faded; and `faded`, the largest step between frames around a jump with the fades as
-they are drawn (`natural_window`: the same around frames without a jump). Needs numpy and cv2.
+they are drawn (`natural_window`: the same around frames without a jump). `jammed` is the share of boids and seconds in which one
+swims but does not get away. Needs numpy and cv2.
 """
 import argparse
 import json
@@ -34,7 +35,11 @@ BARS = [
     ("faded_above_natural_p99", 0.0),
     ("path_deviation_p95_bl", 0.25),
     ("slip_median_rad", 0.05),
+    ("jammed", 0.01),
 ]
+
+# Who gets no farther than this share of its way in a second is jammed.
+JAMMED = 0.15
 
 # What a preset is known by: its least polarization and milling, and their greatest.
 PRESETS = {"school": ((0.65, 0), (1, 1)), "mill": ((0, 0.65), (0.35, 1)), "swarm": ((0, 0), (0.35, 0.35))}
@@ -90,6 +95,7 @@ def measure(args, library, folder):
         "picture_p90_deg": float(np.percentile(gaps, 90)),
         "heading_error_median_deg": np.degrees(stats["heading_error_median_rad"]),
         "heading_error_p90_deg": np.degrees(stats["heading_error_p90_rad"]),
+        "jammed": jammed(flock),
         "component": len(known["component"]),
         "n_frames": n_frames,
         "cut_median": float(np.median(cuts)) / median if cuts else 0.0,
@@ -99,6 +105,19 @@ def measure(args, library, folder):
         "natural_window": float(np.median(windows)) / median,
         "gap": (total - bound) / max(total, 1e-9),
     }
+
+
+def jammed(flock):
+    """The share of boids and seconds in which a boid never gets a sixth or so of its way from where it was."""
+    second = round(flock["fps"])
+    places = np.array([one["boid"]["position"] for one in flock["individuals"]]) / flock["length_px"]
+    speeds = np.array([one["boid"]["speed"] for one in flock["individuals"]])
+    n = places.shape[1] - second
+    if n <= 0:
+        return 0.0
+    ways = np.linalg.norm(np.stack([places[:, k : k + n] for k in range(1, second + 1)]) - places[:, :n], axis=3).max(axis=0)
+    swum = np.cumsum(speeds, axis=1) / flock["fps"]
+    return float((ways < JAMMED * (swum[:, second:] - swum[:, :-second])).mean())
 
 
 def cut_steps(folder, flock, poses):

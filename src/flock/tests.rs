@@ -136,8 +136,10 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
                 let (a, b) = (a.boid.position_px[t], b.boid.position_px[u]);
                 (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
             });
+            // Somebody may be pushed aside just then.
+            let seam_px = 0.015 * LENGTH_PX;
             assert!(
-                across <= inside + 0.05,
+                across <= inside + seam_px,
                 "{name} boid {} {across} {inside}",
                 one.id
             );
@@ -145,7 +147,6 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
                 let (a, b) = (a.centroid_px[t], b.centroid_px[u]);
                 (a[0] - b[0]).hypot(a[1] - b[1])
             });
-            let seam_px = 0.015 * LENGTH_PX;
             assert!(shown.1 <= shown.0 + seam_px, "{name} {} {shown:?}", one.id);
             assert!(moved(one.centroid_px[last], heir.centroid_px[0]) < 0.2 * LENGTH_PX);
             // The animal may turn there, but its sprite is not turned by more than at any jump.
@@ -184,17 +185,23 @@ fn whoever_is_drawn_back_for_a_loop_is_still_followed() {
 #[test]
 fn a_loop_keeps_to_the_animals_speeds() {
     let library = synthetic::library(View::Top);
-    let params = Params {
-        is_loop: true,
-        ..params("swarm")
+    let fastest = |seed| {
+        let params = Params {
+            is_loop: true,
+            seed,
+            ..params("swarm")
+        };
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        let speeds = (flock.individuals.iter()).flat_map(|i| &i.boid.speed_bl_per_s);
+        speeds.fold(0.0f64, |most, &speed| most.max(speed))
     };
-    let flock = plan_flock(&library, &params, &Silent).expect("a good library");
-    let speeds = flock
-        .individuals
-        .iter()
-        .flat_map(|i| &i.boid.speed_bl_per_s);
-    let most = speeds.fold(0.0f64, |most, &speed| most.max(speed));
-    assert!(most < 1.3 * 2.0, "the fastest seen swims 2 BL/s: {most}");
+    let all: Vec<f64> = (1..=8).map(fastest).collect();
+    let mean = all.iter().sum::<f64>() / 8.0;
+    let told = format!("the fastest seen swims 2 BL/s: {all:?}");
+    assert!(
+        mean < 1.2 * 2.0 && all.iter().all(|&most| most < 1.5 * 2.0),
+        "{told}"
+    );
 }
 
 #[test]

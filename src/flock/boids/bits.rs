@@ -12,49 +12,49 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
     (
         "school",
         [
-            0xdfea_3783_0491_c69a,
-            0x450f_c029_b7e6_539e,
-            0x34cf_147d_02f9_6ff5,
+            0x5c88_6421_384c_4c03,
+            0xfb53_2e2d_ae9f_ee9d,
+            0xce57_8a9d_e7e6_336a,
         ],
     ),
     (
         "swarm",
         [
-            0xe734_5c0f_c9b7_11c1,
-            0x1940_b59a_6069_73d0,
-            0xa55e_006e_fca6_6d8d,
+            0xb5b3_3357_c44b_4949,
+            0x6548_ce0a_82fe_57ce,
+            0x5061_2ab7_e4c9_e85d,
         ],
     ),
     (
         "mill",
         [
-            0x9819_68b8_66fc_93b4,
-            0x7430_977b_0cab_69df,
-            0x5723_ce03_26c9_2cb8,
+            0xdbd0_783f_79d2_7834,
+            0x488f_1b06_09ed_9c6b,
+            0x1e87_6894_b8f7_0262,
         ],
     ),
     (
         "scatter",
         [
-            0xd11d_096f_0764_abb1,
-            0x1376_cb80_2ce7_8f89,
-            0x7f52_4765_b857_8f39,
+            0xa635_058c_6bb6_50e9,
+            0x4b0a_6249_67ff_abd6,
+            0x467a_aa78_fc6b_2ee4,
         ],
     ),
     (
         "zonal",
         [
-            0x1c09_d152_c0cf_5923,
-            0xd265_db4f_6c24_0514,
-            0x0393_11ed_8d69_3514,
+            0xdce6_da66_3297_dab3,
+            0xb190_c590_08b7_b24e,
+            0xe126_fbf4_1ccd_05e0,
         ],
     ),
     (
         "papers",
         [
-            0xcfba_75f2_c14b_8423,
-            0x8ddc_ab51_7b57_b0ad,
-            0xbf61_ea4e_276d_b5bb,
+            0xc091_5c60_3874_3464,
+            0x0116_29df_e6e5_5b75,
+            0xcca9_fdc9_7f13_0faa,
         ],
     ),
 ];

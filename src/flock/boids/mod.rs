@@ -35,8 +35,9 @@ use crate::random;
 const LONGEST_STEP_BL: f64 = 0.2;
 /// Boids nearer than this are pushed apart after each step, where the tank has room.
 const OVERLAP_BL: f64 = 0.5;
-/// How long they swim before the first frame, so that the flock has formed.
-const WARM_UP_S: f64 = 10.0;
+/// How far they swim before the first frame, so that the flock has formed, and for how long at least and at most.
+const WARM_UP_BL: f64 = 10.0;
+const WARM_UP_S: [f64; 2] = [10.0, 60.0];
 /// Boids of one unit of parallel work.
 const CHUNK: usize = 64;
 
@@ -78,14 +79,14 @@ impl<'a> Boids<'a> {
         fps: f64,
     ) -> Self {
         let mut boids = Boids::at_random(params, calibration, place, fps);
-        for _ in 0..(WARM_UP_S * fps).ceil() as u64 {
+        for _ in 0..n_frames_before(calibration, fps) {
             boids.advance();
         }
         boids.hunter = boids.habitat.hunter();
         boids
     }
 
-    /// Boids at random places, all of one course as far as they align, `WARM_UP_S` before the film.
+    /// Boids at random places, all of one course as far as they align, before they have formed.
     pub fn at_random(
         params: &'a Params,
         calibration: &'a Calibration,
@@ -96,7 +97,7 @@ impl<'a> Boids<'a> {
         let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
         let n = params.count as usize;
         let closeness = tank.closeness(n);
-        let n_steps = (WARM_UP_S * fps).ceil() * f64::from(n_substeps);
+        let n_steps = n_frames_before(calibration, fps) as f64 * f64::from(n_substeps);
         let step_s = 1.0 / (fps * f64::from(n_substeps));
         let mut boids = Boids {
             params: Params {
@@ -198,7 +199,16 @@ impl<'a> Boids<'a> {
     }
 }
 
+/// Frames in which a flock forms.
+fn n_frames_before(calibration: &Calibration, fps: f64) -> u64 {
+    let [least_s, most_s] = WARM_UP_S;
+    let warm_up_s = (WARM_UP_BL / calibration.cruise_bl_per_s).clamp(least_s, most_s);
+    (warm_up_s * fps).ceil() as u64
+}
+
 #[cfg(test)]
 mod bits;
+#[cfg(test)]
+mod presets;
 #[cfg(test)]
 mod tests;

@@ -21,6 +21,8 @@ const BRAKED: f64 = 0.7;
 const WITHOUT_DELAY: f64 = 20.0;
 /// Whoever circles does so at this share of the way from the middle to the walls.
 const RING: f64 = 0.65;
+/// By how much of the cruising speed whoever circles goes ahead of a crowd behind it.
+const SPREADING: f64 = 0.5;
 /// Time constant of coming back to a slope that the animal has.
 const LEVEL_S: f64 = 0.25;
 /// Weight of swimming across the picture rather than into it.
@@ -217,20 +219,25 @@ impl Steering<'_> {
             2.0 * (RING - norm(from_middle) / room.max(1e-6)).clamp(-1.0, 1.0),
             outward,
         );
-        let course = add_scaled(inward, 1.0, cross(up, outward));
+        let course = unit(add_scaled(inward, 1.0, cross(up, outward)));
+        // Faster than those behind, slower than those ahead: the ring is to be as full all the way round.
+        let behind = |n: &Neighbor| -dot(course, unit(n.offset));
+        let lead: f64 = moment.neighbors.iter().map(behind).sum();
+        let lead = lead / moment.neighbors.len().max(1) as f64;
         let cruise = self.calibration.cruise_bl_per_s;
-        let gap = minus(scaled(cruise, unit(course)), moment.velocity);
+        let pace = cruise * (1.0 + SPREADING * lead);
+        let gap = minus(scaled(pace, course), moment.velocity);
         scaled(1.0 / cruise, gap)
     }
 
-    /// In side view: out of the line of sight, to the side where the neighbors go. Footage shows an animal best
-    /// broadside, and a flock that lingers in depth would be seen end-on half the time.
+    /// In side view: out of the line of sight, to the side where the neighbors go, or, where nobody aligns, where fewer
+    /// go. Footage shows an animal best broadside, and a flock that lingers in depth would be seen end-on half the time.
     fn broadside(&self, seen: &Seen, moment: &Moment) -> Vec3 {
         if self.tank.is_flat() || self.params.rules.circling > 0.0 {
             return [0.0; 3];
         }
         let cruise = self.calibration.cruise_bl_per_s;
-        let follow = 2.0 * self.params.rules.alignment.min(1.0) / seen.n.max(1.0);
+        let follow = (3.0 * self.params.rules.alignment.min(1.0) - 1.0) / seen.n.max(1.0);
         let side = ((moment.velocity[0] + follow * seen.across) / cruise).clamp(-1.0, 1.0);
         // Not onto a wall: its push leads back.
         let across = [cruise.copysign(side), 0.0, 0.0];

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::grid::{Boid, Grid};
 use super::nearest::{Neighbor, Search};
 use super::rules::{Moment, Steering};
-use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, unit};
+use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, turned_at_most, unit};
 use super::{Boids, CHUNK, draw, leadership};
 use crate::cpu::Level;
 use crate::random;
@@ -26,6 +26,8 @@ pub(super) struct Inner {
     leads_for_s: f64,
     /// How far off the last neighbor was that counted. It only tells where to look first.
     sight_bl: f64,
+    /// Others pushed it back by more than half of its way: it turns round, to the side that it wanders to.
+    pub(super) is_blocked: bool,
 }
 
 /// All boids, in the order of the cells that they were in a step ago: who is near whom in the tank is so in memory.
@@ -43,7 +45,7 @@ pub(super) struct Room {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Member {
     pub(super) boid: Boid,
-    inner: Inner,
+    pub(super) inner: Inner,
     /// How far off the nearest other was before the step, squared; the reach when there was none.
     pub(super) nearest_bl2: f64,
 }
@@ -89,6 +91,7 @@ impl Default for Inner {
             wander: [0.0; 2],
             leads_for_s: 0.0,
             sight_bl: f64::INFINITY,
+            is_blocked: false,
         }
     }
 }
@@ -232,6 +235,7 @@ impl Boids<'_> {
             wander: self.next_wander((id, before), pace),
             leads_for_s: self.next_lead((id, before), velocity, neighbors),
             sight_bl: last.map_or(f64::INFINITY, |last| last.square_bl2.sqrt()),
+            is_blocked: false,
         };
         let acceleration = pace.steering.acceleration(&Moment {
             position,
@@ -241,16 +245,19 @@ impl Boids<'_> {
             leads: inner.leads_for_s > 0.0,
             noise: self.noise(id),
         });
-        let wished = add_scaled(velocity, self.step_s, acceleration);
+        let sideways = cross(self.tank.up(), velocity);
+        let wished = match before.is_blocked {
+            true => {
+                let pace = self.calibration.cruise_bl_per_s.max(norm(velocity));
+                scaled(pace * inner.wander[0].signum(), unit(sideways))
+            }
+            false => add_scaled(velocity, self.step_s, acceleration),
+        };
         let wished = match &self.meeting {
             Some(meeting) => meeting.wish(id, position, wished),
             None => wished,
         };
-        let aside = match self.tank.is_flat() {
-            true => [-velocity[1], velocity[0], 0.0],
-            false => [-velocity[2], 0.0, velocity[0]],
-        };
-        let turned = turned_at_most(velocity, wished, pace.cos_sin, aside);
+        let turned = turned_at_most(velocity, wished, pace.cos_sin, sideways);
         let velocity = self.within_limits(turned, position, velocity);
         let mut next = Member {
             boid: Boid {

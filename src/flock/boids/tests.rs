@@ -1,17 +1,16 @@
-//! What a flock of boids promises: order, walls, limits, and the same numbers on any threads.
+//! What a flock of boids promises: walls, limits, and the same numbers on any threads. `presets` has their order.
 
 use super::calibration::Slopes;
-use super::measures::Order;
-use super::vector::{add_scaled, norm, unit};
+use super::vector::{norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
-use crate::flock::params::{Goal, Obstacle, Predator, Zones};
+use crate::flock::params::{Goal, Obstacle, Predator};
 use crate::flock::synthetic;
 use crate::library::{Library, View};
 
-/// Every frame's positions and velocities of `n_frames`, and the mean order of them.
-fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Vec<Vec3>>, Order) {
+/// Every frame's positions and velocities of `n_frames`.
+fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Vec<Vec3>>) {
     let library = synthetic::library(view);
     let calibration = calibrated(&library, params);
     let tank = Tank::new(
@@ -21,17 +20,12 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
     let lens = Lens::of(&library, params);
     let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
     let (mut positions, mut velocities) = (Vec::new(), Vec::new());
-    let mut mean = Order::default();
     for _ in 0..n_frames {
         boids.advance();
-        let now = boids.order();
-        mean.polarization += now.polarization / n_frames as f64;
-        mean.milling += now.milling / n_frames as f64;
-        mean.nearest_bl += now.nearest_bl / n_frames as f64;
         positions.push(boids.positions().to_vec());
         velocities.push(boids.velocities().to_vec());
     }
-    (positions, velocities, mean)
+    (positions, velocities)
 }
 
 fn calibrated(library: &Library, params: &Params) -> Calibration {
@@ -44,33 +38,13 @@ fn preset(name: &str) -> Params {
 }
 
 #[test]
-fn a_school_is_polarized_and_a_swarm_is_not() {
-    for view in [View::Top, View::Side] {
-        let (_, _, school) = swim(view, &preset("school"), 600);
-        assert!(school.polarization > 0.65, "{view:?} {school:?}");
-        let (_, _, swarm) = swim(view, &preset("swarm"), 600);
-        let swarms = swarm.polarization < 0.35 && swarm.milling < 0.35;
-        assert!(swarms, "{view:?} {swarm:?}");
-    }
-}
-
-#[test]
-fn a_mill_turns_about_its_middle() {
-    for view in [View::Top, View::Side] {
-        let (_, _, mill) = swim(view, &preset("mill"), 600);
-        let mills = mill.milling > 0.65 && mill.polarization < 0.35;
-        assert!(mills, "{view:?} {mill:?}");
-    }
-}
-
-#[test]
 fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
     for name in Params::PRESETS {
         let params = Params {
             count: 60,
             ..preset(name)
         };
-        let (positions, velocities, _) = swim(View::Side, &params, 200);
+        let (positions, velocities) = swim(View::Side, &params, 200);
         let tank = Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 3.0]);
         assert!(positions.iter().flatten().all(|&p| tank.holds(p)), "{name}");
         let fastest = velocities
@@ -88,7 +62,7 @@ fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
     let params = preset("swarm");
     let calibration = calibrated(&library, &params);
     let [up, down] = calibration.slopes.expect("side view has a reach").limits;
-    let (_, velocities, _) = swim(View::Side, &params, 300);
+    let (_, velocities) = swim(View::Side, &params, 300);
     for v in velocities.iter().flatten() {
         let level = v[0].hypot(v[2]);
         assert!(
@@ -105,7 +79,7 @@ fn in_side_view_nobody_is_seen_more_steeply_than_most_frames_unless_it_would_hav
     let params = preset("swarm");
     let (calibration, lens) = (calibrated(&library, &params), Lens::of(&library, &params));
     let slopes = calibration.slopes.expect("side view has a reach");
-    let (positions, velocities, _) = swim(View::Side, &params, 300);
+    let (positions, velocities) = swim(View::Side, &params, 300);
     for (&p, &v) in positions.iter().flatten().zip(velocities.iter().flatten()) {
         let [level, across] = lens.seen_level(p, v);
         let limits = slopes.limits.map(|limit| limit * norm([v[0], 0.0, v[2]]));
@@ -215,70 +189,6 @@ fn another_seed_gives_another_flock() {
     };
     assert_ne!(seeded(1), seeded(2));
     assert_eq!(seeded(1), seeded(1));
-}
-
-/// Boids in the open sea, as Couzin et al. have them: 3 units a second, 40 degrees a second.
-fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
-    let mut params = Params {
-        count: 100,
-        ..preset("zonal")
-    };
-    params.leaders = false;
-    params.rules.view_deg = 270.0;
-    params.rules.zones = Some(Zones {
-        orientation_bl,
-        attraction_bl: 14.0,
-        ..Zones::default()
-    });
-    let calibration = Calibration {
-        cruise_bl_per_s: 3.0,
-        speed_limits_bl_per_s: [3.0, 3.0],
-        turn_rad_per_s: 40f64.to_radians(),
-        wander_rad_per_s: 40f64.to_radians(),
-        ..Calibration::default()
-    };
-    (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
-}
-
-/// Polarization and rotation about the group's own axis, after `n_frames` from one heap.
-fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
-    let (params, calibration, tank) = at_sea(orientation_bl);
-    let lens = Lens::flat(40.0);
-    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
-    let heap = (0..u64::from(params.count)).map(|id| {
-        let draw = |word| 2.0 * random::unit(7, &[id, word]) - 1.0;
-        let position = [0, 1, 2].map(|axis| 5.0 * draw(axis));
-        (position, scaled(3.0, unit([3, 4, 5].map(draw))))
-    });
-    let (positions, velocities) = heap.unzip();
-    boids.show(positions, velocities, None);
-    let (mut polarization, mut rotation) = (0.0, 0.0);
-    for frame in 0..n_frames {
-        boids.advance();
-        if frame >= n_frames / 2 {
-            let n = boids.positions().len() as f64;
-            let sum = |of: &dyn Fn(usize) -> Vec3| {
-                (0..boids.positions().len()).fold([0.0; 3], |sum, id| add_scaled(sum, 1.0, of(id)))
-            };
-            let middle = scaled(1.0 / n, sum(&|id| boids.positions()[id]));
-            let spin = |id: usize| {
-                let out = vector::minus(boids.positions()[id], middle);
-                vector::cross(unit(out), unit(boids.velocities()[id]))
-            };
-            polarization += norm(sum(&|id| unit(boids.velocities()[id]))) / n;
-            rotation += norm(sum(&spin)) / n;
-        }
-    }
-    let half = f64::from(n_frames - n_frames / 2);
-    (polarization / half, rotation / half)
-}
-
-#[test]
-fn wider_zones_of_orientation_make_a_swarm_then_a_torus_then_a_school_as_couzin_found() {
-    let [swarm, torus, school] = [0.0, 2.0, 10.0].map(|width| group(width, 2000));
-    assert!(swarm.0 < 0.35 && swarm.1 < 0.35, "{swarm:?}");
-    assert!(torus.0 < 0.35 && torus.1 > 0.6, "{torus:?}");
-    assert!(school.0 > 0.9 && school.1 < 0.35, "{school:?}");
 }
 
 /// The flock in a tank with something else in it, at every frame.

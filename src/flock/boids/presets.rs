@@ -1,0 +1,160 @@
+//! What the presets are known by: order, in tanks wide and narrow, of animals fast and slow.
+
+use super::calibration::Slopes;
+use super::measures::Order;
+use super::params::Zones;
+use super::vector::{add_scaled, cross, minus, norm, unit};
+use super::*;
+use crate::flock::lens::Lens;
+
+fn preset(name: &str) -> Params {
+    Params::preset(name).expect("a known preset")
+}
+
+/// Cruising and slowest and fastest speed of a lively animal and of one that mostly sits, BL/s.
+const ANIMALS: [(f64, [f64; 2]); 2] = [(1.0, [0.5, 1.5]), (0.2, [0.05, 0.8])];
+
+/// From above, behind a pane, and where there is little depth.
+const TANKS: [[f64; 3]; 4] = [
+    [12.0, 9.0, 0.0],
+    [16.0, 6.0, 5.0],
+    [12.0, 5.0, 4.0],
+    [7.0, 4.0, 3.0],
+];
+
+/// The mean order over 15 s.
+fn order(
+    (name, count, seed): (&str, u32, u64),
+    (cruise_bl_per_s, speed_limits_bl_per_s): (f64, [f64; 2]),
+    greatest: Vec3,
+) -> Order {
+    let calibration = Calibration {
+        cruise_bl_per_s,
+        speed_limits_bl_per_s,
+        turn_rad_per_s: 3.0,
+        wander_rad_per_s: 1.0,
+        slopes: (greatest[2] > 0.0).then_some(Slopes {
+            limits: [0.5, 0.5],
+            usual: 0.0,
+            spread: 0.2,
+            in_picture: 0.5,
+        }),
+    };
+    let params = Params {
+        count,
+        seed,
+        ..preset(name)
+    };
+    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], greatest));
+    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+    let (mut mean, n_frames) = (Order::default(), 450);
+    for _ in 0..n_frames {
+        boids.advance();
+        let now = boids.order();
+        mean.polarization += now.polarization / f64::from(n_frames);
+        mean.milling += now.milling / f64::from(n_frames);
+    }
+    mean
+}
+
+/// Where something does not hold of so many.
+fn exceptions(name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> {
+    let mut all = Vec::new();
+    for tank in TANKS {
+        for animal in ANIMALS {
+            for seed in 1..=6 {
+                let order = order((name, count, seed), animal, tank);
+                if !holds(&order) {
+                    all.push(format!("{tank:?} {animal:?} seed {seed}: {order:?}"));
+                }
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn a_school_is_polarized() {
+    let none = exceptions("school", 20, |order| order.polarization > 0.65);
+    assert!(none.is_empty(), "{none:#?}");
+}
+
+#[test]
+fn a_swarm_has_no_course() {
+    let none = exceptions("swarm", 20, |order| {
+        order.polarization < 0.35 && order.milling < 0.35
+    });
+    assert!(none.is_empty(), "{none:#?}");
+}
+
+#[test]
+fn a_mill_turns_about_its_middle_and_is_as_full_all_the_way_round() {
+    let none = exceptions("mill", 12, |order| {
+        order.polarization < 0.35 && order.milling > 0.65
+    });
+    assert!(none.is_empty(), "{none:#?}");
+}
+
+/// Boids in the open sea, as Couzin et al. have them: 3 units a second, 40 degrees a second.
+fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
+    let mut params = Params {
+        count: 100,
+        ..preset("zonal")
+    };
+    params.leaders = false;
+    params.rules.view_deg = 270.0;
+    params.rules.zones = Some(Zones {
+        orientation_bl,
+        attraction_bl: 14.0,
+        ..Zones::default()
+    });
+    let calibration = Calibration {
+        cruise_bl_per_s: 3.0,
+        speed_limits_bl_per_s: [3.0, 3.0],
+        turn_rad_per_s: 40f64.to_radians(),
+        wander_rad_per_s: 40f64.to_radians(),
+        ..Calibration::default()
+    };
+    (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
+}
+
+/// Polarization and rotation about the group's own axis, after `n_frames` from one heap.
+fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
+    let (params, calibration, tank) = at_sea(orientation_bl);
+    let lens = Lens::flat(40.0);
+    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
+    let heap = (0..u64::from(params.count)).map(|id| {
+        let draw = |word| 2.0 * random::unit(7, &[id, word]) - 1.0;
+        let position = [0, 1, 2].map(|axis| 5.0 * draw(axis));
+        (position, scaled(3.0, unit([3, 4, 5].map(draw))))
+    });
+    let (positions, velocities) = heap.unzip();
+    boids.show(positions, velocities, None);
+    let (mut polarization, mut rotation) = (0.0, 0.0);
+    for frame in 0..n_frames {
+        boids.advance();
+        if frame >= n_frames / 2 {
+            let n = boids.positions().len() as f64;
+            let sum = |of: &dyn Fn(usize) -> Vec3| {
+                (0..boids.positions().len()).fold([0.0; 3], |sum, id| add_scaled(sum, 1.0, of(id)))
+            };
+            let middle = scaled(1.0 / n, sum(&|id| boids.positions()[id]));
+            let spin = |id: usize| {
+                let out = minus(boids.positions()[id], middle);
+                cross(unit(out), unit(boids.velocities()[id]))
+            };
+            polarization += norm(sum(&|id| unit(boids.velocities()[id]))) / n;
+            rotation += norm(sum(&spin)) / n;
+        }
+    }
+    let half = f64::from(n_frames - n_frames / 2);
+    (polarization / half, rotation / half)
+}
+
+#[test]
+fn wider_zones_of_orientation_make_a_swarm_then_a_torus_then_a_school_as_couzin_found() {
+    let [swarm, torus, school] = [0.0, 2.0, 10.0].map(|width| group(width, 2000));
+    assert!(swarm.0 < 0.35 && swarm.1 < 0.35, "{swarm:?}");
+    assert!(torus.0 < 0.35 && torus.1 > 0.6, "{torus:?}");
+    assert!(school.0 > 0.9 && school.1 < 0.35, "{school:?}");
+}
