@@ -4,13 +4,17 @@
 //! Inside the silhouette alpha is 1; in a band around its outline alpha is how far the pixel lies
 //! from the plate toward the animal's color nearby, and the color is what remains when the plate's
 //! share is taken away. What is only shadow is black with the share of light that it takes. Computed
-//! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame.
+//! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame,
+//! but for what is cast on things much darker than the ground (`cast`).
 
+mod cast;
+
+use self::cast::Ground;
 use super::background::Plate;
 use super::light::Gain;
 use super::silhouette::{self, Difference, shadow};
 use crate::geometry::Rect;
-use crate::order::percentile;
+use crate::order::{median, percentile};
 use crate::raster::{Frame, Mask, RgbaImage};
 
 /// The animal cut out of one frame.
@@ -33,7 +37,9 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, plate, gain, rect);
     let mask = moved(silhouette, rect);
-    let solid = without_halo(&mask, &difference, plate, band_px);
+    let mut solid = without_halo(&mask, &difference, plate, band_px);
+    let ground = Ground::of(&solid, plate);
+    ground.clear_images(&mut solid);
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
     let puller = Puller {
@@ -42,6 +48,7 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         mask: &mask,
         solid: &solid,
         inside: &inside,
+        ground,
         nearest_inside: nearest_set(&inside, &outer),
         nearest_solid: nearest_set(&solid, &outer),
         band_px,
@@ -81,28 +88,34 @@ fn moved(mask: &Mask, rect: Rect) -> Mask {
 /// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
 /// differ by little of what the animal mostly differs by and that look like the plate, only darker. So a shadow on the
 /// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
-/// belly over a white floor: solid all the same.
+/// belly over a white floor: solid all the same; and so is what has the animal's color, as black fur before a dark wall.
 fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate, band_px: u32) -> Mask {
     /// Of what the starkest quarter of the animal differs by: a mean would sink with the shadow itself.
     const FAINT: f64 = 0.3;
-    let mut levels: Vec<f64> = (difference.levels.iter().zip(&mask.bits))
-        .filter(|&(_, &bit)| bit == 1)
-        .map(|(&level, _)| f64::from(level))
-        .collect();
-    let faint = FAINT * percentile(&mut levels, 0.75).unwrap_or(0.0);
-    let mut solid = mask.clone();
+    /// What has the animal's color is nearer to that quarter's than by this share of what it differs by from the plate.
+    const SAME: f64 = 0.25;
+    let covered = || (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
+    let level = |k: usize| f64::from(difference.levels[k]);
+    let color = |k: usize| [0, 1, 2].map(|c| f64::from(difference.rgb.pixels[3 * k + c]));
+    let starkest = percentile(&mut covered().map(level).collect::<Vec<f64>>(), 0.75).unwrap_or(0.0);
+    let usual = [0, 1, 2].map(|c| {
+        let stark = covered().filter(|&k| level(k) >= starkest);
+        median(stark.map(|k| color(k)[c])).unwrap_or(0.0)
+    });
     let (rect, width) = (mask.rect, mask.width());
-    let at = |x: usize, y: usize| {
-        (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x
-    };
-    for k in 0..solid.bits.len() {
-        let level = difference.levels[k];
+    let looks_like_shadow = |k: usize| {
         let (x, y) = (k % width, k / width);
-        if solid.bits[k] == 1
-            && f64::from(level) < faint
-            && (level <= plate.weak_threshold(at(x, y))
-                || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0))
-        {
+        let at = (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x;
+        difference.levels[k] <= plate.weak_threshold(at)
+            || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0)
+    };
+    let looks_like_animal = |k: usize| {
+        let off = (0..3).map(|c| (color(k)[c] - usual[c]).abs());
+        off.fold(0.0, f64::max) < SAME * level(k)
+    };
+    let mut solid = mask.clone();
+    for k in covered() {
+        if level(k) < FAINT * starkest && looks_like_shadow(k) && !looks_like_animal(k) {
             solid.bits[k] = 0;
         }
     }
@@ -184,6 +197,14 @@ fn contrast(difference: &Difference, mask: &Mask) -> f64 {
     sum as f64 / mask.area().max(1) as f64
 }
 
+/// What a pixel near the animal has a share of.
+enum Nearby {
+    /// The animal's color there.
+    Animal([f32; 3]),
+    /// Nothing but less light.
+    Shadow,
+}
+
 struct Puller<'a> {
     difference: &'a Difference,
     plate: &'a Plate,
@@ -192,6 +213,7 @@ struct Puller<'a> {
     solid: &'a Mask,
     /// The solid part less the band along its outline: alpha 1.
     inside: &'a Mask,
+    ground: Ground<'a>,
     /// For each pixel an inside pixel near it.
     nearest_inside: Vec<u32>,
     /// For each pixel a solid pixel near it.
@@ -212,23 +234,35 @@ impl Puller<'_> {
         let (px, py) = (rect.x + x as u32, rect.y + y as u32);
         let back = self.plate.rgb.pixel(px, py).map(f32::from);
         let seen = self.frame_color(k).map(f32::from);
-        let Some(fore) = self.color_nearby(x, y) else {
+        let Some(nearby) = self.nearby(x, y) else {
             return [0; 4];
+        };
+        let fore = match nearby {
+            Nearby::Animal(color) => color,
+            Nearby::Shadow => [0.0; 3],
         };
         let sigma = self.plate.sigma[py as usize * self.plate.frame.width as usize + px as usize];
         let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
         let span_squared = dot(span, span);
-        let alpha = if span_squared < (3.0 * sigma).powi(2) {
+        let looks_like_plate = span_squared < (3.0 * sigma).powi(2);
+        let alpha = if looks_like_plate {
             self.blurred_solid(x, y)
         } else {
             let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
             (dot(seen_span, span) / span_squared).clamp(0.0, 1.0)
         };
+        let alpha = match nearby {
+            Nearby::Animal(_) => alpha,
+            Nearby::Shadow => alpha * self.ground.share_at(px, py),
+        };
         // A trace of alpha is noise, not animal.
         if alpha < 0.04 {
             return [0; 4];
         }
-        let color = if alpha > 0.2 {
+        let color = if looks_like_plate {
+            // How much of it is the animal is not known: what differs from the plate would be exaggerated.
+            seen
+        } else if alpha > 0.2 {
             [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
         } else {
             fore
@@ -237,22 +271,22 @@ impl Puller<'_> {
         [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
-    /// The color that a band pixel has a share of: the animal's nearby; black outside of what is solid and of the
-    /// band around it, for there is only shadow.
-    fn color_nearby(&self, x: usize, y: usize) -> Option<[f32; 3]> {
+    /// What a band pixel has a share of. Outside of what is solid and of the band around it there is only shadow.
+    fn nearby(&self, x: usize, y: usize) -> Option<Nearby> {
         let width = self.mask.width();
         let place = |found: u32| (found != NOWHERE).then_some(found as usize);
         let steps = |at: usize| (at % width).abs_diff(x).max((at / width).abs_diff(y));
         let (k, band) = (y * width + x, self.band_px as usize);
         let solid = place(self.nearest_solid[k])?;
         if steps(solid) > band {
-            return Some([0.0; 3]);
+            return Some(Nearby::Shadow);
         }
         let inside = place(self.nearest_inside[k]);
-        match inside.filter(|&at| steps(at) <= 2 * band + 1) {
-            Some(at) => Some(self.mean_inside((at % width) as i64, (at / width) as i64)),
-            None => self.starkest((solid % width) as i64, (solid / width) as i64),
-        }
+        let color = match inside.filter(|&at| steps(at) <= 2 * band + 1) {
+            Some(at) => self.mean_inside((at % width) as i64, (at / width) as i64),
+            None => self.starkest((solid % width) as i64, (solid / width) as i64)?,
+        };
+        Some(Nearby::Animal(color))
     }
 
     /// Mean color of the inside pixels of a 3 x 3 neighborhood whose middle is one.

@@ -29,12 +29,17 @@ fn picture(shade: fn(u32, u32) -> u8) -> Frame {
 }
 
 fn drawn(shade: fn(u32, u32) -> u8) -> Drawn {
+    drawn_on(|_, _| PAPER, shade)
+}
+
+fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
     let [width, height] = SIZE;
     let sigma = vec![1.5; (width * height) as usize];
-    let plate = plate_of(picture(|_, _| PAPER), sigma, &Params::default());
+    let plate = plate_of(picture(ground), sigma, &Params::default());
     let mut silhouette = Mask::new(Rect::of_size(width, height));
     for k in 0..width * height {
-        silhouette.bits[k as usize] = u8::from(PAPER - shade(k % width, k / width) > 9);
+        silhouette.bits[k as usize] =
+            u8::from(ground(k % width, k / width) - shade(k % width, k / width) > 9);
     }
     silhouette.fill_holes();
     let matte = pull(&picture(shade), &plate, &Gain::ONE, &silhouette, 60.0);
@@ -151,5 +156,56 @@ fn a_light_spot_on_the_body_covers_and_the_floor_between_two_thin_parts_does_not
     assert_eq!(drawn.pixel(75, 31)[3], 255, "a thin part");
     for (x, y) in (36..40).flat_map(|y| (66..96).map(move |x| (x, y))) {
         assert_eq!(drawn.pixel(x, y)[3], 0, "between, at {x}, {y}");
+    }
+}
+
+/// Paper before a dark wall.
+const WALL: u8 = 50;
+
+fn wall(x: u32, _: u32) -> u8 {
+    if x < 70 { PAPER } else { WALL }
+}
+
+/// A dark body, its shadow on the paper, and in the wall its image, which is clear at one place.
+fn with_image(x: u32, y: u32) -> u8 {
+    let is_cast = (BODY.right()..100).contains(&x) && (28..38).contains(&y);
+    let is_clear = (80..92).contains(&x) && (30..36).contains(&y);
+    match (away([x, y], BODY), is_clear, is_cast) {
+        (0, ..) => FUR,
+        (_, true, _) => 0,
+        (_, _, true) => wall(x, y) - wall(x, y) / 4,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn an_image_in_a_dark_wall_stays_behind_and_the_shadow_before_it_does_not() {
+    let drawn = drawn_on(wall, with_image);
+    for (x, y) in (28..38).flat_map(|y| (65..100).map(move |x| (x, y))) {
+        let shown = drawn.over(PAPER, [x, y]);
+        match x {
+            ..70 => assert!(
+                (shown - 128.0).abs() < 4.0,
+                "the shadow at {x}, {y}: {shown}"
+            ),
+            _ => assert_eq!(drawn.pixel(x, y)[3], 0, "the image at {x}, {y}"),
+        }
+    }
+}
+
+/// The same body, half over the wall.
+fn across_the_wall(x: u32, y: u32) -> u8 {
+    match away([x.saturating_sub(25), y], BODY) {
+        0 => FUR,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
+    let drawn = drawn_on(wall, across_the_wall);
+    for (x, y) in (25..41).flat_map(|y| (55..85).map(move |x| (x, y))) {
+        let shown = drawn.over(240, [x, y]);
+        assert!((shown - f64::from(FUR)).abs() < 4.0, "{shown} at {x}, {y}");
     }
 }
