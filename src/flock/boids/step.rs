@@ -26,8 +26,6 @@ pub(super) struct Inner {
     leads_for_s: f64,
     /// How far off the last neighbor was that counted. It only tells where to look first.
     sight_bl: f64,
-    /// Others pushed it back by more than half of its way: it turns round, to the side that it wanders to.
-    pub(super) is_blocked: bool,
 }
 
 /// All boids, in the order of the cells that they were in a step ago: who is near whom in the tank is so in memory.
@@ -45,7 +43,9 @@ pub(super) struct Room {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Member {
     pub(super) boid: Boid,
-    pub(super) inner: Inner,
+    inner: Inner,
+    /// Others pushed it back by more than half of its way: it turns round, to the side that it wanders to.
+    pub(super) is_blocked: bool,
     /// How far off the nearest other was before the step, squared; the reach when there was none.
     pub(super) nearest_bl2: f64,
 }
@@ -91,7 +91,6 @@ impl Default for Inner {
             wander: [0.0; 2],
             leads_for_s: 0.0,
             sight_bl: f64::INFINITY,
-            is_blocked: false,
         }
     }
 }
@@ -204,7 +203,7 @@ impl Boids<'_> {
     ) -> f64 {
         let mut farthest_bl2 = 0.0f64;
         for (slot, next) in (first..).zip(next) {
-            let before = &now[grid.given()[slot] as usize].inner;
+            let before = &now[grid.given()[slot] as usize];
             *next = self.next(slot, before, (grid, search), pace);
             let way = minus(next.boid.position, grid.at(slot).position);
             farthest_bl2 = farthest_bl2.max(dot(way, way));
@@ -217,7 +216,7 @@ impl Boids<'_> {
     fn next(
         &self,
         slot: usize,
-        before: &Inner,
+        before: &Member,
         (grid, search): (&Grid, &mut Search),
         pace: &Pace,
     ) -> Member {
@@ -228,14 +227,13 @@ impl Boids<'_> {
         } = grid.at(slot);
         let id = own_id as usize;
         let limit = self.params.rules.neighbors as usize;
-        let guess_bl = FARTHER * before.sight_bl;
+        let guess_bl = FARTHER * before.inner.sight_bl;
         let neighbors = search.nearest((grid, slot), (limit, pace.reach_bl), guess_bl, pace.cpu);
         let (nearest, last) = (neighbors.first(), neighbors.get(limit - 1));
         let inner = Inner {
-            wander: self.next_wander((id, before), pace),
-            leads_for_s: self.next_lead((id, before), velocity, neighbors),
+            wander: self.next_wander((id, &before.inner), pace),
+            leads_for_s: self.next_lead((id, &before.inner), velocity, neighbors),
             sight_bl: last.map_or(f64::INFINITY, |last| last.square_bl2.sqrt()),
-            is_blocked: false,
         };
         let acceleration = pace.steering.acceleration(&Moment {
             position,
@@ -248,8 +246,8 @@ impl Boids<'_> {
         let sideways = cross(self.tank.up(), velocity);
         let wished = match before.is_blocked {
             true => {
-                let pace = self.calibration.cruise_bl_per_s.max(norm(velocity));
-                scaled(pace * inner.wander[0].signum(), unit(sideways))
+                let speed = self.calibration.cruise_bl_per_s.max(norm(velocity));
+                scaled(speed * inner.wander[0].signum(), unit(sideways))
             }
             false => add_scaled(velocity, self.step_s, acceleration),
         };
@@ -266,6 +264,7 @@ impl Boids<'_> {
                 id: own_id,
             },
             inner,
+            is_blocked: false,
             nearest_bl2: nearest.map_or(pace.reach_bl * pace.reach_bl, |near| near.square_bl2),
         };
         let boid = &mut next.boid;
