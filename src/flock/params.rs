@@ -126,7 +126,7 @@ pub enum Position {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TankExtent {
-    /// Where the animal was seen, when that is a good part of the picture.
+    /// Where the animal was seen; farther out, but not over a wall, if there is no room for the flock.
     Seen,
     /// The whole picture.
     Picture,

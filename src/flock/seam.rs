@@ -9,7 +9,7 @@
 use super::boids::vector::{Vec3, add_scaled, dot, minus};
 use super::boids::{Boids, Meeting};
 
-/// How long meeting may take; at most half of the film.
+/// How long meeting may take; at most four fifths of the film.
 const MEETING_S: f64 = 8.0;
 /// A difference of velocity counts as much as what it amounts to in this time.
 const AHEAD_S: f64 = 1.0;
@@ -29,7 +29,7 @@ pub(super) struct Moment {
 
 /// How many frames before the first, and before the end, are needed for a film of `n_frames`.
 pub(super) fn n_meeting_frames(n_frames: u32, fps: f64) -> usize {
-    ((MEETING_S * fps).round() as usize).min(n_frames as usize / 2)
+    ((MEETING_S * fps).round() as usize).min(4 * n_frames as usize / 5)
 }
 
 /// Whom each individual becomes. `end`: where they are when meeting begins; `lead`: the moments before

@@ -81,6 +81,40 @@ fn everybody_stays_in_the_picture() {
 }
 
 #[test]
+fn a_crowd_goes_farther_than_the_animal_did_but_not_over_a_wall() {
+    let params = Params {
+        count: 60,
+        frames: 100,
+        ..params("scatter")
+    };
+    let farthest_px = |library: &Library| {
+        let flock = plan_flock(library, &params, &Silent).unwrap();
+        let xs = (flock.individuals.iter()).flat_map(|one| one.centroid_px.iter().map(|p| p[0]));
+        xs.fold(0.0, f64::max)
+    };
+    let mut library = synthetic::library(View::Top);
+    // It swims round in the middle of the picture.
+    let [w, h] = library.poses.image_size_px.map(f64::from);
+    let radius_px = 0.2 * h;
+    for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
+        let angle = frame as f64 / 50.0;
+        let (cos, sin) = (libm::cos(angle), libm::sin(angle));
+        pose.centroid_px = Some([0.5 * w + radius_px * cos, 0.5 * h + radius_px * sin]);
+    }
+    let wall_px = 0.5 * w + radius_px + 0.6 * LENGTH_PX;
+    let open_px = farthest_px(&library);
+    assert!(open_px > wall_px, "{open_px} {wall_px}");
+    let width = library.background.width as usize;
+    for (k, pixel) in library.background.pixels.chunks_exact_mut(3).enumerate() {
+        if (k % width) as f64 > wall_px {
+            pixel.fill(10);
+        }
+    }
+    let farthest_px = farthest_px(&library);
+    assert!(farthest_px < wall_px, "{farthest_px} {wall_px}");
+}
+
+#[test]
 fn the_papers_mirror_nothing_rotate_nothing_and_fade_nothing() {
     for individual in planned(View::Side, "papers").individuals {
         assert!(individual.mirrored.iter().all(|&m| !m));

@@ -1,6 +1,7 @@
 //! Where the flock may go: half-spaces, seen in the picture as lines, and in side view a depth
 //! (ALGORITHMS.md 7). All in body lengths. Inside the tank always.
 
+mod floor;
 mod site;
 
 use super::OVERLAP_BL;

@@ -1,5 +1,6 @@
 //! The tank of a library: where the animal was seen, and where it is wholly in the picture (ALGORITHMS.md 7).
 
+use super::floor::Floor;
 use super::{Tank, Wall};
 use crate::flock::boids::vector::norm;
 use crate::flock::lens::Lens;
@@ -10,9 +11,8 @@ use crate::order::{median, percentile};
 
 /// Directions in which the seen area is bounded.
 const N_SIDES: usize = 16;
-/// A flock without room gets it farther out until the tank is this share of the picture. From above, what
-/// bounds the animal is mostly a wall; from the side, mostly its whim.
-const MOST_OF_ARENA: f64 = 0.35;
+/// A flock without room gets it farther out: from above where the floor goes on, for what bounds the animal is mostly a
+/// wall; from the side, where it is mostly its whim, until the tank is this share of the picture.
 const MOST_OF_TANK: f64 = 0.7;
 /// By so much at a time.
 const FARTHER_BL: f64 = 0.25;
@@ -34,32 +34,35 @@ impl Tank {
             size_px: [w, h],
             depths_bl: depths(library, lens, motion, params),
         };
-        let seen = match params.tank {
+        let mut lines = match params.tank {
             TankExtent::Seen => seen_lines(library),
             TankExtent::Picture => Vec::new(),
         };
-        if seen.is_empty() {
-            return site.tank(&[]);
-        }
-        let most = match library.poses.view {
-            View::Top => MOST_OF_ARENA,
-            View::Side => MOST_OF_TANK,
-        };
-        let mut farther_px = 0.0;
+        let floor =
+            (library.poses.view == View::Top).then(|| Floor::of(&library.background, &lines));
+        let farther_px = FARTHER_BL * lens.length_px;
         loop {
-            let lines: Vec<Line> = seen.iter().map(|&(u, px)| (u, px + farther_px)).collect();
             let tank = site.tank(&lines);
-            let has_room = tank.closeness(params.count as usize) >= 1.0;
-            if has_room || area(&lines) >= most * w * h || farther_px > w + h {
+            if tank.closeness(params.count as usize) >= 1.0 {
                 return tank;
             }
-            farther_px += FARTHER_BL * lens.length_px;
+            let before = lines.clone();
+            match &floor {
+                Some(floor) => floor.widen(&mut lines, farther_px),
+                None if area(&lines) < MOST_OF_TANK * w * h => {
+                    lines.iter_mut().for_each(|line| line.1 += farther_px);
+                }
+                None => {}
+            }
+            if lines == before {
+                return tank;
+            }
         }
     }
 }
 
 /// A unit vector in the picture and how far it may be gone along it from the picture's corner, pixels.
-type Line = ([f64; 2], f64);
+pub(super) type Line = ([f64; 2], f64);
 
 /// What tanks of one library have in common.
 struct Site<'a> {
