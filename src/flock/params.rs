@@ -126,7 +126,8 @@ pub enum Position {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TankExtent {
-    /// Where the animal was seen; farther out, but not over a wall, if there is no room for the flock.
+    /// Where the animal was seen. Farther out if there is no room for the flock: from above as far as what looks like
+    /// the floor there, from the side up to seven tenths of the picture.
     Seen,
     /// The whole picture.
     Picture,

@@ -2,17 +2,23 @@
 //! A few levels less are a large share of the little light there, and would be a dark patch on anything lighter.
 
 use crate::analysis::background::Plate;
-use crate::order::median;
+use crate::geometry::Rect;
+use crate::order::percentile;
 use crate::raster::Mask;
-use crate::raster::runs::components;
+use crate::raster::runs::{Component, components};
 
-/// Relative to the ground: of what is cast on darker things nothing goes with the animal, on lighter ones all.
+/// Relative to the ground: of what is cast on darker things nothing goes with the animal, on lighter ones all. A wall
+/// in which an image was seen (mouse in a round arena) has a third of the floor's light.
 const DARKER: [f32; 2] = [0.5, 0.8];
+/// So much light, the sum of R, G and B, is nothing: no thing is darker than black.
+const BLACK: f32 = 48.0;
+/// It may stand half on dark things: its ground is the lighter quarter of what is behind it.
+const LIGHTER: f64 = 0.75;
 
 /// What the animal stands on.
 pub(super) struct Ground<'a> {
     plate: &'a Plate,
-    /// The plate behind the animal, in the median: the sum of R, G and B.
+    /// How bright it is: the sum of R, G and B.
     brightness: f32,
 }
 
@@ -20,40 +26,63 @@ impl Ground<'_> {
     pub(super) fn of<'a>(solid: &Mask, plate: &'a Plate) -> Ground<'a> {
         let (rect, width) = (solid.rect, solid.width());
         let covered = (0..solid.bits.len()).filter(|&k| solid.bits[k] == 1);
-        let behind = covered.map(|k| {
-            let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
-            f64::from(brightness(plate, x, y))
-        });
+        let mut behind: Vec<f64> = covered
+            .map(|k| {
+                let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
+                f64::from(brightness(plate, x, y))
+            })
+            .collect();
         Ground {
             plate,
-            brightness: median(behind).unwrap_or(0.0) as f32,
+            brightness: percentile(&mut behind, LIGHTER).unwrap_or(0.0) as f32,
         }
     }
 
     /// How much of what is cast on a place of the frame goes with the animal: 0 to 1.
     pub(super) fn share_at(&self, x: u32, y: u32) -> f32 {
-        let relative = brightness(self.plate, x, y) / self.brightness.max(1.0);
+        let relative = (brightness(self.plate, x, y) + BLACK) / (self.brightness + BLACK);
         let share = ((relative - DARKER[0]) / (DARKER[1] - DARKER[0])).clamp(0.0, 1.0);
         share * share * (3.0 - 2.0 * share)
     }
 
-    /// Clears what lies apart from the largest piece and mostly on darker things.
-    pub(super) fn clear_images(&self, solid: &mut Mask) {
-        let pieces = components(solid);
-        let largest = pieces.iter().map(|piece| piece.area).max();
-        for piece in pieces {
-            let pixels =
-                || (piece.runs.iter()).flat_map(|run| (run.x0..run.x1).map(move |x| (x, run.y)));
-            let share: f32 = pixels().map(|(x, y)| self.share_at(x, y)).sum();
-            if Some(piece.area) == largest || 2.0 * share >= piece.area as f32 {
-                continue;
-            }
-            for (x, y) in pixels() {
-                let k = (y - solid.rect.y) * solid.rect.w + x - solid.rect.x;
-                solid.bits[k as usize] = 0;
+    /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is
+    /// hidden: it is mostly `own` (by the number of the mask's pixel), and nothing but dark things lie between.
+    pub(super) fn clear_images(&self, solid: &mut Mask, own: impl Fn(usize) -> bool) {
+        let (rect, width) = (solid.rect, solid.width());
+        let share =
+            |k: usize| self.share_at(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
+        let mut pieces = components(solid);
+        pieces.sort_by_key(|piece| std::cmp::Reverse(piece.area));
+        let is_apart = pieces.len() > 1;
+        let Some(body) = pieces.first().filter(|_| is_apart) else {
+            return;
+        };
+        let mut passable = solid.clone();
+        for (k, bit) in passable.bits.iter_mut().enumerate() {
+            *bit |= u8::from(share(k) < 0.5);
+        }
+        let reached = (components(&passable).iter().map(|part| part.mask(rect)))
+            .find(|part| part.bits[numbers(body, rect)[0]] == 1);
+        for piece in &pieces[1..] {
+            let pixels = numbers(piece, rect);
+            let on_ground: f32 = pixels.iter().map(|&k| share(k)).sum();
+            let n_own = pixels.iter().filter(|&&k| own(k)).count() as u64;
+            let is_reached = reached
+                .as_ref()
+                .is_some_and(|part| part.bits[pixels[0]] == 1);
+            let is_limb = is_reached && 2 * n_own >= piece.area;
+            if 2.0 * on_ground < piece.area as f32 && !is_limb {
+                pixels.iter().for_each(|&k| solid.bits[k] = 0);
             }
         }
     }
+}
+
+/// A component's pixels in a mask over `rect`, by their numbers.
+fn numbers(piece: &Component, rect: Rect) -> Vec<usize> {
+    let places = (piece.runs.iter()).flat_map(|run| (run.x0..run.x1).map(|x| (x, run.y)));
+    let number = |(x, y): (u32, u32)| ((y - rect.y) * rect.w + x - rect.x) as usize;
+    places.map(number).collect()
 }
 
 fn brightness(plate: &Plate, x: u32, y: u32) -> f32 {

@@ -8,13 +8,14 @@
 //! but for what is cast on things much darker than the ground (`cast`).
 
 mod cast;
+mod solid;
 
 use self::cast::Ground;
+use self::solid::Coat;
 use super::background::Plate;
 use super::light::Gain;
-use super::silhouette::{self, Difference, shadow};
+use super::silhouette::{self, Difference};
 use crate::geometry::Rect;
-use crate::order::{median, percentile};
 use crate::raster::{Frame, Mask, RgbaImage};
 
 /// The animal cut out of one frame.
@@ -37,9 +38,10 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, plate, gain, rect);
     let mask = moved(silhouette, rect);
-    let mut solid = without_halo(&mask, &difference, plate, band_px);
+    let coat = Coat::of(&mask, &difference);
+    let mut solid = coat.without_halo(&mask, plate, band_px);
     let ground = Ground::of(&solid, plate);
-    ground.clear_images(&mut solid);
+    ground.clear_images(&mut solid, |k| coat.is_at(k));
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
     let puller = Puller {
@@ -83,60 +85,6 @@ fn moved(mask: &Mask, rect: Rect) -> Mask {
         result.bits[to..to + n].copy_from_slice(&mask.bits[from..from + n]);
     }
     result
-}
-
-/// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
-/// differ by little of what the animal mostly differs by and that look like the plate, only darker. So a shadow on the
-/// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
-/// belly over a white floor: solid all the same; and so is what has the animal's color, as black fur before a dark wall.
-fn without_halo(mask: &Mask, difference: &Difference, plate: &Plate, band_px: u32) -> Mask {
-    /// Of what the starkest quarter of the animal differs by: a mean would sink with the shadow itself.
-    const FAINT: f64 = 0.3;
-    /// What has the animal's color is nearer to that quarter's than by this share of what it differs by from the plate.
-    const SAME: f64 = 0.25;
-    let covered = || (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
-    let level = |k: usize| f64::from(difference.levels[k]);
-    let color = |k: usize| [0, 1, 2].map(|c| f64::from(difference.rgb.pixels[3 * k + c]));
-    let starkest = percentile(&mut covered().map(level).collect::<Vec<f64>>(), 0.75).unwrap_or(0.0);
-    let usual = [0, 1, 2].map(|c| {
-        let stark = covered().filter(|&k| level(k) >= starkest);
-        median(stark.map(|k| color(k)[c])).unwrap_or(0.0)
-    });
-    let (rect, width) = (mask.rect, mask.width());
-    let looks_like_shadow = |k: usize| {
-        let (x, y) = (k % width, k / width);
-        let at = (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x;
-        difference.levels[k] <= plate.weak_threshold(at)
-            || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0)
-    };
-    let looks_like_animal = |k: usize| {
-        let off = (0..3).map(|c| (color(k)[c] - usual[c]).abs());
-        off.fold(0.0, f64::max) < SAME * level(k)
-    };
-    let mut solid = mask.clone();
-    for k in covered() {
-        if level(k) < FAINT * starkest && looks_like_shadow(k) && !looks_like_animal(k) {
-            solid.bits[k] = 0;
-        }
-    }
-    add_midst(&mut solid, 2 * band_px);
-    solid.majority()
-}
-
-/// Adds what walls enclose that are more than twice `reach_px` thick. Thinner ones, as a tail and its shadow that meet,
-/// enclose nothing.
-fn add_midst(solid: &mut Mask, reach_px: u32) {
-    let mut filled = solid.clone();
-    filled.fill_holes();
-    if filled == *solid {
-        return;
-    }
-    let mut midst = (0..reach_px).fold(solid.clone(), |mask, _| mask.eroded());
-    midst.fill_holes();
-    let midst = (0..reach_px).fold(midst, |mask, _| mask.dilated());
-    for (bit, within) in solid.bits.iter_mut().zip(midst.bits) {
-        *bit |= within;
-    }
 }
 
 /// No set pixel is known for this one.
@@ -244,11 +192,15 @@ impl Puller<'_> {
         let sigma = self.plate.sigma[py as usize * self.plate.frame.width as usize + px as usize];
         let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
         let span_squared = dot(span, span);
-        let looks_like_plate = span_squared < (3.0 * sigma).powi(2);
-        let alpha = if looks_like_plate {
-            self.blurred_solid(x, y)
+        let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
+        let noise_squared = (3.0 * sigma).powi(2);
+        let alpha = if span_squared < noise_squared {
+            // What differs all the same is itself, whole: as a share of something it would be exaggerated.
+            match dot(seen_span, seen_span) < noise_squared {
+                true => self.blurred_solid(x, y),
+                false => 1.0,
+            }
         } else {
-            let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
             (dot(seen_span, span) / span_squared).clamp(0.0, 1.0)
         };
         let alpha = match nearby {
@@ -259,10 +211,7 @@ impl Puller<'_> {
         if alpha < 0.04 {
             return [0; 4];
         }
-        let color = if looks_like_plate {
-            // How much of it is the animal is not known: what differs from the plate would be exaggerated.
-            seen
-        } else if alpha > 0.2 {
+        let color = if alpha > 0.2 {
             [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
         } else {
             fore

@@ -39,7 +39,7 @@ fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
     let mut silhouette = Mask::new(Rect::of_size(width, height));
     for k in 0..width * height {
         silhouette.bits[k as usize] =
-            u8::from(ground(k % width, k / width) - shade(k % width, k / width) > 9);
+            u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > 9);
     }
     silhouette.fill_holes();
     let matte = pull(&picture(shade), &plate, &Gain::ONE, &silhouette, 60.0);
@@ -166,14 +166,13 @@ fn wall(x: u32, _: u32) -> u8 {
     if x < 70 { PAPER } else { WALL }
 }
 
-/// A dark body, its shadow on the paper, and in the wall its image, which is clear at one place.
+/// A dark body, its shadow on the paper, and in the wall its image, at one place as dark as itself.
 fn with_image(x: u32, y: u32) -> u8 {
     let is_cast = (BODY.right()..100).contains(&x) && (28..38).contains(&y);
     let is_clear = (80..92).contains(&x) && (30..36).contains(&y);
     match (away([x, y], BODY), is_clear, is_cast) {
-        (0, ..) => FUR,
-        (_, true, _) => 0,
-        (_, _, true) => wall(x, y) - wall(x, y) / 4,
+        (0, ..) | (_, true, _) => FUR,
+        (_, _, true) => wall(x, y) - wall(x, y) / 5,
         _ => wall(x, y),
     }
 }
@@ -181,15 +180,81 @@ fn with_image(x: u32, y: u32) -> u8 {
 #[test]
 fn an_image_in_a_dark_wall_stays_behind_and_the_shadow_before_it_does_not() {
     let drawn = drawn_on(wall, with_image);
-    for (x, y) in (28..38).flat_map(|y| (65..100).map(move |x| (x, y))) {
-        let shown = drawn.over(PAPER, [x, y]);
+    for (x, y) in (29..37).flat_map(|y| (64..100).map(move |x| (x, y))) {
+        let shown = drawn.over(240, [x, y]);
         match x {
             ..70 => assert!(
-                (shown - 128.0).abs() < 4.0,
+                (shown - 0.8 * 240.0).abs() < 4.0,
                 "the shadow at {x}, {y}: {shown}"
             ),
             _ => assert_eq!(drawn.pixel(x, y)[3], 0, "the image at {x}, {y}"),
         }
+    }
+}
+
+/// A light animal on black, in two parts.
+fn in_the_dark(x: u32, y: u32) -> u8 {
+    let is_leg = (64..76).contains(&x) && (30..34).contains(&y);
+    if away([x, y], BODY) == 0 || is_leg {
+        200
+    } else {
+        0
+    }
+}
+
+/// Paper, a dark stripe, and paper.
+fn striped(x: u32, _: u32) -> u8 {
+    if (64..84).contains(&x) { WALL } else { PAPER }
+}
+
+/// A body, and its tail, of which a part before the stripe is hidden.
+fn with_a_hidden_part(x: u32, y: u32) -> u8 {
+    let is_tail = ((60..64).contains(&x) || (68..84).contains(&x)) && (30..35).contains(&y);
+    match away([x, y], BODY) == 0 || is_tail {
+        true => FUR,
+        false => striped(x, y),
+    }
+}
+
+#[test]
+fn a_limb_apart_from_the_body_is_no_image() {
+    let light = drawn_on(|_, _| 0, in_the_dark);
+    let tail = drawn_on(striped, with_a_hidden_part);
+    for x in 70..74 {
+        assert_eq!(light.pixel(x, 32)[3], 255, "the leg at {x}");
+        assert_eq!(tail.pixel(x, 32)[3], 255, "the tail at {x}");
+    }
+}
+
+/// A body hardly darker than the wall, with a bright edge.
+fn with_bright_edge(x: u32, y: u32) -> u8 {
+    let inner = Rect {
+        x: BODY.x + 2,
+        y: BODY.y + 2,
+        w: BODY.w - 4,
+        h: BODY.h - 4,
+    };
+    match (away([x, y], inner), away([x, y], BODY)) {
+        (0, _) => WALL - 1,
+        (_, 0) => 2 * WALL,
+        _ => WALL,
+    }
+}
+
+#[test]
+fn what_differs_from_plate_and_body_is_shown_as_it_is() {
+    let drawn = drawn_on(|_, _| WALL, with_bright_edge);
+    for (x, y) in [
+        (BODY.x, 30),
+        (BODY.x + 1, 30),
+        (40, BODY.y),
+        (40, BODY.y + 1),
+    ] {
+        assert_eq!(
+            drawn.pixel(x, y),
+            [2 * WALL, 2 * WALL, 2 * WALL, 255],
+            "{x}, {y}"
+        );
     }
 }
 

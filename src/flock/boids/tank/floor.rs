@@ -1,104 +1,175 @@
 //! How far the floor goes on that the animal was seen on, seen from above: what looks like it in the background.
 
 use super::site::Line;
-use crate::order::median;
+use crate::order::percentile;
 use crate::raster::RgbImage;
 
-/// Along the longer side about so many places are looked at.
-const N_PLACES: u32 = 160;
-/// What is less bright or brighter than where the animal was seen, by this share of it or so many levels of 255, is
-/// another thing: a rim, a wall, what lies outside.
-const OTHER_SHARE: f64 = 0.3;
-const OTHER_LEVELS: f64 = 12.0;
-/// A strip with more of other things than this ends the floor.
+/// Along the longer side of the background so many places are looked at, at least.
+const N_PLACES: u32 = 320;
+/// A strip with more of other things than this ends the floor: a rim is thin.
 const MOST_OTHER: f64 = 0.05;
+/// What is darker or lighter than nearly all of the floor so far, by this share of its light or so many levels of 255,
+/// is another thing: a rim, a wall, what lies outside. Uneven light changes by less from one strip to the next.
+const OTHER_SHARE: f64 = 0.1;
+const OTHER_LEVELS: f64 = 5.0;
 
-/// The floor, and what is around it.
+/// What of the background may be floor.
 pub(super) struct Floor {
-    /// Places looked at, and whether the floor is seen there.
-    places: Vec<([f64; 2], bool)>,
+    places: Vec<Place>,
+    /// Its size, and how far apart places are, pixels.
+    size_px: [f64; 2],
+    spacing_px: f64,
+}
+
+struct Place {
+    at_px: [f64; 2],
+    rgb: [u8; 3],
 }
 
 impl Floor {
-    /// Within these lines the animal was seen.
-    pub(super) fn of(background: &RgbImage, seen: &[Line]) -> Floor {
+    pub(super) fn of(background: &RgbImage) -> Floor {
         let (width, height) = (background.width, background.height);
         let spacing = (width.max(height) / N_PLACES).max(1) as usize;
         let row = move |y| (0..width).step_by(spacing).map(move |x| (x, y));
-        let at = (0..height).step_by(spacing).flat_map(row);
-        let brightness: Vec<([f64; 2], f64)> = at
-            .map(|(x, y)| {
-                let sum: f64 = background.pixel(x, y).map(f64::from).iter().sum();
-                ([f64::from(x) + 0.5, f64::from(y) + 0.5], sum / 3.0)
-            })
-            .collect();
-        let inside = brightness
-            .iter()
-            .filter(|(place, _)| is_within(seen, *place));
-        let usual = median(inside.map(|&(_, level)| level)).unwrap_or(0.0);
-        let most_off = (OTHER_SHARE * usual).max(OTHER_LEVELS);
-        let is_floor = |level: f64| (level - usual).abs() < most_off;
+        let all = (0..height).step_by(spacing).flat_map(row);
         Floor {
-            places: (brightness.into_iter())
-                .map(|(place, level)| (place, is_floor(level)))
+            places: all
+                .map(|(x, y)| Place {
+                    at_px: [f64::from(x) + 0.5, f64::from(y) + 0.5],
+                    rgb: background.pixel(x, y),
+                })
                 .collect(),
+            size_px: [width, height].map(f64::from),
+            spacing_px: spacing as f64,
         }
     }
 
-    /// Moves each line out by so many pixels beyond which, and within all the others, the floor goes on.
-    pub(super) fn widen(&self, lines: &mut [Line], by_px: f64) {
+    /// Moves each line out by about so many pixels within which, and within all the other lines, the floor goes on
+    /// that lies within all of them; not out of the picture. False when none may move.
+    pub(super) fn widen(&self, lines: &mut [Line], by_px: f64) -> bool {
+        let Some(usual) = self.usual(lines) else {
+            return false;
+        };
+        let by_px = by_px.max(1.5 * self.spacing_px);
+        let mut moved = false;
         for line in 0..lines.len() {
-            let mut farther = lines.to_vec();
-            farther[line].1 += by_px;
-            let beyond = |place| is_within(&farther, place) && !is_within(lines, place);
-            let (mut n, mut n_other) = (0.0, 0.0);
-            for &(_, is_floor) in self.places.iter().filter(|(place, _)| beyond(*place)) {
-                n += 1.0;
-                n_other += f64::from(u8::from(!is_floor));
+            let (outward, px) = lines[line];
+            let farther_px = (px + by_px).min(self.extent_px(outward));
+            if farther_px <= px {
+                continue;
             }
-            if n > 0.0 && n_other <= MOST_OTHER * n {
-                lines[line].1 += by_px;
+            let is_beyond = |place: &&Place| {
+                let along_px = along(outward, place.at_px);
+                px < along_px
+                    && along_px <= farther_px
+                    && (lines.iter().enumerate())
+                        .all(|(k, &(u, px))| k == line || along(u, place.at_px) <= px)
+            };
+            let (mut n, mut n_other) = (0.0, 0.0);
+            for place in self.places.iter().filter(is_beyond) {
+                let is_usual = (place.rgb.iter().zip(&usual))
+                    .all(|(&level, [low, high])| (*low..=*high).contains(&f64::from(level)));
+                n += 1.0;
+                n_other += f64::from(u8::from(!is_usual));
+            }
+            if n_other <= MOST_OTHER * n {
+                lines[line].1 = farther_px;
+                moved = true;
             }
         }
+        moved
+    }
+
+    /// The range of levels that floor may have, by what lies within the lines or beside them; `None` when nothing does.
+    fn usual(&self, lines: &[Line]) -> Option<[[f64; 2]; 3]> {
+        let is_within = |place: &&Place| {
+            (lines.iter()).all(|&(u, px)| along(u, place.at_px) <= px + self.spacing_px)
+        };
+        let within: Vec<&Place> = self.places.iter().filter(is_within).collect();
+        let range = |channel: usize| {
+            let mut levels: Vec<f64> = (within.iter())
+                .map(|place| f64::from(place.rgb[channel]))
+                .collect();
+            let mut at = |share| percentile(&mut levels, share);
+            let (low, middle, high) = (at(MOST_OTHER)?, at(0.5)?, at(1.0 - MOST_OTHER)?);
+            let more = (OTHER_SHARE * middle).max(OTHER_LEVELS);
+            Some([low - more, high + more])
+        };
+        Some([range(0)?, range(1)?, range(2)?])
+    }
+
+    /// How far the picture reaches in a direction.
+    fn extent_px(&self, outward: [f64; 2]) -> f64 {
+        let reach = |axis: usize| (outward[axis] * self.size_px[axis]).max(0.0);
+        reach(0) + reach(1)
     }
 }
 
-fn is_within(lines: &[Line], [x, y]: [f64; 2]) -> bool {
-    (lines.iter()).all(|&(outward, px)| outward[0] * x + outward[1] * y <= px)
+fn along(outward: [f64; 2], [x, y]: [f64; 2]) -> f64 {
+    outward[0] * x + outward[1] * y
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Paper up to x = 200, which gets darker by a fifth across it, and a dark rim beyond.
-    fn background() -> RgbImage {
-        let [width, height] = [300, 150];
-        let level = |x: u32| if x < 200 { 170 - (x / 6) as u8 } else { 50 };
-        RgbImage {
+    /// Where the lines end that begin as a square around the middle.
+    fn ends([width, height]: [u32; 2], pixel: fn(u32, u32) -> [u8; 3], step_px: f64) -> Vec<f64> {
+        let pixels = (0..width * height).flat_map(|k| pixel(k % width, k / width));
+        let floor = Floor::of(&RgbImage {
             width,
             height,
-            pixels: (0..width * height)
-                .flat_map(|k| [level(k % width); 3])
-                .collect(),
-        }
-    }
-
-    /// A box in the middle of the paper.
-    fn seen() -> Vec<Line> {
-        let edges = [120.0, 90.0, -60.0, -60.0];
+            pixels: pixels.collect(),
+        });
+        let middle = [width, height].map(|side| f64::from(side) / 2.0);
         let outward = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
-        outward.into_iter().zip(edges).collect()
+        let mut lines: Vec<Line> = outward.map(|u| (u, along(u, middle) + 20.0)).to_vec();
+        let mut n_rounds = 0;
+        while floor.widen(&mut lines, step_px) {
+            n_rounds += 1;
+            assert!(n_rounds < 10_000, "{lines:?}");
+        }
+        lines.iter().map(|line| line.1).collect()
     }
 
     #[test]
-    fn the_floor_goes_on_in_uneven_light_and_ends_at_a_rim_and_at_the_pictures_edge() {
-        let mut lines = seen();
-        let floor = Floor::of(&background(), &lines);
-        for _ in 0..30 {
-            floor.widen(&mut lines, 10.0);
+    fn the_floor_goes_on_to_the_edges_of_the_picture_however_small_the_animal() {
+        for size in [[300, 150], [1920, 1080]] {
+            let [w, h] = size.map(f64::from);
+            assert_eq!(ends(size, |_, _| [200; 3], 5.0), [w, h, 0.0, 0.0]);
         }
-        let ends: Vec<f64> = lines.iter().map(|line| line.1).collect();
-        assert_eq!(ends, [200.0, 150.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn it_goes_on_in_uneven_light_and_over_tiles() {
+        let vignette = |x: u32, y: u32| [230 - (x.abs_diff(150) / 3 + y.abs_diff(75) / 2) as u8; 3];
+        let tiles = |x: u32, y: u32| {
+            [if (x / 10 + y / 10).is_multiple_of(2) {
+                90
+            } else {
+                200
+            }; 3]
+        };
+        for pixel in [vignette, tiles] {
+            assert_eq!(ends([300, 150], pixel, 10.0), [300.0, 150.0, 0.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn it_ends_at_a_rim_at_a_gray_wall_and_at_another_color() {
+        let rim = |x: u32, _: u32| [if (250..256).contains(&x) { 120 } else { 200 }; 3];
+        let wall = |x: u32, _: u32| [if x < 250 { 230 } else { 175 }; 3];
+        let dark = |x: u32, _: u32| [if x < 250 { 10 } else { 21 }; 3];
+        let color = |x: u32, _: u32| {
+            if x < 250 {
+                [90, 160, 90]
+            } else {
+                [160, 90, 90]
+            }
+        };
+        for pixel in [rim, wall, dark, color] {
+            let end = ends([300, 150], pixel, 10.0)[0];
+            assert!((240.0..=251.0).contains(&end), "{end}");
+        }
     }
 }

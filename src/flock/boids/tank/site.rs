@@ -11,8 +11,8 @@ use crate::order::{median, percentile};
 
 /// Directions in which the seen area is bounded.
 const N_SIDES: usize = 16;
-/// A flock without room gets it farther out: from above where the floor goes on, for what bounds the animal is mostly a
-/// wall; from the side, where it is mostly its whim, until the tank is this share of the picture.
+/// A flock without room gets it farther out: from above where the floor goes on, from the side until the tank is this
+/// share of the picture.
 const MOST_OF_TANK: f64 = 0.7;
 /// By so much at a time.
 const FARTHER_BL: f64 = 0.25;
@@ -38,27 +38,31 @@ impl Tank {
             TankExtent::Seen => seen_lines(library),
             TankExtent::Picture => Vec::new(),
         };
-        let floor =
-            (library.poses.view == View::Top).then(|| Floor::of(&library.background, &lines));
+        let floor = (library.poses.view == View::Top).then(|| Floor::of(&library.background));
         let farther_px = FARTHER_BL * lens.length_px;
         loop {
             let tank = site.tank(&lines);
-            if tank.closeness(params.count as usize) >= 1.0 {
+            if lines.is_empty() || tank.closeness(params.count as usize) >= 1.0 {
                 return tank;
             }
-            let before = lines.clone();
-            match &floor {
+            let moved = match &floor {
                 Some(floor) => floor.widen(&mut lines, farther_px),
-                None if area(&lines) < MOST_OF_TANK * w * h => {
-                    lines.iter_mut().for_each(|line| line.1 += farther_px);
-                }
-                None => {}
-            }
-            if lines == before {
+                None => widen(&mut lines, farther_px, MOST_OF_TANK * w * h),
+            };
+            if !moved {
                 return tank;
             }
         }
     }
+}
+
+/// Moves all lines out by so many pixels; not, and false, when there is at least `most_px2` within them.
+fn widen(lines: &mut [Line], by_px: f64, most_px2: f64) -> bool {
+    if area(lines) >= most_px2 {
+        return false;
+    }
+    lines.iter_mut().for_each(|line| line.1 += by_px);
+    true
 }
 
 /// A unit vector in the picture and how far it may be gone along it from the picture's corner, pixels.

@@ -1,0 +1,88 @@
+//! What of a silhouette is the animal itself, and what is shadow around it.
+
+use crate::analysis::background::Plate;
+use crate::analysis::silhouette::{Difference, shadow};
+use crate::order::{median, percentile};
+use crate::raster::Mask;
+
+/// What the animal looks like where it differs most from the plate.
+pub(super) struct Coat<'a> {
+    difference: &'a Difference,
+    /// What its starkest quarter differs by, at least: a mean would sink with the shadow around it.
+    starkest: f64,
+    /// The median of R, G and B there.
+    color: [f64; 3],
+}
+
+impl Coat<'_> {
+    pub(super) fn of<'a>(mask: &Mask, difference: &'a Difference) -> Coat<'a> {
+        let level = |k: usize| f64::from(difference.levels[k]);
+        let covered = || (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
+        let mut levels: Vec<f64> = covered().map(level).collect();
+        let starkest = percentile(&mut levels, 0.75).unwrap_or(0.0);
+        let channel = |c: usize| {
+            let stark = covered().filter(|&k| level(k) >= starkest);
+            median(stark.map(|k| f64::from(difference.rgb.pixels[3 * k + c]))).unwrap_or(0.0)
+        };
+        Coat {
+            difference,
+            starkest,
+            color: [0, 1, 2].map(channel),
+        }
+    }
+
+    /// Whether a pixel differs by little of that.
+    fn is_faint(&self, k: usize) -> bool {
+        f64::from(self.difference.levels[k]) < 0.3 * self.starkest
+    }
+
+    /// Whether a pixel has its color: it is much nearer to it than to the plate.
+    pub(super) fn is_at(&self, k: usize) -> bool {
+        let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
+        let off = seen.iter().zip(self.color);
+        let most_off = off.fold(0.0, |most, (&seen, color)| {
+            f64::max(most, (f64::from(seen) - color).abs())
+        });
+        most_off < 0.25 * f64::from(self.difference.levels[k])
+    }
+
+    /// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
+    /// differ by little of what the animal mostly differs by and that look like the plate, only darker. So a shadow on the
+    /// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
+    /// belly over a white floor: solid all the same; and so is what has the coat's color, as black fur before a dark wall.
+    pub(super) fn without_halo(&self, mask: &Mask, plate: &Plate, band_px: u32) -> Mask {
+        let difference = self.difference;
+        let mut solid = mask.clone();
+        let (rect, width) = (mask.rect, mask.width());
+        for k in 0..solid.bits.len() {
+            let (x, y) = (k % width, k / width);
+            let at = (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x;
+            if solid.bits[k] == 1
+                && self.is_faint(k)
+                && !self.is_at(k)
+                && (difference.levels[k] <= plate.weak_threshold(at)
+                    || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0))
+            {
+                solid.bits[k] = 0;
+            }
+        }
+        add_midst(&mut solid, 2 * band_px);
+        solid.majority()
+    }
+}
+
+/// Adds what walls enclose that are more than twice `reach_px` thick. Thinner ones, as a tail and its shadow that meet,
+/// enclose nothing.
+fn add_midst(solid: &mut Mask, reach_px: u32) {
+    let mut filled = solid.clone();
+    filled.fill_holes();
+    if filled == *solid {
+        return;
+    }
+    let mut midst = (0..reach_px).fold(solid.clone(), |mask, _| mask.eroded());
+    midst.fill_holes();
+    let midst = (0..reach_px).fold(midst, |mask, _| mask.dilated());
+    for (bit, within) in solid.bits.iter_mut().zip(midst.bits) {
+        *bit |= within;
+    }
+}
