@@ -50,7 +50,6 @@ impl Floor {
         let Some(usual) = self.usual(lines) else {
             return false;
         };
-        let by_px = by_px.max(1.5 * self.spacing_px);
         let mut moved = false;
         for line in 0..lines.len() {
             let (outward, px) = lines[line];
