@@ -15,6 +15,9 @@ const BLACK: f32 = 48.0;
 /// It may stand half on dark things: its ground is the lighter quarter of what is behind it.
 const LIGHTER: f64 = 0.75;
 
+/// A limb is smaller than the body by more than this factor.
+const LIMB: u64 = 5;
+
 /// What the animal stands on.
 pub(super) struct Ground<'a> {
     plate: &'a Plate,
@@ -46,7 +49,7 @@ impl Ground<'_> {
     }
 
     /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is
-    /// hidden: it is mostly `own` (by the number of the mask's pixel), and nothing but dark things lie between.
+    /// hidden: it is small, mostly `own` (by the number of the mask's pixel), and only dark things lie between.
     pub(super) fn clear_images(&self, solid: &mut Mask, own: impl Fn(usize) -> bool) {
         let (rect, width) = (solid.rect, solid.width());
         let share =
@@ -70,7 +73,7 @@ impl Ground<'_> {
             let is_reached = reached
                 .as_ref()
                 .is_some_and(|part| part.bits[pixels[0]] == 1);
-            let is_limb = is_reached && 2 * n_own >= piece.area;
+            let is_limb = LIMB * piece.area < body.area && is_reached && 2 * n_own >= piece.area;
             if 2.0 * on_ground < piece.area as f32 && !is_limb {
                 pixels.iter().for_each(|&k| solid.bits[k] = 0);
             }
