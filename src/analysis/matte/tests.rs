@@ -268,3 +268,18 @@ fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
         assert!((shown - f64::from(FUR)).abs() < 4.0, "{shown} at {x}, {y}");
     }
 }
+
+/// The same, and its image farther on in the wall, as dark as itself.
+fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
+    let is_image = (92..108).contains(&x) && (27..39).contains(&y);
+    if is_image { FUR } else { across_the_wall(x, y) }
+}
+
+#[test]
+fn what_is_as_dark_as_the_animal_and_too_large_for_a_limb_is_an_image() {
+    let drawn = drawn_on(wall, with_image_across_the_wall);
+    assert_eq!(drawn.pixel(80, 33)[3], 255, "the body");
+    for (x, y) in (27..39).flat_map(|y| (92..108).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
