@@ -1,6 +1,7 @@
 //! What the animal casts on things much darker than its ground, as its mirror image in a dark wall: it stays behind.
 //! A few levels less are a large share of the little light there, and would be a dark patch on anything lighter.
 
+use super::solid::Coat;
 use crate::analysis::background::Plate;
 use crate::geometry::Rect;
 use crate::order::percentile;
@@ -16,7 +17,7 @@ const BLACK: f32 = 48.0;
 const LIGHTER: f64 = 0.75;
 
 /// A limb is smaller than the body by more than this factor.
-const LIMB: u64 = 5;
+const LIMB: u64 = 8;
 
 /// What the animal stands on.
 pub(super) struct Ground<'a> {
@@ -49,8 +50,8 @@ impl Ground<'_> {
     }
 
     /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is
-    /// hidden: it is small, mostly `own` (by the number of the mask's pixel), and only dark things lie between.
-    pub(super) fn clear_images(&self, solid: &mut Mask, own: impl Fn(usize) -> bool) {
+    /// hidden: it is small, mostly of the coat's color, and only dark things lie between.
+    pub(super) fn clear_images(&self, solid: &mut Mask, coat: &Coat) {
         let (rect, width) = (solid.rect, solid.width());
         let share =
             |k: usize| self.share_at(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
@@ -69,7 +70,7 @@ impl Ground<'_> {
         for piece in &pieces[1..] {
             let pixels = numbers(piece, rect);
             let on_ground: f32 = pixels.iter().map(|&k| share(k)).sum();
-            let n_own = pixels.iter().filter(|&&k| own(k)).count() as u64;
+            let n_own = pixels.iter().filter(|&&k| coat.matches(k)).count() as u64;
             let is_reached = reached
                 .as_ref()
                 .is_some_and(|part| part.bits[pixels[0]] == 1);

@@ -5,6 +5,11 @@ use crate::analysis::silhouette::{Difference, shadow};
 use crate::order::{median, percentile};
 use crate::raster::Mask;
 
+/// A pixel that differs by less than this share of what the starkest ones do is faint.
+const FAINT: f64 = 0.3;
+/// What is of the coat is off its color by less than this share of what it is off the plate.
+const MATCH: f64 = 0.25;
+
 /// What the animal looks like where it differs most from the plate.
 pub(super) struct Coat<'a> {
     difference: &'a Difference,
@@ -33,17 +38,17 @@ impl Coat<'_> {
 
     /// Whether a pixel differs by little of that.
     fn is_faint(&self, k: usize) -> bool {
-        f64::from(self.difference.levels[k]) < 0.3 * self.starkest
+        f64::from(self.difference.levels[k]) < FAINT * self.starkest
     }
 
     /// Whether a pixel has its color: it is much nearer to it than to the plate.
-    pub(super) fn is_at(&self, k: usize) -> bool {
+    pub(super) fn matches(&self, k: usize) -> bool {
         let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         let off = seen.iter().zip(self.color);
         let most_off = off.fold(0.0, |most, (&seen, color)| {
             f64::max(most, (f64::from(seen) - color).abs())
         });
-        most_off < 0.25 * f64::from(self.difference.levels[k])
+        most_off < MATCH * f64::from(self.difference.levels[k])
     }
 
     /// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
@@ -59,7 +64,7 @@ impl Coat<'_> {
             let at = (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x;
             if solid.bits[k] == 1
                 && self.is_faint(k)
-                && !self.is_at(k)
+                && !self.matches(k)
                 && (difference.levels[k] <= plate.weak_threshold(at)
                     || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0))
             {
