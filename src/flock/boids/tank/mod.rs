@@ -104,10 +104,25 @@ impl Tank {
         }
     }
 
-    /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where
-    /// each has less than a square of `ROOM_BL` in the picture.
+    /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where each has less than
+    /// a square of `ROOM_BL` in the picture, or in a deep tank, where they swim one behind another, less than a cube.
     pub fn closeness(&self, n: usize) -> f64 {
-        ((self.section_bl2 / n as f64).sqrt() / ROOM_BL).clamp(0.05, 1.0)
+        let (beside_bl, depth_bl) = (self.beside_bl(n), 2.0 * self.reach_bl[2]);
+        let apart_bl = match depth_bl > beside_bl {
+            true => libm::cbrt(beside_bl * beside_bl * depth_bl),
+            false => beside_bl,
+        };
+        (apart_bl / ROOM_BL).clamp(0.05, 1.0)
+    }
+
+    /// Whether `n` boids could keep the usual distances side by side.
+    pub fn has_room_beside(&self, n: usize) -> bool {
+        self.beside_bl(n) >= ROOM_BL
+    }
+
+    /// How far apart `n` boids are side by side.
+    fn beside_bl(&self, n: usize) -> f64 {
+        (self.section_bl2 / n as f64).sqrt()
     }
 
     /// How many fit in as near as boids may come to each other: side by side, and in side view one behind another.
@@ -206,6 +221,18 @@ mod tests {
             push[0] < 0.0 && push[1] == 0.0 && push[2] == 0.0,
             "{push:?}"
         );
+    }
+
+    #[test]
+    fn a_deep_tank_has_room_for_a_crowd_that_a_flat_one_has_not() {
+        let closeness = |depth_bl, n| Tank::new([0.0; 3], [12.0, 12.0, depth_bl]).closeness(n);
+        for depth_bl in [0.0, 1.0, 14.4] {
+            assert_eq!(closeness(depth_bl, 100), 1.0, "{depth_bl}");
+        }
+        for (depth_bl, wanted) in [(0.0, 0.316), (0.379, 0.316), (1.2, 0.464), (12.0, 1.0)] {
+            let found = closeness(depth_bl, 1000);
+            assert!((found - wanted).abs() < 1e-3, "{depth_bl}: {found}");
+        }
     }
 
     proptest! {
