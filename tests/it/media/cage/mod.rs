@@ -114,7 +114,8 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
         attempt("udp", udp.to_owned(), alone(&[Calls])),
         attempt("fork", String::new(), alone(&[Calls])),
         attempt("memory", String::new(), alone(&[Limits])),
-        attempt("trace", String::new(), traced),
+        // Only one may trace it, and a film is read by two at once.
+        writing("trace", String::new(), traced),
         attempt("stop", String::new(), alone(&[Signals, Calls])),
         attempt("stop-thread", String::new(), alone(&[Signals, Calls])),
         attempt("truncate", path("secret"), alone(&[Files, Calls])),
