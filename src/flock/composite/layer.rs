@@ -9,9 +9,10 @@ use super::truth::{Drawn, Whole};
 use super::view::View;
 use crate::cpu::Level;
 use crate::flock::individual::{Fade, Individual};
+use crate::geometry::Rect;
 use crate::library::Sprites;
 use crate::raster::blend::{haze, mix};
-use crate::raster::canvas::Cover;
+use crate::raster::canvas::{Canvas, Cover};
 use crate::raster::resample::{Placement, Quad, Resampled, Room};
 
 /// What drawing needs besides the individual.
@@ -71,6 +72,27 @@ impl Painter {
                 veil.color,
             );
         }
+    }
+
+    /// Draws an individual under what is on a canvas, which is nearer; returns its box. The layer is none then that
+    /// anybody may ask for.
+    pub(super) fn paint_under(
+        &mut self,
+        stage: &Stage,
+        who: &Appearance,
+        canvas: &mut Canvas,
+        cover: &mut Cover,
+    ) -> Rect {
+        if who.fade.is_some() || stage.haze.is_some() {
+            self.paint(stage, who, Some(cover));
+            canvas.under(&self.layer, cover, stage.cpu);
+            return self.layer.rect;
+        }
+        // Nothing more is done to it: it need not be a layer first.
+        let (place, t) = (placement(stage, who), who.frame_idx);
+        let frame = who.individual.source_frame[t];
+        let sprite = (stage.stock).take(stage.sprites, frame, place.scale, &mut self.packed);
+        canvas.draw_under(&sprite, &place, cover, stage.cpu)
     }
 
     /// Draws the shadow of an individual in place of it.

@@ -292,14 +292,23 @@ impl<'a> Compositor<'a> {
     }
 
     fn draw(&self, who: &Appearance, desk: &mut Desk) {
-        // The truth asks for everyone whole.
-        let nearer = (!self.with_truth).then_some(&desk.cover);
-        desk.painter.paint(&self.stage(), who, nearer);
-        desk.put(self.cpu);
+        let stage = self.stage();
         if self.with_truth {
-            let drawn = desk.painter.drawn(&self.stage(), who);
-            desk.drawn.push(drawn);
+            // It asks for everyone whole.
+            desk.painter.paint(&stage, who, None);
+            desk.put(self.cpu);
+            desk.drawn.push(desk.painter.drawn(&stage, who));
+            return;
         }
+        let Desk {
+            painter,
+            canvas,
+            cover,
+            boxes,
+            ..
+        } = desk;
+        let rect = painter.paint_under(&stage, who, canvas, cover);
+        boxes.extend((!rect.is_empty()).then_some(rect));
     }
 }
 
@@ -307,8 +316,7 @@ impl Desk {
     /// Puts what the painter has drawn under what is on the canvas.
     fn put(&mut self, cpu: Level) {
         let layer = &self.painter.layer;
-        self.canvas.under(layer, cpu);
-        self.cover.add(layer, &self.canvas);
+        self.canvas.under(layer, &mut self.cover, cpu);
         if !layer.rect.is_empty() {
             self.boxes.push(layer.rect);
         }

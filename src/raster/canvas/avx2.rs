@@ -27,6 +27,16 @@ pub(super) fn under_row(row: &mut [Quad], sprite: &[Quad]) {
     unsafe { _mm256_maskstore_epi64(row_rest.as_mut_ptr().cast(), rest, drawn) };
 }
 
+/// Has pixels fetched that are about to be drawn under: they are far from the row before.
+#[inline]
+#[target_feature(enable = "avx2")]
+pub(super) fn prefetch(row: &[Quad]) {
+    const LINE: usize = 64 / size_of::<Quad>();
+    for pixel in row.iter().step_by(LINE).chain(row.last()) {
+        _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(pixel).cast());
+    }
+}
+
 /// A mask of the first `n` pixels of four.
 #[inline]
 #[target_feature(enable = "avx2")]

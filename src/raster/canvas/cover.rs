@@ -5,12 +5,14 @@
 
 use std::ops::Range;
 
-use super::Canvas;
 use crate::geometry::Rect;
-use crate::raster::resample::{ONE, Quad, Resampled};
+use crate::raster::resample::{ONE, Quad};
 
 /// Columns and rows of a tile: even, so that no block of chroma is parted.
 const TILE: usize = 16;
+/// From this alpha on a pixel counts as letting nothing through: less than half a level of 8 bits. Of fins and soft
+/// edges, one before another, only ever more little is left.
+const OPAQUE: i16 = ONE - ONE / 512;
 /// Columns of a block.
 const BLOCK: usize = 8;
 
@@ -40,24 +42,22 @@ impl Cover {
         self.touched.fill(true);
     }
 
-    /// Adds a layer, which has been put on the canvas.
-    pub fn add(&mut self, layer: &Resampled, canvas: &Canvas) {
+    /// Adds columns of row `y`, which is `drawn` as they left it.
+    #[inline(always)]
+    pub(super) fn add_run(&mut self, y: u32, columns: Range<u32>, drawn: &[Quad]) {
+        let [y, x, to] = [y, columns.start, columns.end].map(|at| at as usize);
         let width = self.size[0] as usize;
         let (n_tiles, n_words) = (width.div_ceil(TILE), words_of(width));
-        for ([x, y], row) in layer.shown() {
-            let (x, y, to) = (x as usize, y as usize, x as usize + row.len());
-            let line = y / TILE * n_tiles;
-            self.touched[line + x / TILE..line + to.div_ceil(TILE)].fill(true);
-            let words = &mut self.opaque[y * n_words..][..n_words];
-            let drawn = &canvas.pixels[y * width..][..width];
-            for block in x / BLOCK..to.div_ceil(BLOCK) {
-                let rest = &drawn[block * BLOCK..];
-                let is_opaque = match rest.first_chunk::<BLOCK>() {
-                    Some(pixels) => are_opaque(pixels),
-                    None => are_opaque(rest),
-                };
-                words[block / 64] |= u64::from(is_opaque) << (block % 64);
-            }
+        let line = y / TILE * n_tiles;
+        self.touched[line + x / TILE..line + to.div_ceil(TILE)].fill(true);
+        let words = &mut self.opaque[y * n_words..][..n_words];
+        for block in x / BLOCK..to.div_ceil(BLOCK) {
+            let rest = &drawn[block * BLOCK..];
+            let is_opaque = match rest.first_chunk::<BLOCK>() {
+                Some(pixels) => are_opaque(pixels),
+                None => are_opaque(rest),
+            };
+            words[block / 64] |= u64::from(is_opaque) << (block % 64);
         }
     }
 
@@ -97,8 +97,9 @@ impl Cover {
 /// Whether all pixels let nothing through.
 #[inline(always)]
 fn are_opaque(pixels: &[Quad]) -> bool {
-    // Alpha goes to ONE, a power of two, which no lesser one has a bit of.
-    pixels.iter().fold(ONE, |all, pixel| all & pixel[3]) == ONE
+    // All four channels, as vectors take them: no color is more than its alpha.
+    let least = |a: Quad, b: &Quad| std::array::from_fn(|k| a[k].min(b[k]));
+    pixels.iter().fold([ONE; 4], least)[3] >= OPAQUE
 }
 
 /// Words for the blocks of a row.
@@ -123,6 +124,9 @@ fn find(within: Range<u32>, words: impl Fn(usize) -> u64) -> u32 {
 mod tests {
     use super::*;
     use crate::cpu::Level;
+    use crate::raster::canvas::straight;
+    use crate::raster::resample::Resampled;
+    use crate::raster::{Canvas, RgbImage};
 
     fn rect(x: u32, y: u32, w: u32, h: u32) -> Rect {
         Rect { x, y, w, h }
@@ -130,21 +134,21 @@ mod tests {
 
     #[test]
     fn every_tile_that_a_layer_shows_on_is_taken_once() {
-        let (mut cover, canvas) = (Cover::none([50, 40]), Canvas::new(50, 40));
+        let (mut cover, mut canvas) = (Cover::none([50, 40]), Canvas::new(50, 40));
         let mut layer = Resampled {
             rect: rect(10, 15, 8, 3),
             pixels: vec![[1; 4]; 24],
             // To the edge of a tile, nothing, and beyond it.
             runs: vec![[15, 10, 16], [17, 15, 18]],
         };
-        cover.add(&layer, &canvas);
-        cover.add(&layer, &canvas);
+        canvas.under(&layer, &mut cover, Level::Scalar);
+        canvas.under(&layer, &mut cover, Level::Scalar);
         let boxes: Vec<Rect> = cover.take().collect();
         assert_eq!(boxes, [rect(0, 0, 16, 16), rect(0, 16, 32, 16)]);
         assert_eq!(cover.take().count(), 0);
         layer.rect.x = 42;
         layer.show_whole();
-        cover.add(&layer, &canvas);
+        canvas.under(&layer, &mut cover, Level::Scalar);
         let boxes: Vec<Rect> = cover.take().collect();
         assert_eq!(boxes, [rect(32, 0, 18, 16), rect(32, 16, 18, 16)]);
         cover.touch_all();
@@ -157,9 +161,9 @@ mod tests {
         for (columns, alpha) in [
             (0..3, ONE),
             (14..25, ONE),
-            (60..70, ONE),
-            (70..75, ONE - 1),
-            (130..200, ONE),
+            (60..70, OPAQUE),
+            (70..75, OPAQUE - 1),
+            (130..200, OPAQUE),
         ] {
             let n = columns.len();
             let layer = Resampled {
@@ -167,8 +171,7 @@ mod tests {
                 pixels: vec![[0, 0, 0, alpha]; n],
                 runs: vec![[1, columns.start, columns.end]],
             };
-            canvas.under(&layer, Level::Scalar);
-            cover.add(&layer, &canvas);
+            canvas.under(&layer, &mut cover, Level::Scalar);
         }
         let open = |y, within: Range<u32>| cover.next_open(y, within);
         // Only whole blocks count: 16..24 and 136..200.
@@ -180,5 +183,34 @@ mod tests {
         assert_eq!(open(0, 0..200), 0..200);
         assert!(cover.take().count() > 0);
         assert_eq!(cover.next_open(1, 0..200), 0..200);
+    }
+
+    #[test]
+    fn what_is_left_out_is_less_than_half_a_level() {
+        let row = |pixel| Resampled {
+            rect: rect(0, 0, 8, 1),
+            pixels: vec![pixel; 8],
+            runs: vec![[0, 0, 8]],
+        };
+        let behind = |alpha: i16, color| {
+            let (mut cover, mut canvas) = (Cover::none([8, 1]), Canvas::new(8, 1));
+            for pixel in [[0, 0, 0, alpha], [color, color, color, ONE]] {
+                canvas.under(&row(pixel), &mut cover, Level::Scalar);
+            }
+            // Black behind all.
+            canvas.under_box(
+                &Canvas::of_rgb(&RgbImage::new(8, 1)),
+                rect(0, 0, 8, 1),
+                Level::Scalar,
+            );
+            canvas.pixels[0]
+        };
+        assert_eq!(behind(OPAQUE, ONE), behind(OPAQUE, 0));
+        let [seen, unseen] = [ONE, 0].map(|color| behind(OPAQUE - 1, color)[0]);
+        assert!(
+            seen - unseen <= ONE / 255 / 2 + 1 && seen > unseen,
+            "{seen}"
+        );
+        assert_eq!(straight(behind(OPAQUE, ONE))[3], 255);
     }
 }

@@ -8,8 +8,10 @@ mod planes; // to an encoder's planes
 
 pub use cover::Cover;
 
+use std::ops::Range;
+
 use super::RgbImage;
-use super::resample::{ONE, Quad, Resampled, scaled};
+use super::resample::{ONE, Placement, Premultiplied, Quad, Resampled, Surface, draw_on, scaled};
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
@@ -59,16 +61,31 @@ impl Canvas {
         }
     }
 
-    /// Draws a placed sprite under what is there: nearer ones come first.
-    pub fn under(&mut self, sprite: &Resampled, cpu: Level) {
-        for ([x, y], sprite_row) in sprite.shown() {
-            let first = y as usize * self.width as usize + x as usize;
-            put_under(
-                &mut self.pixels[first..first + sprite_row.len()],
-                sprite_row,
-                cpu,
-            );
+    /// Draws a layer under what is there, where that lets anything through: nearer ones come first.
+    pub fn under(&mut self, layer: &Resampled, cover: &mut Cover, cpu: Level) {
+        let mut below = Below::of(self, cover, cpu);
+        for ([x, y], pixels) in layer.shown() {
+            let to = x + pixels.len() as u32;
+            let mut open = below.next_open(y, x..to);
+            while !open.is_empty() {
+                let run = (open.start - x) as usize..(open.end - x) as usize;
+                below.put(y, open.clone(), &pixels[run]);
+                open = below.next_open(y, open.end..to);
+            }
         }
+    }
+
+    /// The same with a placed sprite that nothing else is done to.
+    pub fn draw_under(
+        &mut self,
+        sprite: &Premultiplied,
+        place: &Placement,
+        cover: &mut Cover,
+        cpu: Level,
+    ) -> Rect {
+        let size = [self.width, self.height];
+        let mut below = Below::of(self, cover, cpu);
+        draw_on(&mut below, size, sprite, place, cpu)
     }
 
     /// Draws a box of another canvas of the same size under what is there.
@@ -92,6 +109,12 @@ impl Canvas {
         }
     }
 
+    #[inline(always)]
+    fn row_mut(&mut self, y: u32) -> &mut [Quad] {
+        let width = self.width as usize;
+        &mut self.pixels[y as usize * width..][..width]
+    }
+
     /// Where the rows of a box lie among the pixels.
     fn rows(&self, rect: Rect) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let width = self.width as usize;
@@ -99,6 +122,56 @@ impl Canvas {
             let first = y as usize * width + rect.x as usize;
             first..first + rect.w as usize
         })
+    }
+}
+
+/// What is below all that has been drawn on a canvas.
+struct Below<'a> {
+    canvas: &'a mut Canvas,
+    cover: &'a mut Cover,
+    /// Memory for a run.
+    row: Vec<Quad>,
+    cpu: Level,
+}
+
+impl<'a> Below<'a> {
+    fn of(canvas: &'a mut Canvas, cover: &'a mut Cover, cpu: Level) -> Below<'a> {
+        Below {
+            canvas,
+            cover,
+            row: Vec::new(),
+            cpu,
+        }
+    }
+
+    /// Puts pixels into columns of row `y`.
+    #[inline(always)]
+    fn put(&mut self, y: u32, columns: Range<u32>, pixels: &[Quad]) {
+        let drawn = self.canvas.row_mut(y);
+        let above = &mut drawn[columns.start as usize..columns.end as usize];
+        put_under(above, pixels, self.cpu);
+        self.cover.add_run(y, columns, drawn);
+    }
+}
+
+impl Surface for Below<'_> {
+    #[inline(always)]
+    fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
+        self.cover.next_open(y, within)
+    }
+
+    #[inline(always)]
+    fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad])) {
+        let n = columns.len();
+        let mut row = std::mem::take(&mut self.row);
+        if row.len() < n {
+            row.resize(n, [0; 4]);
+        }
+        let above = &self.canvas.row_mut(y)[columns.start as usize..columns.end as usize];
+        prefetch(above, self.cpu);
+        draw(&mut row[..n]);
+        self.put(y, columns, &row[..n]);
+        self.row = row;
     }
 }
 
@@ -128,6 +201,22 @@ pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
     let color = |value: i16| ((i32::from(value) * 255 + whole / 2) / whole).min(255) as u8;
     let alpha = ((whole * 255 + 8192) >> 14) as u8;
     [color(r), color(g), color(b), alpha]
+}
+
+/// Has pixels fetched that are needed soon.
+#[inline(always)]
+fn prefetch(row: &[Quad], cpu: Level) {
+    match cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+            #[expect(unsafe_code, reason = "a kernel for AVX2")]
+            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            unsafe {
+                avx2::prefetch(row);
+            }
+        }
+        _ => {}
+    }
 }
 
 fn put_under(row: &mut [Quad], below: &[Quad], cpu: Level) {
@@ -184,13 +273,14 @@ mod tests {
         ] {
             for cpu in Level::available() {
                 let mut canvas = Canvas::new(1, 1);
-                canvas.under(&layer(rect, pixel), cpu);
+                let mut cover = Cover::none([1, 1]);
+                canvas.under(&layer(rect, pixel), &mut cover, cpu);
                 let mut shown = canvas.clone();
                 let mut behind = Canvas::new(1, 1);
                 behind.pixels[0] = opaque([100; 3]);
                 shown.under_box(&behind, rect, cpu);
                 assert_eq!(straight(shown.pixels[0]), want, "{}", cpu.name());
-                canvas.under(&layer(rect, opaque([100; 3])), cpu);
+                canvas.under(&layer(rect, opaque([100; 3])), &mut cover, cpu);
                 assert_eq!(straight(canvas.pixels[0]), want, "{}", cpu.name());
             }
         }
@@ -201,7 +291,7 @@ mod tests {
         let mut canvas = Canvas::new(2, 1);
         let [r, g, b, a] = opaque([200, 100, 40]);
         let quarter = layer(Rect::of_size(1, 1), [r / 4, g / 4, b / 4, a / 4]);
-        canvas.under(&quarter, Level::detect());
+        canvas.under(&quarter, &mut Cover::none([2, 1]), Level::detect());
         let mut rgba = vec![9; 8];
         canvas.straight_into(Rect::of_size(2, 1), &mut rgba);
         assert_eq!(rgba, [200, 100, 40, 64, 9, 9, 9, 0]);
@@ -259,7 +349,7 @@ mod tests {
             sprite.pixels = other.pixels;
             let with = |cpu: Level| {
                 let mut canvas = base.clone();
-                canvas.under(&sprite, cpu);
+                canvas.under(&sprite, &mut Cover::none([width, height]), cpu);
                 canvas.under_box(&anything(seed + 5, width, height), rect, cpu);
                 let mut frame = Frame::new(width, height, ColorSpec::default());
                 frame.draw_canvas(&canvas, rect, cpu);

@@ -7,18 +7,13 @@ use std::arch::x86_64::*;
 
 use super::catmull_rom::{HALF_PLACE, TWICE, WIDE};
 use super::map::Map;
-use super::{ONE, Premultiplied, Quad, Resampled};
-use crate::raster::canvas::Cover;
+use super::{ONE, Premultiplied, Quad, Surface, draw_rows_with};
+use crate::geometry::Rect;
 
-/// All rows of a layer.
+/// All rows of a sprite.
 #[target_feature(enable = "avx2")]
-pub(super) fn draw_rows(
-    layer: &mut Resampled,
-    sprite: &Premultiplied,
-    map: &Map,
-    nearer: Option<&Cover>,
-) {
-    layer.draw_rows(sprite, map, nearer, |sprite, row, start, step| {
+pub(super) fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map)) {
+    draw_rows_with(surface, rect, from, |sprite, row, start, step| {
         interpolate(sprite, row, start, step);
     });
 }

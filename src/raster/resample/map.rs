@@ -9,6 +9,8 @@ pub(super) struct Map {
     origin: [f64; 2],
     pub(super) per_column: [f64; 2],
     per_row: [f64; 2],
+    /// Columns to a pixel of the sprite; infinite where a row goes along.
+    columns: [f64; 2],
     place: Placement,
 }
 
@@ -69,6 +71,7 @@ impl Map {
             origin,
             per_column,
             per_row,
+            columns: per_column.map(f64::recip),
             place: *place,
         }
     }
@@ -141,7 +144,7 @@ impl Map {
                 }
                 continue;
             }
-            let (a, b) = ((low - start[axis]) / step, (high - start[axis]) / step);
+            let [a, b] = [low, high].map(|edge| (edge - start[axis]) * self.columns[axis]);
             from = from.max(a.min(b).floor() + 1.0);
             to = to.min(a.max(b).ceil());
         }

@@ -11,6 +11,8 @@ mod catmull_rom; // the interpolation of one row
 mod map; // from picture to sprite
 mod premultiplied; // a sprite as it is interpolated
 
+use std::ops::Range;
+
 pub(super) use catmull_rom::scaled;
 pub use premultiplied::{Premultiplied, bounds_of};
 
@@ -64,18 +66,18 @@ impl Resampled {
     /// placement's scale.
     pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, room: Room, cpu: Level) {
         let map = Map::new(sprite, place);
-        self.begin(map.covered(sprite, room.size));
-        match cpu {
-            #[cfg(target_arch = "x86_64")]
-            Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                #[expect(unsafe_code, reason = "a kernel for AVX2")]
-                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
-                unsafe {
-                    avx2::draw_rows(self, sprite, &map, room.nearer);
-                }
-            }
-            _ => self.draw_rows(sprite, &map, room.nearer, Premultiplied::interpolate),
-        }
+        let rect = map.covered(sprite, room.size);
+        self.begin(rect);
+        let nearer = room.nearer;
+        draw_rows(
+            &mut Layer {
+                layer: self,
+                nearer,
+            },
+            rect,
+            (sprite, &map),
+            cpu,
+        );
     }
 
     /// Nothing yet, in a box.
@@ -85,46 +87,6 @@ impl Resampled {
         let area = rect.area() as usize;
         if self.pixels.len() < area {
             self.pixels.resize(area, [0; 4]);
-        }
-    }
-
-    /// Draws with a kernel, for whose instructions this is compiled too.
-    #[inline(always)]
-    fn draw_rows(
-        &mut self,
-        sprite: &Premultiplied,
-        map: &Map,
-        nearer: Option<&Cover>,
-        interpolate: impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
-    ) {
-        let (left, width, way) = (self.rect.x, self.rect.w as usize, map.way());
-        let rows = self.pixels.chunks_exact_mut(width.max(1));
-        for (row, y) in rows.zip(self.rect.y..self.rect.bottom()) {
-            let open = |from: usize, to: usize| {
-                let columns = left + from as u32..left + to as u32;
-                match nearer {
-                    Some(nearer) => nearer.next_open(y, columns),
-                    None => columns,
-                }
-            };
-            if open(0, width).is_empty() {
-                continue;
-            }
-            let start = map.source(f64::from(left) + 0.5, f64::from(y) + 0.5);
-            let (from, to) = map.columns_within(sprite, width, start);
-            let first: [f64; 2] =
-                std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
-            let first = first.map(fixed);
-            let seen = sprite.seen(first, &way, to - from);
-            let to = from + seen.end;
-            let mut run = open(from + seen.start, to);
-            while !run.is_empty() {
-                self.runs.push([y, run.start, run.end]);
-                let [start, end] = [run.start, run.end].map(|x| (x - left) as usize);
-                let place = way.along(first, (start - from) as i32);
-                interpolate(sprite, &mut row[start..end], place, way.step);
-                run = open(end, to);
-            }
         }
     }
 
@@ -153,6 +115,100 @@ impl Resampled {
             }
         }
         alpha
+    }
+}
+
+/// What the rows of a placed sprite are drawn on.
+pub(super) trait Surface {
+    /// The first columns of `within`, in row `y`, where anything may show; empty when there are none.
+    fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32>;
+
+    /// Takes what `draw` makes of a run of columns of row `y`.
+    fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad]));
+}
+
+/// A layer that is begun.
+struct Layer<'a> {
+    layer: &'a mut Resampled,
+    nearer: Option<&'a Cover>,
+}
+
+impl Surface for Layer<'_> {
+    #[inline(always)]
+    fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
+        match self.nearer {
+            Some(nearer) => nearer.next_open(y, within),
+            None => within,
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad])) {
+        let Resampled { rect, pixels, runs } = self.layer;
+        let first = ((y - rect.y) * rect.w + columns.start - rect.x) as usize;
+        draw(&mut pixels[first..first + columns.len()]);
+        runs.push([y, columns.start, columns.end]);
+    }
+}
+
+/// Draws a placed sprite straight on a surface of `size` pixels; returns the box that it lies in. The sprite must
+/// have been made for the placement's scale.
+pub(super) fn draw_on(
+    surface: &mut impl Surface,
+    size: [u32; 2],
+    sprite: &Premultiplied,
+    place: &Placement,
+    cpu: Level,
+) -> Rect {
+    let map = Map::new(sprite, place);
+    let rect = map.covered(sprite, size);
+    draw_rows(surface, rect, (sprite, &map), cpu);
+    rect
+}
+
+fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map), cpu: Level) {
+    match cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
+            #[expect(unsafe_code, reason = "a kernel for AVX2")]
+            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            unsafe {
+                avx2::draw_rows(surface, rect, from);
+            }
+        }
+        _ => draw_rows_with(surface, rect, from, Premultiplied::interpolate),
+    }
+}
+
+/// Draws with a kernel, for whose instructions this is compiled too.
+#[inline(always)]
+fn draw_rows_with(
+    surface: &mut impl Surface,
+    rect: Rect,
+    (sprite, map): (&Premultiplied, &Map),
+    interpolate: impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
+) {
+    let (left, width, way) = (rect.x, rect.w as usize, map.way());
+    for y in rect.y..rect.bottom() {
+        let open = |surface: &_, from: usize, to: usize| {
+            Surface::next_open(surface, y, left + from as u32..left + to as u32)
+        };
+        if open(surface, 0, width).is_empty() {
+            continue;
+        }
+        let start = map.source(f64::from(left) + 0.5, f64::from(y) + 0.5);
+        let (from, to) = map.columns_within(sprite, width, start);
+        let first: [f64; 2] = std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
+        let first = first.map(fixed);
+        let seen = sprite.seen(first, &way, to - from);
+        let to = from + seen.end;
+        let mut run = open(surface, from + seen.start, to);
+        while !run.is_empty() {
+            let [start, end] = [run.start, run.end].map(|x| (x - left) as usize);
+            let place = way.along(first, (start - from) as i32);
+            surface.take(y, run, |row| interpolate(sprite, row, place, way.step));
+            run = open(surface, end, to);
+        }
     }
 }
 

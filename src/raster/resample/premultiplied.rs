@@ -10,8 +10,9 @@ use crate::geometry::Rect;
 
 /// Transparent pixels around a sprite.
 pub(super) const PAD: usize = 4;
-/// Pixels beyond its own that a sprite reaches by interpolation.
-pub(super) const REACH: usize = 2;
+/// Nothing shows so many pixels beyond a sprite's own, and farther: what shows lies between pixels that do. Where only
+/// negative weights meet, interpolation would tell of two hundredths of a level of a ghost.
+pub(super) const REACH: usize = 1;
 /// Below this scale a sprite is halved first.
 const LEAST_SCALE: f64 = 0.6;
 /// A sprite is a dot by then.
@@ -28,8 +29,8 @@ pub struct Premultiplied {
     pub(super) bounds: [usize; 4],
     /// The bounds and a border of `PAD`, by rows.
     pub(super) pixels: Vec<Quad>,
-    /// Per row: the columns, in 65536ths, between which interpolation finds anything; from above to when
-    /// it finds nothing.
+    /// Per row: the columns, in 65536ths, between which a place lies beside a pixel that shows; from above to when
+    /// none does.
     pub(super) spans: Vec<[i32; 2]>,
 }
 
@@ -167,8 +168,8 @@ impl Premultiplied {
                 continue;
             };
             let (first, last) = ((first - REACH) as i32, (last + REACH) as i32);
-            // This row is a tap of the two rows before it, its own, and the one after.
-            for span in &mut self.spans[y - 2..y + 2] {
+            // Places of the row before it and of its own lie beside it.
+            for span in &mut self.spans[y - 1..=y] {
                 *span = [span[0].min(first << 16), span[1].max(last << 16)];
             }
         }

@@ -182,7 +182,7 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
     for (k, pixel) in canvas.pixels.iter_mut().enumerate() {
         // Whole blocks are hidden, and in the others a pixel here and there.
         let hides = k / 8 % 2 == 1 || k % 3 == 2;
-        pixel[3] = if hides { ONE } else { ONE - 1 };
+        pixel[3] = if hides { ONE } else { ONE - ONE / 256 };
     }
     let mut nearer = Cover::none([40, 30]);
     let mut everywhere = Resampled {
@@ -191,7 +191,7 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
         runs: Vec::new(),
     };
     everywhere.show_whole();
-    nearer.add(&everywhere, &canvas);
+    Canvas::new(40, 30).under(&everywhere, &mut nearer, Level::Scalar);
     let bounds = Rect::of_size(12, 12);
     let sprite = Premultiplied::of(&square(), [12, 12], bounds, 1.0);
     for cpu in Level::available() {
@@ -266,4 +266,44 @@ fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
         n_empty += usize::from(n > 1 && (0..n).find(finds).is_none());
     }
     assert!(n_empty > 50, "{n_empty}");
+}
+
+#[test]
+fn what_lies_beside_a_pixel_that_shows_is_drawn() {
+    // An eighth of all pixels, so that many lie alone.
+    let mut rgba = checkered(14, 9);
+    for (k, pixel) in rgba.chunks_exact_mut(4).enumerate() {
+        pixel[3] = if k * 5 % 8 == 0 { 255 } else { 0 };
+    }
+    let bounds = bounds_of(&rgba, 14);
+    for k in 0..12 {
+        let turned = Placement {
+            rotation_rad: 0.5 * f64::from(k),
+            scale: 0.7 + 0.2 * f64::from(k),
+            ..place([20.0, 14.5])
+        };
+        let sprite = Premultiplied::of(&cut(&rgba, 14, bounds), [14, 9], bounds, turned.scale);
+        let map = Map::new(&sprite, &turned);
+        let found = drawn(&rgba, (14, 9), &turned);
+        let (alpha, rect, stride) = (found.alpha(), found.rect, sprite.stride());
+        for (alpha, at) in alpha.into_iter().zip(0..) {
+            let [x, y] = [rect.x + at % rect.w, rect.y + at / rect.w];
+            let place = map.source(f64::from(x) + 0.5, f64::from(y) + 0.5);
+            let [u, v] = place.map(|at| at.floor() as usize);
+            let beside = [0, 1, stride, stride + 1].map(|next| v * stride + u + next);
+            let is_beside = u + 1 < stride
+                && beside
+                    .iter()
+                    .any(|&at| sprite.pixels.get(at).is_some_and(|pixel| pixel[3] > 0));
+            let mut whole = [[0; 4]];
+            if is_beside {
+                sprite.interpolate(&mut whole, place.map(fixed), [0, 0]);
+            }
+            // Places are 256 to a pixel.
+            assert!(
+                alpha.abs_diff(whole[0][3] as u16) < 200,
+                "{k} {x} {y}: {alpha}"
+            );
+        }
+    }
 }
