@@ -59,8 +59,12 @@ fn order(
 
 /// Where something does not hold of so many.
 fn exceptions(name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> {
+    exceptions_in(&TANKS, name, count, holds)
+}
+
+fn exceptions_in(tanks: &[Vec3], name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> {
     let mut all = Vec::new();
-    for tank in TANKS {
+    for &tank in tanks {
         for animal in ANIMALS {
             for seed in 1..=6 {
                 let order = order((name, count, seed), animal, tank);
@@ -76,6 +80,13 @@ fn exceptions(name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> 
 #[test]
 fn a_school_is_polarized() {
     let none = exceptions("school", 20, |order| order.polarization > 0.65);
+    assert!(none.is_empty(), "{none:#?}");
+}
+
+#[test]
+fn a_crowd_in_a_deep_tank_is_polarized() {
+    let deep = [[12.0, 8.0, 12.0], [9.0, 7.0, 14.0]];
+    let none = exceptions_in(&deep, "school", 200, |order| order.polarization > 0.65);
     assert!(none.is_empty(), "{none:#?}");
 }
 
