@@ -205,6 +205,10 @@ pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
 
 /// Has pixels fetched that are needed soon.
 #[inline(always)]
+#[cfg_attr(
+    not(target_arch = "x86_64"),
+    expect(unused_variables, reason = "there is no kernel that fetches")
+)]
 fn prefetch(row: &[Quad], cpu: Level) {
     match cpu {
         #[cfg(target_arch = "x86_64")]
