@@ -10,8 +10,8 @@ use crate::geometry::Rect;
 
 /// Transparent pixels around a sprite.
 pub(super) const PAD: usize = 4;
-/// Nothing shows so many pixels beyond a sprite's own, and farther: what shows lies between pixels that do. Where only
-/// negative weights meet, interpolation would tell of two hundredths of a level of a ghost.
+/// From so many pixels beyond a sprite's own nothing shows: there only negative weights meet, and where they meet in both
+/// directions interpolation would leave a ghost, a sixty-fourth of a pixel at most.
 pub(super) const REACH: usize = 1;
 /// Below this scale a sprite is halved first.
 const LEAST_SCALE: f64 = 0.6;
