@@ -38,8 +38,8 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, plate, gain, rect);
     let mask = moved(silhouette, rect);
-    let coat = Coat::of(&mask, &difference);
-    let mut solid = coat.without_halo(&mask, plate, band_px);
+    let coat = Coat::of(&mask, &difference, plate);
+    let mut solid = coat.without_halo(&mask, band_px);
     let ground = Ground::of(&solid, plate);
     ground.clear_images(&mut solid, &coat);
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());

@@ -5,7 +5,7 @@ use crate::analysis::silhouette::{Difference, shadow};
 use crate::order::{median, percentile};
 use crate::raster::Mask;
 
-/// A pixel that differs by less than this share of what the starkest ones do is faint.
+/// A pixel that differs by less than this part of what the starkest ones do is faint.
 const FAINT: f64 = 0.3;
 /// What is of the coat is off its color by less than this share of what it is off the plate.
 const MATCH: f64 = 0.25;
@@ -13,32 +13,53 @@ const MATCH: f64 = 0.25;
 /// What the animal looks like where it differs most from the plate.
 pub(super) struct Coat<'a> {
     difference: &'a Difference,
-    /// What its starkest quarter differs by, at least: a mean would sink with the shadow around it.
+    plate: &'a Plate,
+    /// What its starkest quarter differs by, at least, in levels: a mean would sink with the shadow around it.
     starkest: f64,
+    /// The same as a share of the light.
+    starkest_share: f64,
     /// The median of R, G and B there.
     color: [f64; 3],
 }
 
 impl Coat<'_> {
-    pub(super) fn of<'a>(mask: &Mask, difference: &'a Difference) -> Coat<'a> {
-        let level = |k: usize| f64::from(difference.levels[k]);
-        let covered = || (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
-        let mut levels: Vec<f64> = covered().map(level).collect();
-        let starkest = percentile(&mut levels, 0.75).unwrap_or(0.0);
-        let channel = |c: usize| {
-            let stark = covered().filter(|&k| level(k) >= starkest);
-            median(stark.map(|k| f64::from(difference.rgb.pixels[3 * k + c]))).unwrap_or(0.0)
-        };
-        Coat {
+    pub(super) fn of<'a>(mask: &Mask, difference: &'a Difference, plate: &'a Plate) -> Coat<'a> {
+        let mut coat = Coat {
             difference,
-            starkest,
-            color: [0, 1, 2].map(channel),
-        }
+            plate,
+            starkest: 0.0,
+            starkest_share: 0.0,
+            color: [0.0; 3],
+        };
+        let covered = || (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
+        let stark = |mut values: Vec<f64>| percentile(&mut values, 0.75).unwrap_or(0.0);
+        coat.starkest = stark(covered().map(|k| coat.level(k)).collect());
+        coat.starkest_share = stark(covered().map(|k| coat.share(k)).collect());
+        coat.color = [0, 1, 2].map(|c| {
+            let stark = covered().filter(|&k| coat.level(k) >= coat.starkest);
+            median(stark.map(|k| f64::from(difference.rgb.pixels[3 * k + c]))).unwrap_or(0.0)
+        });
+        coat
     }
 
-    /// Whether a pixel differs by little of that.
+    /// How far a pixel lies from the plate.
+    fn level(&self, k: usize) -> f64 {
+        f64::from(self.difference.levels[k])
+    }
+
+    /// The same as a share of the brighter of the two, 0 to 1: the one shadow is more levels where the floor is brighter.
+    fn share(&self, k: usize) -> f64 {
+        let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
+        let (x, y) = ((k % width) as u32, (k / width) as u32);
+        let seen = self.difference.rgb.pixel(x, y);
+        let back = self.plate.rgb.pixel(rect.x + x, rect.y + y);
+        let brightest = seen.into_iter().chain(back).fold(1, u8::max);
+        self.level(k) / f64::from(brightest)
+    }
+
+    /// Whether a pixel differs by little of what the starkest ones do.
     fn is_faint(&self, k: usize) -> bool {
-        f64::from(self.difference.levels[k]) < FAINT * self.starkest
+        self.level(k) < FAINT * self.starkest || self.share(k) < FAINT * self.starkest_share
     }
 
     /// Whether a pixel has its color: it is much nearer to it than to the plate.
@@ -48,15 +69,15 @@ impl Coat<'_> {
         let most_off = off.fold(0.0, |most, (&seen, color)| {
             f64::max(most, (f64::from(seen) - color).abs())
         });
-        most_off < MATCH * f64::from(self.difference.levels[k])
+        most_off < MATCH * self.level(k)
     }
 
     /// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
     /// differ by little of what the animal mostly differs by and that look like the plate, only darker. So a shadow on the
     /// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
     /// belly over a white floor: solid all the same; and so is what has the coat's color, as black fur before a dark wall.
-    pub(super) fn without_halo(&self, mask: &Mask, plate: &Plate, band_px: u32) -> Mask {
-        let difference = self.difference;
+    pub(super) fn without_halo(&self, mask: &Mask, band_px: u32) -> Mask {
+        let (difference, plate) = (self.difference, self.plate);
         let mut solid = mask.clone();
         let (rect, width) = (mask.rect, mask.width());
         for k in 0..solid.bits.len() {

@@ -283,3 +283,35 @@ fn what_is_as_dark_as_the_animal_and_too_large_for_a_limb_is_an_image() {
         assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
     }
 }
+
+/// A floor that is brighter on the right.
+fn lit_from_the_right(x: u32, _: u32) -> u8 {
+    if x < 65 { 150 } else { 240 }
+}
+
+/// A dark body on the left, its paler tail on the right, and two shadows that two lamps make of the tail.
+fn with_two_shadows(x: u32, y: u32) -> u8 {
+    let floor = lit_from_the_right(x, y);
+    let is_along = (60..105).contains(&x);
+    match (away([x, y], BODY), y) {
+        (0, _) => FUR,
+        (_, 31..35) if is_along => floor / 2,
+        (_, 22..26 | 40..44) if is_along => (f32::from(floor) * 0.82) as u8,
+        _ => floor,
+    }
+}
+
+#[test]
+fn a_shadow_on_the_brighter_floor_is_a_shadow() {
+    let drawn = drawn_on(lit_from_the_right, with_two_shadows);
+    for x in 67..103 {
+        assert_eq!(drawn.pixel(x, 32)[3], 255, "the tail at {x}");
+        for y in (22..26).chain(40..44) {
+            let shown = drawn.over(FUR, [x, y]);
+            assert!(
+                shown < f64::from(FUR),
+                "the shadow at {x}, {y} shows as {shown}"
+            );
+        }
+    }
+}
