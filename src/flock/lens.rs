@@ -5,7 +5,7 @@
 //! is the given one, or a usual one before an animal whose size in the picture tells how far it is.
 
 use super::boids::tank::Wall;
-use super::boids::vector::{Vec3, norm};
+use super::boids::vector::{Vec3, norm, unit};
 use super::individual::rounded;
 use super::params::Params;
 use crate::geometry::Camera;
@@ -100,6 +100,15 @@ impl Lens {
         let receding = camera.receding(place, velocity);
         let px = camera.focal_px / camera.apparent_bl(place[2]) / self.length_px;
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
+    }
+
+    /// The line of sight: where to one moves, away from the camera, who is seen at the same point of the picture.
+    pub fn sight(&self, place: Vec3) -> Vec3 {
+        let away = [0.0, 0.0, 1.0];
+        let receding = self
+            .camera
+            .map_or(0.0, |camera| camera.receding(place, away));
+        unit([place[0] * receding, place[1] * receding, 1.0])
     }
 
     /// How fast one that otherwise moves at `velocity` must sink to be seen level, and how much faster or slower to be

@@ -76,8 +76,8 @@ struct Seen {
     /// sum p_j - p_i over those nearer than r_c, and how many they are.
     toward: Vec3,
     n_toward: f64,
-    /// sum of how fast they go across the picture.
-    across: f64,
+    /// sum v_j.
+    swim: Vec3,
 }
 
 impl Steering<'_> {
@@ -236,15 +236,22 @@ impl Steering<'_> {
         if self.tank.is_flat() || self.params.rules.circling > 0.0 {
             return [0.0; 3];
         }
+        let [x, _, z] = self.habitat.lens.sight(moment.position);
+        let sight = unit([x, 0.0, z]);
+        let across = [sight[2], 0.0, -sight[0]];
         let cruise = self.calibration.cruise_bl_per_s;
         let follow = (3.0 * self.params.rules.alignment.min(1.0) - 1.0) / seen.n.max(1.0);
-        let side = ((moment.velocity[0] + follow * seen.across) / cruise).clamp(-1.0, 1.0);
+        let swim = add_scaled(moment.velocity, follow, seen.swim);
+        let side = (dot(swim, across) / cruise).clamp(-1.0, 1.0);
         // Not onto a wall: its push leads back.
-        let across = [cruise.copysign(side), 0.0, 0.0];
-        let wall = self.tank.push(moment.position, across, WALL_HORIZON_S)[0];
+        let aside = scaled(cruise.copysign(side), across);
+        let wall = dot(
+            self.tank.push(moment.position, aside, WALL_HORIZON_S),
+            across,
+        );
         let side = (side + 2.0 * wall).clamp(-1.0, 1.0);
-        let into = moment.velocity[2] / cruise;
-        [side * into.abs(), 0.0, -into]
+        let into = dot(moment.velocity, sight) / cruise;
+        add_scaled(scaled(side * into.abs(), across), -into, sight)
     }
 
     /// The wandering turn, as the acceleration that makes it, and the way back to the slopes that the animal has:
@@ -289,7 +296,7 @@ impl Seen {
             seen.n += sees;
             seen.n_along += along;
             seen.n_toward += toward;
-            seen.across += sees * neighbor.velocity[0];
+            seen.swim = add_scaled(seen.swim, sees, neighbor.velocity);
             seen.along = add_scaled(seen.along, along, neighbor.velocity);
             seen.toward = add_scaled(seen.toward, toward, neighbor.offset);
         }

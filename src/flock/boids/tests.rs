@@ -1,7 +1,7 @@
 //! What a flock of boids promises: walls, limits, and the same numbers on any threads. `presets` has their order.
 
 use super::calibration::Slopes;
-use super::vector::{norm, unit};
+use super::vector::{dot, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
@@ -106,6 +106,32 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
         ..Calibration::default()
     };
     (params, calibration)
+}
+
+#[test]
+fn who_is_seen_broadside_swims_on_so_anywhere_in_the_picture() {
+    let library = synthetic::library(View::Side);
+    let (mut params, calibration) = alone(None);
+    params.rules.wander = 0.0;
+    let lens = Lens::of(&library, &params);
+    assert!(!lens.is_flat());
+    let tank = Tank::new([-9.0, -3.0, 6.0], [9.0, 3.0, 18.0]);
+    for x in [-8.0_f64, 8.0] {
+        let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+        let place = [x, 0.0, 12.0];
+        let [sight_x, _, sight_z] = lens.sight(place);
+        let inward = -x.signum();
+        let across = [inward * sight_z, 0.0, -inward * sight_x];
+        boids.show(vec![place], vec![across], None);
+        for _ in 0..90 {
+            boids.advance();
+            let along = dot(
+                unit(boids.velocities()[0]),
+                lens.sight(boids.positions()[0]),
+            );
+            assert!(along.abs() < 0.15, "from {x}: {along}");
+        }
+    }
 }
 
 #[test]
