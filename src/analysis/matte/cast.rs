@@ -1,6 +1,7 @@
 //! What the animal casts on things much darker than its ground, as its mirror image in a dark wall: it stays behind.
 //! A few levels less are a large share of the little light there, and would be a dark patch on anything lighter.
 
+use super::smooth;
 use super::solid::Coat;
 use crate::analysis::background::Plate;
 use crate::geometry::Rect;
@@ -45,8 +46,7 @@ impl Ground<'_> {
     /// How much of what is cast on a place of the frame goes with the animal: 0 to 1.
     pub(super) fn share_at(&self, x: u32, y: u32) -> f32 {
         let relative = (brightness(self.plate, x, y) + BLACK) / (self.brightness + BLACK);
-        let share = ((relative - DARKER[0]) / (DARKER[1] - DARKER[0])).clamp(0.0, 1.0);
-        share * share * (3.0 - 2.0 * share)
+        smooth((relative - DARKER[0]) / (DARKER[1] - DARKER[0]))
     }
 
     /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is

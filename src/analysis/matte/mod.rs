@@ -145,6 +145,18 @@ fn contrast(difference: &Difference, mask: &Mask) -> f64 {
     sum as f64 / mask.area().max(1) as f64
 }
 
+/// Less alpha is noise, not animal.
+const TRACE: f32 = 0.04;
+/// Between these differences, as parts of the least that counts, a shadow fades in: it goes on where the silhouette
+/// ends, and its faint rim would show as an edge.
+const FADED: [f32; 2] = [0.5, 2.0];
+
+/// 0 to 1 without a corner.
+fn smooth(share: f32) -> f32 {
+    let share = share.clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
+}
+
 /// What a pixel near the animal has a share of.
 enum Nearby {
     /// The animal's color there.
@@ -189,7 +201,8 @@ impl Puller<'_> {
             Nearby::Animal(color) => color,
             Nearby::Shadow => [0.0; 3],
         };
-        let sigma = self.plate.sigma[py as usize * self.plate.frame.width as usize + px as usize];
+        let at = py as usize * self.plate.frame.width as usize + px as usize;
+        let sigma = self.plate.sigma[at];
         let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
         let span_squared = dot(span, span);
         let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
@@ -203,12 +216,16 @@ impl Puller<'_> {
         } else {
             (dot(seen_span, span) / span_squared).clamp(0.0, 1.0)
         };
-        let alpha = match nearby {
-            Nearby::Animal(_) => alpha,
-            Nearby::Shadow => alpha * self.ground.share_at(px, py),
+        let (alpha, least) = match nearby {
+            Nearby::Animal(_) => (alpha, TRACE),
+            Nearby::Shadow => {
+                let weak = f32::from(self.plate.weak_threshold(at).max(1));
+                let beyond = f32::from(self.difference.levels[k]) / weak - FADED[0];
+                let fade = smooth(beyond / (FADED[1] - FADED[0]));
+                (alpha * fade * self.ground.share_at(px, py), 0.0)
+            }
         };
-        // A trace of alpha is noise, not animal.
-        if alpha < 0.04 {
+        if alpha < least {
             return [0; 4];
         }
         let color = if alpha > 0.2 {

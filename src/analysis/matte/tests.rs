@@ -115,6 +115,16 @@ fn a_shadow_darkens_whatever_it_falls_on_by_its_own_share() {
     }
 }
 
+#[test]
+fn a_shadow_fades_out_where_its_silhouette_ends() {
+    let drawn = drawn(with_shadow);
+    let shown: Vec<f64> = (64..85).map(|x| drawn.over(240, [x, 33])).collect();
+    for (x, pair) in (64..).zip(shown.windows(2)) {
+        assert!((pair[1] - pair[0]).abs() < 9.5, "{pair:?} at {x}");
+    }
+    assert!(*shown.last().expect("some") > 239.5, "{shown:?}");
+}
+
 /// A body with a spot as light as the paper; beside it two thin things that meet at both ends.
 fn with_gaps(x: u32, y: u32) -> u8 {
     let body = Rect {
