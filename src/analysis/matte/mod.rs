@@ -5,7 +5,7 @@
 //! from the plate toward the animal's color nearby, and the color is what remains when the plate's
 //! share is taken away. What is only shadow is black with the share of light that it takes. Computed
 //! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame,
-//! but for what is cast on things much darker than the ground (`cast`).
+//! but for what is cast on things much darker than the ground (`cast`), and for the faintest rim of shadows.
 
 mod cast;
 mod solid;
