@@ -13,16 +13,16 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         "school",
         [
             0x5c88_6421_384c_4c03,
-            0xfb53_2e2d_ae9f_ee9d,
-            0xce57_8a9d_e7e6_336a,
+            0xd624_7330_d2e2_3211,
+            0x2eaf_5adb_cf19_d51d,
         ],
     ),
     (
         "swarm",
         [
             0xb5b3_3357_c44b_4949,
-            0x6548_ce0a_82fe_57ce,
-            0x5061_2ab7_e4c9_e85d,
+            0xfd7d_33e3_4711_b465,
+            0x2281_bddb_e2dc_29d7,
         ],
     ),
     (
@@ -37,8 +37,8 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         "scatter",
         [
             0xa635_058c_6bb6_50e9,
-            0x4b0a_6249_67ff_abd6,
-            0x467a_aa78_fc6b_2ee4,
+            0x36b9_a186_ae0d_b381,
+            0xd61c_4f40_5f50_d6d3,
         ],
     ),
     (
@@ -53,8 +53,8 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
         "papers",
         [
             0xc091_5c60_3874_3464,
-            0x0116_29df_e6e5_5b75,
-            0xcca9_fdc9_7f13_0faa,
+            0x93e2_777e_a7cb_6679,
+            0xae69_ce29_e673_fa9e,
         ],
     ),
 ];

@@ -26,7 +26,7 @@ const SPREADING: f64 = 0.5;
 /// Time constant of coming back to a slope that the animal has.
 const LEVEL_S: f64 = 0.25;
 /// Weight of swimming across the picture rather than into it.
-const BROADSIDE: f64 = 1.0;
+const BROADSIDE: f64 = 1.5;
 
 /// One boid's moment.
 pub struct Moment<'a> {
@@ -66,8 +66,6 @@ pub struct Steering<'a> {
 /// What a boid sees of its neighbors.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
-    /// Who it sees.
-    n: f64,
     /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
     apart: Vec3,
     /// sum v_j over those nearer than r_a, and how many they are.
@@ -76,8 +74,6 @@ struct Seen {
     /// sum p_j - p_i over those nearer than r_c, and how many they are.
     toward: Vec3,
     n_toward: f64,
-    /// sum v_j.
-    swim: Vec3,
 }
 
 impl Steering<'_> {
@@ -163,7 +159,7 @@ impl Steering<'_> {
         let wishes = [
             scaled(together * rules.alignment, alignment),
             scaled(rules.circling, self.circling(moment)),
-            scaled(BROADSIDE, self.broadside(&seen, moment)),
+            scaled(BROADSIDE, self.broadside(moment)),
             scaled(together * rules.cohesion, seen.cohesion(rules)),
         ];
         (scaled(rules.separation, apart), wishes)
@@ -231,18 +227,24 @@ impl Steering<'_> {
     }
 
     /// In side view: out of the line of sight, to the side where the neighbors go, or, where nobody aligns, where fewer
-    /// go. Footage shows an animal best broadside, and a flock that lingers in depth would be seen end-on half the time.
-    fn broadside(&self, seen: &Seen, moment: &Moment) -> Vec3 {
+    /// go; the more so, the nearer to end-on. Footage shows an animal best broadside, and a flock that lingers in depth
+    /// would be seen end-on half the time.
+    fn broadside(&self, moment: &Moment) -> Vec3 {
         if self.tank.is_flat() || self.params.rules.circling > 0.0 {
             return [0.0; 3];
         }
         let [x, _, z] = self.habitat.lens.sight(moment.position);
         let sight = unit([x, 0.0, z]);
         let across = [sight[2], 0.0, -sight[0]];
+        // Courses count, not speeds: slow ones would never find a side to turn to.
+        let ahead = unit(moment.velocity);
+        let seen = (moment.neighbors.iter()).filter(|n| is_seen(n, ahead, self.cos_half_view));
+        let (sum, n) = seen.fold((0.0, 0.0), |(sum, n), neighbor| {
+            (sum + dot(unit(neighbor.velocity), across), n + 1.0)
+        });
+        let follow = (3.0 * self.params.rules.alignment.min(1.0) - 1.0) / f64::max(n, 1.0);
+        let side = (dot(ahead, across) + follow * sum).clamp(-1.0, 1.0);
         let cruise = self.calibration.cruise_bl_per_s;
-        let follow = (3.0 * self.params.rules.alignment.min(1.0) - 1.0) / seen.n.max(1.0);
-        let swim = add_scaled(moment.velocity, follow, seen.swim);
-        let side = (dot(swim, across) / cruise).clamp(-1.0, 1.0);
         // Not onto a wall: its push leads back.
         let aside = scaled(cruise.copysign(side), across);
         let wall = dot(
@@ -250,7 +252,8 @@ impl Steering<'_> {
             across,
         );
         let side = (side + 2.0 * wall).clamp(-1.0, 1.0);
-        let into = dot(moment.velocity, sight) / cruise;
+        let end_on = dot(ahead, sight);
+        let into = end_on * end_on * dot(moment.velocity, sight) / cruise;
         add_scaled(scaled(side * into.abs(), across), -into, sight)
     }
 
@@ -293,10 +296,8 @@ impl Seen {
             let sees = one_if(is_seen(neighbor, ahead, cos_half_view));
             let along = sees * one_if(neighbor.square_bl2 < along_bl2);
             let toward = sees * one_if(neighbor.square_bl2 < toward_bl2);
-            seen.n += sees;
             seen.n_along += along;
             seen.n_toward += toward;
-            seen.swim = add_scaled(seen.swim, sees, neighbor.velocity);
             seen.along = add_scaled(seen.along, along, neighbor.velocity);
             seen.toward = add_scaled(seen.toward, toward, neighbor.offset);
         }

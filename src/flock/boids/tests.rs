@@ -1,7 +1,7 @@
 //! What a flock of boids promises: walls, limits, and the same numbers on any threads. `presets` has their order.
 
 use super::calibration::Slopes;
-use super::vector::{dot, norm, unit};
+use super::vector::{norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
@@ -108,30 +108,34 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
     (params, calibration)
 }
 
+/// At the edges of the picture lines of sight lead along the walls.
 #[test]
-fn who_is_seen_broadside_swims_on_so_anywhere_in_the_picture() {
+fn a_slow_school_is_polarized_behind_a_camera_too() {
     let library = synthetic::library(View::Side);
-    let (mut params, calibration) = alone(None);
-    params.rules.wander = 0.0;
-    let lens = Lens::of(&library, &params);
-    assert!(!lens.is_flat());
-    let tank = Tank::new([-9.0, -3.0, 6.0], [9.0, 3.0, 18.0]);
-    for x in [-8.0_f64, 8.0] {
+    let calibration = Calibration {
+        cruise_bl_per_s: 0.2,
+        speed_limits_bl_per_s: [0.05, 0.8],
+        wander_rad_per_s: 1.2,
+        ..calibrated(&library, &preset("school"))
+    };
+    let order = |seed: u64| {
+        let params = Params {
+            count: 20,
+            seed,
+            ..preset("school")
+        };
+        let lens = Lens::of(&library, &params);
+        let tank = Tank::of(&library, &lens, &motion_of(&library, &lens), &params);
         let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
-        let place = [x, 0.0, 12.0];
-        let [sight_x, _, sight_z] = lens.sight(place);
-        let inward = -x.signum();
-        let across = [inward * sight_z, 0.0, -inward * sight_x];
-        boids.show(vec![place], vec![across], None);
-        for _ in 0..90 {
+        let orders = (0..400).map(|_| {
             boids.advance();
-            let along = dot(
-                unit(boids.velocities()[0]),
-                lens.sight(boids.positions()[0]),
-            );
-            assert!(along.abs() < 0.15, "from {x}: {along}");
-        }
-    }
+            boids.order().polarization
+        });
+        orders.sum::<f64>() / 400.0
+    };
+    let orders: Vec<f64> = (1..=8).map(order).collect();
+    let mean = orders.iter().sum::<f64>() / 8.0;
+    assert!(mean > 0.75, "{mean}: {orders:?}");
 }
 
 #[test]
