@@ -102,7 +102,7 @@ impl Lens {
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
     }
 
-    /// The line of sight: where to one moves, away from the camera, who is seen at the same point of the picture.
+    /// The line of sight, away from the camera: whoever moves along it stays at the same point of the picture. A unit vector.
     pub fn sight(&self, place: Vec3) -> Vec3 {
         let away = [0.0, 0.0, 1.0];
         let receding = self
