@@ -4,6 +4,7 @@
 //! In top view, and in a plane, a body length has the same size everywhere. In side view the camera
 //! is the given one, or a usual one before an animal whose size in the picture tells how far it is.
 
+use super::boids::lanes::{Lanes, splat3};
 use super::boids::tank::Wall;
 use super::boids::vector::{Vec3, norm, unit};
 use super::individual::rounded;
@@ -97,27 +98,35 @@ impl Lens {
         let Some(camera) = &self.camera else {
             return [velocity[0], velocity[1]];
         };
-        let receding = camera.receding(place, velocity);
+        let receding: f64 = camera.receding(place, velocity);
         let px = camera.focal_px / camera.apparent_bl(place[2]) / self.length_px;
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
     }
 
     /// The line of sight, away from the camera: whoever moves along it stays at the same point of the picture. A unit vector.
-    pub fn sight(&self, place: Vec3) -> Vec3 {
-        let away = [0.0, 0.0, 1.0];
-        let receding = self
-            .camera
-            .map_or(0.0, |camera| camera.receding(place, away));
-        unit([place[0] * receding, place[1] * receding, 1.0])
+    #[inline(always)]
+    pub fn sight<L: Lanes>(&self, place: [L; 3]) -> [L; 3] {
+        let away = splat3([0.0, 0.0, 1.0]);
+        let receding = self.receding(place, away);
+        unit([place[0] * receding, place[1] * receding, L::splat(1.0)])
     }
 
     /// How fast one that otherwise moves at `velocity` must sink to be seen level, and how much faster or slower to be
     /// seen at 45 degrees.
-    pub fn seen_level(&self, place: Vec3, velocity: Vec3) -> [f64; 2] {
-        let recedes = |camera: Pinhole| camera.receding(place, velocity);
-        let receding = self.camera.map_or(0.0, recedes);
+    #[inline(always)]
+    pub fn seen_level<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> [L; 2] {
+        let receding = self.receding(place, velocity);
         let across = velocity[0] - place[0] * receding;
         [place[1] * receding, across.abs()]
+    }
+
+    /// As `Pinhole::receding`; nothing recedes when flat.
+    #[inline(always)]
+    fn receding<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> L {
+        match &self.camera {
+            Some(camera) => camera.receding(place, velocity),
+            None => L::splat(0.0),
+        }
     }
 
     /// The depth, body lengths from the camera, at which a body length has so many pixels; 0 when flat.
@@ -176,13 +185,17 @@ impl Pinhole {
         }
     }
 
-    fn apparent_bl(&self, depth_bl: f64) -> f64 {
-        (self.pane_bl + (depth_bl - self.pane_bl) / self.medium_index).max(0.05)
+    #[inline(always)]
+    fn apparent_bl<L: Lanes>(&self, depth_bl: L) -> L {
+        let pane_bl = L::splat(self.pane_bl);
+        let beyond_bl = (depth_bl - pane_bl) / L::splat(self.medium_index);
+        (pane_bl + beyond_bl).max(L::splat(0.05))
     }
 
     /// The share of its apparent depth that is gained a second by what moves at `velocity`.
-    fn receding(&self, place: Vec3, velocity: Vec3) -> f64 {
-        velocity[2] / self.medium_index / self.apparent_bl(place[2])
+    #[inline(always)]
+    fn receding<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> L {
+        velocity[2] / L::splat(self.medium_index) / self.apparent_bl(place[2])
     }
 }
 

@@ -2,6 +2,7 @@
 //! any machine, with any vector instructions and threads.
 
 use super::calibration::{Calibration, Slopes};
+use super::params::{Goal, Obstacle, Predator};
 use super::tank::Tank;
 use super::*;
 use crate::flock::lens::Lens;
@@ -66,18 +67,26 @@ const SLOPES: Slopes = Slopes {
     in_picture: 1e9,
 };
 
-fn digest(params: &Params, depth_bl: f64, slopes: Option<Slopes>) -> u64 {
-    let calibration = Calibration {
+/// A school among goals and obstacles, before a predator, half of it drawn to where it meets.
+const DIGEST_OF_A_FULL_TANK: u64 = 0xb7ce_ad04_5a4d_39b5;
+
+fn calibration(slopes: Option<Slopes>) -> Calibration {
+    Calibration {
         turn_rad_per_s: 3.0,
         wander_rad_per_s: 1.5,
         slopes,
         ..Calibration::default()
-    };
-    let (lens, tank) = (
-        Lens::flat(40.0),
-        Tank::new([0.0; 3], [20.0, 15.0, depth_bl]),
-    );
-    let mut boids = Boids::at_random(params, &calibration, (&lens, &tank), 30.0);
+    }
+}
+
+fn place(depth_bl: f64) -> (Lens, Tank) {
+    let corner = [20.0, 15.0, depth_bl];
+    (Lens::flat(40.0), Tank::new([0.0; 3], corner))
+}
+
+/// Of their next 40 frames.
+fn digest(mut boids: Boids, cpu: Level) -> u64 {
+    boids.cpu = cpu;
     (0..40).for_each(|_| boids.advance());
     let numbers = boids.positions().iter().chain(boids.velocities()).flatten();
     numbers.fold(0, |digest, number| {
@@ -92,8 +101,52 @@ fn every_preset_swims_as_it_always_did_to_the_last_bit() {
             count: 150,
             ..Params::preset(name).expect("a known preset")
         };
-        let kinds = [(0.0, None), (3.0, None), (3.0, Some(SLOPES))];
-        let found = kinds.map(|(depth_bl, slopes)| digest(&params, depth_bl, slopes));
-        assert_eq!(found, expected, "{name}");
+        for cpu in Level::available() {
+            let kinds = [(0.0, None), (3.0, None), (3.0, Some(SLOPES))];
+            let found = kinds.map(|(depth_bl, slopes)| {
+                let (calibration, (lens, tank)) = (calibration(slopes), place(depth_bl));
+                digest(
+                    Boids::at_random(&params, &calibration, (&lens, &tank), 30.0),
+                    cpu,
+                )
+            });
+            assert_eq!(found, expected, "{name} with {}", cpu.name());
+        }
+    }
+}
+
+#[test]
+fn whatever_else_is_in_the_tank_they_swim_as_they_always_did_to_the_last_bit() {
+    let (center_px, radius_px, box_px) = ([200.0, 300.0], 60.0, [500.0, 100.0, 80.0, 200.0]);
+    let params = Params {
+        count: 75,
+        goals: vec![Goal {
+            at_px: [700.0, 500.0],
+            depth_bl: None,
+            from_s: -1e6,
+            until_s: None,
+            weight: 2.0,
+        }],
+        obstacles: vec![
+            Obstacle::Circle {
+                center_px,
+                radius_px,
+            },
+            Obstacle::Box { box_px },
+        ],
+        predator: Some(Predator::default()),
+        ..Params::default()
+    };
+    let (calibration, (lens, tank)) = (calibration(Some(SLOPES)), place(3.0));
+    for cpu in Level::available() {
+        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        boids.hunter = boids.habitat.hunter();
+        let places = boids.positions.iter().rev().copied();
+        boids.meet(Meeting {
+            share: 0.5,
+            places: places.zip(boids.velocities.clone()).collect(),
+        });
+        let found = digest(boids, cpu);
+        assert_eq!(found, DIGEST_OF_A_FULL_TANK, "with {}", cpu.name());
     }
 }

@@ -33,9 +33,9 @@ pub struct Grid {
     axes: [Vec<f64>; 3],
 }
 
-/// A boid where its cell is, all in one line of the cache.
+/// A boid where its cell is, all in one line of the cache, position and velocity first.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub struct Boid {
     /// Body lengths.
     pub position: Vec3,
@@ -43,12 +43,6 @@ pub struct Boid {
     pub velocity: Vec3,
     /// Its number.
     pub id: u32,
-}
-
-impl AsRef<Boid> for Boid {
-    fn as_ref(&self) -> &Boid {
-        self
-    }
 }
 
 /// Rows of cells beside one another.
@@ -85,7 +79,7 @@ impl Iterator for Rows<'_> {
 impl Grid {
     /// Sorts boids into cells for rules that reach so far; what was sorted before is forgotten. It is the faster the
     /// nearer to one another they are given.
-    pub fn sort<T: AsRef<Boid> + Sync>(&mut self, boids: &[T], reach_bl: f64) {
+    pub fn sort(&mut self, boids: &[Boid], reach_bl: f64) {
         self.lay_cells(boids, reach_bl);
         self.count(boids);
         self.given.resize(boids.len(), 0);
@@ -102,7 +96,7 @@ impl Grid {
             .into_par_iter()
             .with_min_len(CHUNK)
             .for_each(|(boid, &given, x, y, z)| {
-                *boid = *boids[given as usize].as_ref();
+                *boid = boids[given as usize];
                 [*x, *y, *z] = boid.position;
             });
     }
@@ -116,6 +110,12 @@ impl Grid {
     /// Where each boid stands in the order of cells, as they were given.
     pub fn slots(&self) -> &[u32] {
         &self.slots
+    }
+
+    /// Everybody, in the order of cells.
+    #[inline(always)]
+    pub fn boids(&self) -> &[Boid] {
+        &self.boids
     }
 
     /// Whoever stands at `slot`.
@@ -153,13 +153,13 @@ impl Grid {
     }
 
     /// Cells as wide along each axis, as small as the reach asks for and the number of boids allows.
-    fn lay_cells<T: AsRef<Boid> + Sync>(&mut self, boids: &[T], reach_bl: f64) {
+    fn lay_cells(&mut self, boids: &[Boid], reach_bl: f64) {
         let nowhere = || ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| {
             let least = [0, 1, 2].map(|axis| a.0[axis].min(b.0[axis]));
             (least, [0, 1, 2].map(|axis| a.1[axis].max(b.1[axis])))
         };
-        let place = |boid: &T| (boid.as_ref().position, boid.as_ref().position);
+        let place = |boid: &Boid| (boid.position, boid.position);
         let (least, greatest) =
             (boids.par_iter().with_min_len(CHUNK).map(place)).reduce(nowhere, both);
         let span: Vec3 = std::array::from_fn(|axis| (greatest[axis] - least[axis]).max(0.0));
@@ -175,9 +175,9 @@ impl Grid {
     }
 
     /// Where each boid stands, and where cells begin.
-    fn count<T: AsRef<Boid> + Sync>(&mut self, boids: &[T]) {
+    fn count(&mut self, boids: &[Boid]) {
         let mut slots = std::mem::take(&mut self.slots);
-        let cell = |boid: &T| self.index(self.cell_of(boid.as_ref().position)) as u32;
+        let cell = |boid: &Boid| self.index(self.cell_of(boid.position)) as u32;
         (boids.par_iter().with_min_len(CHUNK).map(cell)).collect_into_vec(&mut slots);
         let n = self.n_cells.iter().product::<usize>();
         self.first.clear();

@@ -1,6 +1,7 @@
 //! What is in the tank besides the flock: goals, obstacles and a predator (ALGORITHMS.md 7), in body lengths.
 
 use super::calibration::Calibration;
+use super::lanes::{self, Lanes, by_lane, in_lane, splat3};
 use super::params::{Goal, Obstacle, Predator, Waypoint};
 use super::tank::Tank;
 use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, unit};
@@ -48,20 +49,43 @@ impl<'a> Habitat<'a> {
     }
 
     /// The course to the goals of a time, in cruising speeds; nothing when there are none.
-    pub fn toward_goals(&self, time_s: f64, position: Vec3, velocity: Vec3, cruise: f64) -> Vec3 {
-        let now = self.goals.iter().filter(|goal| {
-            goal.from_s <= time_s && goal.until_s.is_none_or(|until_s| time_s < until_s)
-        });
-        now.fold([0.0; 3], |sum, goal| {
-            let way = minus(self.place(goal.at_px, goal.depth_bl), position);
-            let pace = cruise * (norm(way) / THERE_BL).min(1.0);
-            let gap = minus(scaled(pace, unit(way)), velocity);
-            add_scaled(sum, goal.weight / cruise, gap)
-        })
+    #[inline(always)]
+    pub fn toward_goals<L: Lanes>(
+        &self,
+        time_s: f64,
+        position: [L; 3],
+        velocity: [L; 3],
+        cruise: f64,
+    ) -> [L; 3] {
+        let mut sum = [L::splat(0.0); 3];
+        for goal in self.goals {
+            if time_s < goal.from_s || goal.until_s.is_some_and(|until_s| until_s <= time_s) {
+                continue;
+            }
+            let place = splat3(self.place(goal.at_px, goal.depth_bl));
+            let way = minus(place, position);
+            let share = (norm(way) / L::splat(THERE_BL)).min(L::splat(1.0));
+            let gap = minus(scaled(L::splat(cruise) * share, unit(way)), velocity);
+            sum = add_scaled(sum, L::splat(goal.weight / cruise), gap);
+        }
+        sum
     }
 
     /// Pushes away from obstacles that would be met within `horizon_s`, growing to 1 where they begin.
-    pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
+    #[inline(always)]
+    pub fn push<L: Lanes>(&self, position: [L; 3], velocity: [L; 3], horizon_s: f64) -> [L; 3] {
+        if self.obstacles.is_empty() {
+            return [L::splat(0.0); 3];
+        }
+        let mut pushes = [[0.0; 3]; lanes::MOST];
+        for lane in 0..L::N {
+            let (position, velocity) = (in_lane(position, lane), in_lane(velocity, lane));
+            pushes[lane] = self.push_one(position, velocity, horizon_s);
+        }
+        by_lane(|lane| pushes[lane])
+    }
+
+    fn push_one(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
         self.obstacles.iter().fold([0.0; 3], |push, obstacle| {
             let (room, outward) = self.room(obstacle, position);
             let approach = -dot(outward, velocity) * horizon_s;
@@ -93,6 +117,12 @@ impl<'a> Habitat<'a> {
                 break;
             }
         }
+    }
+
+    /// Whether `keep_out` may change any of these positions.
+    #[inline(always)]
+    pub fn may_hold_off<L: Lanes>(&self, position: [L; 3]) -> bool {
+        !self.obstacles.is_empty() || self.tank.is_left_by_any(position)
     }
 
     /// The predator at the start.
@@ -141,11 +171,31 @@ impl<'a> Habitat<'a> {
         self.keep_out(&mut hunter.position, &mut hunter.velocity);
     }
 
-    /// The wish to get away from a hunter, growing as it comes near; nothing from beyond the reach.
-    pub fn flee(&self, position: Vec3, hunter: Option<&Hunter>) -> Option<Vec3> {
-        let away = minus(position, hunter?.position);
-        let share = norm(away) / self.predator?.flee_bl();
-        (share < 1.0).then(|| scaled(FLEE_WEIGHT * (1.0 - share), unit(away)))
+    /// The wish of each to get away from a hunter, growing as it comes near; nothing from beyond the reach.
+    #[inline(always)]
+    pub fn flight<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> [L; 3] {
+        let Some((away, share)) = self.away(position, hunter) else {
+            return [L::splat(0.0); 3];
+        };
+        let urgency = (L::splat(1.0) - share).max(L::splat(0.0));
+        scaled(L::splat(FLEE_WEIGHT) * urgency, unit(away))
+    }
+
+    /// Who is within the reach of a hunter.
+    #[inline(always)]
+    pub fn flees<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> L::Mask {
+        match self.away(position, hunter) {
+            Some((_, share)) => share.less(L::splat(1.0)),
+            None => L::mask(|_| false),
+        }
+    }
+
+    /// From a hunter to each, and how much of its reach that is.
+    #[inline(always)]
+    fn away<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> Option<([L; 3], L)> {
+        let away = minus(position, splat3(hunter?.position));
+        let share = norm(away) / L::splat(self.predator?.flee_bl());
+        Some((away, share))
     }
 
     fn on_path(&self, path: &[Waypoint], time_s: f64) -> Vec3 {

@@ -1,8 +1,7 @@
 //! Who leads: a boid at the rim of its neighbors, with few of them ahead, may go its own way for a
 //! while, and the others follow by alignment (Hartman & Benes 2006; ALGORITHMS.md 7).
 
-use super::nearest::Neighbor;
-use super::vector::{Vec3, add_scaled, dot, norm, scaled};
+use super::vector::{Vec3, dot, norm, plus, scaled};
 use crate::random;
 
 /// Farther out than this share of the cohesion radius is the rim.
@@ -14,24 +13,22 @@ const SPAN_S: [f64; 2] = [1.0, 3.0];
 /// At most this share of the neighbors may be ahead.
 const MOST_AHEAD: f64 = 0.25;
 
-/// Seconds of lead that a boid begins with in this step; `None` when it does not.
+/// Seconds of lead that a boid begins with in this step, by the ways to its neighbors; `None` when it does not.
 pub fn taken(
     seed: u64,
     key: [u64; 3],
     velocity: Vec3,
-    neighbors: &[Neighbor],
+    offsets: impl Iterator<Item = Vec3> + Clone,
     (cohesion_bl, step_s): (f64, f64),
 ) -> Option<f64> {
     let draw = random::unit(seed, &key);
-    if neighbors.is_empty() || draw >= RATE_PER_S * step_s {
+    if draw >= RATE_PER_S * step_s {
         return None;
     }
-    let n = neighbors.len() as f64;
-    let center = neighbors.iter().fold([0.0; 3], |sum, neighbor| {
-        add_scaled(sum, 1.0, neighbor.offset)
-    });
-    let eccentricity = norm(scaled(1.0 / n, center)) / cohesion_bl;
-    let ahead = neighbors.iter().filter(|n| dot(n.offset, velocity) > 0.0);
+    let n = offsets.clone().count() as f64;
+    let center = offsets.clone().fold([0.0; 3], plus);
+    let eccentricity = norm(scaled(1.0 / n.max(1.0), center)) / cohesion_bl;
+    let ahead = offsets.filter(|&offset| dot(offset, velocity) > 0.0);
     let in_front = ahead.count() as f64 <= MOST_AHEAD * n;
     (in_front && eccentricity > RIM).then(|| {
         let share = random::unit(seed, &[key[0], key[1], key[2], 1]);

@@ -9,26 +9,28 @@
 pub mod calibration;
 pub mod grid;
 pub mod habitat;
+pub mod lanes;
 pub mod leadership;
 pub mod measures;
 mod meeting;
 pub mod nearest;
 mod overlap;
 pub mod params;
+mod room;
 pub mod rules;
 mod step;
 pub mod tank;
 pub mod vector;
-pub mod zones;
 
 use self::calibration::Calibration;
 use self::habitat::{Habitat, Hunter};
 pub use self::meeting::Meeting;
-use self::step::Room;
+use self::room::Room;
 use self::tank::Tank;
 use self::vector::{Vec3, scaled};
 use super::lens::Lens;
 use super::params::Params;
+use crate::cpu::Level;
 use crate::random;
 
 /// The longest way in one step, body lengths.
@@ -61,6 +63,8 @@ pub struct Boids<'a> {
     step_s: f64,
     n_substeps: u32,
     step_idx: u64,
+    /// Decides how fast it goes and nothing else.
+    cpu: Level,
     /// Of the film; negative before it.
     time_s: f64,
     positions: Vec<Vec3>,
@@ -111,6 +115,7 @@ impl<'a> Boids<'a> {
             step_s,
             n_substeps,
             step_idx: 0,
+            cpu: Level::detect(),
             time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],

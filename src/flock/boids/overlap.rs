@@ -6,7 +6,7 @@
 use rayon::prelude::*;
 
 use super::grid::Boid;
-use super::step::{Member, Room};
+use super::room::Room;
 use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 use super::{Boids, CHUNK};
 
@@ -22,15 +22,15 @@ impl Boids<'_> {
     pub(super) fn push_apart(&self, room: &mut Room, farthest_bl: f64) {
         // Who was farther off from all than two come nearer in a step overlaps with nobody.
         let most_bl = (self.overlap_bl + 2.0 * farthest_bl) * (1.0 + 1e-9);
-        let moved: Vec<(usize, Vec3, Vec3)> = (0..room.next.len())
+        let moved: Vec<(usize, Vec3, Vec3)> = (0..room.next.boids.len())
             .into_par_iter()
             .fold_chunks(CHUNK, Vec::new, |mut moved, slot| {
-                if room.next[slot].nearest_bl2 > most_bl * most_bl {
+                if room.next.inners[slot].nearest_bl2 > most_bl * most_bl {
                     return moved;
                 }
                 let near = self.too_near(slot, room, farthest_bl);
                 if !near.is_empty() {
-                    let (position, velocity) = self.apart(&room.next[slot].boid, &near);
+                    let (position, velocity) = self.apart(&room.next.boids[slot], &near);
                     moved.push((slot, position, velocity));
                 }
                 moved
@@ -38,26 +38,24 @@ impl Boids<'_> {
             .flatten_iter()
             .collect();
         for (slot, position, velocity) in moved {
-            let Member {
-                boid, is_blocked, ..
-            } = &mut room.next[slot];
+            let (boid, inner) = (&mut room.next.boids[slot], &mut room.next.inners[slot]);
             let (way, pushed) = (
                 scaled(self.step_s, boid.velocity),
                 minus(position, boid.position),
             );
-            *is_blocked = dot(pushed, way) < -0.5 * dot(way, way);
+            inner.is_blocked = dot(pushed, way) < -0.5 * dot(way, way);
             (boid.position, boid.velocity) = (position, velocity);
         }
     }
 
     /// The others that overlap with whoever stands at `slot`, nearest first, equal distances by id.
     fn too_near(&self, slot: usize, room: &Room, farthest_bl: f64) -> Vec<Near> {
-        let place = room.next[slot].boid.position;
+        let place = room.next.boids[slot].position;
         let most_bl2 = self.overlap_bl * self.overlap_bl;
         let mut near = Vec::new();
         for (from, to) in (room.grid).rows(place, self.overlap_bl + farthest_bl) {
             for other in from..to {
-                let boid = &room.next[other].boid;
+                let boid = &room.next.boids[other];
                 let offset = minus(boid.position, place);
                 let square_bl2 = dot(offset, offset);
                 if square_bl2 < most_bl2 && other != slot {

@@ -4,9 +4,13 @@
 use rayon::prelude::*;
 
 use super::grid::{Boid, Grid};
+use super::lanes::{self, Lanes, by_lane, in_lane, select3, splat3};
+#[cfg(target_arch = "x86_64")]
+use super::lanes::{Eight, Four};
 use super::nearest::{Neighbor, Search};
+use super::room::{Crowd, Inner, Part, Room};
 use super::rules::{Moment, Steering};
-use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, turned_at_most, unit};
+use super::vector::{add_scaled, cross, dot, minus, norm, scaled, turned_at_most, unit};
 use super::{Boids, CHUNK, draw, leadership};
 use crate::cpu::Level;
 use crate::random;
@@ -18,62 +22,6 @@ const FLIGHT_PACE: f64 = 1.6;
 /// The farthest neighbor that counts is looked for a little farther out than it was found a step ago.
 const FARTHER: f64 = 1.03;
 
-/// What of a boid nobody sees.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Inner {
-    /// The wandering turn rate, and the wished slope in standard deviations.
-    wander: [f64; 2],
-    leads_for_s: f64,
-    /// How far off the last neighbor was that counted. It only tells where to look first.
-    sight_bl: f64,
-}
-
-/// All boids, in the order of the cells that they were in a step ago: who is near whom in the tank is so in memory.
-#[derive(Default)]
-pub(super) struct Room {
-    pub(super) now: Vec<Member>,
-    /// Where each stands in `now`, by id.
-    pub(super) places: Vec<u32>,
-    /// In the order of the cells that they are in before the step.
-    pub(super) next: Vec<Member>,
-    pub(super) grid: Grid,
-}
-
-/// A boid with all that the next step asks for.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Member {
-    pub(super) boid: Boid,
-    inner: Inner,
-    /// Others pushed it back by more than half of its way: it turns round, to the side that it wanders to.
-    pub(super) is_blocked: bool,
-    /// How far off the nearest other was before the step, squared; the reach when there was none.
-    pub(super) nearest_bl2: f64,
-}
-
-impl AsRef<Boid> for Member {
-    fn as_ref(&self) -> &Boid {
-        &self.boid
-    }
-}
-
-impl Room {
-    /// Boids that have not swum yet, by id.
-    pub(super) fn of(n: usize) -> Room {
-        let member = |id| Member {
-            boid: Boid {
-                id,
-                ..Boid::default()
-            },
-            ..Member::default()
-        };
-        Room {
-            now: (0..n as u32).map(member).collect(),
-            places: (0..n as u32).collect(),
-            ..Room::default()
-        }
-    }
-}
-
 /// What is the same for all in one step.
 struct Pace<'a> {
     steering: Steering<'a>,
@@ -82,17 +30,6 @@ struct Pace<'a> {
     /// The share of what wanders that is kept, and the spread of what is added, in its own spreads.
     wander: [f64; 2],
     reach_bl: f64,
-    cpu: Level,
-}
-
-impl Default for Inner {
-    fn default() -> Inner {
-        Inner {
-            wander: [0.0; 2],
-            leads_for_s: 0.0,
-            sight_bl: f64::INFINITY,
-        }
-    }
 }
 
 impl Boids<'_> {
@@ -108,21 +45,18 @@ impl Boids<'_> {
             now, next, grid, ..
         } = &mut room;
         let pace = self.pace();
-        grid.sort(now, pace.reach_bl);
-        next.resize(now.len(), Member::default());
-        let farthest_bl2 = (next.par_chunks_mut(CHUNK).enumerate())
-            .map_init(Search::default, |search, (chunk, next)| {
-                self.go_on(chunk * CHUNK, next, (now, grid, search), &pace)
-            })
-            .reduce(|| 0.0, f64::max);
+        grid.sort(&now.boids, pace.reach_bl);
+        next.boids.resize(now.boids.len(), Boid::default());
+        next.inners.resize(now.boids.len(), Inner::default());
+        let farthest_bl2 = self.all_go_on(next, (&now.inners, grid), &pace);
         self.push_apart(&mut room, farthest_bl2.sqrt());
-        let (slots, next) = (room.grid.slots(), &room.next);
+        let (slots, boids) = (room.grid.slots(), &room.next.boids);
         (&mut self.positions, &mut self.velocities, &mut room.places)
             .into_par_iter()
             .with_min_len(CHUNK)
             .for_each(|(position, velocity, place)| {
                 *place = slots[*place as usize];
-                let boid = &next[*place as usize].boid;
+                let boid = &boids[*place as usize];
                 (*position, *velocity) = (boid.position, boid.velocity);
             });
         std::mem::swap(&mut room.now, &mut room.next);
@@ -132,7 +66,7 @@ impl Boids<'_> {
 
     /// Has everybody swim on from where `positions` and `velocities` say.
     pub(super) fn swim_from_here(&mut self) {
-        for Member { boid, .. } in &mut self.room.now {
+        for boid in &mut self.room.now.boids {
             let id = boid.id as usize;
             (boid.position, boid.velocity) = (self.positions[id], self.velocities[id]);
         }
@@ -156,29 +90,48 @@ impl Boids<'_> {
             cos_sin: (libm::cos(turn_rad), libm::sin(turn_rad)),
             wander: [keep, (1.0 - keep * keep).sqrt()],
             reach_bl: rules.reach_bl(),
-            cpu: Level::detect(),
         }
     }
 
-    /// What they are after the step who stand at `first` and after it; the square of the longest way.
-    fn go_on(
-        &self,
-        first: usize,
-        next: &mut [Member],
-        near: (&[Member], &Grid, &mut Search),
-        pace: &Pace,
-    ) -> f64 {
-        match pace.cpu {
+    /// What they are after the step, in as many lanes as there are here; the square of the longest way.
+    fn all_go_on(&self, next: &mut Crowd, before: (&[Inner], &Grid), pace: &Pace) -> f64 {
+        match self.cpu {
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 if is_x86_feature_detected!("avx512f") => {
+                by_chunks(next, |first, next, search| {
+                    #[expect(unsafe_code, reason = "the same code, compiled for AVX-512 F")]
+                    // SAFETY: it was just made sure of AVX-512 F, which is all that the callee asks for.
+                    unsafe {
+                        self.go_on_avx512(first, next, (before, search), pace)
+                    }
+                })
+            }
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
-                #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
-                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
-                unsafe {
-                    self.go_on_avx2(first, next, near, pace)
-                }
+                by_chunks(next, |first, next, search| {
+                    #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
+                    // SAFETY: it was just made sure of AVX2, which is all that the callee asks for.
+                    unsafe {
+                        self.go_on_avx2(first, next, (before, search), pace)
+                    }
+                })
             }
-            _ => self.go_on_with(first, next, near, pace),
+            _ => by_chunks(next, |first, next, search| {
+                self.go_on::<f64>(first, next, (before, search), pace)
+            }),
         }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,avx512f")]
+    fn go_on_avx512(
+        &self,
+        first: usize,
+        next: Part,
+        near: ((&[Inner], &Grid), &mut Search<Eight>),
+        pace: &Pace,
+    ) -> f64 {
+        self.go_on(first, next, near, pace)
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -186,129 +139,202 @@ impl Boids<'_> {
     fn go_on_avx2(
         &self,
         first: usize,
-        next: &mut [Member],
-        near: (&[Member], &Grid, &mut Search),
+        next: Part,
+        near: ((&[Inner], &Grid), &mut Search<Four>),
         pace: &Pace,
     ) -> f64 {
-        self.go_on_with(first, next, near, pace)
+        self.go_on(first, next, near, pace)
     }
 
+    /// What they are after the step who stand at `first` and after it; the square of the longest way.
     #[inline(always)]
-    fn go_on_with(
+    fn go_on<L: Lanes>(
         &self,
         first: usize,
-        next: &mut [Member],
-        (now, grid, search): (&[Member], &Grid, &mut Search),
+        (boids, inners): Part,
+        ((now, grid), search): ((&[Inner], &Grid), &mut Search<L>),
         pace: &Pace,
     ) -> f64 {
-        let mut farthest_bl2 = 0.0f64;
-        for (slot, next) in (first..).zip(next) {
-            let before = &now[grid.given()[slot] as usize];
-            *next = self.next(slot, before, (grid, search), pace);
-            let way = minus(next.boid.position, grid.at(slot).position);
+        let last = first + boids.len() - 1;
+        let mut farthest_bl2 = L::splat(0.0);
+        let groups = boids.chunks_mut(L::N).zip(inners.chunks_mut(L::N));
+        for (group, next) in groups.enumerate() {
+            // Where there are not enough of them the last one stands in.
+            let mut slots = [0; lanes::MOST];
+            for lane in 0..L::N {
+                slots[lane] = (first + group * L::N + lane).min(last) as u32;
+            }
+            let way = self.next((&slots, now), next, (grid, search), pace);
             farthest_bl2 = farthest_bl2.max(dot(way, way));
         }
-        farthest_bl2
+        let squares_bl2 = farthest_bl2.numbers();
+        squares_bl2[..L::N].iter().copied().fold(0.0, f64::max)
     }
 
-    /// What whoever stands at `slot` is after the step.
+    /// What they are after the step who stand at `slots`; the way of each.
     #[inline(always)]
-    fn next(
+    fn next<L: Lanes>(
         &self,
-        slot: usize,
-        before: &Member,
-        (grid, search): (&Grid, &mut Search),
+        (slots, now): (&[u32; lanes::MOST], &[Inner]),
+        (boids, inners): Part,
+        (grid, search): (&Grid, &mut Search<L>),
         pace: &Pace,
-    ) -> Member {
-        let &Boid {
-            position,
-            velocity,
-            id: own_id,
-        } = grid.at(slot);
-        let id = own_id as usize;
-        let limit = self.params.rules.neighbors as usize;
-        let guess_bl = FARTHER * before.inner.sight_bl;
-        let neighbors = search.nearest((grid, slot), (limit, pace.reach_bl), guess_bl, pace.cpu);
-        let (nearest, last) = (neighbors.first(), neighbors.get(limit - 1));
-        let inner = Inner {
-            wander: self.next_wander((id, &before.inner), pace),
-            leads_for_s: self.next_lead((id, &before.inner), velocity, neighbors),
-            sight_bl: last.map_or(f64::INFINITY, |last| last.square_bl2.sqrt()),
-        };
-        let acceleration = pace.steering.acceleration(&Moment {
+    ) -> [L; 3] {
+        let before = slots.map(|slot| &now[grid.given()[slot as usize] as usize]);
+        let ids = slots.map(|slot| grid.at(slot as usize).id);
+        let (position, velocity) = L::gather(grid.boids(), slots);
+        let limits = (self.params.rules.neighbors as usize, pace.reach_bl);
+        let guesses_bl = before.map(|before| FARTHER * before.sight_bl);
+        let neighbors = search.nearest((grid, slots), limits, &guesses_bl, self.cpu);
+        let inner = self.next_inners((&ids, &before), velocity, neighbors, pace);
+        let moment = Moment {
             position,
             velocity,
             neighbors,
-            wander: inner.wander,
-            leads: inner.leads_for_s > 0.0,
-            noise: self.noise(id),
-        });
-        let sideways = cross(self.tank.up(), velocity);
-        let wished = match before.is_blocked {
-            true => {
-                let speed = self.calibration.cruise_bl_per_s.max(norm(velocity));
-                scaled(speed * inner.wander[0].signum(), unit(sideways))
-            }
-            false => add_scaled(velocity, self.step_s, acceleration),
+            wander: [
+                L::from_fn(|lane| inner[lane].wander[0]),
+                L::from_fn(|lane| inner[lane].wander[1]),
+            ],
+            leads: L::mask(|lane| inner[lane].leads_for_s > 0.0),
+            noise: self.noise(&ids),
         };
-        let wished = match &self.meeting {
-            Some(meeting) => meeting.wish(id, position, wished),
-            None => wished,
-        };
+        let wished = self.wished(&moment, (&ids, &before), pace);
+        let sideways = cross(splat3(self.tank.up()), velocity);
         let turned = turned_at_most(velocity, wished, pace.cos_sin, sideways);
-        let velocity = self.within_limits(turned, position, velocity);
-        let mut next = Member {
-            boid: Boid {
-                position: add_scaled(position, self.step_s, velocity),
-                velocity,
-                id: own_id,
-            },
-            inner,
-            is_blocked: false,
-            nearest_bl2: nearest.map_or(pace.reach_bl * pace.reach_bl, |near| near.square_bl2),
-        };
-        let boid = &mut next.boid;
-        self.habitat
-            .keep_out(&mut boid.position, &mut boid.velocity);
+        let next = self.within_limits(turned, position, velocity);
+        let place = add_scaled(position, L::splat(self.step_s), next);
+        let (place, next) = self.kept_in(place, next);
         // A slanting wall reflects more steeply than the animal swims.
-        boid.velocity = self.within_limits(boid.velocity, position, velocity);
-        next
+        let next = self.within_limits(next, position, velocity);
+        for (lane, boid) in boids.iter_mut().enumerate() {
+            *boid = Boid {
+                position: in_lane(place, lane),
+                velocity: in_lane(next, lane),
+                id: ids[lane],
+            };
+        }
+        inners.copy_from_slice(&inner[..inners.len()]);
+        minus(place, position)
+    }
+
+    /// What goes on in each after the step.
+    #[inline(always)]
+    fn next_inners<L: Lanes>(
+        &self,
+        (ids, before): (&[u32; lanes::MOST], &[&Inner; lanes::MOST]),
+        velocity: [L; 3],
+        neighbors: &[Neighbor<L>],
+        pace: &Pace,
+    ) -> [Inner; lanes::MOST] {
+        let nobody = L::splat(f64::INFINITY);
+        let last = self.params.rules.neighbors as usize - 1;
+        let (nearest, last) = (neighbors.first(), neighbors.get(last));
+        let nearest_bl2 = nearest.map_or(nobody, |nearest| nearest.square_bl2);
+        let reach_bl2 = L::splat(pace.reach_bl * pace.reach_bl);
+        let nearest_bl2 = nearest_bl2.min(reach_bl2).numbers();
+        let sight_bl = last.map_or(nobody, |last| last.square_bl2).sqrt().numbers();
+        let mut inners = [Inner::default(); lanes::MOST];
+        for lane in 0..L::N {
+            let before = (ids[lane] as usize, before[lane]);
+            inners[lane] = Inner {
+                wander: self.next_wander(before, pace),
+                leads_for_s: self.next_lead(before, (lane, velocity), neighbors),
+                sight_bl: sight_bl[lane],
+                nearest_bl2: nearest_bl2[lane],
+                is_blocked: false,
+            };
+        }
+        inners
+    }
+
+    /// The velocity that each wishes for.
+    #[inline(always)]
+    fn wished<L: Lanes>(
+        &self,
+        moment: &Moment<L>,
+        (ids, before): (&[u32; lanes::MOST], &[&Inner; lanes::MOST]),
+        pace: &Pace,
+    ) -> [L; 3] {
+        let velocity = moment.velocity;
+        let acceleration = pace.steering.acceleration(moment);
+        let mut wished = add_scaled(velocity, L::splat(self.step_s), acceleration);
+        let is_blocked = L::mask(|lane| before[lane].is_blocked);
+        if L::any(is_blocked) {
+            let speed = norm(velocity).max(L::splat(self.calibration.cruise_bl_per_s));
+            let turn = speed.copysign(moment.wander[0]);
+            let sideways = cross(splat3(self.tank.up()), velocity);
+            wished = select3::<L>(is_blocked, scaled(turn, unit(sideways)), wished);
+        }
+        let Some(meeting) = &self.meeting else {
+            return wished;
+        };
+        let mut wishes = [[0.0; 3]; lanes::MOST];
+        for lane in 0..L::N {
+            let (position, wished) = (in_lane(moment.position, lane), in_lane(wished, lane));
+            wishes[lane] = meeting.wish(ids[lane] as usize, position, wished);
+        }
+        by_lane(|lane| wishes[lane])
+    }
+
+    /// Places and velocities, as the habitat allows.
+    #[inline(always)]
+    fn kept_in<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> ([L; 3], [L; 3]) {
+        if !self.habitat.may_hold_off(place) {
+            return (place, velocity);
+        }
+        let mut kept = [([0.0; 3], [0.0; 3]); lanes::MOST];
+        for lane in 0..L::N {
+            kept[lane] = (in_lane(place, lane), in_lane(velocity, lane));
+            let (place, velocity) = &mut kept[lane];
+            self.habitat.keep_out(place, velocity);
+        }
+        (by_lane(|lane| kept[lane].0), by_lane(|lane| kept[lane].1))
     }
 
     /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
     /// stands.
-    pub(super) fn within_limits(&self, mut velocity: Vec3, position: Vec3, before: Vec3) -> Vec3 {
+    #[inline(always)]
+    pub(super) fn within_limits<L: Lanes>(
+        &self,
+        mut velocity: [L; 3],
+        position: [L; 3],
+        before: [L; 3],
+    ) -> [L; 3] {
         if let Some(slopes) = &self.calibration.slopes {
             let [level, across] = self.habitat.lens.seen_level(position, velocity);
-            let most = slopes.in_picture * across;
+            let most = L::splat(slopes.in_picture) * across;
             let seen = velocity[1].clamp(level - most, level + most);
-            let [up, down] = slopes
-                .limits
-                .map(|limit| limit * norm([velocity[0], 0.0, velocity[2]]));
-            velocity[1] = seen.clamp(-up, down);
+            let pace = norm([velocity[0], L::splat(0.0), velocity[2]]);
+            let [up, down] = slopes.limits;
+            velocity[1] = seen.clamp(-L::splat(up) * pace, L::splat(down) * pace);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;
-        let flees = self.habitat.flee(position, self.hunter.as_ref()).is_some();
-        let most = if flees { FLIGHT_PACE * most } else { most };
+        let flees = self.habitat.flees(position, self.hunter.as_ref());
+        let most = L::select(flees, L::splat(FLIGHT_PACE * most), L::splat(most));
         let speed = norm(velocity);
-        let direction = if speed > 1e-9 {
-            unit(velocity)
-        } else {
-            unit(before)
-        };
-        scaled(speed.clamp(least, most), direction)
+        let moves = L::splat(1e-9).less(speed);
+        let direction = select3::<L>(moves, velocity, before);
+        scaled(speed.clamp(L::splat(least), most), unit(direction))
     }
 
     /// The error of a course with zones, in each direction.
-    fn noise(&self, id: usize) -> Vec3 {
+    #[inline(always)]
+    fn noise<L: Lanes>(&self, ids: &[u32; lanes::MOST]) -> [L; 3] {
         let Some(zones) = &self.params.rules.zones else {
-            return [0.0; 3];
+            return [L::splat(0.0); 3];
         };
         let n_axes = if self.tank.is_flat() { 2 } else { 3 };
-        std::array::from_fn(|axis| {
-            let key = [draw::NOISE, id as u64, self.step_idx, axis as u64];
-            let is_free = axis < n_axes;
-            f64::from(u8::from(is_free)) * zones.noise_rad * random::normal(self.params.seed, &key)
+        by_lane(|lane| {
+            std::array::from_fn(|axis| {
+                let key = [
+                    draw::NOISE,
+                    u64::from(ids[lane]),
+                    self.step_idx,
+                    axis as u64,
+                ];
+                let is_free = f64::from(u8::from(axis < n_axes));
+                is_free * zones.noise_rad * random::normal(self.params.seed, &key)
+            })
         })
     }
 
@@ -330,11 +356,12 @@ impl Boids<'_> {
         }
     }
 
-    fn next_lead(
+    #[inline(always)]
+    fn next_lead<L: Lanes>(
         &self,
         (id, before): (usize, &Inner),
-        velocity: Vec3,
-        neighbors: &[Neighbor],
+        (lane, velocity): (usize, [L; 3]),
+        neighbors: &[Neighbor<L>],
     ) -> f64 {
         let left = before.leads_for_s - self.step_s;
         if left > 0.0 || !self.params.leaders {
@@ -342,6 +369,21 @@ impl Boids<'_> {
         }
         let key = [draw::LEAD, id as u64, self.step_idx];
         let scale = (self.params.rules.cohesion_bl, self.step_s);
-        leadership::taken(self.params.seed, key, velocity, neighbors, scale).unwrap_or(0.0)
+        let offsets = neighbors.iter().filter_map(|n| n.offset_in(lane));
+        let velocity = in_lane(velocity, lane);
+        leadership::taken(self.params.seed, key, velocity, offsets, scale).unwrap_or(0.0)
     }
+}
+
+/// Does some work for every chunk, with the number of its first; the greatest of what comes of it.
+fn by_chunks<L: Lanes + Send>(
+    next: &mut Crowd,
+    work: impl Fn(usize, Part, &mut Search<L>) -> f64 + Sync,
+) -> f64 {
+    let boids = next.boids.par_chunks_mut(CHUNK);
+    (boids.zip(next.inners.par_chunks_mut(CHUNK)).enumerate())
+        .map_init(Search::default, |search, (chunk, next)| {
+            work(chunk * CHUNK, next, search)
+        })
+        .reduce(|| 0.0, f64::max)
 }

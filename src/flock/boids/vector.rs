@@ -1,47 +1,54 @@
-//! Three numbers as a vector: what steering needs and no more. In a flat tank the third stays 0.
+//! Three numbers as a vector: what steering needs and no more, of one boid or of several side by side. In a flat tank
+//! the third stays 0.
+
+use super::lanes::{Lanes, select3};
 
 /// x right, y down, z away.
 pub type Vec3 = [f64; 3];
 
 /// a . b
 #[inline(always)]
-pub fn dot(a: Vec3, b: Vec3) -> f64 {
+pub fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// |a|
 #[inline(always)]
-pub fn norm(a: Vec3) -> f64 {
+pub fn norm<L: Lanes>(a: [L; 3]) -> L {
     dot(a, a).sqrt()
 }
 
 /// a + k b
 #[inline(always)]
-pub fn add_scaled(a: Vec3, k: f64, b: Vec3) -> Vec3 {
+pub fn add_scaled<L: Lanes>(a: [L; 3], k: L, b: [L; 3]) -> [L; 3] {
     [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]
+}
+
+/// a + b
+#[inline(always)]
+pub fn plus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// a - b
 #[inline(always)]
-pub fn minus(a: Vec3, b: Vec3) -> Vec3 {
-    add_scaled(a, -1.0, b)
+pub fn minus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// k a
 #[inline(always)]
-pub fn scaled(k: f64, a: Vec3) -> Vec3 {
+pub fn scaled<L: Lanes>(k: L, a: [L; 3]) -> [L; 3] {
     [k * a[0], k * a[1], k * a[2]]
 }
 
 /// a / |a|, and nothing for (nearly) nothing.
 #[inline(always)]
-pub fn unit(a: Vec3) -> Vec3 {
+pub fn unit<L: Lanes>(a: [L; 3]) -> [L; 3] {
     let length = norm(a);
-    if length > 1e-12 {
-        scaled(1.0 / length, a)
-    } else {
-        [0.0; 3]
-    }
+    let is_long = L::splat(1e-12).less(length);
+    let share = L::select(is_long, L::splat(1.0) / length, L::splat(0.0));
+    scaled(share, a)
 }
 
 /// The angle between two directions, 0..=pi.
@@ -51,7 +58,7 @@ pub fn angle_between(a: Vec3, b: Vec3) -> f64 {
 
 /// a x b
 #[inline(always)]
-pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
+pub fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -62,18 +69,24 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 /// `to` turned back toward `from` until the angle between them is at most that of (cos, sin); the
 /// length stays that of `to`. Opposite directions turn toward `aside`.
 #[inline(always)]
-pub fn turned_at_most(from: Vec3, to: Vec3, cos_sin: (f64, f64), aside: Vec3) -> Vec3 {
-    let (speed, u) = (norm(to), unit(from));
-    let along = dot(unit(to), u);
-    if along >= cos_sin.0 || norm(u) == 0.0 {
+pub fn turned_at_most<L: Lanes>(
+    from: [L; 3],
+    to: [L; 3],
+    cos_sin: (f64, f64),
+    aside: [L; 3],
+) -> [L; 3] {
+    let (cos, sin) = (L::splat(cos_sin.0), L::splat(cos_sin.1));
+    let (speed, u, course) = (norm(to), unit(from), unit(to));
+    let along = dot(course, u);
+    let turns = L::and(along.less(cos), L::splat(0.0).less(norm(u)));
+    if !L::any(turns) {
         return to;
     }
-    let mut perpendicular = add_scaled(unit(to), -along, u);
-    if norm(perpendicular) < 1e-6 {
-        perpendicular = add_scaled(aside, -dot(aside, u), u);
-    }
-    let turned = add_scaled(scaled(cos_sin.0, u), cos_sin.1, unit(perpendicular));
-    scaled(speed, turned)
+    let across = add_scaled(course, -along, u);
+    let is_opposite = norm(across).less(L::splat(1e-6));
+    let across = select3::<L>(is_opposite, add_scaled(aside, -dot(aside, u), u), across);
+    let turned = add_scaled(scaled(cos, u), sin, unit(across));
+    select3::<L>(turns, scaled(speed, turned), to)
 }
 
 #[cfg(test)]

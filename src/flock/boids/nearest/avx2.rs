@@ -7,7 +7,7 @@
 use std::arch::x86_64::*;
 
 use super::Near;
-use crate::flock::boids::grid::{BLOCK, Grid};
+use crate::flock::boids::grid::{BLOCK, Boid, Grid};
 
 /// Vectors of ranks at a time: with the squares that they belong to, most of the registers.
 const RANKS: usize = 6;
@@ -46,6 +46,13 @@ pub(super) fn rank(near: &mut Near) {
     assert!(is_x86_feature_detected!("avx2"), "this machine has no AVX2");
     // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
     unsafe { rank_avx2(near) }
+}
+
+/// Has the memory fetch a boid that is looked at soon.
+#[inline(always)]
+pub(super) fn prefetch(boid: &Boid) {
+    // SAFETY: whatever is hinted at, nothing of it is read; every x86-64 has it.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(boid).cast()) };
 }
 
 // No closures here: what is called with them is not compiled for AVX2.

@@ -7,8 +7,9 @@
 mod avx2;
 mod scalar;
 
-use super::grid::{BLOCK, Grid};
-use super::vector::{Vec3, minus};
+use super::grid::{BLOCK, Boid, Grid};
+use super::lanes::{self, Lanes, in_lane, select3};
+use super::vector::{Vec3, dot, minus};
 use crate::cpu::Level;
 
 /// So many are put in order by counting who is nearer, which knows no branch; more are sorted.
@@ -16,25 +17,50 @@ const MOST_COUNTED: usize = 48;
 /// By how much a guess that was too small grows.
 const GROWTH: f64 = 1.25;
 
-/// A boid near another.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Neighbor {
-    /// Its number.
-    pub id: u32,
-    /// From the one who looks to it, body lengths.
-    pub offset: Vec3,
-    /// |offset|^2.
-    pub square_bl2: f64,
-    /// Its velocity, body lengths a second.
-    pub velocity: Vec3,
+/// Who is near each of some boids, one to each.
+#[derive(Clone, Copy, Debug)]
+pub struct Neighbor<L> {
+    /// From the one who looks to it, body lengths; 0 where there is nobody.
+    pub offset: [L; 3],
+    /// |offset|^2, infinite where there is nobody.
+    pub square_bl2: L,
+    /// Its velocity, body lengths a second; 0 where there is nobody.
+    pub velocity: [L; 3],
 }
 
-/// A search, with its memory.
-#[derive(Clone, Debug, Default)]
-pub struct Search {
+/// A search for the neighbors of as many boids as are steered at a time, with its memory.
+#[derive(Clone, Debug)]
+pub struct Search<L> {
     near: Near,
     order: Vec<u32>,
-    found: Vec<Neighbor>,
+    /// The slots of those found, rank by rank, `L::N` to a rank.
+    slots: Vec<u32>,
+    neighbors: Vec<Neighbor<L>>,
+}
+
+impl<L> Default for Search<L> {
+    fn default() -> Search<L> {
+        Search {
+            near: Near::default(),
+            order: Vec::new(),
+            slots: Vec::new(),
+            neighbors: Vec::new(),
+        }
+    }
+}
+
+impl<L: Lanes> Neighbor<L> {
+    /// Where there is somebody.
+    #[inline(always)]
+    pub fn is_there(&self) -> L::Mask {
+        self.square_bl2.less(L::splat(f64::INFINITY))
+    }
+
+    /// From the one who looks in this lane to it, if there is one.
+    pub fn offset_in(&self, lane: usize) -> Option<Vec3> {
+        let is_there = self.square_bl2.numbers()[lane] < f64::INFINITY;
+        is_there.then(|| in_lane(self.offset, lane))
+    }
 }
 
 /// Whoever is within the radius: the first `n` of all three.
@@ -60,54 +86,95 @@ impl Near {
     }
 }
 
-impl Search {
-    /// The `limit` nearest others within `reach_bl` of whoever stands at `slot`, nearest first. `guess_bl`: within
-    /// it there are about so many, or a little more. `cpu` decides how fast it goes.
+impl<L: Lanes> Search<L> {
+    /// The `limit` nearest others within `reach_bl` of those who stand at `slots`, `L::N` of them; nearest first, as many
+    /// as anybody has. `guesses_bl`: within them there are about so many, or a little more. `cpu` decides how fast it
+    /// goes.
     #[inline(always)]
     pub fn nearest(
         &mut self,
-        (grid, slot): (&Grid, usize),
+        (grid, slots): (&Grid, &[u32]),
         (limit, reach_bl): (usize, f64),
-        guess_bl: f64,
+        guesses_bl: &[f64],
         cpu: Level,
-    ) -> &[Neighbor] {
+    ) -> &[Neighbor<L>] {
+        let n_ranks = limit.max(MOST_COUNTED);
+        if self.slots.len() < n_ranks * L::N {
+            self.slots.resize(n_ranks * L::N, 0);
+        }
+        let (mut counts, mut most) = ([0; lanes::MOST], 0);
+        for lane in 0..L::N {
+            let n = self.find(
+                grid,
+                (lane, slots[lane]),
+                (limit, reach_bl),
+                (guesses_bl[lane], cpu),
+            );
+            // Somebody must stand there for those who have so many.
+            for rank in n..limit {
+                self.slots[rank * L::N + lane] = slots[lane];
+            }
+            (counts[lane], most) = (n, most.max(n));
+        }
+        let (places, _) = L::gather(grid.boids(), slots);
+        let counts = L::from_fn(|lane| counts[lane] as f64);
+        self.neighbors.clear();
+        for rank in 0..most {
+            let slots = &self.slots[rank * L::N..(rank + 1) * L::N];
+            let (positions, velocity) = L::gather(grid.boids(), slots);
+            let nobody = [L::splat(0.0); 3];
+            let is_there = L::splat(rank as f64).less(counts);
+            let offset = select3::<L>(is_there, minus(positions, places), nobody);
+            self.neighbors.push(Neighbor {
+                offset,
+                square_bl2: L::select(is_there, dot(offset, offset), L::splat(f64::INFINITY)),
+                velocity: select3::<L>(is_there, velocity, nobody),
+            });
+        }
+        &self.neighbors
+    }
+
+    /// Puts into its lane the slots of the nearest of whoever stands at `slot`, nearest first; how many they are.
+    #[inline(always)]
+    fn find(
+        &mut self,
+        grid: &Grid,
+        (lane, slot): (usize, u32),
+        (limit, reach_bl): (usize, f64),
+        (guess_bl, cpu): (f64, Level),
+    ) -> usize {
         let mut radius_bl = guess_bl.min(reach_bl);
         loop {
-            gather(cpu, grid, (slot, radius_bl), &mut self.near);
+            gather(cpu, grid, (slot as usize, radius_bl), &mut self.near);
             if self.near.n >= limit || radius_bl >= reach_bl {
                 break;
             }
             radius_bl = (GROWTH * radius_bl).min(reach_bl);
         }
         let n = self.near.n;
-        if self.found.len() < limit.max(MOST_COUNTED) {
-            (self.found).resize(limit.max(MOST_COUNTED), Neighbor::default());
+        if n > MOST_COUNTED || !self.find_by_rank(grid, lane, cpu) {
+            self.find_by_order(grid, lane, limit);
         }
-        let place = grid.at(slot).position;
-        if n > MOST_COUNTED || !self.find_by_rank(grid, place, cpu) {
-            self.find_by_order(grid, place, limit);
-        }
-        &self.found[..n.min(limit)]
+        n.min(limit)
     }
 
     /// Each one at the place that its rank is; false when some are equally far, so that the ranks are too few.
     #[inline(always)]
-    fn find_by_rank(&mut self, grid: &Grid, place: Vec3, cpu: Level) -> bool {
+    fn find_by_rank(&mut self, grid: &Grid, lane: usize, cpu: Level) -> bool {
         let n = self.near.n;
         self.near.make_room(0);
         rank(cpu, &mut self.near);
-        let (near, found) = (&self.near, &mut self.found[..]);
-        let all = near.squares_bl2.iter().zip(&near.slots).zip(&near.ranks);
         let mut sum = 0;
-        for ((&square_bl2, &slot), &rank) in all.take(n) {
-            found[rank as usize].set(grid, place, (square_bl2, slot));
+        for (&slot, &rank) in self.near.slots.iter().zip(&self.near.ranks).take(n) {
+            self.slots[rank as usize * L::N + lane] = slot as u32;
+            prefetch(cpu, grid.at(slot as usize));
             sum += rank as usize;
         }
         2 * sum == n * n.saturating_sub(1)
     }
 
     /// Sorted, equally far ones by id.
-    fn find_by_order(&mut self, grid: &Grid, place: Vec3, limit: usize) {
+    fn find_by_order(&mut self, grid: &Grid, lane: usize, limit: usize) {
         let (order, near) = (&mut self.order, &self.near);
         order.clear();
         order.extend(0..near.n as u32);
@@ -116,22 +183,9 @@ impl Search {
             let [nearer, farther] = [a, b].map(|at| near.squares_bl2[at as usize]);
             nearer.total_cmp(&farther).then_with(|| id(a).cmp(&id(b)))
         });
-        for (found, &at) in self.found.iter_mut().zip(order.iter().take(limit)) {
-            let at = at as usize;
-            found.set(grid, place, (near.squares_bl2[at], near.slots[at]));
+        for (rank, &at) in order.iter().take(limit).enumerate() {
+            self.slots[rank * L::N + lane] = near.slots[at as usize] as u32;
         }
-    }
-}
-
-impl Neighbor {
-    /// Whoever stands at a slot, seen from a place.
-    #[inline(always)]
-    fn set(&mut self, grid: &Grid, place: Vec3, (square_bl2, slot): (f64, u64)) {
-        let other = grid.at(slot as usize);
-        self.id = other.id;
-        self.offset = minus(other.position, place);
-        self.square_bl2 = square_bl2;
-        self.velocity = other.velocity;
     }
 }
 
@@ -155,36 +209,35 @@ fn rank(cpu: Level, near: &mut Near) {
     }
 }
 
+/// Has the memory fetch a boid that is looked at soon.
+#[inline(always)]
+fn prefetch(cpu: Level, boid: &Boid) {
+    match cpu {
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 | Level::Avx512 => avx2::prefetch(boid),
+        _ => {}
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flock::boids::grid::Boid;
     use crate::flock::boids::vector::dot;
     use proptest::prelude::*;
 
-    fn all_by_brute_force(
-        positions: &[Vec3],
-        id: u32,
-        (limit, reach): (usize, f64),
-    ) -> Vec<Neighbor> {
-        let mut all: Vec<Neighbor> = (0u32..)
+    /// Id, square of the distance, and velocity of the nearest.
+    type Found = (u32, f64, Vec3);
+
+    fn all_by_brute_force(positions: &[Vec3], id: u32, (limit, reach): (usize, f64)) -> Vec<Found> {
+        let mut all: Vec<Found> = (0u32..)
             .zip(positions)
             .map(|(other, &p)| {
                 let offset = minus(p, positions[id as usize]);
-                Neighbor {
-                    id: other,
-                    offset,
-                    square_bl2: dot(offset, offset),
-                    velocity: p.map(|x| 2.0 * x),
-                }
+                (other, dot(offset, offset), p.map(|x| 2.0 * x))
             })
-            .filter(|n| n.id != id && n.square_bl2 < reach * reach)
+            .filter(|n| n.0 != id && n.1 < reach * reach)
             .collect();
-        all.sort_by(|a, b| {
-            (a.square_bl2, a.id)
-                .partial_cmp(&(b.square_bl2, b.id))
-                .unwrap()
-        });
+        all.sort_by(|a, b| (a.1, a.0).partial_cmp(&(b.1, b.0)).unwrap());
         all.truncate(limit);
         all
     }
@@ -208,13 +261,16 @@ mod tests {
                 .collect();
             let mut grid = Grid::default();
             grid.sort(&boids, reach);
-            let mut search = Search::default();
+            let mut search = Search::<f64>::default();
             for (id, &slot) in (0..).zip(grid.slots()) {
                 let all = all_by_brute_force(&positions, id, (limit, reach));
                 for cpu in Level::available() {
-                    let near = (&grid, slot as usize);
-                    let found = search.nearest(near, (limit, reach), guess, cpu);
-                    prop_assert_eq!(found, &all[..], "{:?}", cpu);
+                    let near = search.nearest((&grid, &[slot]), (limit, reach), &[guess], cpu);
+                    let near: Vec<_> = near.iter().map(|n| (n.square_bl2, n.velocity)).collect();
+                    let found = search.slots.iter().map(|&slot| grid.at(slot as usize).id);
+                    let found: Vec<Found> =
+                        found.zip(near).map(|(id, (square, velocity))| (id, square, velocity)).collect();
+                    prop_assert_eq!(&found, &all, "{:?}", cpu);
                 }
             }
         }

@@ -5,6 +5,7 @@ mod floor;
 mod site;
 
 use super::OVERLAP_BL;
+use super::lanes::{Lanes, splat3};
 use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// The side of the square that a boid needs to keep the usual distances.
@@ -132,19 +133,28 @@ impl Tank {
     }
 
     /// Inward pushes for whoever would pass a wall within `horizon_s`, growing to 1 at the wall.
-    pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
-        let mut push = [0.0; 3];
+    #[inline(always)]
+    pub fn push<L: Lanes>(&self, position: [L; 3], velocity: [L; 3], horizon_s: f64) -> [L; 3] {
+        let nothing = L::splat(0.0);
+        let mut push = [nothing; 3];
         for wall in self.upright_walls() {
-            let room = wall.offset_bl - dot(wall.outward, position);
-            let approach = dot(wall.outward, velocity) * horizon_s;
-            if approach > room.max(0.0) {
-                let strength = (approach - room.max(0.0)) / approach;
-                for (push, outward) in push.iter_mut().zip(wall.outward) {
-                    *push -= strength * outward;
-                }
-            }
+            let outward = splat3(wall.outward);
+            let room = (L::splat(wall.offset_bl) - dot(outward, position)).max(nothing);
+            let approach = dot(outward, velocity) * L::splat(horizon_s);
+            let strength = (approach - room) / approach;
+            let strength = L::select(room.less(approach), strength, nothing);
+            push = add_scaled(push, -strength, outward);
         }
         push
+    }
+
+    /// Whether any of them is beyond a wall.
+    #[inline(always)]
+    pub fn is_left_by_any<L: Lanes>(&self, position: [L; 3]) -> bool {
+        (self.walls.iter()).any(|wall| {
+            let offset = L::splat(wall.offset_bl);
+            L::any(offset.less(dot(splat3(wall.outward), position)))
+        })
     }
 
     /// Puts a position inside and reflects the part of the velocity that leads out: who only lost it

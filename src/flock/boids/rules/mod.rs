@@ -1,0 +1,327 @@
+//! What a boid asks of itself: separation, alignment, cohesion, walls, circling and wander, granted
+//! in order of priority (Reynolds 1987; O 4; ALGORITHMS.md 7).
+//!
+//! Requests are measured against the acceleration that the animal usually makes, so that one set of weights
+//! serves a slow animal and a fast one, and their sum is cut to the greatest it was seen to make.
+
+mod seen;
+mod zones;
+
+use self::seen::{Seen, at_least_one, is_seen};
+use super::calibration::Calibration;
+use super::habitat::{Habitat, Hunter};
+use super::lanes::{Lanes, select3, splat3};
+use super::nearest::Neighbor;
+use super::tank::Tank;
+use super::vector::{add_scaled, cross, dot, minus, norm, plus, scaled, unit};
+use crate::flock::params::{Params, Separation, Zones};
+
+/// A wall is steered from when the path over this time meets it.
+const WALL_HORIZON_S: f64 = 1.0;
+
+/// The share of a wall's braking that becomes a turn alone.
+const BRAKED: f64 = 0.7;
+/// So strong a wish is granted as far as the turn rate allows.
+const WITHOUT_DELAY: f64 = 20.0;
+/// Whoever circles does so at this share of the way from the middle to the walls.
+const RING: f64 = 0.65;
+/// By how much of the cruising speed whoever circles goes ahead of a crowd behind it.
+const SPREADING: f64 = 0.5;
+/// Time constant of coming back to a slope that the animal has.
+const LEVEL_S: f64 = 0.25;
+/// Weight of swimming across the picture rather than into it.
+const BROADSIDE: f64 = 1.5;
+
+/// A moment of some boids.
+pub struct Moment<'a, L: Lanes> {
+    /// Where each is.
+    pub position: [L; 3],
+    /// Its velocity, body lengths a second.
+    pub velocity: [L; 3],
+    /// Nearest first; all that its rules may need.
+    pub neighbors: &'a [Neighbor<L>],
+    /// The wandering turn rate in the plane of swimming, and how many standard deviations the wished slope is off
+    /// the usual one.
+    pub wander: [L; 2],
+    /// Who leads: alignment and cohesion are off.
+    pub leads: L::Mask,
+    /// What its course is wrong by, with zones.
+    pub noise: [L; 3],
+}
+
+/// Everything that steering depends on besides the moment.
+pub struct Steering<'a> {
+    /// Weights and radii.
+    pub params: &'a Params,
+    /// The animal's limits.
+    pub calibration: &'a Calibration,
+    /// Where the walls are.
+    pub tank: &'a Tank,
+    /// What else there is.
+    pub habitat: &'a Habitat<'a>,
+    /// Seconds of the film.
+    pub time_s: f64,
+    /// The predator.
+    pub hunter: Option<&'a Hunter>,
+    /// cos of half the field of view.
+    pub cos_half_view: f64,
+}
+
+impl Steering<'_> {
+    /// The acceleration granted, at most the calibration's, BL/s^2.
+    #[inline(always)]
+    pub fn acceleration<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
+        let most = self.calibration.acceleration_bl_per_s2();
+        let usual = L::splat(self.calibration.usual_acceleration_bl_per_s2());
+        let (position, velocity) = (moment.position, moment.velocity);
+        let walls = plus(
+            self.tank.push(position, velocity, WALL_HORIZON_S),
+            self.habitat.push(position, velocity, WALL_HORIZON_S),
+        );
+        let walls = self.aside(walls, moment);
+        let flight = self.habitat.flight(position, self.hunter);
+        let walls = add_scaled(flight, L::splat(self.params.rules.walls), walls);
+        let cruise = self.calibration.cruise_bl_per_s;
+        let goals = (self.habitat).toward_goals(self.time_s, position, velocity, cruise);
+        let nothing = [L::splat(0.0); 3];
+        let (urgent, [together, around, broadside, near], wander) = match &self.params.rules.zones {
+            Some(zones) => {
+                let course = self.with_zones(zones, moment);
+                (nothing, [course, nothing, nothing, nothing], nothing)
+            }
+            None => {
+                let (urgent, wishes) = self.with_rules(moment);
+                (urgent, wishes, self.wander(moment))
+            }
+        };
+        let urgent = plus(urgent, walls);
+        let cruise = self.cruise(moment);
+        granted(
+            &[
+                scaled(usual, urgent),
+                scaled(usual, together),
+                scaled(usual, around),
+                scaled(usual, broadside),
+                scaled(usual, near),
+                scaled(usual, goals),
+                wander,
+                cruise,
+            ],
+            most,
+        )
+    }
+
+    /// A push as a turn: who is only slowed down by a wall dawdles before it. What of the push would brake leads to
+    /// the side instead that the rest of it points to, or, head-on, to the one where the neighbors turn, as far as
+    /// it aligns, and where the tank's middle lies, or its circle leads.
+    #[inline(always)]
+    fn aside<L: Lanes>(&self, push: [L; 3], moment: &Moment<L>) -> [L; 3] {
+        let ahead = unit(moment.velocity);
+        let brake = -dot(push, ahead);
+        let is_braked = L::splat(0.0).less(brake);
+        if !L::any(is_braked) {
+            return push;
+        }
+        let side = unit(cross(splat3(self.tank.up()), ahead));
+        let mut turned = L::splat(0.0);
+        for neighbor in moment.neighbors {
+            turned = turned + dot(unit(neighbor.velocity), side);
+        }
+        // Who does not align does not follow others either.
+        let follow = L::splat(self.params.rules.alignment.min(1.0)) / at_least_one(moment.count());
+        let home = match self.params.rules.circling > 0.0 {
+            true => self.circling(moment),
+            false => minus(splat3(self.tank.middle), moment.position),
+        };
+        let chosen = dot(push, side) / brake + follow * turned + dot(unit(home), side);
+        let turn = scaled(brake.copysign(chosen), side);
+        let turned = plus(add_scaled(push, L::splat(BRAKED) * brake, ahead), turn);
+        select3::<L>(is_braked, turned, push)
+    }
+
+    /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
+    #[inline(always)]
+    fn with_rules<L: Lanes>(&self, moment: &Moment<L>) -> ([L; 3], [[L; 3]; 4]) {
+        let rules = &self.params.rules;
+        let ahead = unit(moment.velocity);
+        let seen = Seen::of(moment.neighbors, ahead, self.cos_half_view, rules);
+        let alignment = self.alignment(&seen, moment);
+        let apart = match self.params.separation {
+            Separation::Repulsion => seen.apart,
+            Separation::Papers => self.rule_a_of_the_papers(moment, ahead, alignment),
+        };
+        let together = L::select(moment.leads, L::splat(0.0), L::splat(1.0));
+        let wishes = [
+            scaled(together * L::splat(rules.alignment), alignment),
+            scaled(L::splat(rules.circling), self.circling(moment)),
+            scaled(L::splat(BROADSIDE), self.broadside(moment)),
+            scaled(together * L::splat(rules.cohesion), seen.cohesion(rules)),
+        ];
+        (scaled(L::splat(rules.separation), apart), wishes)
+    }
+
+    /// Couzin et al. 2002: as fast as may be onto the course of the zones.
+    #[inline(always)]
+    fn with_zones<L: Lanes>(&self, zones: &Zones, moment: &Moment<L>) -> [L; 3] {
+        let (velocity, cos) = (moment.velocity, self.cos_half_view);
+        let course = zones::course(zones, velocity, moment.neighbors, cos);
+        let wished = unit(plus(course, moment.noise));
+        let cruise = self.calibration.cruise_bl_per_s;
+        let gap = minus(scaled(L::splat(cruise), wished), velocity);
+        scaled(L::splat(WITHOUT_DELAY / cruise), gap)
+    }
+
+    /// mean v_j - v_i, in cruising speeds.
+    #[inline(always)]
+    fn alignment<L: Lanes>(&self, seen: &Seen<L>, moment: &Moment<L>) -> [L; 3] {
+        let one = L::splat(1.0);
+        let gap = minus(scaled(one / seen.n_along, seen.along), moment.velocity);
+        let wished = scaled(L::splat(1.0 / self.calibration.cruise_bl_per_s), gap);
+        select3::<L>(seen.n_along.at_least(one), wished, [L::splat(0.0); 3])
+    }
+
+    /// O 4, rule A: slower when ahead of the neighbors, faster when behind, and their direction.
+    #[inline(always)]
+    fn rule_a_of_the_papers<L: Lanes>(
+        &self,
+        moment: &Moment<L>,
+        ahead: [L; 3],
+        alignment: [L; 3],
+    ) -> [L; 3] {
+        let (mut lead, mut n) = (L::splat(0.0), L::splat(0.0));
+        for neighbor in moment.neighbors {
+            let sees = L::one_where(is_seen(neighbor, ahead, self.cos_half_view));
+            lead = lead - sees * dot(ahead, unit(neighbor.offset));
+            n = n + sees;
+        }
+        let half = L::splat(0.5);
+        let wished = add_scaled(scaled(-lead / n, ahead), half, alignment);
+        select3::<L>(half.less(n), wished, [L::splat(0.0); 3])
+    }
+
+    /// Toward swimming round the middle of the tank, on a ring that its narrower side holds, in
+    /// the plane of swimming.
+    #[inline(always)]
+    fn circling<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
+        if self.params.rules.circling == 0.0 {
+            return [L::splat(0.0); 3];
+        }
+        let up = splat3(self.tank.up());
+        let from_middle = minus(moment.position, splat3(self.tank.middle));
+        let from_middle = add_scaled(from_middle, -dot(from_middle, up), up);
+        let [width, height, depth] = self.tank.reach_bl;
+        let room = width.min(if self.tank.is_flat() { height } else { depth });
+        let (one, outward) = (L::splat(1.0), unit(from_middle));
+        let off = L::splat(RING) - norm(from_middle) / L::splat(room.max(1e-6));
+        let inward = scaled(L::splat(2.0) * off.clamp(-one, one), outward);
+        let course = unit(plus(inward, cross(up, outward)));
+        // Faster than those behind, slower than those ahead: the ring is to be as full all the way round.
+        let mut lead = L::splat(0.0);
+        for neighbor in moment.neighbors {
+            lead = lead - dot(course, unit(neighbor.offset));
+        }
+        let lead = lead / at_least_one(moment.count());
+        let cruise = self.calibration.cruise_bl_per_s;
+        let pace = L::splat(cruise) * (one + L::splat(SPREADING) * lead);
+        let gap = minus(scaled(pace, course), moment.velocity);
+        scaled(L::splat(1.0 / cruise), gap)
+    }
+
+    /// In side view: out of the line of sight, to the side where the neighbors go, or, where nobody aligns, where fewer
+    /// go; the more so, the nearer to end-on. Footage shows an animal best broadside, and a flock that lingers in depth
+    /// would be seen end-on half the time.
+    #[inline(always)]
+    fn broadside<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
+        let (nothing, one) = (L::splat(0.0), L::splat(1.0));
+        if self.tank.is_flat() || self.params.rules.circling > 0.0 {
+            return [nothing; 3];
+        }
+        let [x, _, z] = self.habitat.lens.sight(moment.position);
+        let sight = unit([x, nothing, z]);
+        let across = [sight[2], nothing, -sight[0]];
+        // Courses count, not speeds: slow ones would never find a side to turn to.
+        let ahead = unit(moment.velocity);
+        let (mut sum, mut n) = (nothing, nothing);
+        for neighbor in moment.neighbors {
+            let sees = L::one_where(is_seen(neighbor, ahead, self.cos_half_view));
+            sum = sum + sees * dot(unit(neighbor.velocity), across);
+            n = n + sees;
+        }
+        let follow = 3.0 * self.params.rules.alignment.min(1.0) - 1.0;
+        let follow = L::splat(follow) / at_least_one(n);
+        let side = (dot(ahead, across) + follow * sum).clamp(-one, one);
+        let cruise = L::splat(self.calibration.cruise_bl_per_s);
+        // Not onto a wall: its push leads back.
+        let aside = scaled(cruise.copysign(side), across);
+        let push = self.tank.push(moment.position, aside, WALL_HORIZON_S);
+        let side = (side + L::splat(2.0) * dot(push, across)).clamp(-one, one);
+        let end_on = dot(ahead, sight);
+        let into = end_on * end_on * dot(moment.velocity, sight) / cruise;
+        add_scaled(scaled(side * into.abs(), across), -into, sight)
+    }
+
+    /// The wandering turn, as the acceleration that makes it, and the way back to the slopes that the animal has:
+    /// left to the rules alone, boids swim as steeply as they may, and who is both steep and seen nearly end-on
+    /// heads in the picture where the animal never did.
+    #[inline(always)]
+    fn wander<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
+        let up = splat3(self.tank.up());
+        let sideways = cross(up, moment.velocity);
+        let turn = scaled(moment.wander[0], sideways);
+        let Some(slopes) = &self.calibration.slopes else {
+            return turn;
+        };
+        let [x, y, z] = moment.velocity;
+        let wished = L::splat(slopes.usual) + L::splat(slopes.spread) * moment.wander[1];
+        let gap = wished * norm([x, L::splat(0.0), z]) - y;
+        add_scaled(turn, gap / L::splat(LEVEL_S), up)
+    }
+
+    /// Back to cruising speed; leaders are faster.
+    #[inline(always)]
+    fn cruise<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
+        let speed = norm(moment.velocity);
+        let pace = L::select(moment.leads, L::splat(1.4), L::splat(1.0));
+        let gap = pace * L::splat(self.calibration.cruise_bl_per_s) - speed;
+        let turn = L::splat(self.calibration.turn_rad_per_s);
+        scaled(gap * turn, unit(moment.velocity))
+    }
+}
+
+impl<L: Lanes> Moment<'_, L> {
+    /// How many neighbors each has.
+    #[inline(always)]
+    fn count(&self) -> L {
+        let mut count = L::splat(0.0);
+        for neighbor in self.neighbors {
+            count = count + L::one_where(neighbor.is_there());
+        }
+        count
+    }
+}
+
+/// Requests in order, until the sum of their sizes reaches `most`; the last one is cut.
+#[inline(always)]
+fn granted<L: Lanes>(requests: &[[L; 3]], most: f64) -> [L; 3] {
+    let mut left = L::splat(most);
+    let mut sum = [L::splat(0.0); 3];
+    for &request in requests {
+        let size = norm(request);
+        let share = L::select(left.less(size), left / size, L::splat(1.0));
+        sum = add_scaled(sum, share, request);
+        left = left - size.min(left);
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn urgent_requests_leave_what_they_do_not_use_to_the_others() {
+        let requests = [[3.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 9.0]];
+        assert_eq!(granted(&requests, 5.0), [3.0, 2.0, 0.0]);
+        assert_eq!(granted(&requests, 2.0), [2.0, 0.0, 0.0]);
+    }
+}

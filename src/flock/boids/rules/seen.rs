@@ -1,0 +1,113 @@
+//! What boids see of their neighbors, summed up for the rules (Reynolds 1987; ALGORITHMS.md 7).
+
+use crate::flock::boids::lanes::Lanes;
+use crate::flock::boids::nearest::Neighbor;
+use crate::flock::boids::params::Rules;
+use crate::flock::boids::vector::{add_scaled, dot, scaled};
+
+/// What boids see of their neighbors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Seen<L> {
+    /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
+    pub(super) apart: [L; 3],
+    /// sum v_j over those nearer than r_a, and how many they are.
+    pub(super) along: [L; 3],
+    pub(super) n_along: L,
+    /// sum p_j - p_i over those nearer than r_c, and how many they are.
+    toward: [L; 3],
+    n_toward: L,
+}
+
+impl<L: Lanes> Seen<L> {
+    /// Of neighbors, nearest first, of who looks `ahead`, unit vectors.
+    #[inline(always)]
+    pub(super) fn of(
+        neighbors: &[Neighbor<L>],
+        ahead: [L; 3],
+        cos_half_view: f64,
+        rules: &Rules,
+    ) -> Seen<L> {
+        let apart_bl2 = L::splat(rules.separation_bl * rules.separation_bl);
+        let along_bl2 = L::splat(rules.alignment_bl * rules.alignment_bl);
+        let toward_bl2 = L::splat(rules.cohesion_bl * rules.cohesion_bl);
+        let (nothing, one) = (L::splat(0.0), L::splat(1.0));
+        let mut seen = Seen {
+            apart: [nothing; 3],
+            along: [nothing; 3],
+            n_along: nothing,
+            toward: [nothing; 3],
+            n_toward: nothing,
+        };
+        for neighbor in neighbors {
+            // Nothing is added instead of nothing being done: who is seen is not to be guessed.
+            let square_bl2 = neighbor.square_bl2;
+            let is_seen = is_seen(neighbor, ahead, cos_half_view);
+            let along = L::one_where(L::and(is_seen, square_bl2.less(along_bl2)));
+            let toward = L::one_where(L::and(is_seen, square_bl2.less(toward_bl2)));
+            seen.n_along = seen.n_along + along;
+            seen.n_toward = seen.n_toward + toward;
+            seen.along = add_scaled(seen.along, along, neighbor.velocity);
+            seen.toward = add_scaled(seen.toward, toward, neighbor.offset);
+            let is_near = L::and(is_seen, square_bl2.less(apart_bl2));
+            if L::any(is_near) {
+                let distance = square_bl2.sqrt().max(L::splat(0.05));
+                let strength = (L::splat(rules.separation_bl) / distance - one) / distance;
+                let strength = L::select(is_near, strength, nothing);
+                seen.apart = add_scaled(seen.apart, -strength, neighbor.offset);
+            }
+        }
+        seen
+    }
+
+    /// mean p_j - p_i over those nearer than r_c, in r_c.
+    #[inline(always)]
+    pub(super) fn cohesion(&self, rules: &Rules) -> [L; 3] {
+        let n = at_least_one(self.n_toward) * L::splat(rules.cohesion_bl);
+        scaled(L::splat(1.0) / n, self.toward)
+    }
+}
+
+/// What to divide by where there may be nobody.
+#[inline(always)]
+pub(super) fn at_least_one<L: Lanes>(count: L) -> L {
+    count.max(L::splat(1.0))
+}
+
+/// Whether it is there and seen by who looks `ahead`.
+#[inline(always)]
+pub(super) fn is_seen<L: Lanes>(
+    neighbor: &Neighbor<L>,
+    ahead: [L; 3],
+    cos_half_view: f64,
+) -> L::Mask {
+    let least = L::splat(cos_half_view) * neighbor.square_bl2.sqrt();
+    L::and(
+        neighbor.is_there(),
+        dot(ahead, neighbor.offset).at_least(least),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn neighbor(offset: [f64; 3]) -> Neighbor<f64> {
+        Neighbor {
+            offset,
+            square_bl2: dot(offset, offset),
+            velocity: [0.0; 3],
+        }
+    }
+
+    #[test]
+    fn a_near_neighbor_pushes_away_and_a_farther_one_attracts() {
+        let (near, far) = (neighbor([0.5, 0.0, 0.0]), neighbor([3.0, 0.0, 0.0]));
+        let rules = Rules::default();
+        let seen = |neighbor| Seen::of(&[neighbor], [1.0, 0.0, 0.0], 0.0, &rules);
+        assert_eq!(seen(near).apart, [-1.0, 0.0, 0.0]);
+        assert_eq!(seen(far).apart, [0.0; 3]);
+        assert_eq!(seen(far).cohesion(&rules), [0.5, 0.0, 0.0]);
+        let nobody = Seen::of(&[], [1.0, 0.0, 0.0], 0.0, &rules);
+        assert_eq!(seen(neighbor([-0.5, 0.0, 0.0])), nobody, "behind");
+    }
+}
