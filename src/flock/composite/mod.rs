@@ -8,6 +8,7 @@
 
 mod backdrop; // what lies behind
 mod bleed; // color beyond the edges of alpha
+mod draw_ahead; // the frames of a film, in order
 mod layer; // one individual in one frame
 mod morph; // two sprites bent to each other at a jump
 pub mod params;
@@ -18,10 +19,9 @@ mod view; // from pixels of the footage to those of the film
 
 use std::sync::{Mutex, PoisonError};
 
-use rayon::prelude::*;
-
 use self::backdrop::Backdrop;
 use self::bleed::bleed;
+use self::draw_ahead::draw_ahead;
 use self::layer::{Appearance, Haze, Painter, Stage};
 use self::params::Background;
 use self::shadow::Floor;
@@ -211,41 +211,20 @@ impl<'a> Compositor<'a> {
         desk.boxes.clear();
     }
 
-    /// Draws every frame in order on all threads and gives each to `sink`. Before a frame is drawn
-    /// `prepare` may say what lies behind it. Either may refuse: then its error comes back. While one
-    /// batch is taken, the next is drawn.
+    /// Draws every frame on all threads and gives each to `sink`, in order. Before a frame is drawn `prepare` may say
+    /// what lies behind it. Either may refuse: then its error comes back.
     pub fn render_all<E: Send>(
         &self,
-        mut prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
-        mut sink: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
+        prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
+        sink: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
     ) -> Result<(), E> {
-        let batch = 2 * rayon::current_num_threads();
-        let n_frames = self.n_frames;
-        let draw = |from: usize, shots: &mut [Shot]| {
-            let indexed = shots.par_iter_mut().enumerate();
-            indexed.for_each(|(k, shot)| self.render(from + k, shot));
+        let [width, height] = self.view.size_px;
+        let n_bytes = match self.form {
+            Form::Planar(_) => Frame::n_bytes(width, height),
+            Form::Straight => 4 * width as usize * height as usize,
         };
-        let n_in = |from: usize| batch.min(n_frames.saturating_sub(from));
-        let mut prepare_all = |from: usize, shots: &mut [Shot]| {
-            (from..)
-                .zip(shots)
-                .try_for_each(|(k, shot)| prepare(k, shot))
-        };
-        let mut ready = vec![Shot::default(); batch];
-        let mut coming = vec![Shot::default(); batch];
-        prepare_all(0, &mut ready[..n_in(0)])?;
-        draw(0, &mut ready[..n_in(0)]);
-        for from in (0..n_frames).step_by(batch) {
-            let (taken, next) = (&ready[..n_in(from)], &mut coming[..n_in(from + batch)]);
-            prepare_all(from + batch, next)?;
-            let (taken, ()) = rayon::join(
-                || (from..).zip(taken).try_for_each(|(k, shot)| sink(k, shot)),
-                || draw(from + batch, next),
-            );
-            taken?;
-            std::mem::swap(&mut ready, &mut coming);
-        }
-        Ok(())
+        let draw = |frame_idx: usize, shot: &mut Shot| self.render(frame_idx, shot);
+        draw_ahead((self.n_frames, n_bytes), prepare, draw, sink)
     }
 
     fn take_desk(&self) -> Desk {

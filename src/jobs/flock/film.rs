@@ -13,9 +13,8 @@ use crate::footage::FrameSource;
 use crate::formats::ground_truth::FilmShape;
 use crate::jobs::Error;
 use crate::library::Library;
-use crate::media::VideoFormat;
 use crate::progress::Progress;
-use crate::raster::{ColorSpec, RgbImage};
+use crate::raster::RgbImage;
 
 /// A flock that can be filmed.
 #[derive(Clone, Copy)]
@@ -104,21 +103,20 @@ impl Film<'_> {
             Some(_) => self.before(compositor).with_truth(),
             None => self.before(compositor),
         };
-        let format = self.format(&compositor);
         let shape = FilmShape {
             size_px: compositor.size_px(),
             n_frames: compositor.n_frames(),
             fps: self.flock.fps,
         };
-        let mut sinks = (targets.iter())
-            .map(|target| Sink::begin(target, &format, self.flock, self.is_clear()))
-            .collect::<Result<Vec<Sink>, Error>>()?;
+        // Begun with the first frame: by then some are drawn, if the encoder lets wait for it.
+        let mut sinks = Vec::new();
+        let begin = |target: &&Target| Sink::begin(target, shape, self.flock, self.is_clear());
         let mut truth = (truth.map(|folder| TruthFolder::create(folder, shape))).transpose()?;
         let mut behind = self.behind()?;
-        let n_wanted = sinks.iter().map(|sink| sink.n_wanted).max();
+        let n_wanted = targets.iter().map(|target| sink::n_wanted(target, shape));
         let n_frames = match truth {
             Some(_) => shape.n_frames,
-            None => n_wanted.unwrap_or(0),
+            None => n_wanted.max().unwrap_or(0),
         };
         compositor.first(n_frames).render_all(
             |frame_idx, shot| {
@@ -128,6 +126,12 @@ impl Film<'_> {
             |frame_idx, shot: &Shot| {
                 if self.progress.cancelled() {
                     return Err(Error::Cancelled);
+                }
+                if frame_idx == 0 {
+                    sinks = targets
+                        .iter()
+                        .map(begin)
+                        .collect::<Result<Vec<Sink>, Error>>()?;
                 }
                 for sink in &mut sinks {
                     sink.take(self.flock, frame_idx, shot)?;
@@ -178,15 +182,5 @@ impl Film<'_> {
     fn is_clear(&self) -> bool {
         matches!(self.backdrop, Backdrop::AsAsked)
             && self.flock.params.render.background == Background::Transparent
-    }
-
-    fn format(&self, compositor: &Compositor) -> VideoFormat {
-        let [width, height] = compositor.size_px();
-        VideoFormat {
-            width,
-            height,
-            fps: self.flock.fps,
-            color: ColorSpec::default(),
-        }
     }
 }

@@ -11,11 +11,11 @@ use super::film::{Output, Target};
 use crate::flock::composite::params::Format;
 use crate::flock::{Flock, Shot};
 use crate::formats::flock_overlay::FlockOverlay;
-use crate::formats::ground_truth::frame_name;
+use crate::formats::ground_truth::{FilmShape, frame_name};
 use crate::formats::picture;
 use crate::jobs::Error;
 use crate::media::{Coding, VideoFormat, VideoWriter};
-use crate::raster::{Frame, RgbImage};
+use crate::raster::{ColorSpec, Frame, RgbImage};
 
 /// A preview ends after so many seconds.
 const PREVIEW_S: f64 = 10.0;
@@ -26,7 +26,7 @@ pub(super) struct Sink {
     /// Whether what is written has transparency.
     alpha: bool,
     /// Frames from here on are not wanted.
-    pub(super) n_wanted: usize,
+    n_wanted: usize,
     kind: Kind,
 }
 
@@ -41,16 +41,21 @@ impl Sink {
     /// Begins a file. `alpha` tells whether nothing lies behind the film.
     pub(super) fn begin(
         target: &Target,
-        format: &VideoFormat,
+        film: FilmShape,
         flock: &Flock,
         alpha: bool,
     ) -> Result<Sink, Error> {
-        let n_frames = flock.params.frames as usize;
+        let format = &VideoFormat {
+            width: film.size_px[0],
+            height: film.size_px[1],
+            fps: film.fps,
+            color: ColorSpec::default(),
+        };
         let path = &target.path;
         let video = |coding| VideoWriter::create_as(path, format, coding).map(Kind::Video);
         let kind = match target.output {
             Output::Overlay => {
-                let overlay = FlockOverlay::new(flock, [format.width, format.height]);
+                let overlay = FlockOverlay::new(flock, film.size_px);
                 let writer = VideoWriter::create(path, format)?;
                 Kind::Overlay(writer, Box::new(overlay), Frame::default())
             }
@@ -61,14 +66,10 @@ impl Sink {
             Output::Film(Format::Webp) => video(Coding::Webp)?,
             Output::Film(Format::Png | Format::Poster) => pictures(path)?,
         };
-        let preview = matches!(target.output, Output::Film(Format::Gif | Format::Webp));
         Ok(Sink {
-            size_px: [format.width, format.height],
+            size_px: film.size_px,
             alpha,
-            n_wanted: match preview {
-                true => n_frames.min((PREVIEW_S * format.fps).ceil() as usize),
-                false => n_frames,
-            },
+            n_wanted: n_wanted(target, film),
             kind,
         })
     }
@@ -115,6 +116,16 @@ impl Sink {
             Kind::Archive(archive) => Ok(archive.finish().map_err(io::Error::from)?.flush()?),
             Kind::Folder(_) => Ok(()),
         }
+    }
+}
+
+/// How many frames of a film a file shows.
+pub(super) fn n_wanted(target: &Target, film: FilmShape) -> usize {
+    match target.output {
+        Output::Film(Format::Gif | Format::Webp) => {
+            film.n_frames.min((PREVIEW_S * film.fps).ceil() as usize)
+        }
+        _ => film.n_frames,
     }
 }
 

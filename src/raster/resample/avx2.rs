@@ -13,9 +13,25 @@ use crate::geometry::Rect;
 /// All rows of a sprite.
 #[target_feature(enable = "avx2")]
 pub(super) fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map)) {
-    draw_rows_with(surface, rect, from, |sprite, row, start, step| {
-        interpolate(sprite, row, start, step);
-    });
+    let interpolate = |sprite: &_, row: &mut _, start, step| interpolate(sprite, row, start, step);
+    let prefetch = |sprite: &_, start, step, n| prefetch(sprite, start, step, n);
+    draw_rows_with(surface, rect, from, (interpolate, prefetch));
+}
+
+/// Has the last row of taps fetched of places that are interpolated soon.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn prefetch(sprite: &Premultiplied, start: [i32; 2], step: [i32; 2], n: usize) {
+    const LINE: usize = 64 / size_of::<Quad>();
+    let (pixels, stride) = (sprite.pixels.as_ptr(), sprite.stride() as isize);
+    let [mut u, mut v] = start;
+    for _ in 0..n.div_ceil(LINE) {
+        let at = ((v >> 16) as isize + 2) * stride + (u >> 16) as isize;
+        // What lies beyond the sprite is fetched in vain.
+        _mm_prefetch::<_MM_HINT_T0>(pixels.wrapping_offset(at).cast());
+        u = u.wrapping_add(LINE as i32 * step[0]);
+        v = v.wrapping_add(LINE as i32 * step[1]);
+    }
 }
 
 /// A run of pixels. Not inlined: the loop needs all registers.

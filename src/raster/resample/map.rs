@@ -81,6 +81,11 @@ impl Map {
         Way::of(self.per_column.map(fixed))
     }
 
+    /// The way through the sprite from a point of the picture to one so many rows below it, in 65536ths.
+    pub(super) fn rows_on(&self, n: f64) -> [i32; 2] {
+        self.per_row.map(|step| fixed(n * step))
+    }
+
     /// The place in the sprite of a point of the picture.
     pub(super) fn source(&self, x: f64, y: f64) -> [f64; 2] {
         std::array::from_fn(|k| self.origin[k] + self.per_column[k] * x + self.per_row[k] * y)

@@ -21,6 +21,10 @@ use super::canvas::Cover;
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
+/// So many rows of the picture before it is needed a sprite's row is fetched: sprites are shown once in a while and lie
+/// far off in memory.
+const ROWS_AHEAD: u32 = 8;
+
 /// Alpha 1, or a full color of alpha 1.
 pub const ONE: i16 = 1 << 14;
 
@@ -176,7 +180,12 @@ fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map
                 avx2::draw_rows(surface, rect, from);
             }
         }
-        _ => draw_rows_with(surface, rect, from, Premultiplied::interpolate),
+        _ => draw_rows_with(
+            surface,
+            rect,
+            from,
+            (Premultiplied::interpolate, |_, _, _, _| {}),
+        ),
     }
 }
 
@@ -186,9 +195,17 @@ fn draw_rows_with(
     surface: &mut impl Surface,
     rect: Rect,
     (sprite, map): (&Premultiplied, &Map),
-    interpolate: impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
+    (interpolate, prefetch): (
+        impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
+        impl Fn(&Premultiplied, [i32; 2], [i32; 2], usize),
+    ),
 ) {
     let (left, width, way) = (rect.x, rect.w as usize, map.way());
+    let ahead = map.rows_on(f64::from(ROWS_AHEAD));
+    let source = |y: u32| map.source(f64::from(left) + 0.5, f64::from(y) + 0.5);
+    for y in rect.y..rect.bottom().min(rect.y + ROWS_AHEAD) {
+        prefetch(sprite, source(y).map(fixed), way.step, width);
+    }
     for y in rect.y..rect.bottom() {
         let open = |surface: &_, from: usize, to: usize| {
             Surface::next_open(surface, y, left + from as u32..left + to as u32)
@@ -196,12 +213,15 @@ fn draw_rows_with(
         if open(surface, 0, width).is_empty() {
             continue;
         }
-        let start = map.source(f64::from(left) + 0.5, f64::from(y) + 0.5);
+        let start = source(y);
         let (from, to) = map.columns_within(sprite, width, start);
         let first: [f64; 2] = std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
         let first = first.map(fixed);
         let seen = sprite.seen(first, &way, to - from);
         let to = from + seen.end;
+        let soon = way.along(first, seen.start as i32);
+        let soon = [soon[0] + ahead[0], soon[1] + ahead[1]];
+        prefetch(sprite, soon, way.step, seen.len());
         let mut run = open(surface, from + seen.start, to);
         while !run.is_empty() {
             let [start, end] = [run.start, run.end].map(|x| (x - left) as usize);

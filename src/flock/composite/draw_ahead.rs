@@ -1,0 +1,132 @@
+//! Frames drawn ahead of whoever takes them, on a thread of their own: an encoder that starts or pauses costs no time
+//! as long as there is memory (ALGORITHMS.md 8).
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+
+use rayon::prelude::*;
+
+use super::Shot;
+
+/// Bytes of frames that may wait, about; two to a thread in any case.
+const AHEAD_BYTES: usize = 32 << 20;
+
+/// Has every one of `n_frames` prepared, in order, drawn on all threads, and taken, in order. Whoever prepares or takes
+/// may refuse: then its error comes back. `n_bytes`: of a frame, about.
+pub(super) fn draw_ahead<E: Send>(
+    (n_frames, n_bytes): (usize, usize),
+    prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
+    draw: impl Fn(usize, &mut Shot) + Sync,
+    mut take: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
+) -> Result<(), E> {
+    let n_shots = (AHEAD_BYTES / n_bytes.max(1)).clamp(2 * rayon::current_num_threads(), 64);
+    let (give, drawn) = channel::<Shot>();
+    let (give_back, used) = channel();
+    for _ in 0..n_shots {
+        // Its other end is just above.
+        give_back.send(Shot::default()).ok();
+    }
+    thread::scope(|scope| {
+        let taker = scope.spawn(move || {
+            for (frame_idx, shot) in drawn.iter().enumerate() {
+                take(frame_idx, &shot)?;
+                // Whoever has drawn all needs none.
+                give_back.send(shot).ok();
+            }
+            Ok(())
+        });
+        let drawn = draw_all(n_frames, prepare, draw, (&used, give));
+        let taken = taker.join();
+        let taken = taken.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        taken.and(drawn)
+    })
+}
+
+/// Draws until all is drawn, or nobody takes any more.
+fn draw_all<E>(
+    n_frames: usize,
+    mut prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
+    draw: impl Fn(usize, &mut Shot) + Sync,
+    (used, give): (&Receiver<Shot>, Sender<Shot>),
+) -> Result<(), E> {
+    let most = rayon::current_num_threads();
+    let mut first = 0;
+    while first < n_frames {
+        // What is there already, one at least; a taker that is gone gives none back.
+        let Ok(shot) = used.recv() else { break };
+        let n = most.min(n_frames - first);
+        let mut shots: Vec<Shot> = (std::iter::once(shot).chain(used.try_iter()))
+            .take(n)
+            .collect();
+        for (k, shot) in shots.iter_mut().enumerate() {
+            prepare(first + k, shot)?;
+        }
+        let numbered = shots.par_iter_mut().enumerate();
+        numbered.for_each(|(k, shot)| draw(first + k, shot));
+        first += shots.len();
+        for shot in shots {
+            // The taker's own error comes back.
+            give.send(shot).ok();
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::{Duration, Instant};
+
+    use super::*;
+
+    /// Draws 40 frames; the taker does not go on from frame `at` until frame `wanted` is drawn, and tells how many are.
+    fn drawn_when(at: usize, wanted: usize, n_bytes: usize) -> usize {
+        let (n_drawn, mut seen) = (AtomicUsize::new(0), 0);
+        let draw = |_, _: &mut Shot| {
+            n_drawn.fetch_add(1, Ordering::SeqCst);
+        };
+        let count = || n_drawn.load(Ordering::SeqCst);
+        let taken = draw_ahead(
+            (40, n_bytes),
+            |_, _| Ok::<(), ()>(()),
+            draw,
+            |frame_idx, _| {
+                let began = Instant::now();
+                while frame_idx == at && count() < wanted && began.elapsed().as_secs() < 1 {
+                    thread::sleep(Duration::from_millis(1));
+                }
+                if frame_idx == at {
+                    seen = count();
+                }
+                Ok(())
+            },
+        );
+        assert_eq!(taken, Ok(()));
+        seen
+    }
+
+    #[test]
+    fn frames_are_drawn_while_nobody_takes_them_as_many_as_there_is_memory_for() {
+        assert_eq!(drawn_when(0, 40, 1 << 10), 40);
+        let n_threads = rayon::current_num_threads();
+        let least = 2 * n_threads;
+        if least < 40 {
+            assert_eq!(drawn_when(0, 40, AHEAD_BYTES), least, "{n_threads} threads");
+        }
+    }
+
+    #[test]
+    fn who_refuses_to_prepare_or_to_take_ends_it_with_its_error() {
+        let refuse = |at: usize| move |frame_idx: usize| (frame_idx < at).then_some(()).ok_or(at);
+        for (prepared, taken) in [(7, 99), (99, 7)] {
+            let (prepare, take) = (refuse(prepared), refuse(taken));
+            let ended = draw_ahead(
+                (40, 1 << 20),
+                |frame_idx, _| prepare(frame_idx),
+                |_, _| {},
+                |frame_idx, _| take(frame_idx),
+            );
+            assert_eq!(ended, Err(7));
+        }
+    }
+}
