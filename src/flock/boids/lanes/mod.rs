@@ -5,7 +5,7 @@
 //! lanes: no sum goes across them, and no product is fused with a sum.
 //!
 //! What reckons with lanes is inlined, always, into a function that is compiled for their instructions. A closure is
-//! not, nor what `map` and `fold` are made of, so there are no lanes in those.
+//! not, nor what `map` and `fold` are made of, so there are no lanes in those, unless they are rarely called.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;

@@ -211,6 +211,10 @@ fn rank(cpu: Level, near: &mut Near) {
 
 /// Has the memory fetch a boid that is looked at soon.
 #[inline(always)]
+#[cfg_attr(
+    not(target_arch = "x86_64"),
+    expect(unused_variables, reason = "there is no kernel that fetches")
+)]
 fn prefetch(cpu: Level, boid: &Boid) {
     match cpu {
         #[cfg(target_arch = "x86_64")]
