@@ -12,6 +12,7 @@ use super::room::{Crowd, Inner, Part, Room};
 use super::rules::{Moment, Steering};
 use super::vector::{add_scaled, cross, dot, minus, norm, scaled, turned_at_most, unit};
 use super::{Boids, CHUNK, draw, leadership};
+#[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;
 use crate::random;
 
