@@ -42,7 +42,7 @@ while len(found) < int(sys.argv[1]):
                 s.bind(("127.0.0.1", at))
     except OSError:
         continue
-    if port not in found:
+    if not {port - 10000, port, port + 10000} & set(found):
         found.append(port)
 print(*found)
 PYTHON
@@ -70,6 +70,11 @@ start_postgres() {
     export FLOCKREEL_TEST_POSTGRES="postgres://postgres@127.0.0.1:$1"
 }
 
+# Whether somebody listens at a port.
+listens() {
+    python3 -c 'import socket, sys; socket.create_connection(("127.0.0.1", int(sys.argv[1])), 1).close()' "$1" 2>/dev/null
+}
+
 start_bucket() {
     mkdir "$folder/bucket"
     cat >"$folder/s3.json" <<'JSON'
@@ -85,7 +90,7 @@ JSON
     export AWS_REGION=us-east-1 FLOCKREEL_TEST_BUCKET=s3://flockreel
     for _ in $(seq 100); do
         if echo "s3.bucket.create -name flockreel" | "$venv/bin/weed" shell -master "127.0.0.1:$1" \
-            -filer "127.0.0.1:$3" 2>&1 | grep -q "create bucket"; then return; fi
+            -filer "127.0.0.1:$3" 2>&1 | grep -q "create bucket" && listens "$5"; then return; fi
         sleep 0.2
     done
     echo "with servers: the bucket did not come to be" >&2
