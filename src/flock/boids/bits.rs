@@ -13,49 +13,49 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
     (
         "school",
         [
-            0x5c88_6421_384c_4c03,
-            0xd624_7330_d2e2_3211,
-            0x2eaf_5adb_cf19_d51d,
+            0xfd14_c8c5_7e78_9832,
+            0x93e4_f3b0_6c49_b751,
+            0x3f07_4642_30cf_747b,
         ],
     ),
     (
         "swarm",
         [
-            0xb5b3_3357_c44b_4949,
-            0xfd7d_33e3_4711_b465,
-            0x2281_bddb_e2dc_29d7,
+            0xa0b2_afa5_b22b_a59e,
+            0x22b0_0c10_2e48_8de2,
+            0xf336_5f9d_6562_02f9,
         ],
     ),
     (
         "mill",
         [
-            0xdbd0_783f_79d2_7834,
-            0x488f_1b06_09ed_9c6b,
-            0x1e87_6894_b8f7_0262,
+            0x33f7_bd6c_3e3e_54cb,
+            0xda27_0599_ab6c_a467,
+            0x57ac_5fc7_5595_f1f6,
         ],
     ),
     (
         "scatter",
         [
-            0xa635_058c_6bb6_50e9,
-            0x36b9_a186_ae0d_b381,
-            0xd61c_4f40_5f50_d6d3,
+            0x4548_4d38_6c4b_7d01,
+            0x5151_3e7f_b2a9_dbc6,
+            0x9a63_5fd8_116a_3781,
         ],
     ),
     (
         "zonal",
         [
-            0xdce6_da66_3297_dab3,
-            0xb190_c590_08b7_b24e,
-            0xe126_fbf4_1ccd_05e0,
+            0xcd94_a349_1415_f2b1,
+            0x4b79_0b85_38ff_af6d,
+            0x31bb_defc_1791_be48,
         ],
     ),
     (
         "papers",
         [
-            0xc091_5c60_3874_3464,
-            0x93e2_777e_a7cb_6679,
-            0xae69_ce29_e673_fa9e,
+            0x8931_5b8c_e146_598b,
+            0x8cdd_41d8_9f6a_5d92,
+            0x77b6_d78f_70d1_9e2e,
         ],
     ),
 ];
@@ -68,7 +68,7 @@ const SLOPES: Slopes = Slopes {
 };
 
 /// A school among goals and obstacles, before a predator, half of it drawn to where it meets.
-const DIGEST_OF_A_FULL_TANK: u64 = 0xb7ce_ad04_5a4d_39b5;
+const DIGEST_OF_A_FULL_TANK: u64 = 0x9d24_a9e8_f1ec_4b94;
 
 fn calibration(slopes: Option<Slopes>) -> Calibration {
     Calibration {

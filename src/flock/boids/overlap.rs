@@ -1,84 +1,152 @@
-//! Nobody lies upon another: one pass of pushing apart after each step (ALGORITHMS.md 7).
+//! Nobody lies upon another: who is too near is pushed away after each step (ALGORITHMS.md 7), and so are those
+//! that they are pushed upon, until nobody is.
 //!
 //! Who may overlap is found in the cells that boids had before the step: none has gone farther since than the
 //! one that went farthest.
 
 use rayon::prelude::*;
 
-use super::grid::Boid;
 use super::room::Room;
-use super::vector::{Vec3, add_scaled, dot, minus, scaled};
+use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled};
 use super::{Boids, CHUNK};
 
 /// At most so many push one.
 const MOST: usize = 16;
+/// Rounds of pushes after one step, at most, and without fewer pushed than ever before: where there is no room they
+/// would never end.
+const ROUNDS: usize = 100;
+const PATIENCE: usize = 24;
+/// So much farther apart than they have to be, for between others and at walls only a part of the way is gone at once.
+const FARTHER: f64 = 1.01;
 
-/// Somebody too near: the square of the distance, its number, and the way to it.
-type Near = (f64, u32, Vec3);
+/// Somebody too near: the square of the distance, where it stands, and the way to it.
+type Near = (f64, usize, Vec3);
+
+/// Where one that was pushed stands, and its position and velocity after that.
+type Pushed = (usize, Vec3, Vec3);
 
 impl Boids<'_> {
-    /// One relaxation: each pair that overlaps moves apart by half of what is missing. Nobody has moved farther
-    /// than `farthest_bl` since the cells were filled.
-    pub(super) fn push_apart(&self, room: &mut Room, farthest_bl: f64) {
+    /// Has pairs that overlap move apart, each by half of what is missing, until there are none. Nobody has moved
+    /// farther than `farthest_bl` since the cells were filled.
+    pub(super) fn push_apart(&self, room: &mut Room, mut farthest_bl: f64) {
         // Who was farther off from all than two come nearer in a step overlaps with nobody.
         let most_bl = (self.overlap_bl + 2.0 * farthest_bl) * (1.0 + 1e-9);
-        let moved: Vec<(usize, Vec3, Vec3)> = (0..room.next.boids.len())
-            .into_par_iter()
-            .fold_chunks(CHUNK, Vec::new, |mut moved, slot| {
-                if room.next.inners[slot].nearest_bl2 > most_bl * most_bl {
-                    return moved;
-                }
+        let everybody = (0..room.next.boids.len()).into_par_iter();
+        let may_overlap = |slot: usize| room.next.inners[slot].nearest_bl2 <= most_bl * most_bl;
+        let mut pushed = self.pushed(everybody, may_overlap, (room, farthest_bl));
+        let (mut least, mut n_in_vain) = (usize::MAX, 0);
+        for _ in 1..ROUNDS {
+            n_in_vain = if pushed.len() < least {
+                0
+            } else {
+                n_in_vain + 1
+            };
+            if pushed.is_empty() || n_in_vain == PATIENCE {
+                break;
+            }
+            least = least.min(pushed.len());
+            farthest_bl += self.put(room, &pushed);
+            let touched = self.touched(&pushed, (room, farthest_bl));
+            pushed = self.pushed(touched.into_par_iter(), |_| true, (room, farthest_bl));
+        }
+        self.put(room, &pushed);
+    }
+
+    /// Those among `slots` that others are too near to, pushed.
+    fn pushed(
+        &self,
+        slots: impl IndexedParallelIterator<Item = usize>,
+        may_overlap: impl Fn(usize) -> bool + Sync,
+        (room, farthest_bl): (&Room, f64),
+    ) -> Vec<Pushed> {
+        let push = |mut pushed: Vec<Pushed>, slot| {
+            if may_overlap(slot) {
                 let near = self.too_near(slot, room, farthest_bl);
                 if !near.is_empty() {
-                    let (position, velocity) = self.apart(&room.next.boids[slot], &near);
-                    moved.push((slot, position, velocity));
+                    let (position, velocity) = self.apart(slot, &near, room);
+                    pushed.push((slot, position, velocity));
                 }
-                moved
-            })
-            .flatten_iter()
-            .collect();
-        for (slot, position, velocity) in moved {
+            }
+            pushed
+        };
+        let chunks = slots.fold_chunks(CHUNK, Vec::new, push);
+        chunks.flatten_iter().collect()
+    }
+
+    /// Puts those that were pushed where they are now; the longest way of one.
+    fn put(&self, room: &mut Room, pushed: &[Pushed]) -> f64 {
+        let mut longest_bl = 0.0;
+        for &(slot, position, velocity) in pushed {
             let (boid, inner) = (&mut room.next.boids[slot], &mut room.next.inners[slot]);
-            let (way, pushed) = (
+            let (way, push) = (
                 scaled(self.step_s, boid.velocity),
                 minus(position, boid.position),
             );
-            inner.is_blocked = dot(pushed, way) < -0.5 * dot(way, way);
+            inner.is_blocked |= dot(push, way) < -0.5 * dot(way, way);
+            longest_bl = f64::max(longest_bl, norm(push));
             (boid.position, boid.velocity) = (position, velocity);
         }
+        longest_bl
+    }
+
+    /// Where those stand who overlap now with one that was pushed, and the pushed themselves.
+    fn touched(&self, pushed: &[Pushed], (room, farthest_bl): (&Room, f64)) -> Vec<usize> {
+        let around = |&(slot, ..): &Pushed| {
+            let near = self.too_near(slot, room, farthest_bl);
+            let itself = (!near.is_empty()).then_some(slot);
+            let others = near.into_iter().map(|(_, other, _)| other);
+            others.chain(itself)
+        };
+        let mut touched: Vec<usize> = pushed.par_iter().flat_map_iter(around).collect();
+        touched.par_sort_unstable();
+        touched.dedup();
+        touched
     }
 
     /// The others that overlap with whoever stands at `slot`, nearest first, equal distances by id.
     fn too_near(&self, slot: usize, room: &Room, farthest_bl: f64) -> Vec<Near> {
-        let place = room.next.boids[slot].position;
+        let boids = &room.next.boids;
+        let place = boids[slot].position;
         let most_bl2 = self.overlap_bl * self.overlap_bl;
         let mut near = Vec::new();
         for (from, to) in (room.grid).rows(place, self.overlap_bl + farthest_bl) {
             for other in from..to {
-                let boid = &room.next.boids[other];
-                let offset = minus(boid.position, place);
+                let offset = minus(boids[other].position, place);
                 let square_bl2 = dot(offset, offset);
                 if square_bl2 < most_bl2 && other != slot {
-                    near.push((square_bl2, boid.id, offset));
+                    near.push((square_bl2, other, offset));
                 }
             }
         }
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.sort_unstable_by(|a, b| {
+            let by_id = boids[a.1].id.cmp(&boids[b.1].id);
+            a.0.total_cmp(&b.0).then(by_id)
+        });
         near.truncate(MOST);
         near
     }
 
     /// Where one goes that others are too near to.
-    fn apart(&self, boid: &Boid, near: &[Near]) -> (Vec3, Vec3) {
+    fn apart(&self, slot: usize, near: &[Near], room: &Room) -> (Vec3, Vec3) {
+        let boid = &room.next.boids[slot];
         let (mut position, mut velocity) = (boid.position, boid.velocity);
         for &(square_bl2, other, offset) in near {
             let distance = square_bl2.sqrt();
             let away = match distance > 1e-9 {
                 true => scaled(-1.0 / distance, offset),
                 // In one place: apart along x, by id.
-                false => [if boid.id < other { -1.0 } else { 1.0 }, 0.0, 0.0],
+                false => [
+                    if boid.id < room.next.boids[other].id {
+                        -1.0
+                    } else {
+                        1.0
+                    },
+                    0.0,
+                    0.0,
+                ],
             };
-            position = add_scaled(position, 0.5 * (self.overlap_bl - distance), away);
+            let missing_bl = FARTHER * self.overlap_bl - distance;
+            position = add_scaled(position, 0.5 * missing_bl, away);
         }
         self.habitat.keep_out(&mut position, &mut velocity);
         (
@@ -117,7 +185,10 @@ mod tests {
         boids.show(positions, velocities, None);
         boids.advance();
         let apart_bl = norm(minus(boids.positions()[1], boids.positions()[0]));
-        assert!((apart_bl - boids.overlap_bl).abs() < 1e-9, "{apart_bl}");
+        assert!(
+            (apart_bl - FARTHER * boids.overlap_bl).abs() < 1e-9,
+            "{apart_bl}"
+        );
     }
 
     /// The share of boids and seconds in which one never gets 0.15 of its way from where it was.

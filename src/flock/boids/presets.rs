@@ -59,13 +59,18 @@ fn order(
 
 /// Where something does not hold of so many.
 fn exceptions(name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> {
-    exceptions_in(&TANKS, name, count, holds)
+    exceptions_of(&ANIMALS, &TANKS, (name, count), holds)
 }
 
-fn exceptions_in(tanks: &[Vec3], name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> {
+fn exceptions_of(
+    animals: &[(f64, [f64; 2])],
+    tanks: &[Vec3],
+    (name, count): (&str, u32),
+    holds: fn(&Order) -> bool,
+) -> Vec<String> {
     let mut all = Vec::new();
     for &tank in tanks {
-        for animal in ANIMALS {
+        for &animal in animals {
             for seed in 1..=6 {
                 let order = order((name, count, seed), animal, tank);
                 if !holds(&order) {
@@ -79,14 +84,27 @@ fn exceptions_in(tanks: &[Vec3], name: &str, count: u32, holds: fn(&Order) -> bo
 
 #[test]
 fn a_school_is_polarized() {
-    let none = exceptions("school", 20, |order| order.polarization > 0.65);
+    let is_polarized = |order: &Order| order.polarization > 0.65;
+    let none = exceptions_of(&ANIMALS[..1], &TANKS, ("school", 20), is_polarized);
     assert!(none.is_empty(), "{none:#?}");
+}
+
+/// It takes its time to turn where walls meet, and while it does points every way: now and then for all of 15 s.
+#[test]
+fn a_school_of_slow_animals_is_polarized_in_the_mean() {
+    for tank in TANKS {
+        let of_seed = |seed| order(("school", 20, seed), ANIMALS[1], tank).polarization;
+        let orders: Vec<f64> = (1..=6).map(of_seed).collect();
+        let mean = orders.iter().sum::<f64>() / 6.0;
+        assert!(mean > 0.8, "{tank:?} {mean}: {orders:?}");
+    }
 }
 
 #[test]
 fn a_crowd_in_a_deep_tank_is_polarized() {
     let deep = [[12.0, 8.0, 12.0], [9.0, 7.0, 14.0]];
-    let none = exceptions_in(&deep, "school", 200, |order| order.polarization > 0.65);
+    let is_polarized = |order: &Order| order.polarization > 0.65;
+    let none = exceptions_of(&ANIMALS, &deep, ("school", 200), is_polarized);
     assert!(none.is_empty(), "{none:#?}");
 }
 

@@ -16,8 +16,10 @@ use super::tank::Tank;
 use super::vector::{add_scaled, cross, dot, minus, norm, plus, scaled, unit};
 use crate::flock::params::{Params, Separation, Zones};
 
-/// A wall is steered from when the path over this time meets it.
+/// A wall is steered from when the path over this time meets it, and that of a slow animal over the time in which it
+/// cruises so far: who notices a wall only when it is there turns alone, and the others push on.
 const WALL_HORIZON_S: f64 = 1.0;
+const WALL_HORIZON_BL: f64 = 0.7;
 
 /// The share of a wall's braking that becomes a turn alone.
 const BRAKED: f64 = 0.7;
@@ -74,9 +76,10 @@ impl Steering<'_> {
         let most = self.calibration.acceleration_bl_per_s2();
         let usual = L::splat(self.calibration.usual_acceleration_bl_per_s2());
         let (position, velocity) = (moment.position, moment.velocity);
+        let horizon_s = self.wall_horizon_s();
         let walls = plus(
-            self.tank.push(position, velocity, WALL_HORIZON_S),
-            self.habitat.push(position, velocity, WALL_HORIZON_S),
+            self.tank.push(position, velocity, horizon_s),
+            self.habitat.push(position, velocity, horizon_s),
         );
         let walls = self.aside(walls, moment);
         let flight = self.habitat.flight(position, self.hunter);
@@ -109,6 +112,11 @@ impl Steering<'_> {
             ],
             most,
         )
+    }
+
+    /// How far ahead walls count, seconds.
+    fn wall_horizon_s(&self) -> f64 {
+        WALL_HORIZON_S.max(WALL_HORIZON_BL / self.calibration.cruise_bl_per_s)
     }
 
     /// A push as a turn: who is only slowed down by a wall dawdles before it. What of the push would brake leads to
@@ -253,7 +261,9 @@ impl Steering<'_> {
         let cruise = L::splat(self.calibration.cruise_bl_per_s);
         // Not onto a wall: its push leads back.
         let aside = scaled(cruise.copysign(side), across);
-        let push = self.tank.push(moment.position, aside, WALL_HORIZON_S);
+        let push = self
+            .tank
+            .push(moment.position, aside, self.wall_horizon_s());
         let side = (side + L::splat(2.0) * dot(push, across)).clamp(-one, one);
         let end_on = dot(ahead, sight);
         let into = end_on * end_on * dot(moment.velocity, sight) / cruise;

@@ -116,6 +116,11 @@ impl Tank {
         (apart_bl / ROOM_BL).clamp(0.05, 1.0)
     }
 
+    /// How near `n` boids may come to each other, body lengths.
+    pub fn overlap_bl(&self, n: usize) -> f64 {
+        OVERLAP_BL * self.closeness(n)
+    }
+
     /// Whether `n` boids could keep the usual distances side by side.
     pub fn has_room_beside(&self, n: usize) -> bool {
         self.beside_bl(n) >= ROOM_BL
