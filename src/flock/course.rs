@@ -117,7 +117,19 @@ impl Course {
         }
         let predator = boids.predator().map(|place| seen(place, lens, boids));
         self.predator_px.extend(predator);
-        self.orders.push(boids.order());
+        self.orders.push(as_told(boids.order()));
+    }
+}
+
+/// An order, rounded as files hold it.
+fn as_told(order: Order) -> Order {
+    let told = |value| rounded(value, 4);
+    Order {
+        polarization: told(order.polarization),
+        milling: told(order.milling),
+        nearest_bl: told(order.nearest_bl),
+        neighbor_share: told(order.neighbor_share),
+        ..order
     }
 }
 

@@ -18,6 +18,7 @@ mod seam;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
+pub use boids::measures::Order;
 pub use composite::{Compositor, Shot};
 pub use error::Error;
 pub use individual::{BoidTrack, Fade, Individual, PlanCost};
@@ -27,6 +28,7 @@ pub use quality::Stats;
 use self::boids::Boids;
 use self::boids::calibration::Calibration;
 use self::boids::tank::Tank;
+use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
 use self::params::MatchBy;
@@ -50,6 +52,8 @@ pub struct Flock {
     pub individuals: Vec<Individual>,
     /// Where the predator was at every frame, as boids' positions are; empty without one.
     pub predator_px: Vec<[f64; 3]>,
+    /// How it moves as a whole, frame by frame.
+    pub orders: Vec<Order>,
     /// How good it is.
     pub stats: Stats,
 }
@@ -90,6 +94,7 @@ pub fn plan_flock(
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
     let boids = Boids::new(params, &calibration, (&lens, &tank), library.poses.fps);
+    let overlap_bl = boids.overlap_bl();
     let course = match params.is_loop {
         true => course::simulate_loop(boids, &lens, (params.frames, library.poses.fps), progress)?,
         false => course::simulate(boids, &lens, params.frames, progress)?,
@@ -113,6 +118,7 @@ pub fn plan_flock(
         length_px: lens.length_px,
         stats: Stats {
             room_for: tank.room_for(),
+            overlap_bl: rounded(overlap_bl, 4),
             ..quality::measure(
                 &individuals,
                 &course.orders,
@@ -121,6 +127,7 @@ pub fn plan_flock(
                 lens.length_px,
             )
         },
+        orders: course.orders,
         params: params.clone(),
         predator_px: course.predator_px,
         individuals,

@@ -49,9 +49,19 @@ pub struct Stats {
     pub milling: f64,
     /// Mean over the frames, body lengths.
     pub nearest_neighbor_bl: f64,
+    /// Share of those that have another within 3 body lengths; mean over the frames.
+    pub neighbor_share: f64,
+    /// Groups of boids within 4 body lengths of one another; mean over the frames.
+    pub groups: f64,
+    /// How near boids may come to each other, body lengths: 0.5, less where the tank is small for so many.
+    pub overlap_bl: f64,
+    /// Boids beyond a wall or within an obstacle, all frames together.
+    pub wall_violations: u64,
+    /// Pairs of boids nearer than `overlap_bl`, all frames together.
+    pub overlap_violations: u64,
 }
 
-/// Measures a flock, all but its room; rounded as files hold it.
+/// Measures a flock, all but its room and how near its boids may come; rounded as files hold it.
 pub fn measure(
     individuals: &[Individual],
     orders: &[Order],
@@ -69,6 +79,7 @@ pub fn measure(
     let least_step_px = MOVING_BL_PER_S * length_px / fps;
     let slips = individuals.iter().flat_map(|i| slips(i, least_step_px));
     let mean = |of: fn(&Order) -> f64| orders.iter().map(of).sum::<f64>() / orders.len() as f64;
+    let sum = |of: fn(&Order) -> u32| orders.iter().map(|order| u64::from(of(order))).sum();
     let stats = Stats {
         heading_error_median_rad: quantile(headings.clone(), 0.5),
         heading_error_p90_rad: quantile(headings, 0.9),
@@ -84,6 +95,11 @@ pub fn measure(
         polarization: mean(|order| order.polarization),
         milling: mean(|order| order.milling),
         nearest_neighbor_bl: mean(|order| order.nearest_bl),
+        neighbor_share: mean(|order| order.neighbor_share),
+        groups: mean(|order| f64::from(order.n_groups)),
+        overlap_bl: 0.0,
+        wall_violations: sum(|order| order.n_outside),
+        overlap_violations: sum(|order| order.n_overlaps),
     };
     stats.rounded()
 }
@@ -105,6 +121,11 @@ impl Stats {
             polarization: r(self.polarization),
             milling: r(self.milling),
             nearest_neighbor_bl: r(self.nearest_neighbor_bl),
+            neighbor_share: r(self.neighbor_share),
+            groups: r(self.groups),
+            overlap_bl: r(self.overlap_bl),
+            wall_violations: self.wall_violations,
+            overlap_violations: self.overlap_violations,
         }
     }
 }

@@ -32,6 +32,31 @@ fn a_school_follows_its_boids_without_clones() {
 }
 
 #[test]
+fn a_flock_tells_its_order_frame_by_frame_and_in_the_mean() {
+    for (view, name) in [(View::Side, "school"), (View::Top, "mill")] {
+        let flock = planned(view, name);
+        let (orders, stats) = (&flock.orders, flock.stats);
+        assert_eq!(orders.len(), 150);
+        let mean = |of: fn(&Order) -> f64| orders.iter().map(of).sum::<f64>() / 150.0;
+        for (told, found) in [
+            (stats.polarization, mean(|order| order.polarization)),
+            (stats.milling, mean(|order| order.milling)),
+            (stats.nearest_neighbor_bl, mean(|order| order.nearest_bl)),
+            (stats.neighbor_share, mean(|order| order.neighbor_share)),
+            (stats.groups, mean(|order| f64::from(order.n_groups))),
+        ] {
+            assert!((told - found).abs() < 5e-5 + 1e-9, "{told} {found}");
+        }
+        assert!(
+            stats.groups >= 1.0 && stats.neighbor_share > 0.5,
+            "{stats:?}"
+        );
+        assert_eq!((stats.wall_violations, stats.overlap_violations), (0, 0));
+        assert_eq!(stats.overlap_bl, 0.5);
+    }
+}
+
+#[test]
 fn a_flock_tells_how_many_the_tank_has_room_for() {
     let room_for = |view, count| {
         let params = Params {

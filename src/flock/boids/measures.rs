@@ -1,7 +1,11 @@
-//! How a flock moves as a whole: polarization, milling, distances (ALGORITHMS.md 7; Tunstrom et al.
-//! 2013).
+//! How a flock moves as a whole: polarization, milling, distances, groups (ALGORITHMS.md 7; Tunstrom et al. 2013).
 
 use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
+
+/// Who is this near to another has a neighbor.
+const NEIGHBOR_BL: f64 = 3.0;
+/// Two this near belong to one group.
+const GROUP_BL: f64 = 4.0;
 
 /// The order of one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -13,10 +17,19 @@ pub struct Order {
     pub milling: f64,
     /// Mean distance to the nearest other, body lengths; 0 for one alone.
     pub nearest_bl: f64,
+    /// Share of those that have another within 3 body lengths.
+    pub neighbor_share: f64,
+    /// Groups that no chain of others, each within 4 body lengths of the next, connects (single linkage).
+    pub n_groups: u32,
+    /// How many are beyond a wall or within an obstacle.
+    pub n_outside: u32,
+    /// Pairs nearer to each other than they may be.
+    pub n_overlaps: u32,
 }
 
-/// The order of boids at `positions` (body lengths) with `velocities`, who turn about `up`, a unit vector.
-pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3) -> Order {
+/// The order of boids at `positions` (body lengths) with `velocities`, who turn about `up`, a unit vector, and may be
+/// as near to each other as `overlap_bl`. Whether any is outside is not known here.
+pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64) -> Order {
     let n = positions.len() as f64;
     let sum = |vectors: &mut dyn Iterator<Item = Vec3>| {
         vectors.fold([0.0; 3], |sum, v| add_scaled(sum, 1.0, v))
@@ -28,34 +41,106 @@ pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3) -> Order {
         .iter()
         .zip(velocities)
         .map(|(&p, &v)| cross(unit(level(v)), unit(level(minus(p, center))))));
+    let row = Row::of(positions);
+    let nearest_bl: Vec<f64> = row.nearest_bl2().into_iter().map(f64::sqrt).collect();
+    let n_with_neighbor = nearest_bl.iter().filter(|&&bl| bl <= NEIGHBOR_BL).count();
     Order {
         polarization: norm(heading) / n,
         milling: norm(spin) / n,
-        nearest_bl: mean_nearest(positions),
+        nearest_bl: match positions.len() {
+            0 | 1 => 0.0,
+            _ => nearest_bl.iter().sum::<f64>() / n,
+        },
+        neighbor_share: n_with_neighbor as f64 / n,
+        n_groups: n_groups(positions, GROUP_BL),
+        n_outside: 0,
+        n_overlaps: row.n_nearer(overlap_bl),
     }
 }
 
-fn mean_nearest(positions: &[Vec3]) -> f64 {
-    if positions.len() < 2 {
-        return 0.0;
+/// Positions along x: who is too far off along x is too far off.
+struct Row<'a> {
+    positions: &'a [Vec3],
+    by_x: Vec<usize>,
+}
+
+impl Row<'_> {
+    fn of(positions: &[Vec3]) -> Row<'_> {
+        let mut by_x: Vec<usize> = (0..positions.len()).collect();
+        by_x.sort_unstable_by(|&a, &b| positions[a][0].total_cmp(&positions[b][0]));
+        Row { positions, by_x }
     }
-    let mut by_x: Vec<usize> = (0..positions.len()).collect();
-    by_x.sort_unstable_by(|&a, &b| positions[a][0].total_cmp(&positions[b][0]));
-    let mut nearest_bl2 = vec![f64::INFINITY; positions.len()];
-    for (rank, &id) in by_x.iter().enumerate() {
-        let here = positions[id];
-        let nearest = &mut nearest_bl2[id];
-        let mut look_at = |&other: &usize| {
-            let offset = minus(positions[other], here);
-            // Who is too far along x is too far, and so is who comes after.
-            let may_be_nearer = offset[0] * offset[0] < *nearest;
-            may_be_nearer.then(|| *nearest = nearest.min(dot(offset, offset)))
+
+    /// The square of each one's distance to the nearest other; infinite for one alone.
+    fn nearest_bl2(&self) -> Vec<f64> {
+        let (positions, by_x) = (self.positions, &self.by_x);
+        let mut nearest_bl2 = vec![f64::INFINITY; positions.len()];
+        for (rank, &id) in by_x.iter().enumerate() {
+            let nearest = &mut nearest_bl2[id];
+            let mut look_at = |&other: &usize| {
+                let offset = minus(positions[other], positions[id]);
+                let may_be_nearer = offset[0] * offset[0] < *nearest;
+                may_be_nearer.then(|| *nearest = nearest.min(dot(offset, offset)))
+            };
+            (by_x[rank + 1..].iter()).try_for_each(&mut look_at);
+            (by_x[..rank].iter().rev()).try_for_each(look_at);
+        }
+        nearest_bl2
+    }
+
+    /// Pairs nearer to each other than `bl`.
+    fn n_nearer(&self, bl: f64) -> u32 {
+        let mut n_pairs = 0;
+        for (rank, &id) in self.by_x.iter().enumerate() {
+            let offsets = (self.by_x[rank + 1..].iter())
+                .map(|&other| minus(self.positions[other], self.positions[id]));
+            let near = offsets.take_while(|offset| offset[0] < bl);
+            n_pairs += near.filter(|&offset| dot(offset, offset) < bl * bl).count() as u32;
+        }
+        n_pairs
+    }
+}
+
+/// Groups by single linkage: two within `link_bl` are of one group, and so is who is of the group of one of them.
+///
+/// Space is cut into cells in which all are within that of each other; cells are joined where any two are.
+fn n_groups(positions: &[Vec3], link_bl: f64) -> u32 {
+    let side_bl = link_bl / 3f64.sqrt() * (1.0 - 1e-9);
+    let cell = |position: Vec3| position.map(|x| (x / side_bl).floor() as i64);
+    let mut placed: Vec<([i64; 3], Vec3)> = positions.iter().map(|&p| (cell(p), p)).collect();
+    placed.sort_unstable_by_key(|&(cell, _)| cell);
+    let cells: Vec<&[([i64; 3], Vec3)]> = placed.chunk_by(|a, b| a.0 == b.0).collect();
+    let mut group: Vec<usize> = (0..cells.len()).collect();
+    let mut n_groups = cells.len() as u32;
+    for (one, here) in cells.iter().enumerate() {
+        // Cells that follow, as far as two cells along x: what is before has been looked at from there.
+        let reached = |there: &[([i64; 3], Vec3)]| {
+            [1, 2].map(|axis| (there[0].0[axis] - here[0].0[axis]).abs() <= 2) == [true; 2]
         };
-        (by_x[rank + 1..].iter()).try_for_each(&mut look_at);
-        (by_x[..rank].iter().rev()).try_for_each(look_at);
+        let after = (one + 1..cells.len()).take_while(|&k| cells[k][0].0[0] - here[0].0[0] <= 2);
+        for other in after.filter(|&k| reached(cells[k])) {
+            let [a, b] = [one, other].map(|k| first_of_group(&mut group, k));
+            let is_near = |p: Vec3, q: Vec3| norm(minus(p, q)) <= link_bl;
+            if a != b
+                && here
+                    .iter()
+                    .any(|p| cells[other].iter().any(|q| is_near(p.1, q.1)))
+            {
+                group[a.max(b)] = a.min(b);
+                n_groups -= 1;
+            }
+        }
     }
-    let sum: f64 = nearest_bl2.into_iter().map(f64::sqrt).sum();
-    sum / positions.len() as f64
+    n_groups
+}
+
+/// Follows who belongs to whom to its end, and shortens the way for whoever comes next.
+fn first_of_group(group: &mut [usize], mut cell: usize) -> usize {
+    while group[cell] != cell {
+        group[cell] = group[group[cell]];
+        cell = group[cell];
+    }
+    cell
 }
 
 #[cfg(test)]
@@ -74,8 +159,35 @@ mod tests {
                 let distances = others.map(|(_, &other)| norm(minus(other, positions[id])));
                 distances.fold(f64::INFINITY, f64::min)
             };
-            let mean = (0..positions.len()).map(nearest).sum::<f64>() / positions.len() as f64;
-            prop_assert_eq!(mean_nearest(&positions), mean);
+            let nearest: Vec<f64> = (0..positions.len()).map(nearest).collect();
+            let n = positions.len() as f64;
+            let order = order(&positions, &positions, [0.0, 0.0, 1.0], 0.6);
+            prop_assert_eq!(order.nearest_bl, nearest.iter().sum::<f64>() / n);
+            let pairs = (0..positions.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+            let near = pairs.filter(|&(a, b)| norm(minus(positions[a], positions[b])) < 0.6);
+            prop_assert_eq!(order.n_overlaps, near.count() as u32);
+        }
+
+        #[test]
+        fn groups_are_what_no_chain_connects(
+            positions in prop::collection::vec(prop::array::uniform3(-9.0..9.0f64), 1..60),
+            flat in any::<bool>(),
+        ) {
+            let depth = if flat { 0.0 } else { 1.0 };
+            let positions: Vec<Vec3> = positions.iter().map(|p| [p[0], p[1], depth * p[2]]).collect();
+            let mut left: Vec<usize> = (0..positions.len()).collect();
+            let mut n = 0;
+            while let Some(first) = left.pop() {
+                let mut front = vec![first];
+                n += 1;
+                while let Some(one) = front.pop() {
+                    let is_near = |other: &usize| norm(minus(positions[one], positions[*other])) <= 2.0;
+                    let (near, far) = left.iter().partition(|other| is_near(other));
+                    front.extend::<Vec<usize>>(near);
+                    left = far;
+                }
+            }
+            prop_assert_eq!(n_groups(&positions, 2.0), n);
         }
     }
 
@@ -88,8 +200,8 @@ mod tests {
         let same: Vec<Vec3> = vec![[0.3, 0.1, 0.0]; 8];
         let around: Vec<Vec3> = ring.iter().map(|p| [-p[1], p[0], 0.0]).collect();
         let (column, mill) = (
-            order(&ring, &same, [0.0, 0.0, 1.0]),
-            order(&ring, &around, [0.0, 0.0, 1.0]),
+            order(&ring, &same, [0.0, 0.0, 1.0], 0.5),
+            order(&ring, &around, [0.0, 0.0, 1.0], 0.5),
         );
         assert!((column.polarization - 1.0).abs() < 1e-12 && column.milling < 1e-12);
         assert!((mill.milling - 1.0).abs() < 1e-12 && mill.polarization < 1e-12);

@@ -109,7 +109,7 @@ impl<'a> Boids<'a> {
                 ..params.clone()
             },
             habitat: Habitat::new(params, lens, tank),
-            overlap_bl: OVERLAP_BL * closeness,
+            overlap_bl: tank.overlap_bl(n),
             calibration,
             tank,
             step_s,
@@ -161,9 +161,20 @@ impl<'a> Boids<'a> {
         }
     }
 
+    /// How near they may come to each other, body lengths: half a length, less where the tank is too small for so many.
+    pub fn overlap_bl(&self) -> f64 {
+        self.overlap_bl
+    }
+
     /// How they move as a whole at this moment.
     pub fn order(&self) -> measures::Order {
-        measures::order(&self.positions, &self.velocities, self.tank.up())
+        let up = self.tank.up();
+        let is_outside =
+            |&&place: &&Vec3| !(self.tank.holds(place) && self.habitat.is_clear(place));
+        measures::Order {
+            n_outside: self.positions.iter().filter(is_outside).count() as u32,
+            ..measures::order(&self.positions, &self.velocities, up, self.overlap_bl)
+        }
     }
 
     /// The depth of the tank's front, body lengths from the camera.

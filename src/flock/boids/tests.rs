@@ -56,6 +56,36 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
     }
 }
 
+/// A preset's flock in a tank, for 200 frames: how many were outside, and how many pairs too near.
+fn violations(name: &str, count: u32, greatest: Vec3) -> (u32, u32) {
+    let params = Params {
+        count,
+        ..preset(name)
+    };
+    let library = synthetic::library(View::Side);
+    let calibration = calibrated(&library, &params);
+    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], greatest));
+    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+    (0..200).fold((0, 0), |(n_outside, n_overlaps), _| {
+        boids.advance();
+        let order = boids.order();
+        (n_outside + order.n_outside, n_overlaps + order.n_overlaps)
+    })
+}
+
+#[test]
+fn nobody_lies_upon_another_and_where_there_is_room_they_keep_half_a_length() {
+    let tanks = [[15.0, 11.0, 0.0], [15.0, 11.0, 3.0], [4.0, 3.0, 0.0]];
+    for (name, tank) in Params::PRESETS
+        .into_iter()
+        .flat_map(|name| tanks.map(|tank| (name, tank)))
+    {
+        assert_eq!(violations(name, 40, tank), (0, 0), "{name} {tank:?}");
+    }
+    let wide = Tank::new([0.0; 3], tanks[0]);
+    assert_eq!(wide.overlap_bl(40), OVERLAP_BL);
+}
+
 #[test]
 fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
     let library = synthetic::library(View::Side);

@@ -90,6 +90,7 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
             ..Params::default()
         },
         individuals: vec![individual],
+        orders: Vec::new(),
         stats: Stats::default(),
     }
 }

@@ -3,9 +3,12 @@
 //! A flock holds its numbers rounded already, so reading gives back exactly what was written, and
 //! anyone can recompute each plan's cost from this file and the library (ALGORITHMS.md 6, proof c).
 
+mod stats; // how good the flock is, and how it moves frame by frame
+
 use serde::{Deserialize, Serialize};
 
-use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost, Stats};
+use self::stats::StatsFile;
+use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/flock@1";
@@ -20,7 +23,7 @@ pub fn write(flock: &Flock) -> Vec<u8> {
         fps: flock.fps,
         image_size_px: flock.image_size_px,
         length_px: flock.length_px,
-        stats: StatsFile::of(&flock.stats),
+        stats: StatsFile::of(&flock.stats, &flock.orders),
         predator: flock.predator_px.clone(),
         individuals: (), // written line by line below
     };
@@ -53,6 +56,7 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
             .into_iter()
             .map(IndividualFile::into_individual)
             .collect(),
+        orders: file.stats.orders()?,
         stats: file.stats.into_stats(),
     })
 }
@@ -128,29 +132,6 @@ struct CostFile {
     #[serde(default)]
     gap: f64,
     exact: bool,
-}
-
-#[derive(Serialize, Deserialize)]
-struct StatsFile {
-    heading_error_median_rad: f64,
-    heading_error_p90_rad: f64,
-    jumps_per_100_frames: f64,
-    /// Absent in files of before; 0 then.
-    #[serde(default)]
-    repeats_per_100_frames: f64,
-    path_deviation_p95_bl: f64,
-    slip_median_rad: f64,
-    clone_share: f64,
-    /// Absent in files of before; 0 then.
-    #[serde(default)]
-    distinct_looks: u32,
-    /// Absent in files of before; 0 then.
-    #[serde(default)]
-    room_for: u32,
-    variety: f64,
-    polarization: f64,
-    milling: f64,
-    nearest_neighbor_bl: f64,
 }
 
 impl IndividualFile {
@@ -256,44 +237,6 @@ impl CostFile {
     }
 }
 
-impl StatsFile {
-    fn of(stats: &Stats) -> StatsFile {
-        StatsFile {
-            heading_error_median_rad: stats.heading_error_median_rad,
-            heading_error_p90_rad: stats.heading_error_p90_rad,
-            jumps_per_100_frames: stats.jumps_per_100_frames,
-            repeats_per_100_frames: stats.repeats_per_100_frames,
-            path_deviation_p95_bl: stats.path_deviation_p95_bl,
-            slip_median_rad: stats.slip_median_rad,
-            clone_share: stats.clone_share,
-            distinct_looks: stats.distinct_looks,
-            room_for: stats.room_for,
-            variety: stats.variety,
-            polarization: stats.polarization,
-            milling: stats.milling,
-            nearest_neighbor_bl: stats.nearest_neighbor_bl,
-        }
-    }
-
-    fn into_stats(self) -> Stats {
-        Stats {
-            heading_error_median_rad: self.heading_error_median_rad,
-            heading_error_p90_rad: self.heading_error_p90_rad,
-            jumps_per_100_frames: self.jumps_per_100_frames,
-            repeats_per_100_frames: self.repeats_per_100_frames,
-            path_deviation_p95_bl: self.path_deviation_p95_bl,
-            slip_median_rad: self.slip_median_rad,
-            clone_share: self.clone_share,
-            distinct_looks: self.distinct_looks,
-            room_for: self.room_for,
-            variety: self.variety,
-            polarization: self.polarization,
-            milling: self.milling,
-            nearest_neighbor_bl: self.nearest_neighbor_bl,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,5 +257,26 @@ mod tests {
         assert_eq!(read(&bytes).unwrap(), flock);
         let head = String::from_utf8_lossy(&bytes[..60]).into_owned();
         assert!(head.starts_with(r#"{"schema":"flockreel/flock@1","version":""#));
+    }
+
+    #[test]
+    fn a_flock_whose_measures_have_different_numbers_of_frames_is_refused() {
+        let library = synthetic::library(View::Top);
+        let params = Params {
+            count: 2,
+            frames: 5,
+            ..Params::default()
+        };
+        let flock = plan_flock(&library, &params, &Silent).unwrap();
+        let text = String::from_utf8(write(&flock)).unwrap();
+        let short = text.replacen(r#""groups":[1,"#, r#""groups":["#, 1);
+        assert_ne!(short, text);
+        let error = read(short.as_bytes()).unwrap_err();
+        assert!(error.to_string().contains("stats.per_frame"), "{error}");
+        // Files of before have none.
+        let (from, to) = (text.find(r#","per_frame""#), text.find(r#"},"predator""#));
+        let (from, to) = (from.unwrap(), to.unwrap());
+        let before = [&text[..from], &text[to..]].concat();
+        assert!(read(before.as_bytes()).unwrap().orders.is_empty());
     }
 }
