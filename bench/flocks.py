@@ -36,6 +36,8 @@ BARS = [
     ("path_deviation_p95_bl", 0.25),
     ("slip_median_rad", 0.05),
     ("jammed", 0.01),
+    ("wall_violations", 0),
+    ("overlap_violations", 0),
 ]
 
 # Who gets no farther than this share of its way in a second is jammed.
