@@ -94,7 +94,6 @@ pub fn plan_flock(
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
     let boids = Boids::new(params, &calibration, (&lens, &tank), library.poses.fps);
-    let overlap_bl = boids.overlap_bl();
     let course = match params.is_loop {
         true => course::simulate_loop(boids, &lens, (params.frames, library.poses.fps), progress)?,
         false => course::simulate(boids, &lens, params.frames, progress)?,
@@ -118,7 +117,7 @@ pub fn plan_flock(
         length_px: lens.length_px,
         stats: Stats {
             room_for: tank.room_for(),
-            overlap_bl: rounded(overlap_bl, 4),
+            overlap_bl: rounded(tank.overlap_bl(individuals.len()), 4),
             ..quality::measure(
                 &individuals,
                 &course.orders,

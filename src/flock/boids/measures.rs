@@ -113,19 +113,14 @@ fn n_groups(positions: &[Vec3], link_bl: f64) -> u32 {
     let mut group: Vec<usize> = (0..cells.len()).collect();
     let mut n_groups = cells.len() as u32;
     for (one, here) in cells.iter().enumerate() {
-        // Cells that follow, as far as two cells along x: what is before has been looked at from there.
-        let reached = |there: &[([i64; 3], Vec3)]| {
-            [1, 2].map(|axis| (there[0].0[axis] - here[0].0[axis]).abs() <= 2) == [true; 2]
-        };
-        let after = (one + 1..cells.len()).take_while(|&k| cells[k][0].0[0] - here[0].0[0] <= 2);
-        for other in after.filter(|&k| reached(cells[k])) {
+        // What is before has been looked at from there; three cells off all are too far.
+        let off = |k: usize, axis: usize| (cells[k][0].0[axis] - here[0].0[axis]).abs();
+        let after = (one + 1..cells.len()).take_while(|&k| off(k, 0) <= 2);
+        for other in after.filter(|&k| off(k, 1) <= 2 && off(k, 2) <= 2) {
             let [a, b] = [one, other].map(|k| first_of_group(&mut group, k));
             let is_near = |p: Vec3, q: Vec3| norm(minus(p, q)) <= link_bl;
-            if a != b
-                && here
-                    .iter()
-                    .any(|p| cells[other].iter().any(|q| is_near(p.1, q.1)))
-            {
+            let any_near = |p: Vec3| cells[other].iter().any(|&(_, q)| is_near(p, q));
+            if a != b && here.iter().any(|&(_, p)| any_near(p)) {
                 group[a.max(b)] = a.min(b);
                 n_groups -= 1;
             }

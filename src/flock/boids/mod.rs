@@ -161,11 +161,6 @@ impl<'a> Boids<'a> {
         }
     }
 
-    /// How near they may come to each other, body lengths: half a length, less where the tank is too small for so many.
-    pub fn overlap_bl(&self) -> f64 {
-        self.overlap_bl
-    }
-
     /// How they move as a whole at this moment.
     pub fn order(&self) -> measures::Order {
         let up = self.tank.up();

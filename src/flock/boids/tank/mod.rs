@@ -116,7 +116,7 @@ impl Tank {
         (apart_bl / ROOM_BL).clamp(0.05, 1.0)
     }
 
-    /// How near `n` boids may come to each other, body lengths.
+    /// How near `n` boids may come to each other, body lengths: half a length, less where they do not fit in.
     pub fn overlap_bl(&self, n: usize) -> f64 {
         OVERLAP_BL * self.closeness(n)
     }
