@@ -7,6 +7,7 @@ use super::boids::vector::{Vec3, unit};
 use super::error::Error;
 use super::individual::{BoidTrack, rounded};
 use super::lens::Lens;
+use super::passing::{Limits, go_aside};
 use super::seam::{self, Moment};
 use crate::geometry::Turns;
 use crate::progress::Progress;
@@ -24,15 +25,16 @@ pub(super) struct Course {
     pub(super) heirs: Option<Vec<u32>>,
 }
 
-/// Simulates `n_frames`.
+/// Has boids form, and simulates `n_frames`.
 pub(super) fn simulate(
     mut boids: Boids,
     lens: &Lens,
     n_frames: u32,
     progress: &dyn Progress,
 ) -> Result<Course, Error> {
+    let mut step = steps(boids.n_frames_before() + n_frames as usize, progress);
+    boids.form(&mut step)?;
     let mut course = Course::new(&boids, lens);
-    let mut step = steps(n_frames as usize, progress);
     for t in 0..n_frames {
         step()?;
         if t > 0 {
@@ -43,7 +45,7 @@ pub(super) fn simulate(
     Ok(course)
 }
 
-/// Simulates `n_frames` of which the last plays into the first.
+/// The same, of which the last plays into the first.
 pub(super) fn simulate_loop(
     mut boids: Boids,
     lens: &Lens,
@@ -52,7 +54,8 @@ pub(super) fn simulate_loop(
 ) -> Result<Course, Error> {
     let n_lead = seam::n_meeting_frames(n_frames, fps);
     let n_frames = n_frames as usize;
-    let mut step = steps(n_frames + n_lead, progress);
+    let mut step = steps(boids.n_frames_before() + n_lead + n_frames, progress);
+    boids.form(&mut step)?;
     boids.set_back(n_lead);
     let mut lead = Vec::with_capacity(n_lead);
     for _ in 0..n_lead {
@@ -75,6 +78,13 @@ pub(super) fn simulate_loop(
         boids.advance();
     }
     seam::close(&mut moments, &lead, &heirs, fps);
+    let meeting = &mut moments[n_frames - n_lead..];
+    let limits = Limits {
+        apart_bl: boids.overlap_bl(),
+        fastest_bl_per_s: boids.fastest_bl_per_s(),
+        fps,
+    };
+    go_aside(meeting, limits, |place| boids.inside(place));
     let mut course = Course::new(&boids, lens);
     for moment in moments {
         boids.show(moment.positions, moment.velocities, moment.hunter);

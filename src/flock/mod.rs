@@ -10,6 +10,7 @@ pub mod individual;
 pub mod lens;
 pub mod motion;
 pub mod params;
+mod passing;
 pub mod placement;
 pub mod plan;
 pub mod quality;
@@ -93,7 +94,7 @@ pub fn plan_flock(
     let motion = motion_of(library, &lens);
     let tank = Tank::of(library, &lens, &motion, params);
     let calibration = Calibration::of(library, &motion, lens.is_flat());
-    let boids = Boids::new(params, &calibration, (&lens, &tank), library.poses.fps);
+    let boids = Boids::at_random(params, &calibration, (&lens, &tank), library.poses.fps);
     let course = match params.is_loop {
         true => course::simulate_loop(boids, &lens, (params.frames, library.poses.fps), progress)?,
         false => course::simulate(boids, &lens, params.frames, progress)?,

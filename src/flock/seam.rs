@@ -129,13 +129,13 @@ impl Moment {
 }
 
 /// From 0 to 1 with no speed nor acceleration at either end; constant outside.
-fn smooth(share: f64) -> f64 {
+pub(super) fn smooth(share: f64) -> f64 {
     let s = share.clamp(0.0, 1.0);
     s * s * s * (10.0 - s * (15.0 - 6.0 * s))
 }
 
 /// Its derivative.
-fn slope(share: f64) -> f64 {
+pub(super) fn slope(share: f64) -> f64 {
     let s = share.clamp(0.0, 1.0);
     30.0 * s * s * (1.0 - s) * (1.0 - s)
 }

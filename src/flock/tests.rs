@@ -264,6 +264,48 @@ fn a_loop_keeps_to_the_animals_speeds() {
 }
 
 #[test]
+fn nobody_passes_through_anybody_in_a_loop() {
+    let library = synthetic::library(View::Side);
+    for seed in 1..=4 {
+        let params = Params {
+            is_loop: true,
+            frames: 300,
+            seed,
+            ..params("school")
+        };
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        assert_eq!(flock.stats.overlap_violations, 0, "seed {seed}");
+        assert_eq!(flock.stats.wall_violations, 0, "seed {seed}");
+    }
+}
+
+#[test]
+fn who_is_not_wanted_any_more_does_not_form() {
+    /// Cancels when asked for the third time.
+    struct Impatient(std::sync::atomic::AtomicU32);
+    impl Progress for Impatient {
+        fn report(&self, stage: &'static str, fraction: f64) {
+            assert!(
+                stage == "simulating" && fraction < 0.01,
+                "{stage} {fraction}"
+            );
+        }
+        fn cancelled(&self) -> bool {
+            self.0.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == 2
+        }
+    }
+    let library = synthetic::library(View::Side);
+    for is_loop in [false, true] {
+        let params = Params {
+            is_loop,
+            ..params("school")
+        };
+        let ended = plan_flock(&library, &params, &Impatient(0.into()));
+        assert!(matches!(ended, Err(Error::Cancelled)), "{ended:?}");
+    }
+}
+
+#[test]
 fn a_loop_of_sums_of_speeds_is_refused() {
     let params = Params {
         is_loop: true,

@@ -16,6 +16,9 @@ use crate::jobs::flock::film::Film;
 use crate::library::Library;
 use crate::media::{self, Tool};
 
+/// A loop whose headings are farther off, in a tenth of what is shown, is too short to be swum.
+const SHORT_LOOP_RAD: f64 = 0.35;
+
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
@@ -32,7 +35,8 @@ pub struct Args {
     /// Everything random follows from it.
     #[arg(long)]
     seed: Option<u64>,
-    /// The last frame plays into the first: a film that repeats without a seam.
+    /// The last frame plays into the first: a film that repeats without a seam. Ten seconds or more, for all swim back
+    /// to where somebody began.
     #[arg(long = "loop")]
     is_loop: bool,
     /// Where to start from: school, swarm, mill, scatter or papers.
@@ -81,13 +85,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             path.display()
         )))?;
     }
-    let (count, room_for) = (flock.individuals.len(), flock.stats.room_for);
-    if room_for > 0 && count > room_for as usize {
-        let advice = "of so many some lie over others: ask for fewer, or film from farther away";
-        super::say(&format!(
-            "there is room for about {room_for}, and {advice} (little_room)"
-        ));
-    }
+    advice(&flock).iter().for_each(|advice| super::say(advice));
     let film = Film {
         library: &library,
         flock: &flock,
@@ -98,6 +96,31 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     film.make(&targets, args.outputs.ground_truth.as_deref())
         .map_err(|error| Error::work(error.code(), &error))?;
     Ok(Some(summary(&args, &flock, began.elapsed())))
+}
+
+/// What would make it look better, each with a stable code.
+fn advice(flock: &Flock) -> Vec<String> {
+    let (count, room_for) = (flock.individuals.len(), flock.stats.room_for);
+    let is_full = room_for > 0 && count > room_for as usize;
+    let little_room = is_full.then(|| {
+        format!(
+            "there is room for about {room_for}, and of so many some lie over others: \
+             ask for fewer, or film from farther away (little_room)"
+        )
+    });
+    let error_rad = flock.stats.heading_error_p90_rad;
+    let is_short = flock.params.is_loop && error_rad > SHORT_LOOP_RAD;
+    let short_loop = is_short.then(|| {
+        let (loop_s, off_deg) = (
+            f64::from(flock.params.frames) / flock.fps,
+            error_rad.to_degrees(),
+        );
+        format!(
+            "in a loop of {loop_s:.1} s they do not come back to where they began by swimming: in a tenth of what is \
+             shown they head {off_deg:.0} degrees or more off their way: ask for more frames (short_loop)"
+        )
+    });
+    little_room.into_iter().chain(short_loop).collect()
 }
 
 fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
@@ -165,5 +188,38 @@ impl Args {
             overrides.extend(value.map(|value| (name.to_owned(), value)));
         }
         params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::synthetic;
+    use crate::library::View;
+    use crate::progress::Silent;
+
+    #[test]
+    fn too_many_and_too_short_a_loop_are_told() {
+        let library = synthetic::library(View::Top);
+        let params = Params {
+            count: 3,
+            frames: 40,
+            is_loop: true,
+            ..Params::default()
+        };
+        let mut flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        flock.stats.room_for = 2;
+        flock.stats.heading_error_p90_rad = 1.0;
+        let [room, short] = &advice(&flock)[..] else {
+            panic!("{:?}", advice(&flock));
+        };
+        assert!(room.contains("room for about 2,") && room.ends_with("(little_room)"));
+        assert!(
+            short.contains("loop of 1.3 s") && short.contains(" 57 degrees"),
+            "{short}"
+        );
+        flock.stats.room_for = 3;
+        flock.params.is_loop = false;
+        assert!(advice(&flock).is_empty());
     }
 }

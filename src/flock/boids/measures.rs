@@ -54,8 +54,13 @@ pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64)
         neighbor_share: n_with_neighbor as f64 / n,
         n_groups: n_groups(positions, GROUP_BL),
         n_outside: 0,
-        n_overlaps: row.n_nearer(overlap_bl),
+        n_overlaps: row.pairs_nearer(overlap_bl).count() as u32,
     }
+}
+
+/// The pairs of ids nearer to each other than `bl`, of each the smaller first.
+pub fn pairs_nearer(positions: &[Vec3], bl: f64) -> Vec<[usize; 2]> {
+    Row::of(positions).pairs_nearer(bl).collect()
 }
 
 /// Positions along x: who is too far off along x is too far off.
@@ -89,15 +94,17 @@ impl Row<'_> {
     }
 
     /// Pairs nearer to each other than `bl`.
-    fn n_nearer(&self, bl: f64) -> u32 {
-        let mut n_pairs = 0;
-        for (rank, &id) in self.by_x.iter().enumerate() {
-            let offsets = (self.by_x[rank + 1..].iter())
-                .map(|&other| minus(self.positions[other], self.positions[id]));
-            let near = offsets.take_while(|offset| offset[0] < bl);
-            n_pairs += near.filter(|&offset| dot(offset, offset) < bl * bl).count() as u32;
-        }
-        n_pairs
+    fn pairs_nearer(&self, bl: f64) -> impl Iterator<Item = [usize; 2]> {
+        let Row { positions, by_x } = self;
+        let offset = |one: usize, other: usize| minus(positions[other], positions[one]);
+        (0..by_x.len()).flat_map(move |rank| {
+            let one = by_x[rank];
+            let after = by_x[rank + 1..].iter().copied();
+            after
+                .take_while(move |&other| offset(one, other)[0] < bl)
+                .filter(move |&other| dot(offset(one, other), offset(one, other)) < bl * bl)
+                .map(move |other| [one.min(other), one.max(other)])
+        })
     }
 }
 

@@ -22,6 +22,8 @@ mod step;
 pub mod tank;
 pub mod vector;
 
+use std::convert::Infallible;
+
 use self::calibration::Calibration;
 use self::habitat::{Habitat, Hunter};
 pub use self::meeting::Meeting;
@@ -62,6 +64,7 @@ pub struct Boids<'a> {
     habitat: Habitat<'a>,
     step_s: f64,
     n_substeps: u32,
+    n_frames_before: usize,
     step_idx: u64,
     /// Decides how fast it goes and nothing else.
     cpu: Level,
@@ -83,10 +86,7 @@ impl<'a> Boids<'a> {
         fps: f64,
     ) -> Self {
         let mut boids = Boids::at_random(params, calibration, place, fps);
-        for _ in 0..n_frames_before(calibration, fps) {
-            boids.advance();
-        }
-        boids.hunter = boids.habitat.hunter();
+        let Ok(()) = boids.form(|| Ok::<(), Infallible>(()));
         boids
     }
 
@@ -101,7 +101,8 @@ impl<'a> Boids<'a> {
         let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
         let n = params.count as usize;
         let closeness = tank.closeness(n);
-        let n_steps = n_frames_before(calibration, fps) as f64 * f64::from(n_substeps);
+        let n_frames_before = n_frames_before(calibration, fps);
+        let n_steps = n_frames_before as f64 * f64::from(n_substeps);
         let step_s = 1.0 / (fps * f64::from(n_substeps));
         let mut boids = Boids {
             params: Params {
@@ -114,6 +115,7 @@ impl<'a> Boids<'a> {
             tank,
             step_s,
             n_substeps,
+            n_frames_before,
             step_idx: 0,
             cpu: Level::detect(),
             time_s: -n_steps * step_s,
@@ -125,6 +127,21 @@ impl<'a> Boids<'a> {
         };
         boids.start();
         boids
+    }
+
+    /// Frames in which they form, before the first of the film.
+    pub fn n_frames_before(&self) -> usize {
+        self.n_frames_before
+    }
+
+    /// Has them swim until they have formed. Before each frame `go_on` may refuse: then its error comes back.
+    pub fn form<E>(&mut self, mut go_on: impl FnMut() -> Result<(), E>) -> Result<(), E> {
+        for _ in 0..self.n_frames_before {
+            go_on()?;
+            self.advance();
+        }
+        self.hunter = self.habitat.hunter();
+        Ok(())
     }
 
     /// Where the predator is, if there is one.
@@ -172,6 +189,22 @@ impl<'a> Boids<'a> {
         }
     }
 
+    /// How near they may be to each other, body lengths.
+    pub fn overlap_bl(&self) -> f64 {
+        self.overlap_bl
+    }
+
+    /// The greatest speed that the animal was seen at.
+    pub fn fastest_bl_per_s(&self) -> f64 {
+        self.calibration.speed_limits_bl_per_s[1]
+    }
+
+    /// The place nearest to another at which one may be.
+    pub fn inside(&self, mut place: Vec3) -> Vec3 {
+        self.habitat.keep_out(&mut place, &mut [0.0; 3]);
+        place
+    }
+
     /// The depth of the tank's front, body lengths from the camera.
     pub fn front_bl(&self) -> f64 {
         self.tank.corners[0][2]
@@ -211,10 +244,10 @@ impl<'a> Boids<'a> {
 }
 
 /// Frames in which a flock forms.
-fn n_frames_before(calibration: &Calibration, fps: f64) -> u64 {
+fn n_frames_before(calibration: &Calibration, fps: f64) -> usize {
     let [least_s, most_s] = WARM_UP_S;
     let warm_up_s = (WARM_UP_BL / calibration.cruise_bl_per_s).clamp(least_s, most_s);
-    (warm_up_s * fps).ceil() as u64
+    (warm_up_s * fps).ceil() as usize
 }
 
 #[cfg(test)]
