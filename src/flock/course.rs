@@ -78,13 +78,12 @@ pub(super) fn simulate_loop(
         boids.advance();
     }
     seam::close(&mut moments, &lead, &heirs, fps);
-    let meeting = &mut moments[n_frames - n_lead..];
     let limits = Limits {
         apart_bl: boids.overlap_bl(),
         fastest_bl_per_s: boids.fastest_bl_per_s(),
         fps,
     };
-    go_aside(meeting, limits, |place| boids.inside(place));
+    go_aside(&mut moments, limits, |place| boids.inside(place));
     let mut course = Course::new(&boids, lens);
     for moment in moments {
         boids.show(moment.positions, moment.velocities, moment.hunter);

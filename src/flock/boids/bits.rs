@@ -13,49 +13,49 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
     (
         "school",
         [
-            0xfd14_c8c5_7e78_9832,
-            0x93e4_f3b0_6c49_b751,
-            0x3f07_4642_30cf_747b,
+            0x4288_e019_c1c8_b215,
+            0x4b63_ab7b_d563_9c09,
+            0xc9a3_159a_6759_41d3,
         ],
     ),
     (
         "swarm",
         [
-            0xa0b2_afa5_b22b_a59e,
-            0x22b0_0c10_2e48_8de2,
-            0xf336_5f9d_6562_02f9,
+            0xe0eb_121b_c5a5_16da,
+            0x6689_1d40_2492_71f6,
+            0x4c7f_2304_9f6f_cafa,
         ],
     ),
     (
         "mill",
         [
-            0x33f7_bd6c_3e3e_54cb,
-            0xda27_0599_ab6c_a467,
-            0x57ac_5fc7_5595_f1f6,
+            0xb117_7420_fd2f_063a,
+            0xda20_0e83_1106_b648,
+            0xafed_8da0_60e0_1b89,
         ],
     ),
     (
         "scatter",
         [
-            0x4548_4d38_6c4b_7d01,
-            0x5151_3e7f_b2a9_dbc6,
-            0x9a63_5fd8_116a_3781,
+            0xa891_5007_84a2_9afb,
+            0xfa0c_8700_73d5_0d72,
+            0x262b_42a3_cd38_9b9c,
         ],
     ),
     (
         "zonal",
         [
-            0xcd94_a349_1415_f2b1,
-            0x4b79_0b85_38ff_af6d,
-            0x31bb_defc_1791_be48,
+            0x6072_e428_6f0c_7ffa,
+            0xe69a_f7c8_c964_2023,
+            0x5a2d_1a3b_4b66_d8a9,
         ],
     ),
     (
         "papers",
         [
-            0x8931_5b8c_e146_598b,
-            0x8cdd_41d8_9f6a_5d92,
-            0x77b6_d78f_70d1_9e2e,
+            0xcbe0_bcda_6075_9877,
+            0x10b2_7df3_6188_fe2c,
+            0xcd9f_119d_e73d_b22d,
         ],
     ),
 ];
@@ -68,7 +68,7 @@ const SLOPES: Slopes = Slopes {
 };
 
 /// A school among goals and obstacles, before a predator, half of it drawn to where it meets.
-const DIGEST_OF_A_FULL_TANK: u64 = 0x9d24_a9e8_f1ec_4b94;
+const DIGEST_OF_A_FULL_TANK: u64 = 0x36e1_0330_42ca_e39a;
 
 fn calibration(slopes: Option<Slopes>) -> Calibration {
     Calibration {

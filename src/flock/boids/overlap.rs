@@ -14,8 +14,8 @@ use super::{Boids, CHUNK};
 const MOST: usize = 16;
 /// Rounds of pushes after one step, at most, and without fewer pushed than ever before: where there is no room they
 /// would never end.
-const ROUNDS: usize = 100;
-const PATIENCE: usize = 24;
+const ROUNDS: usize = 200;
+const PATIENCE: usize = 60;
 /// So much farther apart than they have to be, for between others and at walls only a part of the way is gone at once.
 const FARTHER: f64 = 1.01;
 
@@ -129,7 +129,7 @@ impl Boids<'_> {
     /// Where one goes that others are too near to.
     fn apart(&self, slot: usize, near: &[Near], room: &Room) -> (Vec3, Vec3) {
         let boid = &room.next.boids[slot];
-        let (mut position, mut velocity) = (boid.position, boid.velocity);
+        let (mut position, mut reflected) = (boid.position, boid.velocity);
         for &(square_bl2, other, offset) in near {
             let distance = square_bl2.sqrt();
             let away = match distance > 1e-9 {
@@ -148,7 +148,11 @@ impl Boids<'_> {
             let missing_bl = FARTHER * self.overlap_bl - distance;
             position = add_scaled(position, 0.5 * missing_bl, away);
         }
-        self.habitat.keep_out(&mut position, &mut velocity);
+        self.habitat.keep_out(&mut position, &mut reflected);
+        let velocity = match reflected == boid.velocity {
+            true => boid.velocity,
+            false => self.turned(room.grid.at(slot).velocity, reflected),
+        };
         (
             position,
             self.within_limits(velocity, position, boid.velocity),

@@ -17,7 +17,7 @@ pub struct Rules {
     pub alignment: f64,
     /// Weight of cohesion.
     pub cohesion: f64,
-    /// Weight of the walls.
+    /// Weight of the walls (ALGORITHMS.md 7 has 4: with it slow ones jam at walls that turn nobody at once).
     pub walls: f64,
     /// Weight of the wander: 1 = turn rates as varied as the animal's own.
     pub wander: f64,
@@ -123,7 +123,7 @@ impl Default for Rules {
             separation: 1.5,
             alignment: 2.0,
             cohesion: 0.8,
-            walls: 4.0,
+            walls: 6.0,
             wander: 0.25,
             circling: 0.0,
             separation_bl: 1.0,

@@ -1,7 +1,7 @@
 //! What a flock of boids promises: walls, limits, and the same numbers on any threads. `presets` has their order.
 
 use super::calibration::Slopes;
-use super::vector::{norm, unit};
+use super::vector::{angle_between, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
@@ -84,6 +84,37 @@ fn nobody_lies_upon_another_and_where_there_is_room_they_keep_half_a_length() {
     }
     let wide = Tank::new([0.0; 3], tanks[0]);
     assert_eq!(wide.overlap_bl(40), OVERLAP_BL);
+}
+
+#[test]
+fn nobody_turns_faster_than_the_animal_not_even_at_a_wall_or_in_a_crowd() {
+    let (lens, fps) = (Lens::flat(40.0), 30.0);
+    let calibration = Calibration {
+        turn_rad_per_s: 1.6,
+        ..Calibration::default()
+    };
+    for (name, tank) in Params::PRESETS
+        .into_iter()
+        .flat_map(|name| [[4.0, 3.0, 0.0], [9.0, 5.0, 3.0]].map(|tank| (name, tank)))
+    {
+        let params = Params {
+            count: 30,
+            ..preset(name)
+        };
+        let tank = Tank::new([0.0; 3], tank);
+        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), fps);
+        for t in 0..300 {
+            let before = boids.velocities().to_vec();
+            boids.advance();
+            for (before, now) in before.iter().zip(boids.velocities()) {
+                let turn_rad_per_s = angle_between(*before, *now) * fps;
+                assert!(
+                    turn_rad_per_s < 1.6 + 1e-6,
+                    "{name} {tank:?} {t} {turn_rad_per_s}"
+                );
+            }
+        }
+    }
 }
 
 #[test]
