@@ -95,9 +95,9 @@ impl Painter {
         canvas.draw_under(&sprite, &place, cover, stage.cpu)
     }
 
-    /// Draws the shadow of an individual in place of it.
-    pub(super) fn shade(&mut self, floor: &Floor, stage: &Stage, who: &Appearance) {
-        floor.draw(who, &stage.view, &mut self.layer);
+    /// Draws the shadows of all in place of them.
+    pub(super) fn shade(&mut self, floor: &Floor, view: &View, all: &[Appearance]) {
+        floor.draw(all, view, &mut self.layer);
     }
 
     /// What was painted last, as the ground truth needs it; the layer is used up.

@@ -99,7 +99,7 @@ impl<'a> Compositor<'a> {
             other => other,
         };
         let form = Form::Planar(ColorSpec::default());
-        let floor = Floor::of(library, flock.length_px, render.shadow);
+        let floor = || Floor::of(library, flock, render.shadow);
         Compositor {
             library,
             flock,
@@ -111,7 +111,7 @@ impl<'a> Compositor<'a> {
                 left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
                 color: opaque(backdrop::mean(&library.background)),
             }),
-            floor: (render.shadow > 0.0).then_some(floor),
+            floor: (render.shadow > 0.0).then(floor),
             stock: Stock::default(),
             cpu: Level::detect(),
             n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
@@ -170,10 +170,8 @@ impl<'a> Compositor<'a> {
             self.draw(who, &mut desk);
         }
         if let Some(floor) = &self.floor {
-            for who in &order {
-                desk.painter.shade(floor, &self.stage(), who);
-                desk.put(self.cpu);
-            }
+            desk.painter.shade(floor, &self.view, &order);
+            desk.put(self.cpu);
         }
         if self.with_truth {
             shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);

@@ -84,8 +84,8 @@ impl Resampled {
         );
     }
 
-    /// Nothing yet, in a box.
-    pub(super) fn begin(&mut self, rect: Rect) {
+    /// Nothing yet, in a box, whose pixels mean nothing.
+    pub fn begin(&mut self, rect: Rect) {
         self.rect = rect;
         self.runs.clear();
         let area = rect.area() as usize;
