@@ -33,7 +33,9 @@ pub enum Error {
     #[error("the background moves: the camera must stand still")]
     BackgroundNotStatic,
     /// Two components of comparable area, each persistent.
-    #[error("more than one animal moves in the footage: film one alone, or set follow to largest")]
+    #[error(
+        "more than one animal moves in the footage: film one alone, or set follow to largest (--follow-largest)"
+    )]
     SeveralAnimals,
     /// The animal's pictures found no room.
     #[error(transparent)]

@@ -173,7 +173,7 @@ impl fmt::Display for Advice {
             ),
             Advice::LooseJumps(kappa) => write!(
                 f,
-                "to find moments enough that look alike, differences up to {kappa:.1} times a natural step had to be \
+                "to find enough moments that look alike, differences up to {kappa:.1} times a natural step had to be \
                  allowed, so jumps may be seen: film longer"
             ),
             Advice::MostlyRests(share) => write!(

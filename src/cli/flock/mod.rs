@@ -39,7 +39,7 @@ pub struct Args {
     /// to where somebody began.
     #[arg(long = "loop")]
     is_loop: bool,
-    /// Where to start from: school, swarm, mill, scatter or papers.
+    /// Where to start from: school, swarm, mill, scatter, zonal or papers.
     #[arg(long)]
     preset: Option<String>,
     /// Rules to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.

@@ -15,7 +15,8 @@ use crate::raster::RgbImage;
 /// Flags about the film.
 #[derive(Debug, clap::Args)]
 pub(super) struct Outputs {
-    /// The film to make: .mp4, .webm, .mov (ProRes), .gif, .webp; one picture as .png or .jpg; a folder or
+    /// The film to make: .mp4, .webm, .mov (ProRes); .gif or .webp, at most 480 columns, 15 frames a second and ten
+    /// seconds of it; one picture as .png or .jpg; a folder or
     /// .zip of pictures with --format png.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
@@ -97,7 +98,7 @@ impl Outputs {
         let clear = render.background == Background::Transparent;
         match targets.iter().find(|target| clear && !keeps_alpha(target)) {
             Some(target) => Err(Error::Usage(format!(
-                "no transparency in this kind of file, take .webm, .mov or --format png: {}",
+                "no transparency in this kind of file, take .webm, .mov, .webp or --format png: {}",
                 target.path.display()
             ))),
             None => Ok(targets),

@@ -41,15 +41,17 @@ fn everyone<'a>(
 pub const README: &str = "\
 The ground truth of a flock made by flockreel, told by the compositor itself.
 
-masks/NNNNNN.png  labels, 16-bit gray: 0 = background, else id + 1 of the individual that makes up at least half of
-                  the pixel, counting what covers it. Frames from 000000.
+masks/NNNNNN.png  labels, 16-bit gray: id + 1 of the individual that makes up at least half of the pixel, counting what
+                  covers it; 0 where nobody does: the background, and where soft edges of several meet. Frames from
+                  000000.
 coco.json         COCO instances. One annotation for each individual and frame in which it has a label:
                   segmentation (compressed run lengths, as pycocotools decodes them), bbox and area are of what is
                   visible; amodal_segmentation is of the whole animal within the picture, amodal_bbox and
                   amodal_area of the whole animal wherever it is; visibility is the share of its alpha that is seen.
                   track_id = label; heading_rad = atan2(dy, dx), y down; centroid_px = the animal's own centroid.
 gt/gt.txt         MOTChallenge: frame, id, left, top, width, height, 1, 1, visibility. Frames, ids, left and top
-seqinfo.ini       count from 1; boxes are amodal. Everyone who is at least partly in the picture.
+seqinfo.ini       count from 1; boxes are amodal. Everyone who is at least partly in the picture,
+                  hidden or not.
 tracks.csv        one row for each frame and individual, hidden or not. Boxes are x, y, width, height from 0; empty
                   where there is none.
 

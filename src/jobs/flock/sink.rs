@@ -114,9 +114,20 @@ impl Sink {
         match self.kind {
             Kind::Video(writer) | Kind::Overlay(writer, ..) => Ok(writer.finish()?),
             Kind::Archive(archive) => Ok(archive.finish().map_err(io::Error::from)?.flush()?),
-            Kind::Folder(_) => Ok(()),
+            Kind::Folder(folder) => Ok(remove_frames(&folder, self.n_wanted)?),
         }
     }
+}
+
+/// Removes from a folder what a longer film left there: its frames from `first` on.
+pub(super) fn remove_frames(folder: &Path, first: usize) -> io::Result<()> {
+    for frame_idx in first.. {
+        match fs::remove_file(folder.join(frame_name(frame_idx))) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => break,
+            removed => removed?,
+        }
+    }
+    Ok(())
 }
 
 /// How many frames of a film a file shows.
@@ -166,5 +177,26 @@ fn without_alpha(width: u32, height: u32, rgba: &[u8]) -> RgbImage {
             .chunks_exact(4)
             .flat_map(|p| [p[0], p[1], p[2]])
             .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_longer_film_left_goes_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let names = (0..5).map(frame_name).chain(["notes.txt".to_owned()]);
+        for name in names {
+            fs::write(folder.path().join(name), "x").expect("a file");
+        }
+        remove_frames(folder.path(), 2).expect("they can be removed");
+        let left = fs::read_dir(folder.path()).expect("a folder");
+        let mut left: Vec<_> = left
+            .map(|entry| entry.expect("an entry").file_name())
+            .collect();
+        left.sort();
+        assert_eq!(left, ["000000.png", "000001.png", "notes.txt"]);
     }
 }

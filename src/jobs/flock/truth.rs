@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use zip::write::SimpleFileOptions;
 
+use super::sink::remove_frames;
 use crate::flock::Flock;
 use crate::flock::composite::truth::FrameTruth;
 use crate::formats::ground_truth::coco::Coco;
@@ -54,6 +55,7 @@ impl TruthFolder {
 
     /// Ends every file.
     pub fn finish(mut self) -> io::Result<()> {
+        remove_frames(&self.folder.join("masks"), self.film.n_frames)?;
         self.coco.end()?;
         self.mot.flush()?;
         self.tracks.flush()
