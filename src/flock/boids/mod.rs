@@ -21,6 +21,7 @@ pub mod rules;
 mod step;
 pub mod tank;
 pub mod vector;
+mod walls;
 
 use std::convert::Infallible;
 

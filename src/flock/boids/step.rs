@@ -10,7 +10,7 @@ use super::lanes::{Eight, Four};
 use super::nearest::{Neighbor, Search};
 use super::room::{Crowd, Inner, Part, Room};
 use super::rules::{Moment, Steering};
-use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, turned_at_most, unit};
+use super::vector::{add_scaled, cross, dot, minus, norm, scaled, turned_at_most, unit};
 use super::{Boids, CHUNK, draw, leadership};
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;
@@ -275,37 +275,6 @@ impl Boids<'_> {
             wishes[lane] = meeting.wish(ids[lane] as usize, position, wished);
         }
         by_lane(|lane| wishes[lane])
-    }
-
-    /// Places and velocities after `before`, as the habitat allows: a wall turns nobody faster than they turn.
-    #[inline(always)]
-    fn kept_in<L: Lanes>(
-        &self,
-        place: [L; 3],
-        (before, velocity): ([L; 3], [L; 3]),
-    ) -> ([L; 3], [L; 3]) {
-        if !self.habitat.may_hold_off(place) {
-            return (place, velocity);
-        }
-        let mut kept = [([0.0; 3], [0.0; 3]); lanes::MOST];
-        for lane in 0..L::N {
-            let (mut place, velocity) = (in_lane(place, lane), in_lane(velocity, lane));
-            let mut reflected = velocity;
-            self.habitat.keep_out(&mut place, &mut reflected);
-            kept[lane] = (place, velocity);
-            if reflected != velocity {
-                kept[lane].1 = self.turned(in_lane(before, lane), reflected);
-            }
-        }
-        (by_lane(|lane| kept[lane].0), by_lane(|lane| kept[lane].1))
-    }
-
-    /// What a wall makes of a velocity: from what it was before the step, turned toward what is reflected as far as they
-    /// turn.
-    pub(super) fn turned(&self, before: Vec3, reflected: Vec3) -> Vec3 {
-        let turn_rad = self.calibration.turn_rad_per_s * self.step_s;
-        let cos_sin = (libm::cos(turn_rad), libm::sin(turn_rad));
-        turned_at_most(before, reflected, cos_sin, cross(self.tank.up(), before))
     }
 
     /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
