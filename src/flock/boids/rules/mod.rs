@@ -23,9 +23,6 @@ const WALL_HORIZON_BL: f64 = 0.7;
 
 /// The share of a wall's braking that becomes a turn alone.
 const BRAKED: f64 = 0.7;
-/// Who turns aside before a wall goes with the others so many times as much as home: of a school in which each goes home
-/// one half turns into the other.
-const FOLLOW: f64 = 4.0;
 /// So strong a wish is granted as far as the turn rate allows.
 const WITHOUT_DELAY: f64 = 20.0;
 /// Whoever circles does so at this share of the way from the middle to the walls.
@@ -139,8 +136,7 @@ impl Steering<'_> {
             turned = turned + dot(unit(neighbor.velocity), side);
         }
         // Who does not align does not follow others either.
-        let follow =
-            L::splat(FOLLOW * self.params.rules.alignment.min(1.0)) / at_least_one(moment.count());
+        let follow = L::splat(self.params.rules.alignment.min(1.0)) / at_least_one(moment.count());
         let home = match self.params.rules.circling > 0.0 {
             true => self.circling(moment),
             false => minus(splat3(self.tank.middle), moment.position),
