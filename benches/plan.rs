@@ -136,7 +136,6 @@ fn made_library(n_frames: u32) -> Library {
         clip_frames: 8,
         epsilon: EPSILON,
         natural_step: EPSILON / 2,
-        sprite_scale: None,
         transitions: Vec::new(),
         patches: Vec::new(),
         playback: Playback {

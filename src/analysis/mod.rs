@@ -73,29 +73,16 @@ pub fn analyze(
     let view = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
-    let measured = || {
-        let mut poses = pose::measure(&track.frames, view, &source.format(), params);
-        midline::trace(&mut poses, &track);
-        poses.tail_beat = midline::tail_beat::measure(&poses);
-        poses
-    };
-    let cut_out = |scales: Option<&[f64]>| match animal_too_small {
-        true => Ok(sprite::none(track.frames.len())),
-        false => sprite::align(&track, view, scales),
-    };
-    let (poses, sprite_scale, sprites) = match params.scale_mode {
-        ScaleMode::Depth if view == View::Side => {
-            let poses = measured();
-            let scales = sprite::scales(&poses);
-            let sprites = cut_out(Some(&scales));
-            (poses, Some(scales), sprites)
-        }
-        _ => {
-            let (poses, sprites) = rayon::join(measured, || cut_out(None));
-            (poses, None, sprites)
+    let mut poses = pose::measure(&track.frames, view, &source.format(), params);
+    midline::trace(&mut poses, &track);
+    poses.tail_beat = midline::tail_beat::measure(&poses);
+    let sprites = match animal_too_small {
+        true => sprite::none(track.frames.len()),
+        false => {
+            let by_depth = params.scale_mode == ScaleMode::Depth && view == View::Side;
+            sprite::align(&track, view, by_depth.then(|| sprite::scales(&poses)))
         }
     };
-    let sprites = sprites?;
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
@@ -108,7 +95,6 @@ pub fn analyze(
         poses,
         background: plate.rgb,
         sprites,
-        sprite_scale,
         clip_frames: connections.clip_frames,
         epsilon: connections.epsilon,
         natural_step: connections.natural_step,

@@ -4,14 +4,8 @@ use std::sync::Arc;
 
 use super::sighting::Sighting;
 use super::tracking::{Track, Tracked};
-use crate::cpu::Level;
-use crate::geometry::Rect;
-use crate::library::{Poses, Sprites, View};
+use crate::library::{Cutout, Poses, Sprites, View};
 use crate::order::median;
-use crate::raster::RgbaImage;
-use crate::raster::canvas::straight;
-use crate::raster::resample::{Placement, Premultiplied, Resampled, Room};
-use crate::scratch::Full;
 
 /// Room around the largest silhouette.
 const MARGIN_PX: f64 = 4.0;
@@ -54,28 +48,26 @@ pub fn scales(poses: &Poses) -> Vec<f64> {
     farness.iter().map(scale).collect()
 }
 
-/// The sprites of a track, of the size filmed or of `scales`. The box holds the largest extent from the centroid over the frames in
-/// which the animal is not cut off; from above it is a square that holds the animal at any turn.
-///
-/// The centroid's sub-pixel rest is interpolated by Catmull and Rom's curve in premultiplied alpha: a sprite
-/// is drawn between pixels once more, and would be soft if either step were bilinear.
-pub fn align(track: &Track, view: View, scales: Option<&[f64]>) -> Result<Sprites, Full> {
-    let scale = |frame_idx: usize| scales.map_or(1.0, |scales| scales[frame_idx]);
+/// The sprites of a track, of the size filmed or of `scales`: its mattes, each with its centroid. The box holds the
+/// largest extent from the centroid over the frames in which the animal is not cut off; from above it is a square
+/// that holds the animal at any turn.
+pub fn align(track: &Track, view: View, scales: Option<Vec<f64>>) -> Sprites {
+    let scale = |frame_idx: usize| scales.as_ref().map_or(1.0, |scales| scales[frame_idx]);
     let size = common_size(&track.frames, view, &scale);
-    let n_frames = track.frames.len();
-    let scratch = Arc::clone(&track.scratch);
-    Sprites::drawn(size, n_frames, scratch, |frame_idx, sprite| {
-        let sighting = track.frames[frame_idx].sighting.as_ref();
-        if let Some(sighting) = sighting {
-            draw(
-                sprite,
-                size,
-                &track.image(sighting),
-                (sighting, scale(frame_idx)),
-            );
-        }
-        Ok(sighting.is_some())
-    })
+    let sightings = track.frames.iter().map(|t| t.sighting.as_ref());
+    let cutouts = sightings.map(|sighting| sighting.map(cutout)).collect();
+    Sprites::of(size, cutouts, scales, Arc::clone(&track.scratch))
+}
+
+fn cutout(sighting: &Sighting) -> Cutout {
+    let rect = sighting.rect;
+    let [x, y] = sighting.moments.centroid_px;
+    let thousandths = |px: f64| (px * 1000.0).round() / 1000.0;
+    Cutout {
+        size: [rect.w, rect.h],
+        center_px: [(x, rect.x), (y, rect.y)].map(|(px, from)| thousandths(px - f64::from(from))),
+        at: sighting.at,
+    }
 }
 
 /// Whether the animal covers, in the median, fewer pixels than are worth looking at.
@@ -121,48 +113,6 @@ fn common_size(track: &[Tracked], view: View, scale: &dyn Fn(usize) -> f64) -> [
     match view {
         View::Side => [side(x), side(y)],
         View::Top => [side(radius); 2],
-    }
-}
-
-/// Draws a matte into a sprite, its centroid at the middle.
-fn draw(
-    sprite: &mut [u8],
-    [width, height]: [u32; 2],
-    image: &RgbaImage,
-    (sighting, scale): (&Sighting, f64),
-) {
-    let rect = sighting.rect;
-    let [cx, cy] = sighting.moments.centroid_px;
-    let middle = |from: u32, side: u32, c: f64| f64::from(from) + f64::from(side) / 2.0 - c;
-    let place = Placement {
-        center_px: [
-            f64::from(width) / 2.0 + scale * middle(rect.x, rect.w, cx),
-            f64::from(height) / 2.0 + scale * middle(rect.y, rect.h, cy),
-        ],
-        rotation_rad: 0.0,
-        scale,
-        mirrored: false,
-    };
-    let whole = Rect::of_size(image.width, image.height);
-    let matte = Premultiplied::of(&image.pixels, [image.width, image.height], whole, scale);
-    let mut placed = Resampled::default();
-    let size = [width, height];
-    let room = Room { size, nearer: None };
-    placed.draw(&matte, &place, room, Level::detect());
-    for ([x, y], row) in placed.shown() {
-        let at = (y * width + x) as usize * 4;
-        let out = &mut sprite[at..at + row.len() * 4];
-        for (out, &pixel) in out.chunks_exact_mut(4).zip(row) {
-            out.copy_from_slice(&visible(straight(pixel)));
-        }
-    }
-}
-
-/// A pixel whose alpha rounds to nothing has no color either.
-fn visible(pixel: [u8; 4]) -> [u8; 4] {
-    match pixel[3] {
-        0 => [0; 4],
-        _ => pixel,
     }
 }
 

@@ -35,18 +35,19 @@ pub fn render(library: &Library, film: &Film, frame_idx: usize, frame: &mut Fram
     frame.draw_rgb(&both, Rect::of_size(width, height));
 }
 
-/// The background with the animal of one frame laid back where it was, to the nearest pixel.
+/// The background with the animal of one frame laid back where it was.
 fn real_frame(library: &Library, frame_idx: usize) -> RgbImage {
     let mut image = library.background.clone();
     let sprites = &library.sprites;
     let centroid = library.poses.frames[frame_idx].centroid_px;
-    let Some([cx, cy]) = centroid.filter(|_| sprites.is_present(frame_idx)) else {
+    let Some(([cx, cy], cutout)) = centroid.zip(sprites.cutout(frame_idx)) else {
         return image;
     };
-    let left = (cx - f64::from(sprites.width()) / 2.0).round() as i64;
-    let top = (cy - f64::from(sprites.height()) / 2.0).round() as i64;
-    let sprite = sprites.sprite(frame_idx);
-    let rows = sprite.chunks_exact(sprites.width().max(1) as usize * 4);
+    let left = (cx - cutout.center_px[0]).round() as i64;
+    let top = (cy - cutout.center_px[1]).round() as i64;
+    let mut rgba = Vec::new();
+    sprites.read_cutout(&cutout, &mut rgba);
+    let rows = rgba.chunks_exact(cutout.size[0].max(1) as usize * 4);
     for (y, row) in (top..).zip(rows) {
         for (x, rgba) in (left..).zip(row.chunks_exact(4)) {
             let inside = (0..i64::from(image.width)).contains(&x)

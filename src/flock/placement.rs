@@ -198,8 +198,7 @@ impl Stage<'_> {
         if self.lens.is_flat() {
             return 1.0;
         }
-        let cut_out = (self.library.sprite_scale.as_ref()).map_or(1.0, |all| all[frame as usize]);
-        let filmed_px = cut_out * self.lens.px_per_bl(self.motion[frame as usize].depth_bl);
+        let filmed_px = self.lens.px_per_bl(self.motion[frame as usize].depth_bl);
         let scale = self.lens.px_per_bl(depth_bl) / filmed_px;
         rounded(scale.clamp(LEAST_SCALE, GREATEST_SCALE), 4)
     }

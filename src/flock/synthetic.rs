@@ -51,7 +51,6 @@ pub(crate) fn library(view: View) -> Library {
         clip_frames: CLIP_FRAMES,
         epsilon: 1000,
         natural_step: 500,
-        sprite_scale: None,
         transitions: jumps.iter().map(transition).collect(),
         patches: vec![Patch {
             frames: first..last + 1,

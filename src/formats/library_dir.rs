@@ -1,6 +1,9 @@
-//! A library as a folder: library.json, poses.json, background.png, and sprites.zip, whose entries
-//! 000000.png ... are straight-alpha RGBA of one size, stored, so that any tool opens them. A frame
-//! without the animal has no entry.
+//! A library as a folder: library.json, poses.json, background.png, and cutouts.zip, whose entries
+//! 000000.png ... are the animal as filmed in straight-alpha RGBA, stored, so that any tool opens them. Where its
+//! centroid lies in each, library.json tells. A frame without the animal has no entry.
+//!
+//! Sprites, all of one size with the centroid at the middle, are made of the cutouts; an archive of them is for
+//! export. Libraries of before have such an archive in place of the cutouts, and are still read.
 //!
 //! The only file of ring 2 that touches the file system.
 
@@ -13,10 +16,11 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use zip::write::SimpleFileOptions;
 
-use super::library_json::{self, FootageSummary};
+use super::library_json::{self, FootageSummary, Summary};
 use super::{picture, poses_json};
 use crate::analysis::Params;
-use crate::library::{Library, Sprites};
+use crate::library::{Cutout, Library, Sprites};
+use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
 /// Why a folder is not a library.
@@ -46,9 +50,14 @@ pub enum Error {
         /// What was found.
         cause: picture::Error,
     },
-    /// sprites.zip is damaged.
-    #[error("sprites.zip: {0}")]
-    Zip(#[from] zip::result::ZipError),
+    /// An archive of pictures is damaged.
+    #[error("{file}: {cause}")]
+    Zip {
+        /// Which file of the folder.
+        file: &'static str,
+        /// What was found.
+        cause: zip::result::ZipError,
+    },
     /// The sprites found no room beside the folder.
     #[error(transparent)]
     Full(#[from] Full),
@@ -70,9 +79,10 @@ pub struct StoredLibrary {
 const LIBRARY: &str = "library.json";
 const POSES: &str = "poses.json";
 const BACKGROUND: &str = "background.png";
+const CUTOUTS: &str = "cutouts.zip";
 const SPRITES: &str = "sprites.zip";
-/// The files that a library is read from; there may be others beside them.
-pub const FILES: [&str; 4] = [LIBRARY, POSES, BACKGROUND, SPRITES];
+/// The files that a library is read from; there may be others beside them. Of the archives one is enough.
+pub const FILES: [&str; 5] = [LIBRARY, POSES, BACKGROUND, CUTOUTS, SPRITES];
 
 /// Writes a library into a folder, which is made if need be.
 pub fn write(
@@ -87,8 +97,23 @@ pub fn write(
     };
     put(POSES, &poses_json::write(&library.poses, Some(params)))?;
     put(BACKGROUND, &picture::write_rgb(&library.background))?;
-    write_sprites(&dir.join(SPRITES), &library.sprites)?;
+    write_cutouts(dir, &library.sprites)?;
     put(LIBRARY, &library_json::write(library, params, footage))
+}
+
+/// Writes the sprites into the folder, as an archive of pictures of one size.
+pub fn write_sprites(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
+    write_archive(dir, SPRITES, sprites, |idx| {
+        picture::write_rgba(sprites.width(), sprites.height(), &sprites.sprite(idx))
+    })
+}
+
+fn write_cutouts(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
+    write_archive(dir, CUTOUTS, sprites, |idx| {
+        let (cutout, mut rgba) = (sprites.cutout(idx).expect("present"), Vec::new());
+        sprites.read_cutout(&cutout, &mut rgba);
+        picture::write_rgba(cutout.size[0], cutout.size[1], &rgba)
+    })
 }
 
 /// Reads a library from a folder.
@@ -108,9 +133,6 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "background.png and poses.json differ in size",
         ));
     }
-    let archive = File::open(dir.join(SPRITES)).map_err(sprites_io)?;
-    let size = summary.sprite_size_px;
-    let sprites = read_sprites(archive, size, poses.frames.len(), scratch)?;
     let n_frames = poses.frames.len() as u32;
     let jumps = summary.playback.jumps.iter();
     if jumps
@@ -131,11 +153,17 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "library.json must name a size for the sprite of every frame",
         ));
     }
+    let archive = Archive::open(dir, &summary)?;
+    let cutouts = archive.cutouts(poses.frames.len(), poses.image_size_px, &*scratch)?;
     let library = Library {
         poses,
         background,
-        sprites,
-        sprite_scale: summary.sprite_scale,
+        sprites: Sprites::of(
+            summary.sprite_size_px,
+            cutouts,
+            summary.sprite_scale,
+            scratch,
+        ),
         clip_frames: summary.clip_frames,
         epsilon: summary.epsilon,
         natural_step: summary.natural_step,
@@ -159,100 +187,137 @@ pub fn sprite_name(frame_idx: usize) -> String {
 /// Sprites encoded at a time, on all threads: what is held in memory.
 const BATCH: usize = 256;
 
-fn write_sprites(path: &Path, sprites: &Sprites) -> Result<(), Error> {
-    let file = BufWriter::new(File::create(path).map_err(sprites_io)?);
-    let mut archive = zip::ZipWriter::new(file);
+fn write_archive(
+    dir: &Path,
+    file: &'static str,
+    sprites: &Sprites,
+    encode: impl Fn(usize) -> Vec<u8> + Sync,
+) -> Result<(), Error> {
+    let io = |cause| Error::Io { file, cause };
+    let zip = |cause| Error::Zip { file, cause };
+    let out = BufWriter::new(File::create(dir.join(file)).map_err(io)?);
+    let mut archive = zip::ZipWriter::new(out);
     let stored = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
     let present: Vec<usize> = (0..sprites.n_frames())
         .filter(|&idx| sprites.is_present(idx))
         .collect();
-    let encode = |&idx: &usize| {
-        let (width, height) = (sprites.width(), sprites.height());
-        picture::write_rgba(width, height, &sprites.sprite(idx))
-    };
     for batch in present.chunks(BATCH) {
-        let pictures: Vec<Vec<u8>> = batch.par_iter().map(encode).collect();
+        let pictures: Vec<Vec<u8>> = batch.par_iter().map(|&idx| encode(idx)).collect();
         for (&idx, bytes) in batch.iter().zip(pictures) {
-            archive.start_file(sprite_name(idx), stored)?;
-            archive.write_all(&bytes).map_err(sprites_io)?;
+            archive.start_file(sprite_name(idx), stored).map_err(zip)?;
+            archive.write_all(&bytes).map_err(io)?;
         }
     }
-    let mut file = archive.finish()?;
-    file.flush().map_err(sprites_io)
+    archive.finish().map_err(zip)?.flush().map_err(io)
 }
 
-fn sprites_io(cause: io::Error) -> Error {
-    let file = SPRITES;
-    Error::Io { file, cause }
+/// An archive of cutouts.
+struct Archive<'a> {
+    name: &'static str,
+    file: File,
+    /// The centroid in each; `None` when they are sprites, and it lies at the middle.
+    centers_px: Option<&'a [Option<[f64; 2]>]>,
 }
 
-/// Where a sprite's PNG lies in the archive.
+/// Where a PNG lies in an archive.
 struct Entry {
     at: u64,
     n_bytes: usize,
 }
 
-fn read_sprites(
-    file: File,
-    size: [u32; 2],
-    n_frames: usize,
-    scratch: Arc<dyn Scratch>,
-) -> Result<Sprites, Error> {
-    let entries = entries(&file, n_frames)?;
-    Sprites::drawn(size, n_frames, scratch, |frame_idx, sprite| {
-        let Some(entry) = &entries[frame_idx] else {
-            return Ok(false);
+impl Archive<'_> {
+    fn open<'a>(dir: &Path, summary: &'a Summary) -> Result<Archive<'a>, Error> {
+        let centers_px = &summary.cutout_center_px;
+        let name = if centers_px.is_empty() {
+            SPRITES
+        } else {
+            CUTOUTS
         };
+        let file = File::open(dir.join(name)).map_err(|cause| Error::Io { file: name, cause })?;
+        Ok(Archive {
+            name,
+            file,
+            centers_px: (!centers_px.is_empty()).then_some(centers_px),
+        })
+    }
+
+    /// Puts aside what the archive holds for every frame, none larger than the footage.
+    fn cutouts(
+        &self,
+        n_frames: usize,
+        most_px: [u32; 2],
+        scratch: &dyn Scratch,
+    ) -> Result<Vec<Option<Cutout>>, Error> {
+        if self.centers_px.is_some_and(|all| all.len() != n_frames) {
+            return Err(Error::Mismatch(
+                "library.json must tell the centroid of every frame's cutout",
+            ));
+        }
+        let entries = self.entries(n_frames)?;
+        let cutout = |(frame_idx, entry): (usize, &Option<Entry>)| {
+            let Some(entry) = entry else { return Ok(None) };
+            let image = self.picture(entry)?;
+            let size = [image.width, image.height];
+            let center_px = match self.centers_px {
+                Some(centers_px) => centers_px[frame_idx],
+                None => Some(size.map(|side| f64::from(side) / 2.0)),
+            };
+            let center_px = center_px.filter(|center| center.iter().all(|px| px.abs() < 1e5));
+            let fits = self.centers_px.is_none() || (0..2).all(|k| size[k] <= most_px[k]);
+            let Some(center_px) = center_px.filter(|_| fits) else {
+                return Err(Error::Mismatch(
+                    "a cutout is larger than the footage, or library.json does not tell its centroid",
+                ));
+            };
+            let at = scratch.put(&image.pixels)?;
+            Ok(Some(Cutout {
+                size,
+                center_px,
+                at,
+            }))
+        };
+        entries.par_iter().enumerate().map(cutout).collect()
+    }
+
+    fn picture(&self, entry: &Entry) -> Result<RgbaImage, Error> {
+        let file = self.name;
         let mut bytes = vec![0; entry.n_bytes];
-        file.read_exact_at(&mut bytes, entry.at)
-            .map_err(sprites_io)?;
-        read_sprite(&bytes, size, sprite)?;
-        Ok(true)
-    })
-}
-
-/// The entries of the archive, by frame.
-fn entries(file: &File, n_frames: usize) -> Result<Vec<Option<Entry>>, Error> {
-    let n_bytes_all = file.metadata().map_err(sprites_io)?.len();
-    let mut archive = zip::ZipArchive::new(BufReader::new(file))?;
-    let mut entries: Vec<Option<Entry>> = std::iter::repeat_with(|| None).take(n_frames).collect();
-    for idx in 0..archive.len() {
-        let entry = archive.by_index(idx)?;
-        let frame_idx = (entry.name()?.strip_suffix(".png")).and_then(|stem| stem.parse().ok());
-        let slot = frame_idx.and_then(|idx: usize| entries.get_mut(idx));
-        let slot = slot.ok_or(Error::Mismatch(
-            "sprites.zip has an entry that is no frame of the footage",
-        ))?;
-        let stored = entry.compression() == zip::CompressionMethod::Stored;
-        let at = entry.data_start().filter(|at| {
-            stored
-                && at
-                    .checked_add(entry.size())
-                    .is_some_and(|end| end <= n_bytes_all)
-        });
-        let at = at.ok_or(Error::Mismatch(
-            "an entry of sprites.zip is compressed or cut off",
-        ))?;
-        *slot = Some(Entry {
-            at,
-            n_bytes: entry.size() as usize,
-        });
+        let read = self.file.read_exact_at(&mut bytes, entry.at);
+        read.map_err(|cause| Error::Io { file, cause })?;
+        picture::read_rgba(&bytes).map_err(|cause| Error::Picture { file, cause })
     }
-    Ok(entries)
-}
 
-fn read_sprite(bytes: &[u8], size: [u32; 2], sprite: &mut [u8]) -> Result<(), Error> {
-    let image = picture::read_rgba(bytes).map_err(|cause| Error::Picture {
-        file: SPRITES,
-        cause,
-    })?;
-    if [image.width, image.height] != size {
-        return Err(Error::Mismatch(
-            "a sprite is not of the size that library.json says",
-        ));
+    /// The entries, by frame.
+    fn entries(&self, n_frames: usize) -> Result<Vec<Option<Entry>>, Error> {
+        let file = self.name;
+        let metadata = self.file.metadata();
+        let n_bytes_all = metadata.map_err(|cause| Error::Io { file, cause })?.len();
+        let zip = |cause| Error::Zip { file, cause };
+        let mut archive = zip::ZipArchive::new(BufReader::new(&self.file)).map_err(zip)?;
+        let mut entries: Vec<Option<Entry>> =
+            std::iter::repeat_with(|| None).take(n_frames).collect();
+        for idx in 0..archive.len() {
+            let entry = archive.by_index(idx).map_err(zip)?;
+            let name = entry.name().map_err(zip)?;
+            let frame_idx = (name.strip_suffix(".png")).and_then(|stem| stem.parse().ok());
+            let slot = frame_idx.and_then(|idx: usize| entries.get_mut(idx));
+            let slot = slot.ok_or(Error::Mismatch(
+                "an archive has an entry that is no frame of the footage",
+            ))?;
+            let stored = entry.compression() == zip::CompressionMethod::Stored;
+            let ends = |at: &u64| at.checked_add(entry.size());
+            let at = (entry.data_start())
+                .filter(|at| stored && ends(at).is_some_and(|end| end <= n_bytes_all));
+            let at = at.ok_or(Error::Mismatch(
+                "an entry of an archive is compressed or cut off",
+            ))?;
+            *slot = Some(Entry {
+                at,
+                n_bytes: entry.size() as usize,
+            });
+        }
+        Ok(entries)
     }
-    sprite.copy_from_slice(&image.pixels);
-    Ok(())
 }
 
 #[cfg(test)]
@@ -286,7 +351,6 @@ mod tests {
             clip_frames: 2,
             epsilon: 77,
             natural_step: 38,
-            sprite_scale: None,
             transitions: vec![Transition {
                 from: 0,
                 to: 1,

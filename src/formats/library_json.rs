@@ -30,6 +30,8 @@ pub struct Summary {
     pub sprite_size_px: [u32; 2],
     /// Sizes of the sprites relative to the footage, unless all are as filmed.
     pub sprite_scale: Option<Vec<f64>>,
+    /// The centroid in every frame's cutout; empty in files of before, whose cutouts are sprites.
+    pub cutout_center_px: Vec<Option<[f64; 2]>>,
     /// f.
     pub clip_frames: usize,
     /// Clips nearer than this are alike.
@@ -54,7 +56,10 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
         params: params.clone(),
         footage: footage.clone(),
         sprite_size_px: [library.sprites.width(), library.sprites.height()],
-        sprite_scale: library.sprite_scale.clone(),
+        sprite_scale: library.sprites.scales().map(<[f64]>::to_vec),
+        cutout_center_px: (0..library.sprites.n_frames())
+            .map(|idx| library.sprites.cutout(idx).map(|cutout| cutout.center_px))
+            .collect(),
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
         natural_step: library.natural_step,
@@ -80,6 +85,7 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
         params: file.params,
         sprite_size_px: file.sprite_size_px,
         sprite_scale: file.sprite_scale,
+        cutout_center_px: file.cutout_center_px,
         clip_frames: file.clip_frames,
         epsilon: file.epsilon,
         natural_step: file.natural_step,
@@ -111,6 +117,9 @@ struct LibraryFile {
     /// Absent in files of before.
     #[serde(default)]
     sprite_scale: Option<Vec<f64>>,
+    /// Absent in files of before.
+    #[serde(default)]
+    cutout_center_px: Vec<Option<[f64; 2]>>,
     clip_frames: usize,
     epsilon: u64,
     natural_step: u64,

@@ -132,6 +132,7 @@ impl Input {
         for (name, picture) in svg::pictures(library) {
             std::fs::write(folder.join(name), picture)?;
         }
+        library_dir::write_sprites(folder, &library.sprites)?;
         let map = self.distance_map(attempt, library)?;
         std::fs::write(folder.join("distance.png"), map.draw_distances())?;
         let candidates = map.draw_candidates(library);

@@ -8,7 +8,7 @@ pub mod sprites;
 
 pub use playback::{Jump, Patch, Playback, Transition};
 pub use pose::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
-pub use sprites::Sprites;
+pub use sprites::{Cutout, Sprites};
 
 use crate::raster::RgbImage;
 
@@ -21,8 +21,6 @@ pub struct Library {
     pub background: RgbImage,
     /// The animal cut out of every frame in which it was found.
     pub sprites: Sprites,
-    /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
-    pub sprite_scale: Option<Vec<f64>>,
     /// f: how many sprites a clip holds.
     pub clip_frames: usize,
     /// Clips nearer than this (strictly) are alike.

@@ -1,49 +1,72 @@
-//! Sprites: the animal cut out of each frame, all of one size, centred on its centroid (O's clip U).
+//! The animal of every frame: cut out as it was filmed, pixel for pixel, and from that the sprites, all of
+//! one size with the centroid at the middle (O's clip U).
 //!
-//! Most of a sprite is empty, and a long footage has many: only the box that shows anything is kept,
-//! in a [`Scratch`], and the picture is put together when it is asked for.
+//! What is drawn into a flock is the cutout, so that it is interpolated once; what is compared and exported
+//! are sprites, put together when they are asked for. A long footage has many: their pixels lie in a
+//! [`Scratch`].
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::resample::bounds_of;
+use crate::raster::canvas::straight;
+use crate::raster::resample::{Placement, Premultiplied, Resampled, Room, bounds_of};
 use crate::scratch::{Full, InMemory, Scratch};
 
-/// Straight-alpha RGBA pictures of one common size, one for every frame of the footage.
+/// The animal of every frame of the footage, in straight-alpha RGBA.
 ///
-/// The centroid lies at (width / 2, height / 2). A frame without the animal has no sprite: its
-/// picture is wholly transparent and it is not `present`.
+/// A frame without the animal has no sprite: its picture is wholly transparent and it is not `present`.
 #[derive(Clone, Debug)]
 pub struct Sprites {
     width: u32,
     height: u32,
-    cuts: Vec<Option<Cut>>,
+    cutouts: Vec<Option<Cutout>>,
+    /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
+    scales: Option<Vec<f64>>,
     scratch: Arc<dyn Scratch>,
 }
 
-/// What is kept of a sprite.
-#[derive(Clone, Copy, Debug)]
-struct Cut {
-    /// Where the sprite shows anything; the pixels around it are 0.
-    bounds: Rect,
-    /// Where the bytes of that box lie.
-    at: u64,
+/// The animal cut out of one frame, its pixels those of the frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cutout {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// The animal's centroid, from the upper left corner, to 3 decimals, as files hold it.
+    pub center_px: [f64; 2],
+    /// Where the RGBA bytes lie.
+    pub at: u64,
 }
 
 impl Sprites {
     /// `n_frames` missing sprites of `width` by `height`.
     pub fn missing(width: u32, height: u32, n_frames: usize) -> Sprites {
+        Sprites::of(
+            [width, height],
+            vec![None; n_frames],
+            None,
+            Arc::new(InMemory::default()),
+        )
+    }
+
+    /// Sprites of `size` pixels, of cutouts that lie in `scratch`: as large as filmed, or of `scales`.
+    pub fn of(
+        [width, height]: [u32; 2],
+        cutouts: Vec<Option<Cutout>>,
+        scales: Option<Vec<f64>>,
+        scratch: Arc<dyn Scratch>,
+    ) -> Sprites {
         Sprites {
             width,
             height,
-            cuts: vec![None; n_frames],
-            scratch: Arc::new(InMemory::default()),
+            cutouts,
+            scales,
+            scratch,
         }
     }
 
-    /// Draws a sprite for every frame, on all threads, and puts them aside.
+    /// Draws a sprite for every frame, on all threads, and puts aside what each shows.
     ///
     /// `draw` is given a frame's number and its picture, wholly transparent, and says whether the frame has a sprite.
     pub fn drawn<E: From<Full> + Send>(
@@ -59,24 +82,28 @@ impl Sprites {
             if !draw(frame_idx, picture)? {
                 return Ok(None);
             }
-            let bounds = bounds_of(picture, width);
+            let bounds = match bounds_of(picture, width) {
+                nothing if nothing.is_empty() => Rect::of_size(1, 1),
+                bounds => bounds,
+            };
             packed.clear();
             for row in rows(bounds, width) {
                 packed.extend_from_slice(&picture[row]);
             }
-            let at = scratch.put(packed)?;
-            Ok(Some(Cut { bounds, at }))
+            Ok(Some(Cutout {
+                size: [bounds.w, bounds.h],
+                center_px: [
+                    f64::from(width) / 2.0 - f64::from(bounds.x),
+                    f64::from(height) / 2.0 - f64::from(bounds.y),
+                ],
+                at: scratch.put(packed)?,
+            }))
         };
-        let cuts = (0..n_frames)
+        let cutouts = (0..n_frames)
             .into_par_iter()
             .map_init(Default::default, cut)
             .collect::<Result<_, E>>()?;
-        Ok(Sprites {
-            width,
-            height,
-            cuts,
-            scratch,
-        })
+        Ok(Sprites::of([width, height], cutouts, None, scratch))
     }
 
     /// Columns of each sprite.
@@ -96,53 +123,103 @@ impl Sprites {
 
     /// One for every frame of the footage, missing ones included.
     pub fn n_frames(&self) -> usize {
-        self.cuts.len()
+        self.cutouts.len()
     }
 
     /// Whether frame `frame_idx` has a sprite.
     pub fn is_present(&self, frame_idx: usize) -> bool {
-        self.cuts[frame_idx].is_some()
+        self.cutouts[frame_idx].is_some()
     }
 
-    /// The box of a frame's sprite that shows anything; empty where nothing does.
-    pub fn bounds(&self, frame_idx: usize) -> Rect {
-        self.cuts[frame_idx].map_or(Rect::default(), |cut| cut.bounds)
+    /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
+    pub fn scales(&self) -> Option<&[f64]> {
+        self.scales.as_deref()
     }
 
-    /// The RGBA bytes of a frame, all zero when it is missing. Panics beyond the last frame.
+    /// What was cut out of a frame. Panics beyond the last frame.
+    pub fn cutout(&self, frame_idx: usize) -> Option<Cutout> {
+        self.cutouts[frame_idx]
+    }
+
+    /// The RGBA bytes of a cutout, by rows, in memory that the caller lends.
+    pub fn read_cutout(&self, cutout: &Cutout, rgba: &mut Vec<u8>) {
+        let [width, height] = cutout.size;
+        rgba.clear();
+        rgba.resize(width as usize * height as usize * 4, 0);
+        self.scratch.get(cutout.at, rgba);
+    }
+
+    /// The RGBA bytes of a frame's sprite, all zero when it is missing. Panics beyond the last frame.
+    ///
+    /// The centroid's sub-pixel rest is interpolated by Catmull and Rom's curve in premultiplied alpha; where
+    /// there is none, pixels are those of the cutout.
     pub fn sprite(&self, frame_idx: usize) -> Vec<u8> {
-        let mut picture = Vec::new();
-        self.read(frame_idx, &mut picture);
+        let mut picture = vec![0; self.n_bytes()];
+        let Some(cutout) = self.cutouts[frame_idx] else {
+            return picture;
+        };
+        let mut rgba = Vec::new();
+        self.read_cutout(&cutout, &mut rgba);
+        let scale = self.scales().map_or(1.0, |scales| scales[frame_idx]);
+        match self.whole_shift(&cutout).filter(|_| scale == 1.0) {
+            Some(shift) => self.copy(&rgba, cutout.size, shift, &mut picture),
+            None => self.interpolate(&rgba, &cutout, scale, &mut picture),
+        }
         picture
     }
 
-    /// As [`sprite`](Sprites::sprite), in memory that the caller lends.
-    pub fn read(&self, frame_idx: usize, picture: &mut Vec<u8>) {
-        picture.clear();
-        picture.resize(self.n_bytes(), 0);
-        let mut packed = Vec::new();
-        let bounds = self.read_cut(frame_idx, &mut packed);
-        let packed_rows = packed.chunks_exact(bounds.w.max(1) as usize * 4);
-        for (row, packed_row) in rows(bounds, self.width).zip(packed_rows) {
-            picture[row].copy_from_slice(packed_row);
+    /// Where the corner of a cutout comes to lie in its sprite, if that is on a whole pixel.
+    fn whole_shift(&self, cutout: &Cutout) -> Option<[i64; 2]> {
+        let middle = [self.width, self.height].map(|side| f64::from(side) / 2.0);
+        let shift = [0, 1].map(|k| middle[k] - cutout.center_px[k]);
+        let is_whole = shift.iter().all(|px| px.fract() == 0.0);
+        is_whole.then(|| shift.map(|px| px as i64))
+    }
+
+    fn copy(&self, rgba: &[u8], [w, h]: [u32; 2], [x, y]: [i64; 2], picture: &mut [u8]) {
+        let (right, bottom) = (x + i64::from(w), y + i64::from(h));
+        let seen = Rect::clipped(x, y, right, bottom, self.width, self.height);
+        let left = (i64::from(seen.x) - x) as usize;
+        let hidden = (i64::from(seen.y) - y) as usize;
+        let from = rgba.chunks_exact(w.max(1) as usize * 4).skip(hidden);
+        for (row, from) in rows(seen, self.width).zip(from) {
+            let n = row.len();
+            picture[row].copy_from_slice(&from[left * 4..left * 4 + n]);
         }
     }
 
-    /// The box that shows anything, whose RGBA bytes alone become those of `packed`; empty for a missing
-    /// sprite.
-    pub fn read_cut(&self, frame_idx: usize, packed: &mut Vec<u8>) -> Rect {
-        packed.clear();
-        let Some(Cut { bounds, at }) = self.cuts[frame_idx] else {
-            return Rect::default();
+    fn interpolate(&self, rgba: &[u8], cutout: &Cutout, scale: f64, picture: &mut [u8]) {
+        let size = [self.width, self.height];
+        let place = Placement {
+            center_px: size.map(|side| f64::from(side) / 2.0),
+            rotation_rad: 0.0,
+            scale,
+            mirrored: false,
         };
-        packed.resize(bounds.area() as usize * 4, 0);
-        self.scratch.get(at, packed);
-        bounds
+        let premultiplied = Premultiplied::of(rgba, cutout.size, cutout.center_px, scale);
+        let mut placed = Resampled::default();
+        let room = Room { size, nearer: None };
+        placed.draw(&premultiplied, &place, room, Level::detect());
+        for ([x, y], row) in placed.shown() {
+            let at = (y * self.width + x) as usize * 4;
+            let out = &mut picture[at..at + row.len() * 4];
+            for (out, &pixel) in out.chunks_exact_mut(4).zip(row) {
+                out.copy_from_slice(&visible(straight(pixel)));
+            }
+        }
     }
 
     /// Where more may be put aside that belongs to these sprites.
     pub fn scratch(&self) -> &Arc<dyn Scratch> {
         &self.scratch
+    }
+}
+
+/// A pixel whose alpha rounds to nothing has no color either.
+fn visible(pixel: [u8; 4]) -> [u8; 4] {
+    match pixel[3] {
+        0 => [0; 4],
+        _ => pixel,
     }
 }
 
@@ -158,11 +235,15 @@ fn rows(bounds: Rect, width: u32) -> impl Iterator<Item = std::ops::Range<usize>
 impl PartialEq for Sprites {
     fn eq(&self, other: &Sprites) -> bool {
         let shape = |s: &Sprites| (s.width, s.height, s.n_frames());
+        let cutout = |sprites: &Sprites, idx: usize| {
+            let cutout = sprites.cutout(idx)?;
+            let mut rgba = Vec::new();
+            sprites.read_cutout(&cutout, &mut rgba);
+            Some((cutout.size, cutout.center_px, rgba))
+        };
         shape(self) == shape(other)
-            && (0..self.n_frames()).all(|idx| {
-                self.is_present(idx) == other.is_present(idx)
-                    && self.sprite(idx) == other.sprite(idx)
-            })
+            && self.scales == other.scales
+            && (0..self.n_frames()).all(|idx| cutout(self, idx) == cutout(other, idx))
     }
 }
 
@@ -174,7 +255,7 @@ mod tests {
     fn a_sprite_comes_back_with_its_empty_rim_and_a_missing_one_empty() {
         let mut picture = vec![0; 6 * 5 * 4];
         for (x, y) in [(2, 1), (4, 3)] {
-            picture[(y * 6 + x) * 4..][..4].copy_from_slice(&[10, 20, 30, 40]);
+            picture[(y * 6 + x) * 4..][..4].copy_from_slice(&[10, 20, 30, 1]);
         }
         let draw = |frame_idx, rgba: &mut [u8]| {
             rgba.copy_from_slice(&picture);
@@ -183,9 +264,43 @@ mod tests {
         let sprites = Sprites::drawn([6, 5], 3, Arc::new(InMemory::default()), draw);
         let sprites = sprites.expect("memory has room");
         assert_eq!(sprites.sprite(2), picture);
-        let (x, y, w, h) = (2, 1, 3, 3);
-        assert_eq!(sprites.bounds(2), Rect { x, y, w, h });
-        assert!(!sprites.is_present(1) && sprites.bounds(1).is_empty());
+        let cutout = sprites.cutout(2).expect("a sprite");
+        assert_eq!((cutout.size, cutout.center_px), ([3, 3], [1.0, 1.5]));
+        assert!(!sprites.is_present(1) && sprites.cutout(1).is_none());
         assert_eq!(sprites.sprite(1), vec![0; 120]);
+    }
+
+    /// A white bar of 3 x 1 in a cutout of 5 x 3, in a sprite of 4 x 2, as alpha.
+    fn alpha_of_bar(center_px: [f64; 2], scales: Option<Vec<f64>>) -> Vec<u8> {
+        let scratch = InMemory::default();
+        let mut rgba = vec![0; 5 * 3 * 4];
+        rgba[(5 + 1) * 4..(5 + 4) * 4].fill(255);
+        let cutout = Cutout {
+            size: [5, 3],
+            center_px,
+            at: scratch.put(&rgba).expect("memory has room"),
+        };
+        let sprites = Sprites::of([4, 2], vec![Some(cutout)], scales, Arc::new(scratch));
+        let sprite = sprites.sprite(0);
+        sprite.chunks_exact(4).map(|pixel| pixel[3]).collect()
+    }
+
+    #[test]
+    fn the_centroid_comes_to_lie_in_the_middle_and_what_has_no_room_is_left_out() {
+        assert_eq!(
+            alpha_of_bar([3.0, 1.0], None),
+            [0, 0, 0, 0, 255, 255, 255, 0]
+        );
+        assert_eq!(alpha_of_bar([4.0, 2.0], None), [255, 255, 0, 0, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn between_pixels_a_sprite_is_interpolated_and_another_scale_shows_it_larger() {
+        let half = alpha_of_bar([2.5, 1.0], None);
+        assert_eq!(half[..4], [0; 4]);
+        // Catmull and Rom's curve half way up an edge: 9 / 16 - 1 / 16.
+        assert_eq!(half[4..], [128, 255, 255, 128]);
+        let large = alpha_of_bar([2.5, 1.5], Some(vec![2.0]));
+        assert!(large.iter().all(|&alpha| alpha > 200), "{large:?}");
     }
 }

@@ -14,8 +14,10 @@
 //! with P = 0 outside the sprite. The canvas is as large as the turned animals need; a larger one
 //! would only add zeros to every sprite, so D does not depend on its size.
 
+use rayon::prelude::*;
+
 use crate::geometry::Turns;
-use crate::library::{Poses, Sprites};
+use crate::library::{Pose, Poses, Sprites};
 
 /// The common picture into which sprites are turned, their center in its middle.
 pub(super) struct Canvas {
@@ -29,18 +31,21 @@ impl Canvas {
     /// The smallest canvas, in multiples of 8, that holds every sprite of known heading.
     pub(super) fn around(sprites: &Sprites, poses: &Poses) -> Canvas {
         let (w, h) = (sprites.width() as usize, sprites.height() as usize);
-        let (mut half_width, mut half_height) = (0.0f64, 0.0f64);
-        for (frame_idx, pose) in poses.frames.iter().enumerate() {
+        let most = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+        let halves = |(frame_idx, pose): (usize, &Pose)| {
             let Some(heading) = pose.heading_rad else {
-                continue;
+                return [0.0; 2];
             };
             let (c, s) = (libm::cos(heading), libm::sin(heading));
-            for corner in outline(&sprites.sprite(frame_idx), w) {
+            let corners = outline(&sprites.sprite(frame_idx), w).into_iter();
+            let turned = corners.map(|corner| {
                 let (x, y) = (corner[0] - w as f64 / 2.0, corner[1] - h as f64 / 2.0);
-                half_width = half_width.max((c * x + s * y).abs());
-                half_height = half_height.max((c * y - s * x).abs());
-            }
-        }
+                [(c * x + s * y).abs(), (c * y - s * x).abs()]
+            });
+            turned.fold([0.0; 2], most)
+        };
+        let frames = poses.frames.par_iter().enumerate();
+        let [half_width, half_height] = frames.map(halves).reduce(|| [0.0; 2], most);
         // One pixel for the reach of the interpolation, one for the rounding of the heading.
         let side = |half: f64| ((half + 2.0) * 2.0).ceil() as usize;
         Canvas {

@@ -51,7 +51,6 @@ fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
         clip_frames: 8,
         epsilon: 10,
         natural_step: 5,
-        sprite_scale: None,
         transitions: Vec::new(),
         playback: Playback {
             jumps: (0..30).rev().map(jump).collect(),

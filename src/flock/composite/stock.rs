@@ -34,9 +34,14 @@ impl Stock {
         let key = (frame, Premultiplied::level_for(scale));
         let kept = self.with(|shelf| shelf.sprites.get(&key).cloned());
         kept.unwrap_or_else(|| {
-            let bounds = sprites.read_cut(frame as usize, packed);
-            let size = [sprites.width(), sprites.height()];
-            let sprite = Arc::new(Premultiplied::of(packed, size, bounds, scale));
+            let sprite = match sprites.cutout(frame as usize) {
+                Some(cutout) => {
+                    sprites.read_cutout(&cutout, packed);
+                    Premultiplied::of(packed, cutout.size, cutout.center_px, scale)
+                }
+                None => Premultiplied::of(&[], [0; 2], [0.0; 2], scale),
+            };
+            let sprite = Arc::new(sprite);
             self.with(|shelf| shelf.keep(key, &sprite));
             sprite
         })

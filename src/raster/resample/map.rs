@@ -63,9 +63,8 @@ impl Map {
         let [x, y] = place.center_px;
         let origin = std::array::from_fn(|k| {
             // Pixel k of a level has its center at k + 0.5 of its own pixels.
-            let middle = f64::from(sprite.size[k]) / (2.0 * unit) - 0.5;
-            let padded = PAD as f64 - sprite.bounds[k] as f64;
-            middle + padded - per_column[k] * x - per_row[k] * y
+            let middle = sprite.middle_px[k] / unit - 0.5;
+            middle + PAD as f64 - per_column[k] * x - per_row[k] * y
         });
         Map {
             origin,
@@ -94,18 +93,16 @@ impl Map {
     /// The box of the picture that the sprite may touch.
     pub(super) fn covered(&self, sprite: &Premultiplied, [w, h]: [u32; 2]) -> Rect {
         let unit = f64::from(1u32 << sprite.level);
-        let [left, top, right, bottom] = sprite.bounds.map(|bound| bound as f64);
-        if sprite.bounds[2] == 0 {
+        if sprite.is_empty() {
             return Rect::default();
         }
+        let [width, height] = sprite.size.map(|side| side as f64);
+        let [middle_x, middle_y] = sprite.middle_px;
         let reach = REACH as f64;
         let (mut least, mut greatest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for u in [left - reach, right + reach] {
-            for v in [top - reach, bottom + reach] {
-                let corner = self.forward(
-                    u * unit - f64::from(sprite.size[0]) / 2.0,
-                    v * unit - f64::from(sprite.size[1]) / 2.0,
-                );
+        for u in [-reach, width + reach] {
+            for v in [-reach, height + reach] {
+                let corner = self.forward(u * unit - middle_x, v * unit - middle_y);
                 for axis in 0..2 {
                     least[axis] = least[axis].min(corner[axis]);
                     greatest[axis] = greatest[axis].max(corner[axis]);
@@ -140,7 +137,7 @@ impl Map {
     ) -> (usize, usize) {
         let (mut from, mut to) = (0.0f64, n as f64);
         for axis in 0..2 {
-            let extent = (sprite.bounds[axis + 2] - sprite.bounds[axis]) as f64;
+            let extent = sprite.size[axis] as f64;
             let (low, high) = ((PAD - REACH) as f64, (PAD + REACH) as f64 + extent - 1.0);
             let step = self.per_column[axis];
             if step.abs() < 1e-12 {

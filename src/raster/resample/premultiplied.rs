@@ -18,16 +18,16 @@ const LEAST_SCALE: f64 = 0.6;
 /// A sprite is a dot by then.
 const MOST_HALVED: u32 = 8;
 
-/// A sprite, premultiplied, where it shows anything.
+/// A sprite, premultiplied.
 #[derive(Clone, Debug, Default)]
 pub struct Premultiplied {
-    /// Width and height of the whole sprite, before halving.
-    pub(super) size: [u32; 2],
+    /// Its middle, which a placement places, from its upper left corner; pixels before halving.
+    pub(super) middle_px: [f64; 2],
     /// How often it has been halved.
     pub(super) level: u32,
-    /// Where alpha is not 0: left, top, right, bottom in pixels of the level.
-    pub(super) bounds: [usize; 4],
-    /// The bounds and a border of `PAD`, by rows.
+    /// Columns and rows of the level.
+    pub(super) size: [usize; 2],
+    /// These and a border of `PAD`, by rows.
     pub(super) pixels: Vec<Quad>,
     /// Per row: the columns, in 65536ths, between which a place lies beside a pixel that shows; from above to when
     /// none does.
@@ -35,12 +35,16 @@ pub struct Premultiplied {
 }
 
 impl Premultiplied {
-    /// Takes what a straight-alpha RGBA sprite of `size` pixels shows within `bounds` (rows of that
-    /// box), for being drawn at `scale`.
-    pub fn of(rgba: &[u8], size: [u32; 2], bounds: Rect, scale: f64) -> Premultiplied {
-        let mut sprite = Premultiplied::default();
-        sprite.fill(rgba, size, bounds);
-        if sprite.bounds[2] > 0 {
+    /// Takes a straight-alpha RGBA sprite of `size` pixels, for being drawn at `scale` about `middle_px`, which is told
+    /// from its upper left corner and may lie between pixels.
+    pub fn of(rgba: &[u8], size: [u32; 2], middle_px: [f64; 2], scale: f64) -> Premultiplied {
+        let mut sprite = Premultiplied {
+            middle_px,
+            size: size.map(|side| side as usize),
+            ..Premultiplied::default()
+        };
+        sprite.fill(rgba);
+        if !sprite.is_empty() {
             (0..Premultiplied::level_for(scale)).for_each(|_| sprite.halve());
         }
         sprite.find_spans();
@@ -101,16 +105,17 @@ impl Premultiplied {
         size_of_val(&*self.pixels) + size_of_val(&*self.spans)
     }
 
-    fn fill(&mut self, rgba: &[u8], size: [u32; 2], bounds: Rect) {
-        self.size = size;
-        self.level = 0;
-        let edges = [bounds.x, bounds.y, bounds.right(), bounds.bottom()];
-        self.bounds = edges.map(|edge| edge as usize);
+    /// Whether it has no pixels.
+    pub(super) fn is_empty(&self) -> bool {
+        self.size.contains(&0)
+    }
+
+    fn fill(&mut self, rgba: &[u8]) {
         self.clear();
-        let stride = self.stride();
-        let rows = rgba.chunks_exact(bounds.w.max(1) as usize * 4);
+        let (stride, width) = (self.stride(), self.size[0]);
+        let rows = rgba.chunks_exact(width.max(1) * 4);
         for (row, y) in rows.zip(PAD..) {
-            let out = &mut self.pixels[y * stride + PAD..][..bounds.w as usize];
+            let out = &mut self.pixels[y * stride + PAD..][..width];
             for (out, pixel) in out.iter_mut().zip(row.chunks_exact(4)) {
                 *out = premultiplied(pixel);
             }
@@ -119,11 +124,11 @@ impl Premultiplied {
 
     /// Columns of `pixels`.
     pub(super) fn stride(&self) -> usize {
-        self.bounds[2] - self.bounds[0] + 2 * PAD
+        self.size[0] + 2 * PAD
     }
 
     fn clear(&mut self) {
-        let n_rows = self.bounds[3] - self.bounds[1] + 2 * PAD;
+        let n_rows = self.size[1] + 2 * PAD;
         self.pixels.clear();
         self.pixels.resize(self.stride() * n_rows, [0; 4]);
     }
@@ -131,17 +136,16 @@ impl Premultiplied {
     /// The next level: means of two by two pixels.
     fn halve(&mut self) {
         let finer = std::mem::take(&mut self.pixels);
-        let (before, stride_before) = (self.bounds, self.stride());
-        let [left, top, right, bottom] = before;
-        self.bounds = [left / 2, top / 2, right.div_ceil(2), bottom.div_ceil(2)];
+        let stride_before = self.stride();
+        self.size = self.size.map(|side| side.div_ceil(2));
         self.level += 1;
         self.clear();
         let stride = self.stride();
-        let [left, top, right, bottom] = self.bounds;
-        for y in top..bottom {
-            for x in left..right {
+        let [width, height] = self.size;
+        for y in 0..height {
+            for x in 0..width {
                 // The border takes in what an odd edge lacks.
-                let at = (2 * y + PAD - before[1]) * stride_before + 2 * x + PAD - before[0];
+                let at = (2 * y + PAD) * stride_before + 2 * x + PAD;
                 let block = [at, at + 1, at + stride_before, at + stride_before + 1];
                 let mut sum = [2i32; 4];
                 for pixel in block.map(|at| finer[at]) {
@@ -149,8 +153,7 @@ impl Premultiplied {
                         *sum += i32::from(value);
                     }
                 }
-                self.pixels[(y - top + PAD) * stride + x - left + PAD] =
-                    sum.map(|sum| (sum / 4) as i16);
+                self.pixels[(y + PAD) * stride + x + PAD] = sum.map(|sum| (sum / 4) as i16);
             }
         }
     }

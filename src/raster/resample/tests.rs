@@ -18,20 +18,21 @@ fn place(center_px: [f64; 2]) -> Placement {
     }
 }
 
-/// The part of a sprite that shows anything, as `fill` takes it.
-fn cut(rgba: &[u8], width: u32, bounds: Rect) -> Vec<u8> {
-    (bounds.y..bounds.bottom())
-        .flat_map(|y| {
-            let at = ((y * width + bounds.x) * 4) as usize;
-            &rgba[at..at + bounds.w as usize * 4]
-        })
-        .copied()
-        .collect()
+/// The part of a sprite of `size` pixels that shows anything, placed by the middle of the whole.
+fn cut(rgba: &[u8], [width, height]: [u32; 2], scale: f64) -> Premultiplied {
+    let bounds = bounds_of(rgba, width);
+    let rows = (bounds.y..bounds.bottom()).flat_map(|y| {
+        let at = ((y * width + bounds.x) * 4) as usize;
+        &rgba[at..at + bounds.w as usize * 4]
+    });
+    let shown: Vec<u8> = rows.copied().collect();
+    let middle = |side: u32, from: u32| f64::from(side) / 2.0 - f64::from(from);
+    let middle_px = [middle(width, bounds.x), middle(height, bounds.y)];
+    Premultiplied::of(&shown, [bounds.w, bounds.h], middle_px, scale)
 }
 
 fn drawn_with(rgba: &[u8], (w, h): (u32, u32), place: &Placement, cpu: Level) -> Resampled {
-    let bounds = bounds_of(rgba, w);
-    let sprite = Premultiplied::of(&cut(rgba, w, bounds), [w, h], bounds, place.scale);
+    let sprite = cut(rgba, [w, h], place.scale);
     let mut resampled = Resampled::default();
     let size = [40, 30];
     resampled.draw(&sprite, place, Room { size, nearer: None }, cpu);
@@ -192,8 +193,7 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
     };
     everywhere.show_whole();
     Canvas::new(40, 30).under(&everywhere, &mut nearer, Level::Scalar);
-    let bounds = Rect::of_size(12, 12);
-    let sprite = Premultiplied::of(&square(), [12, 12], bounds, 1.0);
+    let sprite = Premultiplied::of(&square(), [12, 12], [6.0; 2], 1.0);
     for cpu in Level::available() {
         let (mut all, mut rest) = (Resampled::default(), Resampled::default());
         let size = [40, 30];
@@ -240,8 +240,7 @@ fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
         let is_shown = !(12..15).contains(&y) && (x + y * y / 9) % 40 < 9;
         rgba[k * 4 + 3] = if is_shown { 200 } else { 0 };
     }
-    let bounds = bounds_of(&rgba, 40);
-    let sprite = Premultiplied::of(&cut(&rgba, 40, bounds), [40, 30], bounds, 1.0);
+    let sprite = cut(&rgba, [40, 30], 1.0);
     let within =
         |at: [i32; 2]| (3..35).contains(&(at[0] >> 16)) && (3..30).contains(&(at[1] >> 16));
     let mut n_empty = 0;
@@ -275,14 +274,13 @@ fn what_lies_beside_a_pixel_that_shows_is_drawn() {
     for (k, pixel) in rgba.chunks_exact_mut(4).enumerate() {
         pixel[3] = if k * 5 % 8 == 0 { 255 } else { 0 };
     }
-    let bounds = bounds_of(&rgba, 14);
     for k in 0..12 {
         let turned = Placement {
             rotation_rad: 0.5 * f64::from(k),
             scale: 0.7 + 0.2 * f64::from(k),
             ..place([20.0, 14.5])
         };
-        let sprite = Premultiplied::of(&cut(&rgba, 14, bounds), [14, 9], bounds, turned.scale);
+        let sprite = cut(&rgba, [14, 9], turned.scale);
         let map = Map::new(&sprite, &turned);
         let found = drawn(&rgba, (14, 9), &turned);
         let (alpha, rect, stride) = (found.alpha(), found.rect, sprite.stride());
