@@ -29,13 +29,17 @@ pub struct Lens {
 
 /// A camera with the body length as its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Pinhole {
-    focal_px: f64,
-    center_px: [f64; 2],
-    pane_bl: f64,
-    medium_index: f64,
+pub struct Pinhole {
+    /// Focal length, pixels.
+    pub focal_px: f64,
+    /// Where its axis meets the picture.
+    pub center_px: [f64; 2],
+    /// Distance of the front pane, behind which the medium begins.
+    pub pane_bl: f64,
+    /// Refractive index of the medium; 1 = none.
+    pub medium_index: f64,
     /// Metres to the body length, where they are known.
-    metres: Option<f64>,
+    pub metres: Option<f64>,
 }
 
 impl Lens {
@@ -59,10 +63,29 @@ impl Lens {
 
     /// One that shows every place at the same size.
     pub fn flat(length_px: f64) -> Lens {
-        Lens {
-            length_px,
-            camera: None,
-        }
+        Lens::with(length_px, None)
+    }
+
+    /// One of a camera; without one, flat.
+    pub fn with(length_px: f64, camera: Option<Pinhole>) -> Lens {
+        Lens { length_px, camera }
+    }
+
+    /// Its camera; `None` when flat.
+    pub fn camera(&self) -> Option<&Pinhole> {
+        self.camera.as_ref()
+    }
+
+    /// The same with the digits that files hold.
+    pub(super) fn rounded(&self) -> Lens {
+        let rounded_camera = |camera: Pinhole| Pinhole {
+            focal_px: rounded(camera.focal_px, 3),
+            center_px: camera.center_px.map(|px| rounded(px, 3)),
+            pane_bl: rounded(camera.pane_bl, 5),
+            medium_index: rounded(camera.medium_index, 5),
+            metres: camera.metres.map(|metres| rounded(metres, 5)),
+        };
+        Lens::with(self.length_px, self.camera.map(rounded_camera))
     }
 
     /// Whether every place has the same size in the picture.

@@ -16,6 +16,7 @@ pub mod plan;
 pub mod quality;
 mod rotation;
 mod seam;
+pub mod space;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
@@ -25,6 +26,7 @@ pub use error::Error;
 pub use individual::{BoidTrack, Fade, Individual, PlanCost};
 pub use params::Params;
 pub use quality::Stats;
+pub use space::Space;
 
 use self::boids::Boids;
 use self::boids::calibration::Calibration;
@@ -47,6 +49,8 @@ pub struct Flock {
     pub image_size_px: [u32; 2],
     /// A body length (BL) in the picture.
     pub length_px: f64,
+    /// Where its boids may be, and how that is seen.
+    pub space: Space,
     /// What was asked for.
     pub params: Params,
     /// By id.
@@ -116,6 +120,7 @@ pub fn plan_flock(
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
         length_px: lens.length_px,
+        space: Space::of(&lens, &tank),
         stats: Stats {
             room_for: tank.room_for(),
             overlap_bl: rounded(tank.overlap_bl(individuals.len()), 4),

@@ -3,10 +3,12 @@
 //! A flock holds its numbers rounded already, so reading gives back exactly what was written, and
 //! anyone can recompute each plan's cost from this file and the library (ALGORITHMS.md 6, proof c).
 
+mod space; // where boids may be, and how that is seen
 mod stats; // how good the flock is, and how it moves frame by frame
 
 use serde::{Deserialize, Serialize};
 
+use self::space::SpaceFile;
 use self::stats::StatsFile;
 use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 
@@ -23,6 +25,7 @@ pub fn write(flock: &Flock) -> Vec<u8> {
         fps: flock.fps,
         image_size_px: flock.image_size_px,
         length_px: flock.length_px,
+        space: Some(SpaceFile::of(&flock.space)),
         stats: StatsFile::of(&flock.stats, &flock.orders),
         predator: flock.predator_px.clone(),
         individuals: (), // written line by line below
@@ -49,6 +52,7 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
         fps: file.fps,
         image_size_px: file.image_size_px,
         length_px: file.length_px,
+        space: SpaceFile::into_space(file.space, file.length_px),
         params: file.params,
         predator_px: file.predator,
         individuals: file
@@ -70,6 +74,9 @@ struct FlockFile<Individuals> {
     fps: f64,
     image_size_px: [u32; 2],
     length_px: f64,
+    /// Absent in files of before.
+    #[serde(default)]
+    space: Option<SpaceFile>,
     stats: StatsFile,
     /// Absent in files of before.
     #[serde(default)]

@@ -2,7 +2,10 @@
 //! (ALGORITHMS.md 8): mean absolute error in the animal's box below 2 of 255 over the film and below 4
 //! in every frame, resampling, halved chroma, matte and plate all included. The film has no noise, which no plate could have foreseen.
 
-use flockreel::flock::{BoidTrack, Compositor, Flock, Individual, Params, PlanCost, Shot, Stats};
+use flockreel::flock::lens::Lens;
+use flockreel::flock::{
+    BoidTrack, Compositor, Flock, Individual, Params, PlanCost, Shot, Space, Stats,
+};
 use flockreel::footage::FrameSource;
 use flockreel::library::Library;
 use flockreel::raster::{Frame, RgbImage};
@@ -84,6 +87,12 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
         length_px: 50.0,
+        space: Space {
+            lens: Lens::flat(50.0),
+            front_bl: 0.0,
+            up: [0.0, 0.0, 1.0],
+            walls: Vec::new(),
+        },
         params: Params {
             count: 1,
             frames: n_frames as u32,

@@ -213,6 +213,11 @@ impl Tank {
         self.walls.iter().all(|wall| beyond(wall) < 1e-9)
     }
 
+    /// Where it ends.
+    pub fn walls(&self) -> &[Wall] {
+        &self.walls
+    }
+
     /// The walls that steer: a flat tank has no front and back.
     fn upright_walls(&self) -> impl Iterator<Item = &Wall> {
         let flat = self.is_flat();

@@ -1,0 +1,103 @@
+//! Where boids are in space: how the tank is seen and where it ends (ALGORITHMS.md 7), as flock.json tells it, so that
+//! whoever reads that can reckon distances, order and walls anew.
+
+use super::boids::tank::{Tank, Wall};
+use super::boids::vector::Vec3;
+use super::individual::rounded;
+use super::lens::Lens;
+
+/// The space of a flock, rounded as files hold it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Space {
+    /// From places, in body lengths, to the picture.
+    pub lens: Lens,
+    /// The depth of the tank's front, body lengths from the camera; 0 where the lens is flat.
+    pub front_bl: f64,
+    /// The axis about which boids turn, a unit vector: the vertical, or out of the picture where they have no depth.
+    pub up: Vec3,
+    /// Where the tank ends. In one without depth its front and back are walls too, at the boids' own depth.
+    pub walls: Vec<Wall>,
+}
+
+impl Space {
+    /// Of a tank that is seen through a lens.
+    pub fn of(lens: &Lens, tank: &Tank) -> Space {
+        let wall = |wall: &Wall| Wall {
+            outward: wall.outward.map(|part| rounded(part, 6)),
+            offset_bl: rounded(wall.offset_bl, 4),
+        };
+        Space {
+            lens: lens.rounded(),
+            front_bl: rounded(tank.corners[0][2], 4),
+            up: tank.up(),
+            walls: tank.walls().iter().map(wall).collect(),
+        }
+    }
+
+    /// The place of a boid whose position flock.json tells: x and y in the picture, and how far behind the front;
+    /// pixels.
+    pub fn place_bl(&self, [x, y, behind_px]: [f64; 3]) -> Vec3 {
+        let depth_bl = self.front_bl + behind_px / self.lens.length_px;
+        self.lens.place_bl([x, y], depth_bl)
+    }
+
+    /// How far a place is beyond the wall that it is farthest beyond, body lengths; below 0 inside.
+    pub fn beyond_bl(&self, place: Vec3) -> f64 {
+        let beyond = |wall: &Wall| {
+            let along = (0..3).map(|axis| wall.outward[axis] * place[axis]);
+            along.sum::<f64>() - wall.offset_bl
+        };
+        self.walls
+            .iter()
+            .map(beyond)
+            .fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::boids::measures;
+    use crate::flock::{Params, plan_flock, synthetic};
+    use crate::library::View;
+    use crate::progress::Silent;
+
+    #[test]
+    fn what_a_file_tells_is_enough_to_reckon_order_distances_and_walls_anew() {
+        for view in [View::Top, View::Side] {
+            let params = Params {
+                count: 9,
+                frames: 40,
+                ..Params::default()
+            };
+            let flock = plan_flock(&synthetic::library(view), &params, &Silent).unwrap();
+            for (t, told) in flock.orders.iter().enumerate() {
+                let boids = || flock.individuals.iter().map(|one| &one.boid);
+                let places: Vec<Vec3> = boids()
+                    .map(|boid| flock.space.place_bl(boid.position_px[t]))
+                    .collect();
+                let courses: Vec<Vec3> = boids()
+                    .map(|boid| match &boid.forward {
+                        Some(forward) => forward[t],
+                        None => {
+                            let heading = boid.heading_rad[t];
+                            [libm::cos(heading), libm::sin(heading), 0.0]
+                        }
+                    })
+                    .collect();
+                let up = flock.space.up;
+                let found = measures::order(&places, &courses, up, flock.stats.overlap_bl - 0.01);
+                for (found, told) in [
+                    (found.polarization, told.polarization),
+                    (found.milling, told.milling),
+                    (found.nearest_bl, told.nearest_bl),
+                ] {
+                    assert!((found - told).abs() < 2e-3, "{view:?} {t}: {found} {told}");
+                }
+                assert_eq!((found.n_groups, found.n_overlaps), (told.n_groups, 0));
+                let beyond = places.iter().map(|&place| flock.space.beyond_bl(place));
+                assert!(beyond.fold(f64::NEG_INFINITY, f64::max) < 1e-3);
+            }
+        }
+    }
+}

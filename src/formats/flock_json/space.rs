@@ -1,0 +1,88 @@
+//! `space` of flock.json: how the tank is seen, and where it ends, body lengths (ALGORITHMS.md 7).
+//!
+//! A boid at `position` [x, y, behind] is z = `front_bl` + behind / `length_px` body lengths from the camera, and
+//! x_bl = (x - center_px[0]) / px, y_bl alike, with px = focal_px / (pane_bl + (z - pane_bl) / medium_index); without a
+//! camera px = `length_px`, and center_px is [0, 0].
+
+use serde::{Deserialize, Serialize};
+
+use crate::flock::Space;
+use crate::flock::boids::tank::Wall;
+use crate::flock::lens::{Lens, Pinhole};
+
+/// `camera` is null where every place is seen at the same size.
+#[derive(Serialize, Deserialize)]
+pub(super) struct SpaceFile {
+    camera: Option<CameraFile>,
+    front_bl: f64,
+    up: [f64; 3],
+    walls: Vec<WallFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct CameraFile {
+    focal_px: f64,
+    center_px: [f64; 2],
+    pane_bl: f64,
+    medium_index: f64,
+    /// Null where metres are not known.
+    m_per_bl: Option<f64>,
+}
+
+/// Inside is where `outward` . place <= `offset_bl`.
+#[derive(Serialize, Deserialize)]
+struct WallFile {
+    outward: [f64; 3],
+    offset_bl: f64,
+}
+
+impl SpaceFile {
+    pub(super) fn of(space: &Space) -> SpaceFile {
+        let camera = |camera: &Pinhole| CameraFile {
+            focal_px: camera.focal_px,
+            center_px: camera.center_px,
+            pane_bl: camera.pane_bl,
+            medium_index: camera.medium_index,
+            m_per_bl: camera.metres,
+        };
+        let wall = |wall: &Wall| WallFile {
+            outward: wall.outward,
+            offset_bl: wall.offset_bl,
+        };
+        SpaceFile {
+            camera: space.lens.camera().map(camera),
+            front_bl: space.front_bl,
+            up: space.up,
+            walls: space.walls.iter().map(wall).collect(),
+        }
+    }
+
+    /// Of a file of before, which tells none, a plane without walls.
+    pub(super) fn into_space(file: Option<SpaceFile>, length_px: f64) -> Space {
+        let Some(file) = file else {
+            return Space {
+                lens: Lens::flat(length_px),
+                front_bl: 0.0,
+                up: [0.0, 0.0, 1.0],
+                walls: Vec::new(),
+            };
+        };
+        let camera = |camera: CameraFile| Pinhole {
+            focal_px: camera.focal_px,
+            center_px: camera.center_px,
+            pane_bl: camera.pane_bl,
+            medium_index: camera.medium_index,
+            metres: camera.m_per_bl,
+        };
+        let wall = |wall: WallFile| Wall {
+            outward: wall.outward,
+            offset_bl: wall.offset_bl,
+        };
+        Space {
+            lens: Lens::with(length_px, file.camera.map(camera)),
+            front_bl: file.front_bl,
+            up: file.up,
+            walls: file.walls.into_iter().map(wall).collect(),
+        }
+    }
+}
