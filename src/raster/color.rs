@@ -6,7 +6,7 @@
 /// Which luma weights the planes were made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Matrix {
-    /// ITU-R BT.601: standard definition, and whatever says nothing.
+    /// ITU-R BT.601: standard definition, and whatever says nothing, as ffmpeg and OpenCV read it.
     #[default]
     Bt601,
     /// ITU-R BT.709: high definition.

@@ -10,6 +10,8 @@ use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// The side of the square that a boid needs to keep the usual distances.
 const ROOM_BL: f64 = 1.2;
+/// The share of an even distance that boids can keep while they swim: told to keep more, a crowd is pushed about.
+const KEPT: f64 = 0.62;
 /// Points a side by which the tank's section is measured.
 const N_SAMPLES: usize = 48;
 
@@ -108,17 +110,25 @@ impl Tank {
     /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where each has less than
     /// a square of `ROOM_BL` in the picture, or in a deep tank, where they swim one behind another, less than a cube.
     pub fn closeness(&self, n: usize) -> f64 {
-        let (beside_bl, depth_bl) = (self.beside_bl(n), 2.0 * self.reach_bl[2]);
-        let apart_bl = match depth_bl > beside_bl {
-            true => libm::cbrt(beside_bl * beside_bl * depth_bl),
-            false => beside_bl,
-        };
-        (apart_bl / ROOM_BL).clamp(0.05, 1.0)
+        (self.apart_bl(n) / ROOM_BL).clamp(0.05, 1.0)
     }
 
-    /// How near `n` boids may come to each other, body lengths: half a length, less where they do not fit in.
+    /// How near `n` boids may come to each other, body lengths: half a length where they can keep that and still get
+    /// about, and else the usual share of it.
     pub fn overlap_bl(&self, n: usize) -> f64 {
-        OVERLAP_BL * self.closeness(n)
+        match KEPT * self.apart_bl(n) >= OVERLAP_BL {
+            true => OVERLAP_BL,
+            false => OVERLAP_BL * self.closeness(n),
+        }
+    }
+
+    /// How far apart `n` boids are that share the tank evenly.
+    fn apart_bl(&self, n: usize) -> f64 {
+        let (beside_bl, depth_bl) = (self.beside_bl(n), 2.0 * self.reach_bl[2]);
+        match depth_bl > beside_bl {
+            true => libm::cbrt(beside_bl * beside_bl * depth_bl),
+            false => beside_bl,
+        }
     }
 
     /// Whether `n` boids could keep the usual distances side by side.
@@ -241,6 +251,16 @@ mod tests {
             push[0] < 0.0 && push[1] == 0.0 && push[2] == 0.0,
             "{push:?}"
         );
+    }
+
+    #[test]
+    fn half_a_length_is_kept_as_long_as_all_can_get_about() {
+        let overlap = |n| Tank::new([0.0; 3], [4.0, 4.0, 0.0]).overlap_bl(n);
+        assert_eq!([1, 11, 24].map(overlap), [0.5; 3]);
+        let crowded = [25, 400].map(|n: usize| 0.5 * (16.0 / n as f64).sqrt() / ROOM_BL);
+        for (n, wanted) in [25, 400].into_iter().zip(crowded) {
+            assert!((overlap(n) - wanted).abs() < 1e-3, "{n}: {}", overlap(n));
+        }
     }
 
     #[test]
