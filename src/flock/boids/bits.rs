@@ -13,49 +13,49 @@ const DIGESTS: [(&str, [u64; 3]); 6] = [
     (
         "school",
         [
-            0x4288_e019_c1c8_b215,
-            0x4b63_ab7b_d563_9c09,
-            0xc9a3_159a_6759_41d3,
+            0x3620_a364_8fb5_47d5,
+            0x90a3_cdcf_47a4_352f,
+            0xf246_1abd_0efc_9df5,
         ],
     ),
     (
         "swarm",
         [
-            0xe0eb_121b_c5a5_16da,
-            0x6689_1d40_2492_71f6,
-            0x4c7f_2304_9f6f_cafa,
+            0x25e1_92f6_8836_f025,
+            0xd176_d9a9_4cfe_ee1f,
+            0x62e6_9b90_29f8_7624,
         ],
     ),
     (
         "mill",
         [
-            0xb117_7420_fd2f_063a,
-            0xda20_0e83_1106_b648,
-            0xafed_8da0_60e0_1b89,
+            0x80e8_cf01_082c_0cd0,
+            0x5c1a_adf6_8c3c_36a4,
+            0xb429_89d6_25fe_f63c,
         ],
     ),
     (
         "scatter",
         [
-            0xa891_5007_84a2_9afb,
-            0xfa0c_8700_73d5_0d72,
-            0x262b_42a3_cd38_9b9c,
+            0x2eb4_2824_15fe_4c5d,
+            0x3770_571f_4e8b_831a,
+            0x121a_deea_e73d_f7ab,
         ],
     ),
     (
         "zonal",
         [
-            0x6072_e428_6f0c_7ffa,
-            0xe69a_f7c8_c964_2023,
-            0x5a2d_1a3b_4b66_d8a9,
+            0x38f3_9e25_ee5e_23d3,
+            0x500f_7a5c_fd72_896b,
+            0xec1c_68c5_a16e_c5de,
         ],
     ),
     (
         "papers",
         [
-            0xcbe0_bcda_6075_9877,
-            0x10b2_7df3_6188_fe2c,
-            0xcd9f_119d_e73d_b22d,
+            0x41f7_2fd7_c583_6ab3,
+            0x2be5_e0e0_af53_767d,
+            0xa101_d9f4_58cc_f784,
         ],
     ),
 ];
@@ -68,7 +68,7 @@ const SLOPES: Slopes = Slopes {
 };
 
 /// A school among goals and obstacles, before a predator, half of it drawn to where it meets.
-const DIGEST_OF_A_FULL_TANK: u64 = 0x36e1_0330_42ca_e39a;
+const DIGEST_OF_A_FULL_TANK: u64 = 0xeecb_40e3_b462_3b35;
 
 fn calibration(slopes: Option<Slopes>) -> Calibration {
     Calibration {

@@ -14,10 +14,13 @@ use super::{Boids, CHUNK};
 const MOST: usize = 16;
 /// Rounds of pushes after one step, at most, and without fewer pushed than ever before: where there is no room they
 /// would never end.
-const ROUNDS: usize = 200;
-const PATIENCE: usize = 60;
+const ROUNDS: usize = 500;
+const PATIENCE: usize = 150;
 /// So much farther apart than they have to be, for between others and at walls only a part of the way is gone at once.
 const FARTHER: f64 = 1.01;
+
+/// Whoever is pushed back by more than this share of its way turns round.
+const BLOCKED: f64 = 0.5;
 
 /// Somebody too near: the square of the distance, where it stands, and the way to it.
 type Near = (f64, usize, Vec3);
@@ -82,7 +85,7 @@ impl Boids<'_> {
                 scaled(self.step_s, boid.velocity),
                 minus(position, boid.position),
             );
-            inner.is_blocked |= dot(push, way) < -0.5 * dot(way, way);
+            inner.is_blocked |= dot(push, way) < -BLOCKED * dot(way, way);
             longest_bl = f64::max(longest_bl, norm(push));
             (boid.position, boid.velocity) = (position, velocity);
         }
@@ -232,8 +235,8 @@ mod tests {
     #[test]
     fn nobody_pushes_others_forever() {
         for preset in ["school", "swarm", "mill"] {
-            let jams: f64 = (1..=6).map(|seed| jammed(preset, seed)).sum();
-            assert!(jams / 6.0 < 0.015, "{preset} {}", jams / 6.0);
+            let jams: f64 = (1..=20).map(|seed| jammed(preset, seed)).sum();
+            assert!(jams / 20.0 < 0.025, "{preset} {}", jams / 20.0);
         }
     }
 }

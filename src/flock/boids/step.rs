@@ -14,7 +14,7 @@ use super::vector::{add_scaled, cross, dot, minus, norm, scaled, turned_at_most,
 use super::{Boids, CHUNK, draw, leadership};
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;
-use crate::random;
+use crate::random::{self, Row};
 
 /// Time constant of the wandering turn rate.
 const WANDER_S: f64 = 1.0;
@@ -30,6 +30,8 @@ struct Pace<'a> {
     cos_sin: (f64, f64),
     /// The share of what wanders that is kept, and the spread of what is added, in its own spreads.
     wander: [f64; 2],
+    /// What is added to the turn and to the slope, by id.
+    kicks: [Row; 2],
     reach_bl: f64,
 }
 
@@ -90,6 +92,7 @@ impl Boids<'_> {
             },
             cos_sin: (libm::cos(turn_rad), libm::sin(turn_rad)),
             wander: [keep, (1.0 - keep * keep).sqrt()],
+            kicks: [0, 1].map(|k| random::row(self.params.seed, &[draw::WANDER, self.step_idx, k])),
             reach_bl: rules.reach_bl(),
         }
     }
@@ -329,8 +332,7 @@ impl Boids<'_> {
     fn next_wander(&self, (id, before): (usize, &Inner), pace: &Pace) -> [f64; 2] {
         let [keep, fresh] = pace.wander;
         let next = |k: usize, spread: f64| {
-            let key = [draw::WANDER, id as u64, self.step_idx, k as u64];
-            keep * before.wander[k] + spread * fresh * random::normal(self.params.seed, &key)
+            keep * before.wander[k] + spread * fresh * pace.kicks[k].bell(id as u64)
         };
         let turn = next(
             0,

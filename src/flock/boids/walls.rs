@@ -3,7 +3,12 @@
 
 use super::Boids;
 use super::lanes::{self, Lanes, by_lane, in_lane};
-use super::vector::{Vec3, cross, turned_at_most};
+use super::vector::{Vec3, cross, dot, norm, scaled, turned_at_most, unit};
+
+/// Whoever is reflected into a direction of less than this cosine to its own is thrown back.
+const THROWN_BACK: f64 = -0.7;
+/// Whoever turns by more than this share of what it may means to.
+const TURNING: f64 = 0.3;
 
 impl Boids<'_> {
     /// Places and velocities after `before`, as the habitat allows: a wall turns nobody faster than they turn.
@@ -23,10 +28,25 @@ impl Boids<'_> {
             self.habitat.keep_out(&mut place, &mut reflected);
             kept[lane] = (place, velocity);
             if reflected != velocity {
-                kept[lane].1 = self.turned(in_lane(before, lane), reflected);
+                let before = in_lane(before, lane);
+                kept[lane].1 = self.turned(before, self.onward(before, velocity, reflected));
             }
         }
         (by_lane(|lane| kept[lane].0), by_lane(|lane| kept[lane].1))
+    }
+
+    /// Where to turn who is thrown back: on to the side to which it was turning. In a corner the shorter way to what is
+    /// reflected leads to the other side, and step by step it would turn to and fro and never get out.
+    fn onward(&self, before: Vec3, velocity: Vec3, reflected: Vec3) -> Vec3 {
+        let is_thrown_back = dot(reflected, velocity) < THROWN_BACK * dot(velocity, velocity);
+        let side = unit(cross(self.tank.up(), before));
+        let speed = norm(velocity);
+        let turn_rad = libm::asin((dot(velocity, side) / speed).clamp(-1.0, 1.0));
+        let most_rad = self.calibration.turn_rad_per_s * self.step_s;
+        match is_thrown_back && turn_rad.abs() > TURNING * most_rad {
+            true => scaled(speed.copysign(turn_rad), side),
+            false => reflected,
+        }
     }
 
     /// What a wall makes of a velocity: from what it was before the step, turned toward what is reflected as far as they

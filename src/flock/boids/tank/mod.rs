@@ -10,8 +10,10 @@ use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// The side of the square that a boid needs to keep the usual distances.
 const ROOM_BL: f64 = 1.2;
-/// The share of an even distance that boids can keep while they swim: told to keep more, a crowd is pushed about.
-const KEPT: f64 = 0.62;
+/// The share of an even distance that boids can keep while they swim: told to keep more, a crowd is pushed about. In
+/// depth they get past each other more easily than in a plane.
+const KEPT: f64 = 0.45;
+const KEPT_IN_DEPTH: f64 = 0.62;
 /// Points a side by which the tank's section is measured.
 const N_SAMPLES: usize = 48;
 
@@ -116,7 +118,11 @@ impl Tank {
     /// How near `n` boids may come to each other, body lengths: half a length where they can keep that and still get
     /// about, and else the usual share of it.
     pub fn overlap_bl(&self, n: usize) -> f64 {
-        match KEPT * self.apart_bl(n) >= OVERLAP_BL {
+        let kept = match self.is_deep_for(n) {
+            true => KEPT_IN_DEPTH,
+            false => KEPT,
+        };
+        match kept * self.apart_bl(n) >= OVERLAP_BL {
             true => OVERLAP_BL,
             false => OVERLAP_BL * self.closeness(n),
         }
@@ -125,10 +131,15 @@ impl Tank {
     /// How far apart `n` boids are that share the tank evenly.
     fn apart_bl(&self, n: usize) -> f64 {
         let (beside_bl, depth_bl) = (self.beside_bl(n), 2.0 * self.reach_bl[2]);
-        match depth_bl > beside_bl {
+        match self.is_deep_for(n) {
             true => libm::cbrt(beside_bl * beside_bl * depth_bl),
             false => beside_bl,
         }
+    }
+
+    /// Whether `n` boids would swim one behind another, not only side by side.
+    fn is_deep_for(&self, n: usize) -> bool {
+        2.0 * self.reach_bl[2] > self.beside_bl(n)
     }
 
     /// Whether `n` boids could keep the usual distances side by side.
@@ -256,11 +267,14 @@ mod tests {
     #[test]
     fn half_a_length_is_kept_as_long_as_all_can_get_about() {
         let overlap = |n| Tank::new([0.0; 3], [4.0, 4.0, 0.0]).overlap_bl(n);
-        assert_eq!([1, 11, 24].map(overlap), [0.5; 3]);
-        let crowded = [25, 400].map(|n: usize| 0.5 * (16.0 / n as f64).sqrt() / ROOM_BL);
-        for (n, wanted) in [25, 400].into_iter().zip(crowded) {
+        assert_eq!([1, 5, 12].map(overlap), [0.5; 3]);
+        for n in [13, 400] {
+            let wanted = 0.5 * (16.0 / n as f64).sqrt() / ROOM_BL;
             assert!((overlap(n) - wanted).abs() < 1e-3, "{n}: {}", overlap(n));
         }
+        let in_depth = |n| Tank::new([0.0; 3], [4.0, 4.0, 4.0]).overlap_bl(n);
+        assert_eq!(in_depth(121), 0.5);
+        assert!(in_depth(123) < 0.35);
     }
 
     #[test]
