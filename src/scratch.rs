@@ -1,5 +1,5 @@
 //! Bytes put aside while something is computed: what a long footage has too much of to hold in memory,
-//! mattes and sprites above all (ALGORITHMS.md 5, at any size).
+//! mattes above all (ALGORITHMS.md 5, at any size).
 //!
 //! The algorithms know only that they can put bytes aside and have them back; `store` has the one that
 //! goes to a file.

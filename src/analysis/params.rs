@@ -55,7 +55,7 @@ pub struct Params {
     pub axis_and_head: AxisAndHead,
 }
 
-/// At which size sprites are cut out (ALGORITHMS.md 5).
+/// At which size sprites are compared and exported (ALGORITHMS.md 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScaleMode {

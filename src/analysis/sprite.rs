@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::sighting::Sighting;
 use super::tracking::{Track, Tracked};
-use crate::library::{Cutout, Poses, Sprites, View};
+use crate::library::{Matte, Poses, Sprites, View};
 use crate::order::median;
 
 /// Room around the largest silhouette.
@@ -55,15 +55,15 @@ pub fn align(track: &Track, view: View, scales: Option<Vec<f64>>) -> Sprites {
     let scale = |frame_idx: usize| scales.as_ref().map_or(1.0, |scales| scales[frame_idx]);
     let size = common_size(&track.frames, view, &scale);
     let sightings = track.frames.iter().map(|t| t.sighting.as_ref());
-    let cutouts = sightings.map(|sighting| sighting.map(cutout)).collect();
-    Sprites::of(size, cutouts, scales, Arc::clone(&track.scratch))
+    let mattes = sightings.map(|sighting| sighting.map(matte)).collect();
+    Sprites::of(size, mattes, scales, Arc::clone(&track.scratch))
 }
 
-fn cutout(sighting: &Sighting) -> Cutout {
+fn matte(sighting: &Sighting) -> Matte {
     let rect = sighting.rect;
     let [x, y] = sighting.moments.centroid_px;
     let thousandths = |px: f64| (px * 1000.0).round() / 1000.0;
-    Cutout {
+    Matte {
         size: [rect.w, rect.h],
         center_px: [(x, rect.x), (y, rect.y)].map(|(px, from)| thousandths(px - f64::from(from))),
         at: sighting.at,

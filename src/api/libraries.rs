@@ -34,6 +34,7 @@ const FILES: Files = &[
     ("transitions.svg", "image/svg+xml"),
     ("overlay.mp4", "video/mp4"),
     ("sprites.zip", "application/zip"),
+    ("mattes.zip", "application/zip"),
 ];
 
 /// The one file that is not kept.
@@ -105,7 +106,7 @@ pub(super) async fn delete_library(
 }
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,
-/// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip; and
+/// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip, mattes.zip; and
 /// distance.npy, which is computed anew each time and comes whole.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(

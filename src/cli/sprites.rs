@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::{Error, Summary};
-use crate::formats::{library_dir, picture};
+use crate::formats::{picture, picture_archive};
 
 /// Arguments of `sprites`.
 #[derive(Debug, clap::Args)]
@@ -29,7 +29,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .filter(|&idx| sprites.is_present(idx))
         .collect();
     present.par_iter().try_for_each(|&idx| {
-        let path = folder.join(library_dir::sprite_name(idx));
+        let path = folder.join(picture_archive::name(idx));
         let bytes = picture::write_rgba(sprites.width(), sprites.height(), &sprites.sprite(idx));
         std::fs::write(&path, bytes).map_err(Error::io(format!("cannot write {}", path.display())))
     })?;

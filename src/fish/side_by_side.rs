@@ -1,5 +1,5 @@
 //! The animal and its virtual twin next to each other: the real frame, put together again from
-//! sprite and background, on the left; the same moment of the virtual fish on the right (N, figures
+//! matte and background, on the left; the same moment of the virtual fish on the right (N, figures
 //! 2 and 3).
 
 use super::film::Film;
@@ -40,14 +40,14 @@ fn real_frame(library: &Library, frame_idx: usize) -> RgbImage {
     let mut image = library.background.clone();
     let sprites = &library.sprites;
     let centroid = library.poses.frames[frame_idx].centroid_px;
-    let Some(([cx, cy], cutout)) = centroid.zip(sprites.cutout(frame_idx)) else {
+    let Some(([cx, cy], matte)) = centroid.zip(sprites.matte(frame_idx)) else {
         return image;
     };
-    let left = (cx - cutout.center_px[0]).round() as i64;
-    let top = (cy - cutout.center_px[1]).round() as i64;
+    let left = (cx - matte.center_px[0]).round() as i64;
+    let top = (cy - matte.center_px[1]).round() as i64;
     let mut rgba = Vec::new();
-    sprites.read_cutout(&cutout, &mut rgba);
-    let rows = rgba.chunks_exact(cutout.size[0].max(1) as usize * 4);
+    sprites.read_matte(&matte, &mut rgba);
+    let rows = rgba.chunks_exact(matte.size[0].max(1) as usize * 4);
     for (y, row) in (top..).zip(rows) {
         for (x, rgba) in (left..).zip(row.chunks_exact(4)) {
             let inside = (0..i64::from(image.width)).contains(&x)

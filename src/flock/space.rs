@@ -33,34 +33,59 @@ impl Space {
             walls: tank.walls().iter().map(wall).collect(),
         }
     }
-
-    /// The place of a boid whose position flock.json tells: x and y in the picture, and how far behind the front;
-    /// pixels.
-    pub fn place_bl(&self, [x, y, behind_px]: [f64; 3]) -> Vec3 {
-        let depth_bl = self.front_bl + behind_px / self.lens.length_px;
-        self.lens.place_bl([x, y], depth_bl)
-    }
-
-    /// How far a place is beyond the wall that it is farthest beyond, body lengths; below 0 inside.
-    pub fn beyond_bl(&self, place: Vec3) -> f64 {
-        let beyond = |wall: &Wall| {
-            let along = (0..3).map(|axis| wall.outward[axis] * place[axis]);
-            along.sum::<f64>() - wall.offset_bl
-        };
-        self.walls
-            .iter()
-            .map(beyond)
-            .fold(f64::NEG_INFINITY, f64::max)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::flock::boids::measures;
+    use crate::flock::lens::Pinhole;
     use crate::flock::{Params, plan_flock, synthetic};
     use crate::library::View;
     use crate::progress::Silent;
+
+    /// As README.md has it.
+    fn place_bl(space: &Space, [x, y, behind]: [f64; 3]) -> Vec3 {
+        let length_px = space.lens.length_px;
+        let z = space.front_bl + behind / length_px;
+        let Some(camera) = space.lens.camera() else {
+            return [x / length_px, y / length_px, z];
+        };
+        let apparent = camera.pane_bl + (z - camera.pane_bl) / camera.medium_index;
+        let px = camera.focal_px / apparent;
+        let [cx, cy] = camera.center_px;
+        [(x - cx) / px, (y - cy) / px, z]
+    }
+
+    /// How far a place is beyond the wall that it is farthest beyond, body lengths; below 0 inside.
+    fn beyond_bl(space: &Space, place: Vec3) -> f64 {
+        let beyond = |wall: &Wall| {
+            let along = (0..3).map(|axis| wall.outward[axis] * place[axis]);
+            along.sum::<f64>() - wall.offset_bl
+        };
+        (space.walls.iter().map(beyond)).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    #[test]
+    fn places_behind_a_pane_in_water_are_where_the_lens_has_them() {
+        let camera = Pinhole {
+            focal_px: 700.0,
+            center_px: [310.0, 250.0],
+            pane_bl: 7.0,
+            medium_index: 1.33,
+            metres: Some(0.1),
+        };
+        let lens = Lens::with(90.0, Some(camera));
+        let tank = Tank::new([-3.0, -2.0, 7.5], [3.0, 2.0, 10.0]);
+        let space = Space::of(&lens, &tank);
+        for place in [[0.5, -1.0, 7.5], [-2.0, 1.5, 9.75]] {
+            let [x, y] = lens.picture_px(place);
+            let found = place_bl(&space, [x, y, (place[2] - 7.5) * 90.0]);
+            assert!((0..3).all(|axis| (found[axis] - place[axis]).abs() < 1e-9));
+            assert!(beyond_bl(&space, place) <= 1e-9);
+        }
+        assert!((beyond_bl(&space, [3.5, 0.0, 8.0]) - 0.5).abs() < 1e-9);
+    }
 
     #[test]
     fn what_a_file_tells_is_enough_to_reckon_order_distances_and_walls_anew() {
@@ -74,7 +99,7 @@ mod tests {
             for (t, told) in flock.orders.iter().enumerate() {
                 let boids = || flock.individuals.iter().map(|one| &one.boid);
                 let places: Vec<Vec3> = boids()
-                    .map(|boid| flock.space.place_bl(boid.position_px[t]))
+                    .map(|boid| place_bl(&flock.space, boid.position_px[t]))
                     .collect();
                 let courses: Vec<Vec3> = boids()
                     .map(|boid| match &boid.forward {
@@ -95,7 +120,7 @@ mod tests {
                     assert!((found - told).abs() < 2e-3, "{view:?} {t}: {found} {told}");
                 }
                 assert_eq!((found.n_groups, found.n_overlaps), (told.n_groups, 0));
-                let beyond = places.iter().map(|&place| flock.space.beyond_bl(place));
+                let beyond = places.iter().map(|&place| beyond_bl(&flock.space, place));
                 assert!(beyond.fold(f64::NEG_INFINITY, f64::max) < 1e-3);
             }
         }

@@ -1,9 +1,9 @@
-//! A library as a folder: library.json, poses.json, background.png, and cutouts.zip, whose entries
+//! A library as a folder: library.json, poses.json, background.png, and mattes.zip, whose entries
 //! 000000.png ... are the animal as filmed in straight-alpha RGBA, stored, so that any tool opens them. Where its
 //! centroid lies in each, library.json tells. A frame without the animal has no entry.
 //!
-//! Sprites, all of one size with the centroid at the middle, are made of the cutouts; an archive of them is for
-//! export. Libraries of before have such an archive in place of the cutouts, and are still read.
+//! Sprites, all of one size with the centroid at the middle, are made of the mattes; an archive of them is for
+//! export. Libraries of before have such an archive in place of the mattes, and are still read.
 //!
 //! The only file of ring 2 that touches the file system.
 
@@ -14,12 +14,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use zip::write::SimpleFileOptions;
 
 use super::library_json::{self, FootageSummary, Summary};
+use super::picture_archive::{self, Entry};
 use super::{picture, poses_json};
 use crate::analysis::Params;
-use crate::library::{Cutout, Library, Sprites};
+use crate::library::{Library, Matte, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
@@ -58,7 +58,7 @@ pub enum Error {
         /// What was found.
         cause: zip::result::ZipError,
     },
-    /// The sprites found no room beside the folder.
+    /// The mattes found no room beside the folder.
     #[error(transparent)]
     Full(#[from] Full),
     /// The files do not belong together.
@@ -79,10 +79,12 @@ pub struct StoredLibrary {
 const LIBRARY: &str = "library.json";
 const POSES: &str = "poses.json";
 const BACKGROUND: &str = "background.png";
-const CUTOUTS: &str = "cutouts.zip";
+const MATTES: &str = "mattes.zip";
 const SPRITES: &str = "sprites.zip";
+/// No picture of a library has a longer side.
+const MOST_SIDE_PX: u32 = 16384;
 /// The files that a library is read from; there may be others beside them. Of the archives one is enough.
-pub const FILES: [&str; 5] = [LIBRARY, POSES, BACKGROUND, CUTOUTS, SPRITES];
+pub const FILES: [&str; 5] = [LIBRARY, POSES, BACKGROUND, MATTES, SPRITES];
 
 /// Writes a library into a folder, which is made if need be.
 pub fn write(
@@ -97,7 +99,9 @@ pub fn write(
     };
     put(POSES, &poses_json::write(&library.poses, Some(params)))?;
     put(BACKGROUND, &picture::write_rgb(&library.background))?;
-    write_cutouts(dir, &library.sprites)?;
+    write_mattes(dir, &library.sprites)?;
+    // What an earlier analysis left there is not of this library.
+    fs::remove_file(dir.join(SPRITES)).ok();
     put(LIBRARY, &library_json::write(library, params, footage))
 }
 
@@ -108,16 +112,16 @@ pub fn write_sprites(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
     })
 }
 
-fn write_cutouts(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
-    write_archive(dir, CUTOUTS, sprites, |idx| {
-        let (cutout, mut rgba) = (sprites.cutout(idx).expect("present"), Vec::new());
-        sprites.read_cutout(&cutout, &mut rgba);
-        picture::write_rgba(cutout.size[0], cutout.size[1], &rgba)
+fn write_mattes(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
+    write_archive(dir, MATTES, sprites, |idx| {
+        let (matte, mut rgba) = (sprites.matte(idx).expect("present"), Vec::new());
+        sprites.read_matte(&matte, &mut rgba);
+        picture::write_rgba(matte.size[0], matte.size[1], &rgba)
     })
 }
 
 /// Reads a library from a folder.
-/// The sprites are put aside in `scratch`.
+/// The mattes are put aside in `scratch`.
 pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Error> {
     let get =
         |file: &'static str| fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause });
@@ -153,14 +157,23 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "library.json must name a size for the sprite of every frame",
         ));
     }
+    if !(summary.sprite_size_px.iter()).all(|side| (1..=MOST_SIDE_PX).contains(side)) {
+        return Err(Error::Mismatch(
+            "library.json names an impossible size of sprites",
+        ));
+    }
     let archive = Archive::open(dir, &summary)?;
-    let cutouts = archive.cutouts(poses.frames.len(), poses.image_size_px, &*scratch)?;
+    let most_px = match archive.centers_px {
+        Some(_) => poses.image_size_px.map(|side| side.min(MOST_SIDE_PX)),
+        None => summary.sprite_size_px,
+    };
+    let mattes = archive.mattes(poses.frames.len(), most_px, &*scratch)?;
     let library = Library {
         poses,
         background,
         sprites: Sprites::of(
             summary.sprite_size_px,
-            cutouts,
+            mattes,
             summary.sprite_scale,
             scratch,
         ),
@@ -179,14 +192,6 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
     })
 }
 
-/// The name of a frame's sprite, in the archive and in exported folders.
-pub fn sprite_name(frame_idx: usize) -> String {
-    format!("{frame_idx:06}.png")
-}
-
-/// Sprites encoded at a time, on all threads: what is held in memory.
-const BATCH: usize = 256;
-
 fn write_archive(
     dir: &Path,
     file: &'static str,
@@ -194,24 +199,14 @@ fn write_archive(
     encode: impl Fn(usize) -> Vec<u8> + Sync,
 ) -> Result<(), Error> {
     let io = |cause| Error::Io { file, cause };
-    let zip = |cause| Error::Zip { file, cause };
+    let present = (0..sprites.n_frames()).filter(|&idx| sprites.is_present(idx));
     let out = BufWriter::new(File::create(dir.join(file)).map_err(io)?);
-    let mut archive = zip::ZipWriter::new(out);
-    let stored = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
-    let present: Vec<usize> = (0..sprites.n_frames())
-        .filter(|&idx| sprites.is_present(idx))
-        .collect();
-    for batch in present.chunks(BATCH) {
-        let pictures: Vec<Vec<u8>> = batch.par_iter().map(|&idx| encode(idx)).collect();
-        for (&idx, bytes) in batch.iter().zip(pictures) {
-            archive.start_file(sprite_name(idx), stored).map_err(zip)?;
-            archive.write_all(&bytes).map_err(io)?;
-        }
-    }
-    archive.finish().map_err(zip)?.flush().map_err(io)
+    let mut out =
+        picture_archive::write(out, present, encode).map_err(|cause| Error::Zip { file, cause })?;
+    out.flush().map_err(io)
 }
 
-/// An archive of cutouts.
+/// An archive of mattes.
 struct Archive<'a> {
     name: &'static str,
     file: File,
@@ -219,19 +214,18 @@ struct Archive<'a> {
     centers_px: Option<&'a [Option<[f64; 2]>]>,
 }
 
-/// Where a PNG lies in an archive.
-struct Entry {
-    at: u64,
-    n_bytes: usize,
-}
-
 impl Archive<'_> {
     fn open<'a>(dir: &Path, summary: &'a Summary) -> Result<Archive<'a>, Error> {
-        let centers_px = &summary.cutout_center_px;
+        let centers_px = &summary.matte_center_px;
+        if centers_px.is_empty() && summary.sprite_scale.is_some() {
+            return Err(Error::Mismatch(
+                "sprites of one height are no longer read: analyze the footage again",
+            ));
+        }
         let name = if centers_px.is_empty() {
             SPRITES
         } else {
-            CUTOUTS
+            MATTES
         };
         let file = File::open(dir.join(name)).map_err(|cause| Error::Io { file: name, cause })?;
         Ok(Archive {
@@ -241,90 +235,66 @@ impl Archive<'_> {
         })
     }
 
-    /// Puts aside what the archive holds for every frame, none larger than the footage.
-    fn cutouts(
+    /// Puts aside what the archive holds for every frame, none larger than `most_px`.
+    fn mattes(
         &self,
         n_frames: usize,
         most_px: [u32; 2],
         scratch: &dyn Scratch,
-    ) -> Result<Vec<Option<Cutout>>, Error> {
+    ) -> Result<Vec<Option<Matte>>, Error> {
         if self.centers_px.is_some_and(|all| all.len() != n_frames) {
             return Err(Error::Mismatch(
-                "library.json must tell the centroid of every frame's cutout",
+                "library.json must tell the centroid of every frame's matte",
             ));
         }
         let entries = self.entries(n_frames)?;
-        let cutout = |(frame_idx, entry): (usize, &Option<Entry>)| {
+        let matte = |(frame_idx, entry): (usize, &Option<Entry>)| {
             let Some(entry) = entry else { return Ok(None) };
-            let image = self.picture(entry)?;
+            let image = self.picture(entry, most_px)?;
             let size = [image.width, image.height];
             let center_px = match self.centers_px {
                 Some(centers_px) => centers_px[frame_idx],
                 None => Some(size.map(|side| f64::from(side) / 2.0)),
             };
-            let center_px = center_px.filter(|center| center.iter().all(|px| px.abs() < 1e5));
-            let fits = self.centers_px.is_none() || (0..2).all(|k| size[k] <= most_px[k]);
-            let Some(center_px) = center_px.filter(|_| fits) else {
-                return Err(Error::Mismatch(
-                    "a cutout is larger than the footage, or library.json does not tell its centroid",
-                ));
-            };
-            let at = scratch.put(&image.pixels)?;
-            Ok(Some(Cutout {
+            let is_near = |center_px: &[f64; 2]| center_px.iter().all(|px| px.abs() < 1e5);
+            let center_px = center_px.filter(is_near).ok_or(Error::Mismatch(
+                "library.json does not tell the centroid of a matte",
+            ))?;
+            Ok(Some(Matte {
                 size,
                 center_px,
-                at,
+                at: scratch.put(&image.pixels)?,
             }))
         };
-        entries.par_iter().enumerate().map(cutout).collect()
+        entries.par_iter().enumerate().map(matte).collect()
     }
 
-    fn picture(&self, entry: &Entry) -> Result<RgbaImage, Error> {
+    fn entries(&self, n_frames: usize) -> Result<Vec<Option<Entry>>, Error> {
+        let file = self.name;
+        let metadata = self.file.metadata();
+        let n_bytes = metadata.map_err(|cause| Error::Io { file, cause })?.len();
+        picture_archive::entries(BufReader::new(&self.file), n_bytes, n_frames).map_err(|error| {
+            match error {
+                picture_archive::Error::Zip(cause) => Error::Zip { file, cause },
+                picture_archive::Error::Mismatch(what) => Error::Mismatch(what),
+            }
+        })
+    }
+
+    /// Reads a picture, no larger than `most_px`.
+    fn picture(&self, entry: &Entry, most_px: [u32; 2]) -> Result<RgbaImage, Error> {
         let file = self.name;
         let mut bytes = vec![0; entry.n_bytes];
         let read = self.file.read_exact_at(&mut bytes, entry.at);
         read.map_err(|cause| Error::Io { file, cause })?;
-        picture::read_rgba(&bytes).map_err(|cause| Error::Picture { file, cause })
-    }
-
-    /// The entries, by frame.
-    fn entries(&self, n_frames: usize) -> Result<Vec<Option<Entry>>, Error> {
-        let file = self.name;
-        let metadata = self.file.metadata();
-        let n_bytes_all = metadata.map_err(|cause| Error::Io { file, cause })?.len();
-        let zip = |cause| Error::Zip { file, cause };
-        let mut archive = zip::ZipArchive::new(BufReader::new(&self.file)).map_err(zip)?;
-        let mut entries: Vec<Option<Entry>> =
-            std::iter::repeat_with(|| None).take(n_frames).collect();
-        for idx in 0..archive.len() {
-            let entry = archive.by_index(idx).map_err(zip)?;
-            let name = entry.name().map_err(zip)?;
-            let frame_idx = (name.strip_suffix(".png")).and_then(|stem| stem.parse().ok());
-            let slot = frame_idx.and_then(|idx: usize| entries.get_mut(idx));
-            let slot = slot.ok_or(Error::Mismatch(
-                "an archive has an entry that is no frame of the footage",
-            ))?;
-            let stored = entry.compression() == zip::CompressionMethod::Stored;
-            let ends = |at: &u64| at.checked_add(entry.size());
-            let at = (entry.data_start())
-                .filter(|at| stored && ends(at).is_some_and(|end| end <= n_bytes_all));
-            let at = at.ok_or(Error::Mismatch(
-                "an entry of an archive is compressed or cut off",
-            ))?;
-            *slot = Some(Entry {
-                at,
-                n_bytes: entry.size() as usize,
-            });
-        }
-        Ok(entries)
+        picture::read_rgba(&bytes, most_px).map_err(|cause| Error::Picture { file, cause })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::library::{Jump, Transition};
-    use crate::library::{LibraryStats, Patch, Playback, Pose, Poses, View};
+    use crate::library::{Jump, LibraryStats, Playback, Pose, Poses, Transition, View};
     use crate::raster::RgbImage;
     use crate::scratch::InMemory;
 
@@ -359,31 +329,16 @@ mod tests {
                 heading_gap_rad: 0.25,
             }],
             playback: Playback {
-                jumps: vec![
-                    Jump {
-                        from: 0,
-                        to: 2,
-                        cost: 5,
-                        mirrored: true,
-                    },
-                    Jump {
-                        from: 2,
-                        to: 0,
-                        cost: 5,
-                        mirrored: false,
-                    },
-                ],
+                jumps: vec![Jump {
+                    from: 0,
+                    to: 2,
+                    cost: 5,
+                    mirrored: true,
+                }],
                 component: vec![0, 1, 2],
             },
-            patches: vec![Patch {
-                frames: 0..3,
-                next: vec![0],
-            }],
-            stats: LibraryStats {
-                n_frames: 3,
-                component_share: 1.0,
-                ..LibraryStats::default()
-            },
+            patches: Vec::new(),
+            stats: LibraryStats::default(),
         }
     }
 
@@ -399,5 +354,44 @@ mod tests {
         let back = read(dir.path(), Arc::new(InMemory::default())).expect("read");
         assert_eq!(back.library, library);
         assert_eq!((back.params, back.footage), (Params::default(), footage));
+    }
+
+    #[test]
+    fn a_folder_of_before_is_read_and_what_does_not_belong_together_is_refused() {
+        let library = small_library();
+        let footage = FootageSummary {
+            sha256: "ab".into(),
+            n_bytes: 9,
+        };
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        write(dir.path(), &library, &Params::default(), &footage).expect("written");
+        let json = fs::read_to_string(dir.path().join(LIBRARY)).expect("a file");
+        let centers = r#""matte_center_px":[null,[4.0,4.0],null]"#;
+        let of = |from: &str, to: &str| {
+            assert!(json.contains(from), "{json}");
+            fs::write(dir.path().join(LIBRARY), json.replace(from, to)).expect("written");
+            read(dir.path(), Arc::new(InMemory::default()))
+        };
+        let missing = r#""matte_center_px":[null,null,null]"#;
+        let few = r#""matte_center_px":[null,[4.0,4.0]]"#;
+        for other in [missing, few] {
+            assert!(matches!(of(centers, other), Err(Error::Mismatch(_))));
+        }
+        for size in ["[0,8]", "[8,70000]"] {
+            let size = format!(r#""sprite_size_px":{size}"#);
+            let read = of(r#""sprite_size_px":[8,8]"#, &size);
+            assert!(matches!(read, Err(Error::Mismatch(_))));
+        }
+        fs::remove_file(dir.path().join(MATTES)).expect("it was there");
+        write_sprites(dir.path(), &library.sprites).expect("written");
+        let before = r#""matte_center_px":[]"#;
+        let found = of(centers, before).expect("a library of before");
+        let sprites = &found.library.sprites;
+        assert_eq!(sprites.sprite(1), library.sprites.sprite(1));
+        let scaled = of(
+            r#""sprite_scale":null,"matte_center_px":[null,[4.0,4.0],null]"#,
+            r#""sprite_scale":[1.0,1.0,1.0]"#,
+        );
+        assert!(matches!(scaled, Err(Error::Mismatch(_))));
     }
 }

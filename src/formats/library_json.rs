@@ -1,6 +1,6 @@
 //! library.json: what may follow what, and how good a library is (DESIGN.md, a library on disk).
 //!
-//! Poses, background and sprites lie beside it; `library_dir` puts all together.
+//! Poses, background and mattes lie beside it; `library_dir` puts all together.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,8 +30,8 @@ pub struct Summary {
     pub sprite_size_px: [u32; 2],
     /// Sizes of the sprites relative to the footage, unless all are as filmed.
     pub sprite_scale: Option<Vec<f64>>,
-    /// The centroid in every frame's cutout; empty in files of before, whose cutouts are sprites.
-    pub cutout_center_px: Vec<Option<[f64; 2]>>,
+    /// The centroid in every frame's matte; empty in files of before, whose mattes are sprites.
+    pub matte_center_px: Vec<Option<[f64; 2]>>,
     /// f.
     pub clip_frames: usize,
     /// Clips nearer than this are alike.
@@ -57,8 +57,8 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
         footage: footage.clone(),
         sprite_size_px: [library.sprites.width(), library.sprites.height()],
         sprite_scale: library.sprites.scales().map(<[f64]>::to_vec),
-        cutout_center_px: (0..library.sprites.n_frames())
-            .map(|idx| library.sprites.cutout(idx).map(|cutout| cutout.center_px))
+        matte_center_px: (0..library.sprites.n_frames())
+            .map(|idx| library.sprites.matte(idx).map(|matte| matte.center_px))
             .collect(),
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
@@ -85,7 +85,7 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
         params: file.params,
         sprite_size_px: file.sprite_size_px,
         sprite_scale: file.sprite_scale,
-        cutout_center_px: file.cutout_center_px,
+        matte_center_px: file.matte_center_px,
         clip_frames: file.clip_frames,
         epsilon: file.epsilon,
         natural_step: file.natural_step,
@@ -119,7 +119,7 @@ struct LibraryFile {
     sprite_scale: Option<Vec<f64>>,
     /// Absent in files of before.
     #[serde(default)]
-    cutout_center_px: Vec<Option<[f64; 2]>>,
+    matte_center_px: Vec<Option<[f64; 2]>>,
     clip_frames: usize,
     epsilon: u64,
     natural_step: u64,

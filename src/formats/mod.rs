@@ -13,5 +13,6 @@ pub mod npy;
 pub mod overlay;
 pub mod params;
 pub mod picture;
+pub mod picture_archive;
 pub mod poses_json;
 pub mod svg;

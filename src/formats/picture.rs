@@ -22,6 +22,14 @@ pub enum Error {
         /// What the file holds.
         found: (ColorType, BitDepth),
     },
+    /// It has more pixels than expected.
+    #[error("{width} x {height} pixels are more than there can be")]
+    TooLarge {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
 }
 
 /// An RGB image as PNG.
@@ -70,7 +78,7 @@ pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
 
 /// Reads an 8-bit RGB PNG.
 pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
-    let (width, height, pixels) = decode(bytes, ColorType::Rgb, "RGB")?;
+    let (width, height, pixels) = decode(bytes, (ColorType::Rgb, "RGB"), [u32::MAX; 2])?;
     Ok(RgbImage {
         width,
         height,
@@ -78,9 +86,9 @@ pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
     })
 }
 
-/// Reads an 8-bit RGBA PNG.
-pub fn read_rgba(bytes: &[u8]) -> Result<RgbaImage, Error> {
-    let (width, height, pixels) = decode(bytes, ColorType::Rgba, "RGBA")?;
+/// Reads an 8-bit RGBA PNG of at most so many columns and rows.
+pub fn read_rgba(bytes: &[u8], most_px: [u32; 2]) -> Result<RgbaImage, Error> {
+    let (width, height, pixels) = decode(bytes, (ColorType::Rgba, "RGBA"), most_px)?;
     Ok(RgbaImage {
         width,
         height,
@@ -107,8 +115,8 @@ fn encode_deep(width: u32, height: u32, kind: (ColorType, BitDepth), pixels: &[u
 
 fn decode(
     bytes: &[u8],
-    color: ColorType,
-    wanted: &'static str,
+    (color, wanted): (ColorType, &'static str),
+    most_px: [u32; 2],
 ) -> Result<(u32, u32, Vec<u8>), Error> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
     let found = reader.output_color_type();
@@ -116,6 +124,9 @@ fn decode(
         return Err(Error::Kind { wanted, found });
     }
     let (width, height) = (reader.info().width, reader.info().height);
+    if width > most_px[0] || height > most_px[1] {
+        return Err(Error::TooLarge { width, height });
+    }
     let mut pixels = vec![0; width as usize * height as usize * color.samples()];
     reader.next_frame(&mut pixels)?;
     Ok((width, height, pixels))
@@ -139,7 +150,9 @@ mod tests {
             .enumerate()
             .for_each(|(k, p)| *p = (k * 41) as u8);
         let bytes = write_rgba(3, 4, &rgba.pixels);
-        assert_eq!(read_rgba(&bytes).expect("our own PNG"), rgba);
+        assert_eq!(read_rgba(&bytes, [3, 4]).expect("our own PNG"), rgba);
+        let larger = read_rgba(&bytes, [3, 3]);
+        assert!(matches!(larger, Err(Error::TooLarge { .. })));
         assert!(matches!(
             read_rgb(&bytes),
             Err(Error::Kind { wanted: "RGB", .. })

@@ -8,7 +8,7 @@ pub mod sprites;
 
 pub use playback::{Jump, Patch, Playback, Transition};
 pub use pose::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
-pub use sprites::{Cutout, Sprites};
+pub use sprites::{Matte, Sprites};
 
 use crate::raster::RgbImage;
 

@@ -1,7 +1,7 @@
 //! The animal of every frame: cut out as it was filmed, pixel for pixel, and from that the sprites, all of
 //! one size with the centroid at the middle (O's clip U).
 //!
-//! What is drawn into a flock is the cutout, so that it is interpolated once; what is compared and exported
+//! What is drawn into a flock is the matte, so that it is interpolated once; what is compared and exported
 //! are sprites, put together when they are asked for. A long footage has many: their pixels lie in a
 //! [`Scratch`].
 
@@ -22,7 +22,7 @@ use crate::scratch::{Full, InMemory, Scratch};
 pub struct Sprites {
     width: u32,
     height: u32,
-    cutouts: Vec<Option<Cutout>>,
+    mattes: Vec<Option<Matte>>,
     /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
     scales: Option<Vec<f64>>,
     scratch: Arc<dyn Scratch>,
@@ -30,13 +30,24 @@ pub struct Sprites {
 
 /// The animal cut out of one frame, its pixels those of the frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cutout {
+pub struct Matte {
     /// Columns and rows.
     pub size: [u32; 2],
     /// The animal's centroid, from the upper left corner, to 3 decimals, as files hold it.
     pub center_px: [f64; 2],
     /// Where the RGBA bytes lie.
     pub at: u64,
+}
+
+impl Matte {
+    /// How far its farthest corner is from the centroid, pixels.
+    pub fn reach_px(&self) -> f64 {
+        let farthest = |k: usize| {
+            let after = f64::from(self.size[k]) - self.center_px[k];
+            self.center_px[k].abs().max(after.abs())
+        };
+        libm::hypot(farthest(0), farthest(1))
+    }
 }
 
 impl Sprites {
@@ -50,17 +61,17 @@ impl Sprites {
         )
     }
 
-    /// Sprites of `size` pixels, of cutouts that lie in `scratch`: as large as filmed, or of `scales`.
+    /// Sprites of `size` pixels, of mattes that lie in `scratch`: as large as filmed, or of `scales`.
     pub fn of(
         [width, height]: [u32; 2],
-        cutouts: Vec<Option<Cutout>>,
+        mattes: Vec<Option<Matte>>,
         scales: Option<Vec<f64>>,
         scratch: Arc<dyn Scratch>,
     ) -> Sprites {
         Sprites {
             width,
             height,
-            cutouts,
+            mattes,
             scales,
             scratch,
         }
@@ -90,7 +101,7 @@ impl Sprites {
             for row in rows(bounds, width) {
                 packed.extend_from_slice(&picture[row]);
             }
-            Ok(Some(Cutout {
+            Ok(Some(Matte {
                 size: [bounds.w, bounds.h],
                 center_px: [
                     f64::from(width) / 2.0 - f64::from(bounds.x),
@@ -99,11 +110,11 @@ impl Sprites {
                 at: scratch.put(packed)?,
             }))
         };
-        let cutouts = (0..n_frames)
+        let mattes = (0..n_frames)
             .into_par_iter()
             .map_init(Default::default, cut)
             .collect::<Result<_, E>>()?;
-        Ok(Sprites::of([width, height], cutouts, None, scratch))
+        Ok(Sprites::of([width, height], mattes, None, scratch))
     }
 
     /// Columns of each sprite.
@@ -123,12 +134,12 @@ impl Sprites {
 
     /// One for every frame of the footage, missing ones included.
     pub fn n_frames(&self) -> usize {
-        self.cutouts.len()
+        self.mattes.len()
     }
 
     /// Whether frame `frame_idx` has a sprite.
     pub fn is_present(&self, frame_idx: usize) -> bool {
-        self.cutouts[frame_idx].is_some()
+        self.mattes[frame_idx].is_some()
     }
 
     /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
@@ -137,41 +148,41 @@ impl Sprites {
     }
 
     /// What was cut out of a frame. Panics beyond the last frame.
-    pub fn cutout(&self, frame_idx: usize) -> Option<Cutout> {
-        self.cutouts[frame_idx]
+    pub fn matte(&self, frame_idx: usize) -> Option<Matte> {
+        self.mattes[frame_idx]
     }
 
-    /// The RGBA bytes of a cutout, by rows, in memory that the caller lends.
-    pub fn read_cutout(&self, cutout: &Cutout, rgba: &mut Vec<u8>) {
-        let [width, height] = cutout.size;
+    /// The RGBA bytes of a matte, by rows, in memory that the caller lends.
+    pub fn read_matte(&self, matte: &Matte, rgba: &mut Vec<u8>) {
+        let [width, height] = matte.size;
         rgba.clear();
         rgba.resize(width as usize * height as usize * 4, 0);
-        self.scratch.get(cutout.at, rgba);
+        self.scratch.get(matte.at, rgba);
     }
 
     /// The RGBA bytes of a frame's sprite, all zero when it is missing. Panics beyond the last frame.
     ///
     /// The centroid's sub-pixel rest is interpolated by Catmull and Rom's curve in premultiplied alpha; where
-    /// there is none, pixels are those of the cutout.
+    /// there is none, pixels are those of the matte.
     pub fn sprite(&self, frame_idx: usize) -> Vec<u8> {
         let mut picture = vec![0; self.n_bytes()];
-        let Some(cutout) = self.cutouts[frame_idx] else {
+        let Some(matte) = self.mattes[frame_idx] else {
             return picture;
         };
         let mut rgba = Vec::new();
-        self.read_cutout(&cutout, &mut rgba);
+        self.read_matte(&matte, &mut rgba);
         let scale = self.scales().map_or(1.0, |scales| scales[frame_idx]);
-        match self.whole_shift(&cutout).filter(|_| scale == 1.0) {
-            Some(shift) => self.copy(&rgba, cutout.size, shift, &mut picture),
-            None => self.interpolate(&rgba, &cutout, scale, &mut picture),
+        match self.whole_shift(&matte).filter(|_| scale == 1.0) {
+            Some(shift) => self.copy(&rgba, matte.size, shift, &mut picture),
+            None => self.interpolate(&rgba, &matte, scale, &mut picture),
         }
         picture
     }
 
-    /// Where the corner of a cutout comes to lie in its sprite, if that is on a whole pixel.
-    fn whole_shift(&self, cutout: &Cutout) -> Option<[i64; 2]> {
+    /// Where the corner of a matte comes to lie in its sprite, if that is on a whole pixel.
+    fn whole_shift(&self, matte: &Matte) -> Option<[i64; 2]> {
         let middle = [self.width, self.height].map(|side| f64::from(side) / 2.0);
-        let shift = [0, 1].map(|k| middle[k] - cutout.center_px[k]);
+        let shift = [0, 1].map(|k| middle[k] - matte.center_px[k]);
         let is_whole = shift.iter().all(|px| px.fract() == 0.0);
         is_whole.then(|| shift.map(|px| px as i64))
     }
@@ -188,7 +199,7 @@ impl Sprites {
         }
     }
 
-    fn interpolate(&self, rgba: &[u8], cutout: &Cutout, scale: f64, picture: &mut [u8]) {
+    fn interpolate(&self, rgba: &[u8], matte: &Matte, scale: f64, picture: &mut [u8]) {
         let size = [self.width, self.height];
         let place = Placement {
             center_px: size.map(|side| f64::from(side) / 2.0),
@@ -196,7 +207,7 @@ impl Sprites {
             scale,
             mirrored: false,
         };
-        let premultiplied = Premultiplied::of(rgba, cutout.size, cutout.center_px, scale);
+        let premultiplied = Premultiplied::of(rgba, matte.size, matte.center_px, scale);
         let mut placed = Resampled::default();
         let room = Room { size, nearer: None };
         placed.draw(&premultiplied, &place, room, Level::detect());
@@ -235,15 +246,15 @@ fn rows(bounds: Rect, width: u32) -> impl Iterator<Item = std::ops::Range<usize>
 impl PartialEq for Sprites {
     fn eq(&self, other: &Sprites) -> bool {
         let shape = |s: &Sprites| (s.width, s.height, s.n_frames());
-        let cutout = |sprites: &Sprites, idx: usize| {
-            let cutout = sprites.cutout(idx)?;
+        let matte = |sprites: &Sprites, idx: usize| {
+            let matte = sprites.matte(idx)?;
             let mut rgba = Vec::new();
-            sprites.read_cutout(&cutout, &mut rgba);
-            Some((cutout.size, cutout.center_px, rgba))
+            sprites.read_matte(&matte, &mut rgba);
+            Some((matte.size, matte.center_px, rgba))
         };
         shape(self) == shape(other)
             && self.scales == other.scales
-            && (0..self.n_frames()).all(|idx| cutout(self, idx) == cutout(other, idx))
+            && (0..self.n_frames()).all(|idx| matte(self, idx) == matte(other, idx))
     }
 }
 
@@ -264,23 +275,23 @@ mod tests {
         let sprites = Sprites::drawn([6, 5], 3, Arc::new(InMemory::default()), draw);
         let sprites = sprites.expect("memory has room");
         assert_eq!(sprites.sprite(2), picture);
-        let cutout = sprites.cutout(2).expect("a sprite");
-        assert_eq!((cutout.size, cutout.center_px), ([3, 3], [1.0, 1.5]));
-        assert!(!sprites.is_present(1) && sprites.cutout(1).is_none());
+        let matte = sprites.matte(2).expect("a sprite");
+        assert_eq!((matte.size, matte.center_px), ([3, 3], [1.0, 1.5]));
+        assert!(!sprites.is_present(1) && sprites.matte(1).is_none());
         assert_eq!(sprites.sprite(1), vec![0; 120]);
     }
 
-    /// A white bar of 3 x 1 in a cutout of 5 x 3, in a sprite of 4 x 2, as alpha.
+    /// A white bar of 3 x 1 in a matte of 5 x 3, in a sprite of 4 x 2, as alpha.
     fn alpha_of_bar(center_px: [f64; 2], scales: Option<Vec<f64>>) -> Vec<u8> {
         let scratch = InMemory::default();
         let mut rgba = vec![0; 5 * 3 * 4];
         rgba[(5 + 1) * 4..(5 + 4) * 4].fill(255);
-        let cutout = Cutout {
+        let matte = Matte {
             size: [5, 3],
             center_px,
             at: scratch.put(&rgba).expect("memory has room"),
         };
-        let sprites = Sprites::of([4, 2], vec![Some(cutout)], scales, Arc::new(scratch));
+        let sprites = Sprites::of([4, 2], vec![Some(matte)], scales, Arc::new(scratch));
         let sprite = sprites.sprite(0);
         sprite.chunks_exact(4).map(|pixel| pixel[3]).collect()
     }

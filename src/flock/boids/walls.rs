@@ -57,3 +57,43 @@ impl Boids<'_> {
         turned_at_most(before, reflected, cos_sin, cross(self.tank.up(), before))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::Params;
+    use crate::flock::boids::calibration::Calibration;
+    use crate::flock::boids::tank::Tank;
+    use crate::flock::boids::vector::minus;
+    use crate::flock::lens::Lens;
+
+    #[test]
+    fn whoever_swims_into_a_corner_gets_out_again() {
+        let calibration = Calibration {
+            cruise_bl_per_s: 2.0,
+            speed_limits_bl_per_s: [1.0, 4.0],
+            turn_rad_per_s: 4.8,
+            wander_rad_per_s: 2.0,
+            ..Calibration::default()
+        };
+        let params = Params {
+            count: 1,
+            leaders: false,
+            ..Params::default()
+        };
+        let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [6.0, 2.0, 0.0]));
+        for degrees in 0..90u32 {
+            let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+            let angle = f64::from(degrees).to_radians();
+            let velocity = [-libm::cos(angle), libm::sin(angle), 0.0];
+            boids.show(vec![[0.0, 2.0, 0.0]], vec![velocity], None);
+            let off = |boids: &Boids| norm(minus(boids.positions()[0], [0.0, 2.0, 0.0]));
+            let mut farthest_bl = 0.0f64;
+            for _ in 0..45 {
+                boids.advance();
+                farthest_bl = farthest_bl.max(off(&boids));
+            }
+            assert!(farthest_bl > 0.7, "{degrees}: {farthest_bl}");
+        }
+    }
+}

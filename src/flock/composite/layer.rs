@@ -119,14 +119,17 @@ impl Painter {
 
     /// Draws once more with room on all sides, to see what the border cut off.
     fn whole(&mut self, stage: &Stage, who: &Appearance) -> Whole {
-        let (sprites, place) = (stage.sprites, placement(stage, who));
-        let [w, h] = [sprites.width(), sprites.height()].map(f64::from);
-        let diagonal = (w * w + h * h).sqrt();
-        let of_fade = who
-            .fade
-            .map_or(0.0, |fade| fade.scale[who.frame_idx - fade.start as usize]);
-        let scale = place.scale.max(of_fade * stage.view.scale);
-        let room = (diagonal * scale).ceil() as u32 + 4;
+        let place = placement(stage, who);
+        let reach_px = |frame: u32, scale: f64| {
+            let matte = stage.sprites.matte(frame as usize);
+            matte.map_or(0.0, |matte| matte.reach_px()) * scale
+        };
+        let of_fade = who.fade.map_or(0.0, |fade| {
+            let k = who.frame_idx - fade.start as usize;
+            reach_px(fade.source_frame[k], fade.scale[k] * stage.view.scale)
+        });
+        let shown = who.individual.source_frame[who.frame_idx];
+        let room = reach_px(shown, place.scale).max(of_fade).ceil() as u32 + 4;
         // From the nearest whole pixel inside of the picture, however far outside it is drawn.
         let size = [2 * room, 2 * room];
         let shift = place

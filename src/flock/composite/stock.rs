@@ -34,10 +34,10 @@ impl Stock {
         let key = (frame, Premultiplied::level_for(scale));
         let kept = self.with(|shelf| shelf.sprites.get(&key).cloned());
         kept.unwrap_or_else(|| {
-            let sprite = match sprites.cutout(frame as usize) {
-                Some(cutout) => {
-                    sprites.read_cutout(&cutout, packed);
-                    Premultiplied::of(packed, cutout.size, cutout.center_px, scale)
+            let sprite = match sprites.matte(frame as usize) {
+                Some(matte) => {
+                    sprites.read_matte(&matte, packed);
+                    Premultiplied::of(packed, matte.size, matte.center_px, scale)
                 }
                 None => Premultiplied::of(&[], [0; 2], [0.0; 2], scale),
             };

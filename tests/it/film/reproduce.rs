@@ -1,4 +1,4 @@
-//! A cutout put back over the plate reproduces its frame (ALGORITHMS.md 2.7): mean absolute error in
+//! A matte put back over the plate reproduces its frame (ALGORITHMS.md 2.7): mean absolute error in
 //! the animal's box below 1.5 of 255, in a film without noise. Its pixels are those of the frame, so that
 //! nothing is interpolated.
 
@@ -9,7 +9,7 @@ use flockreel::raster::{Frame, RgbImage};
 use super::sample::filmed_without_noise;
 
 #[test]
-fn a_cutout_over_the_plate_reproduces_its_frame() {
+fn a_matte_over_the_plate_reproduces_its_frame() {
     let (film, library, _) = filmed_without_noise();
     let (mut stream, mut frame) = (film.open().unwrap(), Frame::default());
     let mut n_frames = 0;
@@ -28,12 +28,12 @@ fn a_cutout_over_the_plate_reproduces_its_frame() {
 /// Mean absolute difference over the box and the channels.
 fn error_in_box(library: &Library, idx: usize, pose: &Pose, seen: &RgbImage) -> f64 {
     let (rect, centroid) = (pose.box_px.unwrap(), pose.centroid_px.unwrap());
-    let (cutout, mut rgba) = (library.sprites.cutout(idx).unwrap(), Vec::new());
-    library.sprites.read_cutout(&cutout, &mut rgba);
-    let [left, top] = [0, 1].map(|k| (centroid[k] - cutout.center_px[k]).round() as u32);
+    let (matte, mut rgba) = (library.sprites.matte(idx).unwrap(), Vec::new());
+    library.sprites.read_matte(&matte, &mut rgba);
+    let [left, top] = [0, 1].map(|k| (centroid[k] - matte.center_px[k]).round() as u32);
     let (mut sum, mut n) = (0.0, 0.0);
     for (k, rgba) in (0..).zip(rgba.chunks_exact(4)) {
-        let (x, y) = (left + k % cutout.size[0], top + k / cutout.size[0]);
+        let (x, y) = (left + k % matte.size[0], top + k / matte.size[0]);
         if !rect.contains(x, y) {
             continue;
         }

@@ -120,6 +120,7 @@ async fn result_of(server: &Server, job: &Value) -> Vec<String> {
         "poses.json",
         "background.png",
         "sprites.zip",
+        "mattes.zip",
         "overlay.mp4",
     ] {
         let url = format!("{}{library}/{file}", server.base);

@@ -42,6 +42,7 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
         ("overlay.mp4", b"\0\0\0"),
         ("poses.csv", b"frame"),
         ("sprites.zip", b"PK"),
+        ("mattes.zip", b"PK"),
     ] {
         let answer = app.get(&format!("{library}/{file}")).send().await.unwrap();
         assert_eq!(answer.status(), StatusCode::OK, "{file}");

@@ -1,0 +1,110 @@
+//! Pictures of the frames of a footage in one file: a zip whose entries 000000.png ... are stored, so that any tool opens
+//! them and one is read without the others. A frame may have none.
+
+use std::io::{Read, Seek, Write};
+
+use rayon::prelude::*;
+use zip::write::SimpleFileOptions;
+
+/// Why a file is no such archive.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// It is damaged.
+    #[error("{0}")]
+    Zip(#[from] zip::result::ZipError),
+    /// It holds something else.
+    #[error("{0}")]
+    Mismatch(&'static str),
+}
+
+/// Where a picture lies in an archive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Its first byte.
+    pub at: u64,
+    /// Its length.
+    pub n_bytes: usize,
+}
+
+/// Pictures encoded at a time, on all threads: what is held in memory.
+const BATCH: usize = 256;
+
+/// The name of a frame's picture, in archives and in folders.
+pub fn name(frame_idx: usize) -> String {
+    format!("{frame_idx:06}.png")
+}
+
+/// Writes the pictures of some frames, in order, which `encode` makes; gives back what was written to.
+pub fn write<W: Write + Seek>(
+    out: W,
+    frames: impl Iterator<Item = usize>,
+    encode: impl Fn(usize) -> Vec<u8> + Sync,
+) -> Result<W, zip::result::ZipError> {
+    let mut archive = zip::ZipWriter::new(out);
+    let stored = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    let frames: Vec<usize> = frames.collect();
+    for batch in frames.chunks(BATCH) {
+        let pictures: Vec<Vec<u8>> = batch.par_iter().map(|&idx| encode(idx)).collect();
+        for (&idx, bytes) in batch.iter().zip(pictures) {
+            archive.start_file(name(idx), stored)?;
+            archive.write_all(&bytes)?;
+        }
+    }
+    archive.finish()
+}
+
+/// Where the pictures of `n_frames` frames lie in an archive of `n_bytes`.
+pub fn entries(
+    archive: impl Read + Seek,
+    n_bytes: u64,
+    n_frames: usize,
+) -> Result<Vec<Option<Entry>>, Error> {
+    let mut archive = zip::ZipArchive::new(archive)?;
+    let mut entries = vec![None; n_frames];
+    for idx in 0..archive.len() {
+        let entry = archive.by_index(idx)?;
+        let frame_idx = (entry.name()?.strip_suffix(".png")).and_then(|stem| stem.parse().ok());
+        let slot = frame_idx.and_then(|idx: usize| entries.get_mut(idx));
+        let slot = slot.ok_or(Error::Mismatch(
+            "an archive has an entry that is no frame of the footage",
+        ))?;
+        let stored = entry.compression() == zip::CompressionMethod::Stored;
+        let ends = |at: &u64| at.checked_add(entry.size());
+        let at =
+            (entry.data_start()).filter(|at| stored && ends(at).is_some_and(|end| end <= n_bytes));
+        let at = at.ok_or(Error::Mismatch(
+            "an entry of an archive is compressed or cut off",
+        ))?;
+        *slot = Some(Entry {
+            at,
+            n_bytes: entry.size() as usize,
+        });
+    }
+    Ok(entries)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    #[test]
+    fn every_picture_lies_where_its_entry_says_and_other_archives_are_refused() {
+        let encode = |idx: usize| vec![idx as u8; idx + 1];
+        let archive = write(Cursor::new(Vec::new()), [0, 2, 3].into_iter(), encode);
+        let bytes = archive.expect("memory has room").into_inner();
+        let read = |n_bytes, n_frames| entries(Cursor::new(&bytes), n_bytes, n_frames);
+        let all = bytes.len() as u64;
+        let found = read(all, 4).expect("our own archive");
+        assert_eq!(found[1], None);
+        for idx in [0, 2, 3] {
+            let Entry { at, n_bytes } = found[idx].expect("an entry");
+            assert_eq!(bytes[at as usize..][..n_bytes], encode(idx));
+        }
+        assert!(matches!(read(all, 3), Err(Error::Mismatch(_))));
+        assert!(matches!(read(40, 4), Err(Error::Mismatch(_))));
+        let cut_off = entries(Cursor::new(&bytes[..50]), 50, 4);
+        assert!(matches!(cut_off, Err(Error::Zip(_))));
+    }
+}
