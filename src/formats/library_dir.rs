@@ -137,31 +137,7 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "background.png and poses.json differ in size",
         ));
     }
-    let n_frames = poses.frames.len() as u32;
-    let jumps = summary.playback.jumps.iter();
-    if jumps
-        .flat_map(|j| [j.from, j.to])
-        .chain(summary.playback.component.iter().copied())
-        .any(|f| f >= n_frames)
-    {
-        return Err(Error::Mismatch(
-            "library.json names a frame that poses.json does not have",
-        ));
-    }
-    let scales = summary.sprite_scale.as_deref().unwrap_or_default();
-    let is_sound = |&scale: &f64| (0.01..=100.0).contains(&scale);
-    if summary.sprite_scale.is_some() && scales.len() != poses.frames.len()
-        || !scales.iter().all(is_sound)
-    {
-        return Err(Error::Mismatch(
-            "library.json must name a size for the sprite of every frame",
-        ));
-    }
-    if !(summary.sprite_size_px.iter()).all(|side| (1..=MOST_SIDE_PX).contains(side)) {
-        return Err(Error::Mismatch(
-            "library.json names an impossible size of sprites",
-        ));
-    }
+    check(&summary, poses.frames.len())?;
     let archive = Archive::open(dir, &summary)?;
     let most_px = match archive.centers_px {
         Some(_) => poses.image_size_px.map(|side| side.min(MOST_SIDE_PX)),
@@ -190,6 +166,34 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
         params: summary.params,
         footage: summary.footage,
     })
+}
+
+/// Whether what library.json says can be said of so many frames.
+fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
+    let jumps = summary.playback.jumps.iter().flat_map(|j| [j.from, j.to]);
+    let component = summary.playback.component.iter().copied();
+    if jumps
+        .chain(component)
+        .any(|frame| frame as usize >= n_frames)
+    {
+        return Err(Error::Mismatch(
+            "library.json names a frame that poses.json does not have",
+        ));
+    }
+    let is_sound = |&scale: &f64| (0.01..=100.0).contains(&scale);
+    let scales = summary.sprite_scale.as_deref();
+    if scales.is_some_and(|all| all.len() != n_frames || !all.iter().all(is_sound)) {
+        return Err(Error::Mismatch(
+            "library.json must name a size for the sprite of every frame",
+        ));
+    }
+    let mut sides_px = summary.sprite_size_px.iter();
+    match sides_px.all(|side| (1..=MOST_SIDE_PX).contains(side)) {
+        true => Ok(()),
+        false => Err(Error::Mismatch(
+            "library.json names an impossible size of sprites",
+        )),
+    }
 }
 
 fn write_archive(
@@ -342,13 +346,17 @@ mod tests {
         }
     }
 
+    fn footage() -> FootageSummary {
+        FootageSummary {
+            sha256: "ab".into(),
+            n_bytes: 9,
+        }
+    }
+
     #[test]
     fn a_library_comes_back_from_its_folder_as_it_was() {
         let library = small_library();
-        let footage = FootageSummary {
-            sha256: "ab".into(),
-            n_bytes: 9,
-        };
+        let footage = footage();
         let dir = tempfile::tempdir().expect("a temporary folder");
         write(dir.path(), &library, &Params::default(), &footage).expect("written");
         let back = read(dir.path(), Arc::new(InMemory::default())).expect("read");
@@ -359,12 +367,8 @@ mod tests {
     #[test]
     fn a_folder_of_before_is_read_and_what_does_not_belong_together_is_refused() {
         let library = small_library();
-        let footage = FootageSummary {
-            sha256: "ab".into(),
-            n_bytes: 9,
-        };
         let dir = tempfile::tempdir().expect("a temporary folder");
-        write(dir.path(), &library, &Params::default(), &footage).expect("written");
+        write(dir.path(), &library, &Params::default(), &footage()).expect("written");
         let json = fs::read_to_string(dir.path().join(LIBRARY)).expect("a file");
         let centers = r#""matte_center_px":[null,[4.0,4.0],null]"#;
         let of = |from: &str, to: &str| {
@@ -372,10 +376,9 @@ mod tests {
             fs::write(dir.path().join(LIBRARY), json.replace(from, to)).expect("written");
             read(dir.path(), Arc::new(InMemory::default()))
         };
-        let missing = r#""matte_center_px":[null,null,null]"#;
-        let few = r#""matte_center_px":[null,[4.0,4.0]]"#;
-        for other in [missing, few] {
-            assert!(matches!(of(centers, other), Err(Error::Mismatch(_))));
+        for others in ["[null,null,null]", "[null,[4.0,4.0]]"] {
+            let others = format!(r#""matte_center_px":{others}"#);
+            assert!(matches!(of(centers, &others), Err(Error::Mismatch(_))));
         }
         for size in ["[0,8]", "[8,70000]"] {
             let size = format!(r#""sprite_size_px":{size}"#);
@@ -384,8 +387,7 @@ mod tests {
         }
         fs::remove_file(dir.path().join(MATTES)).expect("it was there");
         write_sprites(dir.path(), &library.sprites).expect("written");
-        let before = r#""matte_center_px":[]"#;
-        let found = of(centers, before).expect("a library of before");
+        let found = of(centers, r#""matte_center_px":[]"#).expect("a library of before");
         let sprites = &found.library.sprites;
         assert_eq!(sprites.sprite(1), library.sprites.sprite(1));
         let scaled = of(
