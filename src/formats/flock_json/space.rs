@@ -1,8 +1,8 @@
 //! `space` of flock.json: how the tank is seen, and where it ends, body lengths (ALGORITHMS.md 7).
 //!
-//! A boid at `position` [x, y, behind] is z = `front_bl` + behind / `length_px` body lengths from the camera, and
-//! x_bl = (x - center_px[0]) / px, y_bl alike, with px = focal_px / (pane_bl + (z - pane_bl) / medium_index); without a
-//! camera px = `length_px`, and center_px is [0, 0].
+//! A boid at `position` (x, y, behind) is z = `front_bl` + behind / `length_px` body lengths from the camera, and
+//! (x - cx) / px to its right, y alike, with px = `focal_px` / (`pane_bl` + (z - `pane_bl`) / `medium_index`) and cx of
+//! `center_px`; without a camera px = `length_px`, and the center is 0.
 
 use serde::{Deserialize, Serialize};
 
