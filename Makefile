@@ -105,6 +105,7 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	target/bench-venv/bin/python bench/boids.py
 	@test -d target/demo/library || $(MAKE) --no-print-directory demo
 	python3 bench/render.py target/demo/library $(RELEASE)
+	target/bench-venv/bin/python bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
 accuracy: build ## the poses against the truth of a film generator: make accuracy GENERATOR=goldfish.py
 	python3 bench/accuracy.py $(RELEASE) $(GENERATOR)

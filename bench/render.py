@@ -6,8 +6,9 @@ Two films: 20 individuals x 400 frames at the footage's size (wanted: below 1.25
 1920x1080 (wanted: below 1.5). Each is planned once; then filming that plan (`rendered_s`: from the first sprite
 drawn to the named file) and ffmpeg encoding the same frames from a raw file with x264 veryfast (crf 18, 4 threads) are
 measured in turn, five rounds; the medians count. The program looks less closely for motion than that preset does, so
-ffmpeg encodes them with the very settings of the program too; how much larger the file is then is told. The frames in the file are those that are drawn, for
-those of the film have lost what is costly to encode. Last, the memory of filming 400 and 10 000 frames. Ends with 1 when a ratio is missed or memory grows.
+ffmpeg encodes them with the very settings of the program too; how much larger the file is then is told. The frames in
+the file are those that are drawn, for those of the film have lost what is costly to encode. Last, the memory of filming
+400 and 10 000 frames. Ends with 1 when a ratio is missed or memory grows.
 """
 
 import json

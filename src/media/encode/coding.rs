@@ -129,7 +129,7 @@ fn h264(format: &VideoFormat, quality: Quality) -> String {
     // Our RGB is sRGB, whatever the luma weights: its primaries are those of BT.709. The filter on
     // the stream drops the message in which x264 writes its version and settings. Of motion it looks less closely than
     // the preset does (`subme`, `me`): most of a film is its plate, and a quarter of the encoder's time buys 5 to 9 % of
-    // size and 0.1 dB there (docs/SPEED.md).
+    // size there (docs/SPEED.md).
     format!(
         "-vf setparams=range={range}:colorspace={matrix}:color_primaries=bt709:color_trc=bt709 \
          -c:v libx264 -preset veryfast -profile:v high -crf {crf} -threads {threads} \
