@@ -1,6 +1,7 @@
 //! A flock of one that swims where the filmed animal swam, without a jump, is the footage again
-//! (ALGORITHMS.md 8): mean absolute error in the animal's box below 2 of 255 over the film and below 4
-//! in every frame, resampling, halved chroma, matte and plate all included. The film has no noise, which no plate could have foreseen.
+//! (ALGORITHMS.md 8): mean absolute error in the animal's box below 0.8 of 255 over the film and below 1.5
+//! in every frame, halved chroma, matte and plate all included. ALGORITHMS.md asks for less than 2, which leaves room for noise;
+//! this film has none. Interpolated once too often the animal is off by 1.6.
 
 use flockreel::flock::lens::Lens;
 use flockreel::flock::{
@@ -28,7 +29,7 @@ fn a_flock_of_one_along_its_own_path_is_the_footage() {
         };
         compositor.render(t, &mut shot);
         let error = error_in_box(library, frame_idx, &shot.frame.to_rgb(), &frame.to_rgb());
-        assert!(error < 4.0, "frame {frame_idx}: {error}");
+        assert!(error < 1.5, "frame {frame_idx}: {error}");
         errors.push(error);
         let seen = &shot.truth.seen[0];
         let [x, y, w, h] = seen.amodal_box.unwrap();
@@ -40,7 +41,7 @@ fn a_flock_of_one_along_its_own_path_is_the_footage() {
         assert!(inside, "frame {frame_idx}: {:?} {known:?}", seen.amodal_box);
     }
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-    assert!(mean < 2.0, "{mean}");
+    assert!(mean < 0.8, "{mean}");
 }
 
 /// The longest run of whole sprites: its first frame, and how many.
