@@ -132,6 +132,7 @@ fn made_library(n_frames: u32) -> Library {
             frames,
         },
         background: RgbImage::new(640, 480),
+        occluders: None,
         sprites: Sprites::missing(96, 64, n_frames as usize),
         clip_frames: 8,
         epsilon: EPSILON,

@@ -15,6 +15,7 @@ pub mod silhouette;
 // The animal followed and cut out.
 pub mod matte;
 pub mod moments;
+pub mod occluders;
 pub mod read_ahead;
 pub mod sighting;
 pub mod sprite;
@@ -65,11 +66,12 @@ pub fn analyze(
     progress: &dyn Progress,
 ) -> Result<Library, Error> {
     let n_frames = source.format().n_frames_hint;
-    let (plate, track) = read_ahead::while_reading(source, |batches| {
+    let (plate, mut track) = read_ahead::while_reading(source, |batches| {
         let plate = background::estimate(source, background, params, progress)?;
         let track = tracking::follow(batches, n_frames, &plate, params, scratch, progress)?;
         Ok::<_, Error>((plate, track))
     })?;
+    let occluders = occluders::take_out(&mut track, &plate, progress)?;
     let view = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
@@ -94,6 +96,7 @@ pub fn analyze(
     Ok(Library {
         poses,
         background: plate.rgb,
+        occluders,
         sprites,
         clip_frames: connections.clip_frames,
         epsilon: connections.epsilon,

@@ -2,11 +2,11 @@
 
 use super::background::Plate;
 use super::light::Gain;
-use super::matte::{self, Matte};
+use super::matte;
 use super::moments::{self, Moments};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
-use crate::raster::{Frame, Mask};
+use crate::raster::{Frame, Mask, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
 /// What was seen of the animal in one frame.
@@ -30,6 +30,31 @@ pub struct Sighting {
     pub box_px: Rect,
     /// The silhouette touches the border of the frame.
     pub cut: bool,
+}
+
+impl Sighting {
+    /// What a matte that lies at `rect` tells by itself: neither where it is put aside, nor its contrast, its
+    /// silhouette's box and whether that is cut. `None` when nothing of it is opaque.
+    pub(super) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
+        let pixels = matte.pixels.as_chunks::<4>().0;
+        let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
+        let moments = moments::moments(rect, &weights)?;
+        let axis = moments.major_rad.unwrap_or(0.0);
+        let solid = solid(rect, matte);
+        let extent_px = |along_rad| moments::extent_px(&solid, along_rad);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        Some(Sighting {
+            rect,
+            at: 0,
+            reach_px: reach_px(rect, matte, moments.centroid_px),
+            contrast: 0.0,
+            moments,
+            extent_px: [extent_px(axis), extent_px(axis + quarter)],
+            upright_px: extent_px(quarter),
+            box_px: rect,
+            cut: false,
+        })
+    }
 }
 
 /// The component taken for the animal in one frame, and its mended form.
@@ -57,25 +82,15 @@ impl Scene<'_> {
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let silhouette = &choice.silhouette;
         let matte = matte::pull(self.frame, self.plate, self.gain, silhouette, length_px);
-        let pixels = matte.image.pixels.as_chunks::<4>().0;
-        let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
-        let Some(moments) = moments::moments(matte.rect, &weights) else {
+        let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
-        let axis = moments.major_rad.unwrap_or(0.0);
-        let solid = solid(&matte);
-        let extent_px = |along_rad| moments::extent_px(&solid, along_rad);
-        let quarter = std::f64::consts::FRAC_PI_2;
         Ok(Some(Sighting {
-            rect: matte.rect,
             at: scratch.put(&matte.image.pixels)?,
-            reach_px: reach_px(&matte, moments.centroid_px),
             contrast: matte.contrast,
-            moments,
-            extent_px: [extent_px(axis), extent_px(axis + quarter)],
-            upright_px: extent_px(quarter),
             box_px: rect,
             cut: self.touches_border(rect),
+            ..measured
         }))
     }
 
@@ -87,25 +102,20 @@ impl Scene<'_> {
 
 /// The pixels that are more animal than background. The silhouette itself is wider: its threshold is
 /// low, so that no fin is lost.
-fn solid(matte: &Matte) -> Mask {
+fn solid(rect: Rect, matte: &RgbaImage) -> Mask {
     let bits = matte
-        .image
         .pixels
         .chunks_exact(4)
         .map(|rgba| u8::from(rgba[3] >= 128))
         .collect();
-    Mask {
-        rect: matte.rect,
-        bits,
-    }
+    Mask { rect, bits }
 }
 
 /// How far the alpha reaches from the centroid: horizontally, vertically, in any direction.
-fn reach_px(matte: &Matte, [cx, cy]: [f64; 2]) -> [f64; 3] {
-    let rect = matte.rect;
+fn reach_px(rect: Rect, matte: &RgbaImage, [cx, cy]: [f64; 2]) -> [f64; 3] {
     let mut most = [0.0f64; 3];
     let columns = rect.w.max(1) as usize;
-    let rows = matte.image.pixels.as_chunks::<4>().0.chunks_exact(columns);
+    let rows = matte.pixels.as_chunks::<4>().0.chunks_exact(columns);
     let inside = |rgba: &[u8; 4]| rgba[3] > 0;
     for (row, y) in rows.zip(rect.y..) {
         // The ends of a row lie farthest from any centroid.

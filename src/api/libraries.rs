@@ -26,6 +26,7 @@ const FILES: Files = &[
     ("poses.json", "application/json"),
     ("poses.csv", "text/csv; charset=utf-8"),
     ("background.png", "image/png"),
+    ("occluders.png", "image/png"),
     ("distance.png", "image/png"),
     ("candidates.png", "image/png"),
     ("headings.svg", "image/svg+xml"),
@@ -105,7 +106,7 @@ pub(super) async fn delete_library(
     gone(state.context.store.delete_library(id).await?)
 }
 
-/// A file of a library: library.json, poses.json, poses.csv, background.png, distance.png,
+/// A file of a library: library.json, poses.json, poses.csv, background.png, occluders.png, distance.png,
 /// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip, mattes.zip; and
 /// distance.npy, which is computed anew each time and comes whole.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",

@@ -47,6 +47,7 @@ pub(crate) fn library(view: View) -> Library {
             frames,
         },
         background: water(),
+        occluders: None,
         sprites,
         clip_frames: CLIP_FRAMES,
         epsilon: 1000,

@@ -10,7 +10,7 @@ pub use playback::{Jump, Patch, Playback, Transition};
 pub use pose::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 pub use sprites::{Matte, Sprites};
 
-use crate::raster::RgbImage;
+use crate::raster::{RgbImage, RgbaImage};
 
 /// What one analysis yields.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +19,9 @@ pub struct Library {
     pub poses: Poses,
     /// The scene without the animal, of the footage's size.
     pub background: RgbImage,
+    /// What stands before the animal and is seen in the background too: its straight color, and as alpha the share of
+    /// the pixel that it takes; of the footage's size. `None` when nothing is known to.
+    pub occluders: Option<RgbaImage>,
     /// The animal cut out of every frame in which it was found.
     pub sprites: Sprites,
     /// f: how many sprites a clip holds.

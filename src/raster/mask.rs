@@ -31,6 +31,28 @@ impl Mask {
         self.rect.h as usize
     }
 
+    /// Whether the pixel in column `x` and row `y` of the image is set.
+    pub fn is_set(&self, x: u32, y: u32) -> bool {
+        let at = || (y - self.rect.y) as usize * self.width() + (x - self.rect.x) as usize;
+        self.rect.contains(x, y) && self.bits[at()] == 1
+    }
+
+    /// Sets what is set in another mask, within this one's box.
+    pub fn add(&mut self, other: &Mask) {
+        let both = self.rect.intersection(&other.rect);
+        for y in both.y..both.bottom() {
+            let row = |mask: &Mask| {
+                let first =
+                    (y - mask.rect.y) as usize * mask.width() + (both.x - mask.rect.x) as usize;
+                first..first + both.w as usize
+            };
+            let (to, from) = (row(self), row(other));
+            for (bit, &other) in self.bits[to].iter_mut().zip(&other.bits[from]) {
+                *bit |= other;
+            }
+        }
+    }
+
     /// Number of set pixels.
     pub fn area(&self) -> usize {
         self.bits.iter().map(|&bit| bit as usize).sum()

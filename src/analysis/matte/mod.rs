@@ -77,13 +77,7 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
 /// The mask over another box; what lies outside the old one is clear.
 fn moved(mask: &Mask, rect: Rect) -> Mask {
     let mut result = Mask::new(rect);
-    let both = mask.rect.intersection(&rect);
-    for y in both.y..both.bottom() {
-        let from = ((y - mask.rect.y) * mask.rect.w + both.x - mask.rect.x) as usize;
-        let to = ((y - rect.y) * rect.w + both.x - rect.x) as usize;
-        let n = both.w as usize;
-        result.bits[to..to + n].copy_from_slice(&mask.bits[from..from + n]);
-    }
+    result.add(mask);
     result
 }
 

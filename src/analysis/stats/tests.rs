@@ -47,6 +47,7 @@ fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
         },
         poses,
         background: RgbImage::new(400, 100),
+        occluders: None,
         sprites: Sprites::missing(8, 8, 300),
         clip_frames: 8,
         epsilon: 10,

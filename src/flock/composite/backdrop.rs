@@ -1,6 +1,7 @@
 //! What lies behind a flock: the plate at the film's size, one color, nothing, or a given picture
 //! (ALGORITHMS.md 8); in the form of the film already, so that a frame begins with a copy.
 
+use super::front::{self, Front};
 use super::params::Background;
 use super::view::View;
 use super::{Form, Shot};
@@ -8,12 +9,14 @@ use crate::cpu::Level;
 use crate::geometry::Rect;
 use crate::raster::canvas::opaque;
 use crate::raster::resize::resized;
-use crate::raster::{Canvas, Frame, RgbImage};
+use crate::raster::{Canvas, Frame, RgbImage, RgbaImage};
 
 /// A background, ready.
 pub(super) struct Backdrop {
     /// What sprites are drawn over.
     pub(super) canvas: Canvas,
+    /// What is drawn over the sprites.
+    pub(super) front: Option<Front>,
     /// Whether there is nothing behind.
     pub(super) is_clear: bool,
     frame: Frame,
@@ -21,26 +24,29 @@ pub(super) struct Backdrop {
 }
 
 impl Backdrop {
-    /// A background that can be asked for by name.
+    /// A background that can be asked for by name; `occluders` are what stands before everyone in the plate.
     pub(super) fn of(
         background: Background,
-        plate: &RgbImage,
+        (plate, occluders): (&RgbImage, Option<&RgbaImage>),
         view: &View,
         form: Form,
     ) -> Backdrop {
         let [width, height] = view.size_px;
         let mut canvas = Canvas::new(width, height);
+        let occluders = occluders.filter(|_| background == Background::Plate);
         match background {
             Background::Transparent => {}
             Background::Color(rgb) => canvas.pixels.fill(opaque(rgb)),
             Background::Plate => {
                 canvas.pixels.fill(opaque([0; 3]));
                 let rect = view.rect();
-                let plate = Canvas::of_rgb(&resized(plate, rect.w, rect.h));
-                canvas.put(&plate, rect);
+                let scene = occluders.map(|occluders| front::scene(plate, occluders));
+                let scene = resized(scene.as_ref().unwrap_or(plate), rect.w, rect.h);
+                canvas.put(&Canvas::of_rgb(&scene), rect);
             }
         }
-        let mut backdrop = Backdrop::ready(canvas, form);
+        let front = occluders.map(|occluders| Front::of(occluders, view));
+        let mut backdrop = Backdrop::ready(canvas, front, form);
         if background == Background::Transparent {
             backdrop.is_clear = true;
             backdrop.hide(mean(plate));
@@ -50,26 +56,31 @@ impl Backdrop {
 
     /// A picture that fills the film.
     pub(super) fn picture(picture: &RgbImage, size_px: [u32; 2], form: Form) -> Backdrop {
-        Backdrop::ready(filling(picture, size_px), form)
+        Backdrop::ready(filling(picture, size_px), None, form)
     }
 
-    fn ready(canvas: Canvas, form: Form) -> Backdrop {
+    fn ready(canvas: Canvas, front: Option<Front>, form: Form) -> Backdrop {
         let whole = Rect::of_size(canvas.width, canvas.height);
+        let mut shown = canvas.clone();
+        if let Some(front) = &front {
+            front.draw(&mut shown, whole);
+        }
         let mut backdrop = Backdrop {
             is_clear: false,
             frame: Frame::default(),
             rgba: Vec::new(),
             canvas,
+            front,
         };
         match form {
             Form::Planar(color) => {
                 backdrop.frame = Frame::new(whole.w, whole.h, color);
                 let cpu = Level::detect();
-                backdrop.frame.draw_canvas(&backdrop.canvas, whole, cpu);
+                backdrop.frame.draw_canvas(&shown, whole, cpu);
             }
             Form::Straight => {
                 backdrop.rgba = vec![0; whole.area() as usize * 4];
-                backdrop.canvas.straight_into(whole, &mut backdrop.rgba);
+                shown.straight_into(whole, &mut backdrop.rgba);
             }
         }
         backdrop

@@ -9,6 +9,7 @@
 mod backdrop; // what lies behind
 mod bleed; // color beyond the edges of alpha
 mod draw_ahead; // the frames of a film, in order
+mod front; // what stands before all
 mod layer; // one individual in one frame
 mod morph; // two sprites bent to each other at a jump
 pub mod params;
@@ -22,6 +23,7 @@ use std::sync::{Mutex, PoisonError};
 use self::backdrop::Backdrop;
 use self::bleed::bleed;
 use self::draw_ahead::draw_ahead;
+use self::front::Front;
 use self::layer::{Appearance, Haze, Painter, Stage};
 use self::params::Background;
 use self::shadow::Floor;
@@ -33,7 +35,7 @@ use super::{Flock, Library};
 use crate::cpu::Level;
 use crate::geometry::Rect;
 use crate::raster::canvas::{Cover, opaque};
-use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
+use crate::raster::{Canvas, ColorSpec, Frame, RgbImage, RgbaImage};
 
 /// Draws the frames of a flock, any of them from any thread.
 pub struct Compositor<'a> {
@@ -106,7 +108,7 @@ impl<'a> Compositor<'a> {
             view,
             form,
             with_truth: false,
-            backdrop: Backdrop::of(background, &library.background, &view, form),
+            backdrop: Backdrop::of(background, scene_of(library), &view, form),
             haze: (render.haze_per_bl > 0.0).then(|| Haze {
                 left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
                 color: opaque(backdrop::mean(&library.background)),
@@ -140,8 +142,8 @@ impl<'a> Compositor<'a> {
     }
 
     fn behind(mut self, background: Background) -> Compositor<'a> {
-        let plate = &self.library.background;
-        self.backdrop = Backdrop::of(background, plate, &self.view, self.form);
+        let scene = scene_of(self.library);
+        self.backdrop = Backdrop::of(background, scene, &self.view, self.form);
         self
     }
 
@@ -174,13 +176,28 @@ impl<'a> Compositor<'a> {
             desk.put(self.cpu);
         }
         if self.with_truth {
-            shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px);
+            shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px, self.left(shot));
         }
         self.develop(&mut desk, shot);
         self.desks
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .push(desk);
+    }
+
+    /// What stands before everyone in a shot.
+    fn front(&self, shot: &Shot) -> Option<&Front> {
+        let front = self.backdrop.front.as_ref();
+        front.filter(|_| shot.behind.planes.is_empty())
+    }
+
+    /// How much of each pixel of a shot is left for everyone, 16384ths.
+    fn left(&self, shot: &Shot) -> Vec<u16> {
+        let [width, height] = self.view.size_px.map(|side| side as usize);
+        match self.front(shot) {
+            Some(front) => front.left(),
+            None => vec![truth::ONE as u16; width * height],
+        }
     }
 
     /// Turns what is on the desk into the form asked for, and wipes it off.
@@ -194,6 +211,9 @@ impl<'a> Compositor<'a> {
         let behind = own.as_ref().unwrap_or(&self.backdrop.canvas);
         for rect in desk.cover.take() {
             desk.canvas.under_box(behind, rect, self.cpu);
+            if let Some(front) = self.front(shot) {
+                front.draw(&mut desk.canvas, rect);
+            }
             match self.form {
                 Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect, self.cpu),
                 Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
@@ -298,6 +318,11 @@ impl Desk {
             self.boxes.push(layer.rect);
         }
     }
+}
+
+/// The plate, and what stands before everyone in it.
+fn scene_of(library: &Library) -> (&RgbImage, Option<&RgbaImage>) {
+    (&library.background, library.occluders.as_ref())
 }
 
 fn fades_by_frame(individual: &Individual) -> Vec<Option<u32>> {

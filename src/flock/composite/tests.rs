@@ -93,6 +93,62 @@ fn nothing_changes_where_nobody_is() {
     }
 }
 
+/// The synthetic library with a red wire of three rows, of which the middle one hides all, before everybody.
+fn behind_a_wire(row: u32) -> Library {
+    let mut library = synthetic::library(View::Top);
+    let [width, height] = library.poses.image_size_px;
+    let mut wire = RgbaImage::new(width, height);
+    for x in 0..width {
+        for (y, alpha) in [(row - 1, 128), (row, 255), (row + 1, 128)] {
+            wire.set_pixel(x, y, [200, 30, 30, alpha]);
+        }
+        library.background.set_pixel(x, row, [200, 30, 30]);
+    }
+    library.occluders = Some(wire);
+    library
+}
+
+#[test]
+fn a_wire_is_before_everybody_on_the_plate_and_before_nobody_elsewhere() {
+    const ROW: usize = 120;
+    let library = behind_a_wire(ROW as u32);
+    let mut flock = flock(&library, "swarm");
+    let width = library.background.width as usize;
+    let row = ROW * width..(ROW + 1) * width;
+    let passes = |truth: &FrameTruth| {
+        let of = |row: usize| &truth.labels[row * width..][..width];
+        let (above, below) = (of(ROW - 2), of(ROW + 2));
+        (above.iter().zip(below)).any(|(a, b)| *a > 0 && a == b)
+    };
+    let mut n_passing = 0;
+    for shot in shots(&library, &flock) {
+        assert!(
+            shot.truth.labels[row.clone()]
+                .iter()
+                .all(|&label| label == 0)
+        );
+        n_passing += usize::from(passes(&shot.truth));
+        for rgb in shot.frame.to_rgb().pixels[3 * row.start..3 * row.end].chunks(3) {
+            // Chroma is shared with the rows beside it.
+            assert!(rgb[0] > rgb[1].saturating_add(60), "{rgb:?}");
+        }
+    }
+    assert!(n_passing > 5, "{n_passing}");
+    flock.params.render.background = Background::Color([0, 0, 255]);
+    let has_label = |shot: &Shot| {
+        shot.truth.labels[row.clone()]
+            .iter()
+            .any(|&label| label > 0)
+    };
+    assert!(
+        shots(&library, &flock)
+            .iter()
+            .filter(|shot| has_label(shot))
+            .count()
+            >= n_passing
+    );
+}
+
 #[test]
 fn overlapping_boxes_are_merged_and_those_apart_kept() {
     let rect = |x, y| Rect { x, y, w: 10, h: 10 };

@@ -66,16 +66,16 @@ pub(super) struct Whole {
 }
 
 impl FrameTruth {
-    /// The truth of everyone drawn, near to far; ids are 0..n, each once.
-    pub(super) fn of(drawn: &[Drawn], size_px: [u32; 2]) -> FrameTruth {
+    /// The truth of everyone drawn, near to far; ids are 0..n, each once. `left` is what stands before them all
+    /// leaves of each pixel.
+    pub(super) fn of(drawn: &[Drawn], size_px: [u32; 2], mut left: Vec<u16>) -> FrameTruth {
         let n_pixels = size_px[0] as usize * size_px[1] as usize;
         let mut truth = FrameTruth {
             size_px,
             labels: vec![0; n_pixels],
             seen: vec![Seen::default(); drawn.len()],
         };
-        // What of each pixel is left for those farther.
-        let mut left = vec![ONE as u16; n_pixels];
+        // Each takes of it what those farther do not have.
         for drawn in drawn {
             truth.seen[drawn.id as usize] = truth.look(drawn, &mut left);
         }
@@ -182,6 +182,10 @@ mod tests {
         }
     }
 
+    fn clear(n_pixels: usize) -> Vec<u16> {
+        vec![ONE as u16; n_pixels]
+    }
+
     fn rect(x: u32, y: u32, w: u32, h: u32) -> Rect {
         Rect { x, y, w, h }
     }
@@ -190,7 +194,7 @@ mod tests {
     fn the_nearer_hides_the_farther_by_its_alpha() {
         let far = layer(1, rect(0, 0, 4, 2), ONE as u16);
         let near = layer(0, rect(2, 0, 4, 2), 3 * ONE as u16 / 4);
-        let truth = FrameTruth::of(&[near, far], [8, 2]);
+        let truth = FrameTruth::of(&[near, far], [8, 2], clear(16));
         assert_eq!(truth.labels[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
         // Half of the far one is covered by three quarters.
         assert!((truth.seen[1].visibility - 0.625).abs() < 1e-4);
@@ -208,18 +212,32 @@ mod tests {
         let box_px = rect(0, 0, 1, 1);
         let far = layer(0, box_px, ONE as u16);
         let near = layer(1, box_px, HALF as u16);
-        assert_eq!(FrameTruth::of(&[near, far], [1, 1]).labels, [2]);
+        assert_eq!(FrameTruth::of(&[near, far], [1, 1], clear(1)).labels, [2]);
     }
 
     #[test]
     fn whoever_is_wholly_hidden_has_no_label_but_an_extent() {
         let far = layer(0, rect(1, 0, 2, 1), ONE as u16);
         let near = layer(1, rect(0, 0, 4, 1), ONE as u16);
-        let hidden = &FrameTruth::of(&[near, far], [4, 1]).seen[0];
+        let hidden = &FrameTruth::of(&[near, far], [4, 1], clear(4)).seen[0];
         assert_eq!((hidden.visible_box, hidden.visible_area), (None, 0));
         assert_eq!(
             (hidden.amodal_box, hidden.visibility),
             (Some([1, 0, 2, 1]), 0.0)
+        );
+    }
+
+    #[test]
+    fn a_wire_before_all_has_no_label_and_takes_of_what_can_be_seen() {
+        let bird = layer(0, rect(0, 0, 4, 1), ONE as u16);
+        let left = vec![ONE as u16, 0, ONE as u16 / 4, 3 * ONE as u16 / 4];
+        let truth = FrameTruth::of(&[bird], [4, 1], left);
+        assert_eq!(truth.labels, [1, 0, 0, 1]);
+        let seen = &truth.seen[0];
+        assert_eq!((seen.visible_area, seen.amodal_area), (2, 4));
+        assert_eq!(
+            (seen.visibility, seen.visible_box),
+            (0.5, Some(rect(0, 0, 4, 1)))
         );
     }
 
@@ -234,7 +252,7 @@ mod tests {
                 .zip(&layers)
                 .map(|(id, &(x, y, w, h, alpha))| layer(id, rect(x, y, w, h), alpha))
                 .collect();
-            let truth = FrameTruth::of(&drawn, [12, 12]);
+            let truth = FrameTruth::of(&drawn, [12, 12], clear(144));
             for at in 0..144u32 {
                 let (x, y) = (at % 12, at / 12);
                 let mut through = 1.0;

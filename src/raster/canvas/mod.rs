@@ -95,6 +95,18 @@ impl Canvas {
         }
     }
 
+    /// Draws a box of another canvas of the same size over what is there.
+    pub fn over_box(&mut self, above: &Canvas, rect: Rect) {
+        for row in self.rows(rect) {
+            let here = self.pixels[row.clone()].iter_mut();
+            for (below, above) in here.zip(&above.pixels[row]) {
+                if above[3] > 0 {
+                    *below = one_over(*above, *below);
+                }
+            }
+        }
+    }
+
     /// The box as straight-alpha RGBA, into a picture of the canvas's size; a pixel without alpha keeps
     /// the color that the picture has there.
     pub fn straight_into(&self, rect: Rect, rgba: &mut [u8]) {

@@ -1,4 +1,5 @@
-//! A library as a folder: library.json, poses.json, background.png, and mattes.zip, whose entries
+//! A library as a folder: library.json, poses.json, background.png, occluders.png where something is known to stand
+//! before the animal, and mattes.zip, whose entries
 //! 000000.png ... are the animal as filmed in straight-alpha RGBA, stored, so that any tool opens them. Where its
 //! centroid lies in each, library.json tells. A frame without the animal has no entry.
 //!
@@ -7,19 +8,18 @@
 //!
 //! The only file of ring 2 that touches the file system.
 
-use std::fs::{self, File};
-use std::io::{self, BufReader, BufWriter, Write};
-use std::os::unix::fs::FileExt;
+mod archive;
+
+use std::fs;
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
+use self::archive::Archive;
 use super::library_json::{self, FootageSummary, Summary};
-use super::picture_archive::{self, Entry};
 use super::{picture, poses_json};
 use crate::analysis::Params;
-use crate::library::{Library, Matte, Sprites};
+use crate::library::{Library, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
@@ -79,12 +79,14 @@ pub struct StoredLibrary {
 const LIBRARY: &str = "library.json";
 const POSES: &str = "poses.json";
 const BACKGROUND: &str = "background.png";
+const OCCLUDERS: &str = "occluders.png";
 const MATTES: &str = "mattes.zip";
 const SPRITES: &str = "sprites.zip";
 /// No picture of a library has a longer side.
 const MOST_SIDE_PX: u32 = 16384;
-/// The files that a library is read from; there may be others beside them. Of the archives one is enough.
-pub const FILES: [&str; 5] = [LIBRARY, POSES, BACKGROUND, MATTES, SPRITES];
+/// The files that a library is read from; there may be others beside them. Of the archives one is enough, and only
+/// some libraries have occluders.
+pub const FILES: [&str; 6] = [LIBRARY, POSES, BACKGROUND, OCCLUDERS, MATTES, SPRITES];
 
 /// Writes a library into a folder, which is made if need be.
 pub fn write(
@@ -102,18 +104,27 @@ pub fn write(
     write_mattes(dir, &library.sprites)?;
     // What an earlier analysis left there is not of this library.
     fs::remove_file(dir.join(SPRITES)).ok();
+    match &library.occluders {
+        Some(image) => {
+            let png = picture::write_rgba(image.width, image.height, &image.pixels);
+            put(OCCLUDERS, &png)?;
+        }
+        None => {
+            fs::remove_file(dir.join(OCCLUDERS)).ok();
+        }
+    }
     put(LIBRARY, &library_json::write(library, params, footage))
 }
 
 /// Writes the sprites into the folder, as an archive of pictures of one size.
 pub fn write_sprites(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
-    write_archive(dir, SPRITES, sprites, |idx| {
+    archive::write(dir, SPRITES, sprites, |idx| {
         picture::write_rgba(sprites.width(), sprites.height(), &sprites.sprite(idx))
     })
 }
 
 fn write_mattes(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
-    write_archive(dir, MATTES, sprites, |idx| {
+    archive::write(dir, MATTES, sprites, |idx| {
         let (matte, mut rgba) = (sprites.matte(idx).expect("present"), Vec::new());
         sprites.read_matte(&matte, &mut rgba);
         picture::write_rgba(matte.size[0], matte.size[1], &rgba)
@@ -137,6 +148,7 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "background.png and poses.json differ in size",
         ));
     }
+    let occluders = read_occluders(dir, poses.image_size_px)?;
     check(&summary, poses.frames.len())?;
     let archive = Archive::open(dir, &summary)?;
     let most_px = match archive.centers_px {
@@ -147,6 +159,7 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
     let library = Library {
         poses,
         background,
+        occluders,
         sprites: Sprites::of(
             summary.sprite_size_px,
             mattes,
@@ -166,6 +179,24 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
         params: summary.params,
         footage: summary.footage,
     })
+}
+
+/// What stands before the animal, if the folder tells of such a thing.
+fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<Option<RgbaImage>, Error> {
+    let file = OCCLUDERS;
+    let bytes = match fs::read(dir.join(file)) {
+        Ok(bytes) => bytes,
+        Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(cause) => return Err(Error::Io { file, cause }),
+    };
+    let image = picture::read_rgba(&bytes, size_px);
+    let image = image.map_err(|cause| Error::Picture { file, cause })?;
+    match [image.width, image.height] == size_px {
+        true => Ok(Some(image)),
+        false => Err(Error::Mismatch(
+            "occluders.png and poses.json differ in size",
+        )),
+    }
 }
 
 /// Whether what library.json says can be said of so many frames.
@@ -196,105 +227,6 @@ fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
     }
 }
 
-fn write_archive(
-    dir: &Path,
-    file: &'static str,
-    sprites: &Sprites,
-    encode: impl Fn(usize) -> Vec<u8> + Sync,
-) -> Result<(), Error> {
-    let io = |cause| Error::Io { file, cause };
-    let present = (0..sprites.n_frames()).filter(|&idx| sprites.is_present(idx));
-    let out = BufWriter::new(File::create(dir.join(file)).map_err(io)?);
-    let mut out =
-        picture_archive::write(out, present, encode).map_err(|cause| Error::Zip { file, cause })?;
-    out.flush().map_err(io)
-}
-
-/// An archive of mattes.
-struct Archive<'a> {
-    name: &'static str,
-    file: File,
-    /// The centroid in each; `None` when they are sprites, and it lies at the middle.
-    centers_px: Option<&'a [Option<[f64; 2]>]>,
-}
-
-impl Archive<'_> {
-    fn open<'a>(dir: &Path, summary: &'a Summary) -> Result<Archive<'a>, Error> {
-        let centers_px = &summary.matte_center_px;
-        if centers_px.is_empty() && summary.sprite_scale.is_some() {
-            return Err(Error::Mismatch(
-                "sprites of one height are no longer read: analyze the footage again",
-            ));
-        }
-        let name = if centers_px.is_empty() {
-            SPRITES
-        } else {
-            MATTES
-        };
-        let file = File::open(dir.join(name)).map_err(|cause| Error::Io { file: name, cause })?;
-        Ok(Archive {
-            name,
-            file,
-            centers_px: (!centers_px.is_empty()).then_some(centers_px),
-        })
-    }
-
-    /// Puts aside what the archive holds for every frame, none larger than `most_px`.
-    fn mattes(
-        &self,
-        n_frames: usize,
-        most_px: [u32; 2],
-        scratch: &dyn Scratch,
-    ) -> Result<Vec<Option<Matte>>, Error> {
-        if self.centers_px.is_some_and(|all| all.len() != n_frames) {
-            return Err(Error::Mismatch(
-                "library.json must tell the centroid of every frame's matte",
-            ));
-        }
-        let entries = self.entries(n_frames)?;
-        let matte = |(frame_idx, entry): (usize, &Option<Entry>)| {
-            let Some(entry) = entry else { return Ok(None) };
-            let image = self.picture(entry, most_px)?;
-            let size = [image.width, image.height];
-            let center_px = match self.centers_px {
-                Some(centers_px) => centers_px[frame_idx],
-                None => Some(size.map(|side| f64::from(side) / 2.0)),
-            };
-            let is_near = |center_px: &[f64; 2]| center_px.iter().all(|px| px.abs() < 1e5);
-            let center_px = center_px.filter(is_near).ok_or(Error::Mismatch(
-                "library.json does not tell the centroid of a matte",
-            ))?;
-            Ok(Some(Matte {
-                size,
-                center_px,
-                at: scratch.put(&image.pixels)?,
-            }))
-        };
-        entries.par_iter().enumerate().map(matte).collect()
-    }
-
-    fn entries(&self, n_frames: usize) -> Result<Vec<Option<Entry>>, Error> {
-        let file = self.name;
-        let metadata = self.file.metadata();
-        let n_bytes = metadata.map_err(|cause| Error::Io { file, cause })?.len();
-        picture_archive::entries(BufReader::new(&self.file), n_bytes, n_frames).map_err(|error| {
-            match error {
-                picture_archive::Error::Zip(cause) => Error::Zip { file, cause },
-                picture_archive::Error::Mismatch(what) => Error::Mismatch(what),
-            }
-        })
-    }
-
-    /// Reads a picture, no larger than `most_px`.
-    fn picture(&self, entry: &Entry, most_px: [u32; 2]) -> Result<RgbaImage, Error> {
-        let file = self.name;
-        let mut bytes = vec![0; entry.n_bytes];
-        let read = self.file.read_exact_at(&mut bytes, entry.at);
-        read.map_err(|cause| Error::Io { file, cause })?;
-        picture::read_rgba(&bytes, most_px).map_err(|cause| Error::Picture { file, cause })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -321,6 +253,7 @@ mod tests {
                 frames: vec![Pose::default(); 3],
             },
             background: RgbImage::new(16, 12),
+            occluders: Some(RgbaImage::new(16, 12)),
             sprites,
             clip_frames: 2,
             epsilon: 77,
@@ -385,9 +318,15 @@ mod tests {
             let read = of(r#""sprite_size_px":[8,8]"#, &size);
             assert!(matches!(read, Err(Error::Mismatch(_))));
         }
+        let small = picture::write_rgba(8, 8, &[0; 256]);
+        fs::write(dir.path().join(OCCLUDERS), small).expect("written");
+        let read = of(centers, centers);
+        assert!(matches!(read, Err(Error::Mismatch(_))));
+        fs::remove_file(dir.path().join(OCCLUDERS)).expect("it was there");
         fs::remove_file(dir.path().join(MATTES)).expect("it was there");
         write_sprites(dir.path(), &library.sprites).expect("written");
         let found = of(centers, r#""matte_center_px":[]"#).expect("a library of before");
+        assert_eq!(found.library.occluders, None);
         let sprites = &found.library.sprites;
         assert_eq!(sprites.sprite(1), library.sprites.sprite(1));
         let scaled = of(

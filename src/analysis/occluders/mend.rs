@@ -1,0 +1,113 @@
+//! Mattes without what stood before the animal: where it did, they are continued from the pixels around.
+
+use rayon::prelude::*;
+
+use super::ring::OUTER_PX;
+use crate::analysis::sighting::Sighting;
+use crate::analysis::tracking::Track;
+use crate::raster::RgbaImage;
+use crate::scratch::{Full, Scratch};
+
+/// An occluder that takes no more of a pixel is taken away from it; of what is left less would be noise.
+const MOST_TAKEN_AWAY: u8 = 128;
+
+/// Mends every matte of a track that shows something of the occluders, and measures it anew.
+pub(super) fn mend(track: &mut Track, occluders: &RgbaImage) -> Result<(), Full> {
+    let scratch = track.scratch.clone();
+    track.frames.par_iter_mut().try_for_each(|tracked| {
+        let Some(seen) = &tracked.sighting else {
+            return Ok(());
+        };
+        let occluder =
+            |x: usize, y: usize| occluders.pixel(seen.rect.x + x as u32, seen.rect.y + y as u32);
+        let mut image = RgbaImage::new(seen.rect.w, seen.rect.h);
+        scratch.get(seen.at, &mut image.pixels);
+        if fill(&mut image, occluder) {
+            tracked.sighting = remeasured(seen, &image, &*scratch)?;
+        }
+        Ok(())
+    })
+}
+
+fn remeasured(
+    seen: &Sighting,
+    image: &RgbaImage,
+    scratch: &dyn Scratch,
+) -> Result<Option<Sighting>, Full> {
+    let Some(mut mended) = Sighting::measured(seen.rect, image) else {
+        return Ok(None);
+    };
+    mended.at = scratch.put(&image.pixels)?;
+    mended.contrast = seen.contrast;
+    mended.box_px = seen.box_px;
+    mended.cut = seen.cut;
+    Ok(Some(mended))
+}
+
+/// Frees the pixels of a matte from what is before them; returns whether anything changed. Where that takes up to half of
+/// an opaque pixel, what is left is known; all others become the mean of those around.
+fn fill(image: &mut RgbaImage, occluder: impl Fn(usize, usize) -> [u8; 4]) -> bool {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let is_found = |x: usize, y: usize| occluder(x, y)[3] > 0;
+    let mut filled = Vec::new();
+    for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+        if is_found(x, y) {
+            let (old, before) = (image.pixel(x as u32, y as u32), occluder(x, y));
+            let new = match old[3] == 255 && before[3] <= MOST_TAKEN_AWAY {
+                true => without(old, before),
+                false => around(image, [x, y], &is_found),
+            };
+            filled.push((y * width + x, new));
+        }
+    }
+    let mut has_changed = false;
+    for (k, pixel) in filled {
+        let old = &mut image.pixels[4 * k..4 * k + 4];
+        has_changed |= old != pixel;
+        old.copy_from_slice(&pixel);
+    }
+    has_changed
+}
+
+/// A = (I - w F) / (1 - w).
+fn without(seen: [u8; 4], before: [u8; 4]) -> [u8; 4] {
+    let share = f64::from(before[3]) / 255.0;
+    let own = |c: usize| {
+        let left = f64::from(seen[c]) - share * f64::from(before[c]);
+        (left / (1.0 - share)).round() as u8
+    };
+    [own(0), own(1), own(2), 255]
+}
+
+/// The mean around a pixel, weighed by 1 / distance^4, so that an edge of the animal stays one.
+fn around(
+    image: &RgbaImage,
+    [x, y]: [usize; 2],
+    is_found: &impl Fn(usize, usize) -> bool,
+) -> [u8; 4] {
+    let rows = y.saturating_sub(OUTER_PX)..(y + OUTER_PX + 1).min(image.height as usize);
+    let (mut color, mut alpha, mut total) = ([0.0; 3], 0.0, 0.0);
+    for v in rows {
+        for u in x.saturating_sub(OUTER_PX)..(x + OUTER_PX + 1).min(image.width as usize) {
+            if is_found(u, v) {
+                continue;
+            }
+            let (dx, dy) = (u.abs_diff(x) as f64, v.abs_diff(y) as f64);
+            let weight = (dx * dx + dy * dy).powi(-2);
+            let [r, g, b, a] = image.pixel(u as u32, v as u32).map(f64::from);
+            for (sum, value) in color.iter_mut().zip([r, g, b]) {
+                *sum += weight * a * value;
+            }
+            alpha += weight * a;
+            total += weight;
+        }
+    }
+    if alpha <= 0.0 {
+        return [0; 4];
+    }
+    let [r, g, b] = color.map(|sum| (sum / alpha).round() as u8);
+    match (alpha / total).round() as u8 {
+        0 => [0; 4],
+        a => [r, g, b, a],
+    }
+}

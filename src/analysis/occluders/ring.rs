@@ -1,0 +1,76 @@
+//! Sums over the ring of pixels around a pixel, at the same cost for any ring.
+
+use crate::geometry::Rect;
+
+/// A ring is the pixels at most so many rows and columns away ...
+pub(super) const OUTER_PX: usize = 4;
+/// ... but farther than this: what is seen at the pixel itself is blurred over its neighbors.
+const INNER_PX: usize = 1;
+
+/// A plane of numbers, any box of it summed by four of them (Crow 1984).
+pub(super) struct SummedArea {
+    width: usize,
+    height: usize,
+    /// One row and one column more than the plane has. Sums may wrap around; those of a ring are small again.
+    sums: Vec<i32>,
+}
+
+impl SummedArea {
+    /// Of a plane of the size of `rect` whose value at index k is `value(k)`.
+    pub(super) fn of(rect: Rect, value: impl Fn(usize) -> i32) -> SummedArea {
+        let (width, height) = (rect.w as usize, rect.h as usize);
+        let mut sums = vec![0i32; (width + 1) * (height + 1)];
+        for y in 0..height {
+            let mut row = 0i32;
+            for x in 0..width {
+                row = row.wrapping_add(value(y * width + x));
+                let above = sums[y * (width + 1) + x + 1];
+                sums[(y + 1) * (width + 1) + x + 1] = above.wrapping_add(row);
+            }
+        }
+        SummedArea {
+            width,
+            height,
+            sums,
+        }
+    }
+
+    /// The sum over the ring around a pixel; there is nothing beyond the plane.
+    pub(super) fn ring(&self, x: usize, y: usize) -> i32 {
+        self.around(x, y, OUTER_PX)
+            .wrapping_sub(self.around(x, y, INNER_PX))
+    }
+
+    fn around(&self, x: usize, y: usize, reach: usize) -> i32 {
+        let (left, top) = (x.saturating_sub(reach), y.saturating_sub(reach));
+        let right = (x + reach + 1).min(self.width);
+        let bottom = (y + reach + 1).min(self.height);
+        let sum = |x: usize, y: usize| self.sums[y * (self.width + 1) + x];
+        sum(right, bottom)
+            .wrapping_sub(sum(left, bottom))
+            .wrapping_sub(sum(right, top))
+            .wrapping_add(sum(left, top))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ring_is_what_is_near_but_not_beside() {
+        let rect = Rect::of_size(13, 11);
+        let value = |k: usize| (k as i32 * 7919) % 511 - 255;
+        let plane = SummedArea::of(rect, value);
+        for (x, y) in [(0, 0), (6, 5), (12, 10), (2, 9)] {
+            let mut wanted = 0;
+            for (u, v) in (0..11usize).flat_map(|v| (0..13usize).map(move |u| (u, v))) {
+                let away = u.abs_diff(x).max(v.abs_diff(y));
+                if (2..=4).contains(&away) {
+                    wanted += value(v * 13 + u);
+                }
+            }
+            assert_eq!(plane.ring(x, y), wanted, "{x}, {y}");
+        }
+    }
+}
