@@ -108,7 +108,8 @@ pub(super) async fn delete_library(
 
 /// A file of a library: library.json, poses.json, poses.csv, background.png, occluders.png, distance.png,
 /// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip, mattes.zip; and
-/// distance.npy, which is computed anew each time and comes whole.
+/// distance.npy, which is computed anew each time and comes whole. occluders.png is there where something is known to stand
+/// before the animal (`occluders` in library.json).
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),

@@ -32,6 +32,8 @@ pub struct Summary {
     pub sprite_scale: Option<Vec<f64>>,
     /// The centroid in every frame's matte; empty in files of before, whose mattes are sprites.
     pub matte_center_px: Vec<Option<[f64; 2]>>,
+    /// Whether something is known to stand before the animal: occluders.png.
+    pub occluders: bool,
     /// f.
     pub clip_frames: usize,
     /// Clips nearer than this are alike.
@@ -60,6 +62,7 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
         matte_center_px: (0..library.sprites.n_frames())
             .map(|idx| library.sprites.matte(idx).map(|matte| matte.center_px))
             .collect(),
+        occluders: library.occluders.is_some(),
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
         natural_step: library.natural_step,
@@ -86,6 +89,7 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
         sprite_size_px: file.sprite_size_px,
         sprite_scale: file.sprite_scale,
         matte_center_px: file.matte_center_px,
+        occluders: file.occluders,
         clip_frames: file.clip_frames,
         epsilon: file.epsilon,
         natural_step: file.natural_step,
@@ -120,6 +124,9 @@ struct LibraryFile {
     /// Absent in files of before.
     #[serde(default)]
     matte_center_px: Vec<Option<[f64; 2]>>,
+    /// Absent in files of before.
+    #[serde(default)]
+    occluders: bool,
     clip_frames: usize,
     epsilon: u64,
     natural_step: u64,

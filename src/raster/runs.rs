@@ -47,16 +47,6 @@ impl Component {
         mask
     }
 
-    /// Whether it has a pixel of another component.
-    pub fn touches(&self, other: &Component) -> bool {
-        let share = |a: &Run, b: &Run| a.y == b.y && a.x0 < b.x1 && b.x0 < a.x1;
-        !self.rect.intersection(&other.rect).is_empty()
-            && self
-                .runs
-                .iter()
-                .any(|a| other.runs.iter().any(|b| share(a, b)))
-    }
-
     /// The mean of its pixels' centers, from sums along the runs (exact in integers).
     ///
     /// ```

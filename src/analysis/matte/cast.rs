@@ -49,10 +49,28 @@ impl Ground<'_> {
         smooth((relative - DARKER[0]) / (DARKER[1] - DARKER[0]))
     }
 
+    /// Clears what is faint where a mask lies on darker things and is mostly of another color than the coat there: an image
+    /// may be as dark as the animal in its midst, but fades toward its edges.
+    pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) {
+        let (rect, width) = (solid.rect, solid.width());
+        let mut on_dark = mask.clone();
+        for (k, bit) in on_dark.bits.iter_mut().enumerate() {
+            let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
+            *bit &= u8::from(self.share_at(x, y) < 0.5);
+        }
+        for region in components(&on_dark) {
+            let pixels = numbers(&region, rect);
+            let n_own = pixels.iter().filter(|&&k| coat.matches(k)).count();
+            if 2 * n_own < pixels.len() {
+                let faint = pixels.into_iter().filter(|&k| coat.is_faint(k));
+                faint.for_each(|k| solid.bits[k] = 0);
+            }
+        }
+    }
+
     /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is
-    /// hidden: it is small, only dark things lie between, and all that differs there (`mask`) is mostly of the coat's
-    /// color. An image may have it in its midst, but fades toward its edges.
-    pub(super) fn clear_images(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) {
+    /// hidden: it is small, mostly of the coat's color, and only dark things lie between.
+    pub(super) fn clear_images(&self, solid: &mut Mask, coat: &Coat) {
         let (rect, width) = (solid.rect, solid.width());
         let share =
             |k: usize| self.share_at(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
@@ -62,11 +80,6 @@ impl Ground<'_> {
         let Some(body) = pieces.first().filter(|_| is_apart) else {
             return;
         };
-        let mut dark = mask.clone();
-        for (k, bit) in dark.bits.iter_mut().enumerate() {
-            *bit &= u8::from(share(k) < 0.5);
-        }
-        let dark = components(&dark);
         let mut passable = solid.clone();
         for (k, bit) in passable.bits.iter_mut().enumerate() {
             *bit |= u8::from(share(k) < 0.5);
@@ -76,18 +89,11 @@ impl Ground<'_> {
         for piece in &pieces[1..] {
             let pixels = numbers(piece, rect);
             let on_ground: f32 = pixels.iter().map(|&k| share(k)).sum();
-            let around = dark
-                .iter()
-                .find(|part| part.touches(piece))
-                .unwrap_or(piece);
-            let own = numbers(around, rect)
-                .into_iter()
-                .filter(|&k| coat.matches(k));
-            let is_own = 2 * own.count() as u64 >= around.area;
+            let n_own = pixels.iter().filter(|&&k| coat.matches(k)).count() as u64;
             let is_reached = reached
                 .as_ref()
                 .is_some_and(|part| part.bits[pixels[0]] == 1);
-            let is_limb = LIMB * piece.area < body.area && is_reached && is_own;
+            let is_limb = LIMB * piece.area < body.area && is_reached && 2 * n_own >= piece.area;
             if 2.0 * on_ground < piece.area as f32 && !is_limb {
                 pixels.iter().for_each(|&k| solid.bits[k] = 0);
             }

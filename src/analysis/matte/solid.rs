@@ -58,7 +58,7 @@ impl Coat<'_> {
     }
 
     /// Whether a pixel differs by little of what the starkest ones do.
-    fn is_faint(&self, k: usize) -> bool {
+    pub(super) fn is_faint(&self, k: usize) -> bool {
         self.level(k) < FAINT * self.starkest || self.share(k) < FAINT * self.starkest_share
     }
 

@@ -11,8 +11,8 @@ use crate::raster::{Mask, RgbImage, RgbaImage};
 
 /// The animal must be known at so many pixels of a ring of 72.
 const LEAST_RING: i64 = 24;
-/// Frames that are looked at at once.
-const BATCH: usize = 16;
+/// Pixels of mattes that are looked at at once, but for one frame.
+const BATCH_PX: u64 = 1 << 20;
 /// Means over rings are kept in parts of a level.
 const PARTS: i64 = 16;
 
@@ -72,7 +72,7 @@ impl Evidence {
         let left = self.here as f64 - 2.0 * through * self.both as f64
             + through * through * self.around as f64;
         let unlike = self.unlike as f64;
-        // Seen through the animal, a line behind it takes just this share.
+        // A line behind the animal, seen through it, takes at most this share: just so much were the animal opaque.
         let feigned = (self.toward as f64 / self.around.max(1) as f64).max(0.0);
         let is_in_plate = self.alike > 0 && self.toward < 0;
         let gain = (unlike - left) / (3 * PARTS * PARTS) as f64;
@@ -101,7 +101,9 @@ impl Question<'_> {
     ) -> Result<Vec<(usize, Evidence)>, Error> {
         let mut sums: Vec<(usize, Evidence)> = Vec::new();
         let mut slots = vec![u32::MAX; self.found.bits.len()];
-        for batch in sightings.chunks(BATCH) {
+        let area = sightings.iter().map(|seen| seen.rect.area()).max();
+        let batch = (BATCH_PX / area.unwrap_or(1).max(1)).clamp(1, 64);
+        for batch in sightings.chunks(batch as usize) {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }

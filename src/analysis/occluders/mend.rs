@@ -3,8 +3,10 @@
 use rayon::prelude::*;
 
 use super::ring::OUTER_PX;
+use crate::analysis::Error;
 use crate::analysis::sighting::Sighting;
 use crate::analysis::tracking::Track;
+use crate::progress::Progress;
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
@@ -12,12 +14,19 @@ use crate::scratch::{Full, Scratch};
 const MOST_TAKEN_AWAY: u8 = 128;
 
 /// Mends every matte of a track that shows something of the occluders, and measures it anew.
-pub(super) fn mend(track: &mut Track, occluders: &RgbaImage) -> Result<(), Full> {
+pub(super) fn mend(
+    track: &mut Track,
+    occluders: &RgbaImage,
+    progress: &dyn Progress,
+) -> Result<(), Error> {
     let scratch = track.scratch.clone();
     track.frames.par_iter_mut().try_for_each(|tracked| {
         let Some(seen) = &tracked.sighting else {
             return Ok(());
         };
+        if progress.cancelled() {
+            return Err(Error::Cancelled);
+        }
         let occluder =
             |x: usize, y: usize| occluders.pixel(seen.rect.x + x as u32, seen.rect.y + y as u32);
         let mut image = RgbaImage::new(seen.rect.w, seen.rect.h);
@@ -93,7 +102,8 @@ fn around(
                 continue;
             }
             let (dx, dy) = (u.abs_diff(x) as f64, v.abs_diff(y) as f64);
-            let weight = (dx * dx + dy * dy).powi(-2);
+            let squared = dx * dx + dy * dy;
+            let weight = 1.0 / (squared * squared);
             let [r, g, b, a] = image.pixel(u as u32, v as u32).map(f64::from);
             for (sum, value) in color.iter_mut().zip([r, g, b]) {
                 *sum += weight * a * value;

@@ -16,6 +16,8 @@ mod evidence;
 mod mend;
 mod ring;
 
+use std::collections::HashMap;
+
 use self::evidence::{Evidence, Proof, Question};
 use self::ring::SummedArea;
 use super::Error;
@@ -51,6 +53,8 @@ const ENOUGH: Proof = Proof {
 const LEAST_AREA_PX: u64 = 3;
 /// Between two frames that are looked at the animal has moved by so many pixels: what rests shows the same again.
 const APART_PX: f64 = 3.0;
+/// And at a place of that size it is looked at so often at most: who rocks to and fro shows two pictures, not many.
+const MOST_AT_PLACE: u32 = 3;
 /// More frames than these tell nothing new.
 const MOST_FRAMES: usize = 1024;
 
@@ -70,34 +74,44 @@ pub fn take_out(
     if stark.area() == 0 {
         return Ok(None);
     }
-    let (mut found, mut evidence) = (Mask::new(within), Vec::new());
-    // What was found is left out of rings in the second round, which sees the animal more truly.
-    for _ in 0..2 {
+    let judge = |found: &Mask| {
         let question = Question {
             plate: &plate.rgb,
-            found: &found,
+            found,
         };
-        evidence = question.answer(track, &sightings, progress)?;
-        found = judged(&evidence, &stark);
+        let evidence = question.answer(track, &sightings, progress)?;
+        Ok::<_, Error>((judged(&evidence, &stark), evidence))
+    };
+    let (found, _) = judge(&Mask::new(within))?;
+    if found.area() == 0 {
+        return Ok(None);
     }
+    // What was found is left out of rings now, so that they show the animal more truly.
+    let (found, evidence) = judge(&found)?;
     if found.area() == 0 {
         return Ok(None);
     }
     let occluders = picture(&plate.rgb, &found, &evidence);
-    mend::mend(track, &occluders)?;
+    mend::mend(track, &occluders, progress)?;
     Ok(Some(occluders))
 }
 
-/// Sightings between which the animal moved.
+/// Sightings between which the animal moved, few of them at one place.
 fn spaced(track: &Track) -> Vec<Sighting> {
-    let mut spaced: Vec<Sighting> = Vec::new();
+    let (mut spaced, mut last) = (Vec::new(), None);
+    let mut n_at: HashMap<[i64; 2], u32> = HashMap::new();
     for seen in track.frames.iter().filter_map(|t| t.sighting.as_ref()) {
         let [x, y] = seen.moments.centroid_px;
-        let is_apart = |last: &Sighting| {
-            let [u, v] = last.moments.centroid_px;
-            libm::hypot(x - u, y - v) >= APART_PX
-        };
-        if spaced.last().is_none_or(is_apart) {
+        let is_apart = |[u, v]: [f64; 2]| libm::hypot(x - u, y - v) >= APART_PX;
+        if !last.is_none_or(is_apart) {
+            continue;
+        }
+        let n_here = n_at
+            .entry([x, y].map(|px| (px / APART_PX).floor() as i64))
+            .or_default();
+        *n_here += 1;
+        if *n_here <= MOST_AT_PLACE {
+            last = Some([x, y]);
             spaced.push(seen.clone());
         }
     }
@@ -180,11 +194,14 @@ fn picture(plate: &RgbImage, found: &Mask, evidence: &[(usize, Evidence)]) -> Rg
     let mut picture = RgbaImage::new(plate.width, plate.height);
     for (k, evidence) in evidence.iter().filter(|(k, _)| found.bits[*k] == 1) {
         let (x, y) = (k % within.w as usize, k / within.w as usize);
-        let n = f64::from(n.ring(x, y).max(1));
-        let (share, shown) = (evidence.share(), color_at(plate, within, *k));
+        let n = n.ring(x, y);
+        let (share, shown) = (evidence.share(), color_at(plate, within, *k).map(f64::from));
         let own = |c: usize| {
-            let scene = f64::from(sums[c].ring(x, y)) / n;
-            ((f64::from(shown[c]) - (1.0 - share) * scene) / share).round() as u8
+            let scene = match n {
+                0 => shown[c],
+                n => f64::from(sums[c].ring(x, y)) / f64::from(n),
+            };
+            ((shown[c] - (1.0 - share) * scene) / share).round() as u8
         };
         let rgba = [own(0), own(1), own(2), (255.0 * share).round() as u8];
         picture.set_pixel(within.x + x as u32, within.y + y as u32, rgba);

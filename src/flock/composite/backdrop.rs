@@ -1,7 +1,7 @@
 //! What lies behind a flock: the plate at the film's size, one color, nothing, or a given picture
 //! (ALGORITHMS.md 8); in the form of the film already, so that a frame begins with a copy.
 
-use super::front::{self, Front};
+use super::front::Front;
 use super::params::Background;
 use super::view::View;
 use super::{Form, Shot};
@@ -40,12 +40,14 @@ impl Backdrop {
             Background::Plate => {
                 canvas.pixels.fill(opaque([0; 3]));
                 let rect = view.rect();
-                let scene = occluders.map(|occluders| front::scene(plate, occluders));
-                let scene = resized(scene.as_ref().unwrap_or(plate), rect.w, rect.h);
-                canvas.put(&Canvas::of_rgb(&scene), rect);
+                let plate = Canvas::of_rgb(&resized(plate, rect.w, rect.h));
+                canvas.put(&plate, rect);
             }
         }
-        let front = occluders.map(|occluders| Front::of(occluders, view));
+        let mut front = occluders.map(|occluders| Front::of(occluders, view));
+        if let Some(front) = &mut front {
+            front.take_off(&mut canvas);
+        }
         let mut backdrop = Backdrop::ready(canvas, front, form);
         if background == Background::Transparent {
             backdrop.is_clear = true;

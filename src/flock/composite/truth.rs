@@ -1,7 +1,8 @@
 //! What of whom can be seen in a frame, told by the compositor from the very alpha it drew with:
-//! visible_i = alpha_i times the product of (1 - alpha_k) over all k nearer (ALGORITHMS.md 8).
+//! visible_i = alpha_i times the product of (1 - alpha_k) over all k nearer (ALGORITHMS.md 8), and what stands
+//! before them all.
 //!
-//! Everything is counted in 16384ths, so that what all individuals and the background show of a pixel
+//! Everything is counted in 16384ths, so that what that, all individuals and the background show of a pixel
 //! adds up to exactly one.
 
 use crate::geometry::Rect;

@@ -42,8 +42,10 @@ pub const README: &str = "\
 The ground truth of a flock made by flockreel, told by the compositor itself.
 
 masks/NNNNNN.png  labels, 16-bit gray: id + 1 of the individual that makes up at least half of the pixel, counting what
-                  covers it; 0 where nobody does: the background, and where soft edges of several meet. Frames from
-                  000000.
+                  covers it; 0 where nobody does: the background, where soft edges of several meet, and where
+                  something known to stand before them (wires of a cage: the library's occluders.png) is in the film.
+                  A film without background has no such thing; of two films this is of the opaque one. Frames
+                  from 000000.
 coco.json         COCO instances. One annotation for each individual and frame in which it has a label:
                   segmentation (compressed run lengths, as pycocotools decodes them), bbox and area are of what is
                   visible; amodal_segmentation is of the whole animal within the picture, amodal_bbox and

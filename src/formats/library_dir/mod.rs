@@ -6,7 +6,7 @@
 //! Sprites, all of one size with the centroid at the middle, are made of the mattes; an archive of them is for
 //! export. Libraries of before have such an archive in place of the mattes, and are still read.
 //!
-//! The only file of ring 2 that touches the file system.
+//! The only module of ring 2 that touches the file system.
 
 mod archive;
 
@@ -148,7 +148,9 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             "background.png and poses.json differ in size",
         ));
     }
-    let occluders = read_occluders(dir, poses.image_size_px)?;
+    let occluders = (summary.occluders)
+        .then(|| read_occluders(dir, poses.image_size_px))
+        .transpose()?;
     check(&summary, poses.frames.len())?;
     let archive = Archive::open(dir, &summary)?;
     let most_px = match archive.centers_px {
@@ -181,18 +183,14 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
     })
 }
 
-/// What stands before the animal, if the folder tells of such a thing.
-fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<Option<RgbaImage>, Error> {
+/// What stands before the animal.
+fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<RgbaImage, Error> {
     let file = OCCLUDERS;
-    let bytes = match fs::read(dir.join(file)) {
-        Ok(bytes) => bytes,
-        Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(cause) => return Err(Error::Io { file, cause }),
-    };
+    let bytes = fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause })?;
     let image = picture::read_rgba(&bytes, size_px);
     let image = image.map_err(|cause| Error::Picture { file, cause })?;
     match [image.width, image.height] == size_px {
-        true => Ok(Some(image)),
+        true => Ok(image),
         false => Err(Error::Mismatch(
             "occluders.png and poses.json differ in size",
         )),
@@ -253,7 +251,7 @@ mod tests {
                 frames: vec![Pose::default(); 3],
             },
             background: RgbImage::new(16, 12),
-            occluders: Some(RgbaImage::new(16, 12)),
+            occluders: Some(wire()),
             sprites,
             clip_frames: 2,
             epsilon: 77,
@@ -279,6 +277,13 @@ mod tests {
         }
     }
 
+    fn wire() -> RgbaImage {
+        let mut wire = RgbaImage::new(16, 12);
+        wire.set_pixel(3, 2, [10, 20, 30, 40]);
+        wire.set_pixel(4, 2, [50, 60, 70, 255]);
+        wire
+    }
+
     fn footage() -> FootageSummary {
         FootageSummary {
             sha256: "ab".into(),
@@ -294,7 +299,18 @@ mod tests {
         write(dir.path(), &library, &Params::default(), &footage).expect("written");
         let back = read(dir.path(), Arc::new(InMemory::default())).expect("read");
         assert_eq!(back.library, library);
-        assert_eq!((back.params, back.footage), (Params::default(), footage));
+        assert_eq!(
+            (back.params, back.footage),
+            (Params::default(), footage.clone())
+        );
+        // What was analyzed into the same folder before is not of a library that has nothing before the animal.
+        let open = Library {
+            occluders: None,
+            ..library
+        };
+        write(dir.path(), &open, &Params::default(), &footage).expect("written");
+        let back = read(dir.path(), Arc::new(InMemory::default())).expect("read");
+        assert!(back.library == open && !dir.path().join(OCCLUDERS).exists());
     }
 
     #[test]
@@ -323,14 +339,16 @@ mod tests {
         let read = of(centers, centers);
         assert!(matches!(read, Err(Error::Mismatch(_))));
         fs::remove_file(dir.path().join(OCCLUDERS)).expect("it was there");
+        assert!(matches!(of(centers, centers), Err(Error::Io { .. })));
         fs::remove_file(dir.path().join(MATTES)).expect("it was there");
         write_sprites(dir.path(), &library.sprites).expect("written");
-        let found = of(centers, r#""matte_center_px":[]"#).expect("a library of before");
+        let before = format!(r#"{centers},"occluders":true"#);
+        let found = of(&before, r#""matte_center_px":[]"#).expect("a library of before");
         assert_eq!(found.library.occluders, None);
         let sprites = &found.library.sprites;
         assert_eq!(sprites.sprite(1), library.sprites.sprite(1));
         let scaled = of(
-            r#""sprite_scale":null,"matte_center_px":[null,[4.0,4.0],null]"#,
+            &format!(r#""sprite_scale":null,{before}"#),
             r#""sprite_scale":[1.0,1.0,1.0]"#,
         );
         assert!(matches!(scaled, Err(Error::Mismatch(_))));

@@ -78,15 +78,21 @@ impl Film<'_> {
         let (planar, straight): (Vec<&Target>, Vec<&Target>) = moving
             .into_iter()
             .partition(|target| target.output.is_planar());
-        let n_passes =
-            usize::from(!planar.is_empty() || truth.is_some()) + usize::from(!straight.is_empty());
+        // Truth is that of the film it lies beside: what stands before the animals is in an opaque one alone.
+        let has_planar = !planar.is_empty() || (straight.is_empty() && truth.is_some());
+        let of_straight = truth.filter(|_| !has_planar);
+        let n_passes = usize::from(has_planar) + usize::from(!straight.is_empty());
         let compositor = Compositor::new(self.library, self.flock);
-        if !planar.is_empty() || truth.is_some() {
+        if has_planar {
             self.pass(compositor, (&planar, truth), (0, n_passes))?;
         }
         if !straight.is_empty() {
             let compositor = Compositor::new(self.library, self.flock).straight();
-            self.pass(compositor, (&straight, None), (n_passes - 1, n_passes))?;
+            self.pass(
+                compositor,
+                (&straight, of_straight),
+                (n_passes - 1, n_passes),
+            )?;
         }
         posters
             .into_iter()
