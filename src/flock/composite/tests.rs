@@ -101,8 +101,12 @@ fn behind_a_wire(row: u32) -> Library {
     for x in 0..width {
         for (y, alpha) in [(row - 1, 128), (row, 255), (row + 1, 128)] {
             wire.set_pixel(x, y, [200, 30, 30, alpha]);
+            let behind = library.background.pixel(x, y);
+            let share = f64::from(alpha) / 255.0;
+            let mixed = |own, behind| share * f64::from(own) + (1.0 - share) * f64::from(behind);
+            let shown = [0, 1, 2].map(|c| mixed([200, 30, 30][c], behind[c]) as u8);
+            library.background.set_pixel(x, y, shown);
         }
-        library.background.set_pixel(x, row, [200, 30, 30]);
     }
     library.occluders = Some(wire);
     library
