@@ -116,7 +116,8 @@ fn behind_a_wire(row: u32) -> Library {
 fn a_wire_is_before_everybody_on_the_plate_and_before_nobody_elsewhere() {
     const ROW: usize = 120;
     let library = behind_a_wire(ROW as u32);
-    let mut flock = flock(&library, "swarm");
+    // For whom the floor goes on behind the wire.
+    let mut flock = flock(&synthetic::library(View::Top), "swarm");
     let width = library.background.width as usize;
     let row = ROW * width..(ROW + 1) * width;
     let passes = |truth: &FrameTruth| {
