@@ -17,6 +17,9 @@ const BLACK: f32 = 48.0;
 /// It may stand half on dark things: its ground is the lighter quarter of what is behind it.
 const LIGHTER: f64 = 0.75;
 
+/// What so many erosions wear away is thin.
+const THIN_PX: u32 = 3;
+
 /// A limb is smaller than the body by more than this factor.
 const LIMB: u64 = 8;
 
@@ -50,7 +53,8 @@ impl Ground<'_> {
     }
 
     /// Clears what is faint where a mask lies on darker things and is mostly of another color than the coat there: an image
-    /// may be as dark as the animal in its midst, but fades toward its edges.
+    /// may be as dark as the animal in its midst, but fades toward its edges. Lines of the scene, such as wires, are too thin
+    /// to show one.
     pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) {
         let (rect, width) = (solid.rect, solid.width());
         let mut on_dark = mask.clone();
@@ -58,8 +62,12 @@ impl Ground<'_> {
             let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
             *bit &= u8::from(self.share_at(x, y) < 0.5);
         }
+        let broad = (0..THIN_PX).fold(on_dark.clone(), |mask, _| mask.eroded());
         for region in components(&on_dark) {
             let pixels = numbers(&region, rect);
+            if pixels.iter().all(|&k| broad.bits[k] == 0) {
+                continue;
+            }
             let n_own = pixels.iter().filter(|&&k| coat.matches(k)).count();
             if 2 * n_own < pixels.len() {
                 let faint = pixels.into_iter().filter(|&k| coat.is_faint(k));
