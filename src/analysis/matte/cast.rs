@@ -54,8 +54,8 @@ impl Ground<'_> {
 
     /// Clears what is faint where a mask lies on darker things and is mostly of another color than the coat there: an image
     /// may be as dark as the animal in its midst, but fades toward its edges. Lines of the scene, such as wires, are too thin
-    /// to show one.
-    pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) {
+    /// to show one. Returns where images are.
+    pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) -> Mask {
         let (rect, width) = (solid.rect, solid.width());
         let mut on_dark = mask.clone();
         for (k, bit) in on_dark.bits.iter_mut().enumerate() {
@@ -63,6 +63,7 @@ impl Ground<'_> {
             *bit &= u8::from(self.share_at(x, y) < 0.5);
         }
         let broad = (0..THIN_PX).fold(on_dark.clone(), |mask, _| mask.eroded());
+        let mut images = Mask::new(rect);
         for region in components(&on_dark) {
             let pixels = numbers(&region, rect);
             if pixels.iter().all(|&k| broad.bits[k] == 0) {
@@ -72,13 +73,15 @@ impl Ground<'_> {
             if 2 * n_own < pixels.len() {
                 let faint = pixels.into_iter().filter(|&k| coat.is_faint(k));
                 faint.for_each(|k| solid.bits[k] = 0);
+                images.add(&region.mask(region.rect));
             }
         }
+        images
     }
 
     /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is
-    /// hidden: it is small, mostly of the coat's color, and only dark things lie between.
-    pub(super) fn clear_images(&self, solid: &mut Mask, coat: &Coat) {
+    /// hidden: it is small, mostly of the coat's color, only dark things lie between, and it is no part of `images`.
+    pub(super) fn clear_images(&self, solid: &mut Mask, images: &Mask, coat: &Coat) {
         let (rect, width) = (solid.rect, solid.width());
         let share =
             |k: usize| self.share_at(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
@@ -101,7 +104,9 @@ impl Ground<'_> {
             let is_reached = reached
                 .as_ref()
                 .is_some_and(|part| part.bits[pixels[0]] == 1);
-            let is_limb = LIMB * piece.area < body.area && is_reached && 2 * n_own >= piece.area;
+            let is_image = pixels.iter().any(|&k| images.bits[k] == 1);
+            let is_limb =
+                !is_image && LIMB * piece.area < body.area && is_reached && 2 * n_own >= piece.area;
             if 2.0 * on_ground < piece.area as f32 && !is_limb {
                 pixels.iter().for_each(|&k| solid.bits[k] = 0);
             }

@@ -41,8 +41,8 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
     let coat = Coat::of(&mask, &difference, plate);
     let mut solid = coat.without_halo(&mask, band_px);
     let ground = Ground::of(&solid, plate);
-    ground.clear_faded(&mut solid, &mask, &coat);
-    ground.clear_images(&mut solid, &coat);
+    let images = ground.clear_faded(&mut solid, &mask, &coat);
+    ground.clear_images(&mut solid, &images, &coat);
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
     let puller = Puller {
