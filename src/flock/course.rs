@@ -93,14 +93,14 @@ pub(super) fn simulate_loop(
     Ok(course)
 }
 
-/// To be called before each of so many frames.
+/// To be called before each of so many frames, or some more.
 fn steps(n_frames: usize, progress: &dyn Progress) -> impl FnMut() -> Result<(), Error> {
     let mut gone = 0;
     move || {
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
-        progress.report("simulating", gone as f64 / n_frames as f64);
+        progress.report("simulating", f64::min(1.0, gone as f64 / n_frames as f64));
         gone += 1;
         Ok(())
     }

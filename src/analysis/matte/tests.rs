@@ -304,6 +304,31 @@ fn what_is_as_dark_as_the_animal_and_too_large_for_a_limb_is_an_image() {
     }
 }
 
+/// The body that ends at the wall, and in the wall its small image, in its midst as dark as itself, that fades over ten pixels.
+fn with_a_small_image(x: u32, y: u32) -> u8 {
+    let midst = Rect {
+        x: 75,
+        y: 31,
+        w: 3,
+        h: 3,
+    };
+    let faded = away([x, y], midst).min(10) as u8;
+    match away([x.saturating_sub(10), y], BODY) {
+        0 => FUR,
+        _ if wall(x, y) == WALL => FUR + (WALL - FUR) / 10 * faded,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn an_image_that_fades_is_no_limb_however_dark_its_midst() {
+    let drawn = drawn_on(wall, with_a_small_image);
+    assert_eq!(drawn.pixel(50, 33)[3], 255, "the body");
+    for (x, y) in (31..34).flat_map(|y| (75..78).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
+
 /// A floor that is brighter on the right.
 fn lit_from_the_right(x: u32, _: u32) -> u8 {
     if x < 65 { 150 } else { 240 }

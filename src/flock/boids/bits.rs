@@ -64,7 +64,7 @@ const SLOPES: Slopes = Slopes {
     limits: [0.5, 0.6],
     usual: 0.05,
     spread: 0.2,
-    in_picture: 1e9,
+    in_picture: [1e9; 2],
 };
 
 /// A school among goals and obstacles, before a predator, half of it drawn to where it meets.

@@ -29,16 +29,17 @@ pub struct Slopes {
     pub usual: f64,
     /// Standard deviation, from the middle two thirds.
     pub spread: f64,
-    /// Greatest slope in the picture, up or down. Who swims nearly along the line of sight is seen to head steeply
-    /// when it rises a little, or keeps its height far above the camera or below.
-    pub in_picture: f64,
+    /// Greatest slope in the picture, upward and downward: an animal may be seen to rise often and hardly ever to sink.
+    /// Who swims nearly along the line of sight is seen to head steeply when it rises a little, or keeps its height far
+    /// above the camera or below.
+    pub in_picture: [f64; 2],
 }
 
-/// Share of the frames that the steepest directions, and the fastest turns, may leave out.
-const STEEPEST: f64 = 0.98;
-/// Share of the frames that are steeper in the picture than a boid may be seen: few frames, for which no plan finds
-/// one that follows.
-const STEEPER_IN_PICTURE: f64 = 0.2;
+/// Share of the frames that may rise more steeply than a boid, and of those that may sink so.
+const STEEPER: f64 = 0.02;
+/// Share of the frames that rise more steeply in the picture than a boid may be seen to, and of those that sink so: few
+/// frames, for which no plan finds one that follows.
+const STEEPER_IN_PICTURE: f64 = 0.15;
 const FASTEST: f64 = 0.95;
 /// And the slowest.
 const SLOWEST: f64 = 0.05;
@@ -81,7 +82,7 @@ impl Calibration {
             wander_rad_per_s: root_mean_square(&swings, turn_rad_per_s),
             slopes: (library.poses.view == View::Side && !flat).then(|| {
                 let pitches = shown().map(|m| libm::asin(m.forward[1].clamp(-1.0, 1.0)));
-                let elevations = shown().map(|m| libm::asin(libm::sin(m.heading_rad).abs()));
+                let elevations = shown().map(|m| libm::asin(libm::sin(m.heading_rad)));
                 Slopes::of(pitches.collect(), elevations.collect())
             }),
         }
@@ -100,17 +101,21 @@ impl Calibration {
 }
 
 impl Slopes {
-    /// Of an animal seen at these pitches in space, and at these angles to the horizontal in the picture.
+    /// Of an animal seen at these pitches in space, and at these angles to the horizontal in the picture; positive downward.
     fn of(mut pitches: Vec<f64>, mut elevations: Vec<f64>) -> Slopes {
+        let limits = |angles: &mut Vec<f64>, steeper: f64| {
+            let [up, down] = [steeper, 1.0 - steeper].map(|share| percentile(angles, share));
+            [up.map_or(0.0, |up| -up), down.unwrap_or(0.0)]
+                .map(|rad| libm::tan(rad.clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD)))
+        };
+        let in_space = limits(&mut pitches, STEEPER);
         let mut at = |share| percentile(&mut pitches, share).unwrap_or(0.0);
-        let limit = |rad: f64| libm::tan(rad.clamp(LEAST_STEEP_RAD, MOST_STEEP_RAD));
-        let limits = [-at(1.0 - STEEPEST), at(STEEPEST)].map(limit);
         let [low, usual, high] = [0.1587, 0.5, 0.8413].map(|share| libm::tan(at(share)));
         Slopes {
-            limits,
+            limits: in_space,
             usual,
             spread: 0.5 * (high - low),
-            in_picture: limit(percentile(&mut elevations, 1.0 - STEEPER_IN_PICTURE).unwrap_or(0.0)),
+            in_picture: limits(&mut elevations, STEEPER_IN_PICTURE),
         }
     }
 }
@@ -119,4 +124,21 @@ impl Slopes {
 fn root_mean_square(values: &[f64], most: f64) -> f64 {
     let squares: f64 = values.iter().map(|v| v.min(most) * v.min(most)).sum();
     (squares / values.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_was_seen_to_rise_steeply_and_hardly_to_sink_may_do_just_that() {
+        let degrees = |least: i32, most: i32| (least..=most).map(|deg| f64::from(deg).to_radians());
+        let slopes = Slopes::of(degrees(-50, 0).collect(), degrees(-50, 10).collect());
+        let close = |slope: f64, deg: f64| assert!((slope.atan().to_degrees() - deg).abs() < 1e-9);
+        close(slopes.limits[0], 49.0);
+        close(slopes.limits[1], LEAST_STEEP_RAD.to_degrees());
+        close(slopes.in_picture[0], 41.0);
+        close(slopes.in_picture[1], LEAST_STEEP_RAD.to_degrees());
+        close(slopes.usual, -25.0);
+    }
 }

@@ -31,22 +31,16 @@ pub struct Order {
 /// as near to each other as `overlap_bl`. Whether any is outside is not known here.
 pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64) -> Order {
     let n = positions.len() as f64;
-    let sum = |vectors: &mut dyn Iterator<Item = Vec3>| {
-        vectors.fold([0.0; 3], |sum, v| add_scaled(sum, 1.0, v))
-    };
     let level = |v: Vec3| add_scaled(v, -dot(v, up), up);
-    let center = scaled(1.0 / n, sum(&mut positions.iter().copied()));
-    let heading = sum(&mut velocities.iter().map(|&v| unit(v)));
-    let spin = sum(&mut positions
-        .iter()
-        .zip(velocities)
-        .map(|(&p, &v)| cross(unit(level(v)), unit(level(minus(p, center))))));
+    let center = scaled(1.0 / n, sum(positions.iter().copied()));
+    let spins = (positions.iter().zip(velocities))
+        .map(|(&p, &v)| cross(unit(level(v)), unit(level(minus(p, center)))));
     let row = Row::of(positions);
     let nearest_bl: Vec<f64> = row.nearest_bl2().into_iter().map(f64::sqrt).collect();
     let n_with_neighbor = nearest_bl.iter().filter(|&&bl| bl <= NEIGHBOR_BL).count();
     Order {
-        polarization: norm(heading) / n,
-        milling: norm(spin) / n,
+        polarization: polarization(velocities),
+        milling: norm(sum(spins)) / n,
         nearest_bl: match positions.len() {
             0 | 1 => 0.0,
             _ => nearest_bl.iter().sum::<f64>() / n,
@@ -56,6 +50,15 @@ pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64)
         n_outside: 0,
         n_overlaps: row.pairs_nearer(overlap_bl).count() as u32,
     }
+}
+
+/// How far all point one way: 0 to 1.
+pub fn polarization(velocities: &[Vec3]) -> f64 {
+    norm(sum(velocities.iter().map(|&v| unit(v)))) / velocities.len() as f64
+}
+
+fn sum(vectors: impl Iterator<Item = Vec3>) -> Vec3 {
+    vectors.fold([0.0; 3], |sum, v| add_scaled(sum, 1.0, v))
 }
 
 /// The pairs of ids nearer to each other than `bl`, of each the smaller first.

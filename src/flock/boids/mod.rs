@@ -43,6 +43,9 @@ const OVERLAP_BL: f64 = 0.5;
 /// How far they swim before the first frame, so that the flock has formed, and for how long at least and at most.
 const WARM_UP_BL: f64 = 10.0;
 const WARM_UP_S: [f64; 2] = [10.0, 60.0];
+/// Who align have formed when they are polarized by this much. A slow school before a wall takes the whole of a short film
+/// to turn, all the while of two courses.
+const FORMED: f64 = 0.9;
 /// Boids of one unit of parallel work.
 const CHUNK: usize = 64;
 
@@ -130,7 +133,7 @@ impl<'a> Boids<'a> {
         boids
     }
 
-    /// Frames in which they form, before the first of the film.
+    /// Frames in which they form, before the first of the film; a school may take as many again.
     pub fn n_frames_before(&self) -> usize {
         self.n_frames_before
     }
@@ -141,8 +144,21 @@ impl<'a> Boids<'a> {
             go_on()?;
             self.advance();
         }
+        let mut n_left = self.n_frames_before;
+        while n_left > 0 && !self.has_formed() {
+            go_on()?;
+            self.set_back(1);
+            self.advance();
+            n_left -= 1;
+        }
         self.hunter = self.habitat.hunter();
         Ok(())
+    }
+
+    fn has_formed(&self) -> bool {
+        let rules = &self.params.rules;
+        let is_school = rules.alignment > 0.0 && rules.zones.is_none();
+        !is_school || measures::polarization(&self.velocities) >= FORMED
     }
 
     /// Where the predator is, if there is one.

@@ -37,7 +37,7 @@ fn order(
             limits: [0.5, 0.5],
             usual: 0.0,
             spread: 0.2,
-            in_picture: 0.5,
+            in_picture: [0.5; 2],
         }),
     };
     let params = Params {

@@ -291,11 +291,11 @@ impl Boids<'_> {
     ) -> [L; 3] {
         if let Some(slopes) = &self.calibration.slopes {
             let [level, across] = self.habitat.lens.seen_level(position, velocity);
-            let most = L::splat(slopes.in_picture) * across;
-            let seen = velocity[1].clamp(level - most, level + most);
+            let [up, down] = slopes.in_picture.map(|slope| L::splat(slope) * across);
+            let seen = velocity[1].clamp(level - up, level + down);
             let pace = norm([velocity[0], L::splat(0.0), velocity[2]]);
-            let [up, down] = slopes.limits;
-            velocity[1] = seen.clamp(-L::splat(up) * pace, L::splat(down) * pace);
+            let [up, down] = slopes.limits.map(|slope| L::splat(slope) * pace);
+            velocity[1] = seen.clamp(-up, down);
         }
         let [least, most] = self.calibration.speed_limits_bl_per_s;
         let flees = self.habitat.flees(position, self.hunter.as_ref());

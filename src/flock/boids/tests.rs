@@ -144,11 +144,11 @@ fn in_side_view_nobody_is_seen_more_steeply_than_most_frames_unless_it_would_hav
     for (&p, &v) in positions.iter().flatten().zip(velocities.iter().flatten()) {
         let [level, across] = lens.seen_level(p, v);
         let limits = slopes.limits.map(|limit| limit * norm([v[0], 0.0, v[2]]));
-        let most = slopes.in_picture * across;
-        let lowest = (level - most).clamp(-limits[0], limits[1]);
-        let highest = (level + most).clamp(-limits[0], limits[1]);
+        let [up, down] = slopes.in_picture.map(|slope| slope * across);
+        let highest = (level - up).clamp(-limits[0], limits[1]);
+        let lowest = (level + down).clamp(-limits[0], limits[1]);
         // The place is that after the step.
-        assert!(v[1] > lowest - 0.02 && v[1] < highest + 0.02, "{p:?} {v:?}");
+        assert!(v[1] > highest - 0.02 && v[1] < lowest + 0.02, "{p:?} {v:?}");
     }
 }
 
@@ -228,7 +228,7 @@ fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
         limits: [1.5, 1.5],
         usual: -0.2,
         spread: 0.05,
-        in_picture: 1e9,
+        in_picture: [1e9; 2],
     };
     let (params, calibration) = alone(Some(slopes));
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [60.0, 60.0, 60.0]));
