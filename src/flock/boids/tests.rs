@@ -169,6 +169,28 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
     (params, calibration)
 }
 
+#[test]
+fn who_align_take_longer_to_form_while_they_are_of_two_courses_and_the_film_begins_no_later() {
+    let (params, calibration) = alone(None);
+    let params = Params { count: 2, ..params };
+    let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [30.0, 30.0, 0.0]));
+    let formed = |courses: [f64; 2]| {
+        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        let places = vec![[14.0, 15.0, 0.0], [16.0, 15.0, 0.0]];
+        boids.show(places, courses.map(|x| [x, 0.0, 0.0]).to_vec(), None);
+        boids.n_frames_before = 5;
+        let mut n_frames = 0;
+        let Ok(()) = boids.form(|| {
+            n_frames += 1;
+            Ok::<(), Infallible>(())
+        });
+        (n_frames, boids.time_s)
+    };
+    let (one_course, two_courses) = (formed([1.0, 1.0]), formed([1.0, -1.0]));
+    assert_eq!([one_course.0, two_courses.0], [5, 10]);
+    assert!((one_course.1 - two_courses.1).abs() < 1e-9);
+}
+
 /// At the edges of the picture lines of sight lead along the walls.
 #[test]
 fn a_slow_school_is_polarized_behind_a_camera_too() {
