@@ -52,15 +52,25 @@ impl Ground<'_> {
         smooth((relative - DARKER[0]) / (DARKER[1] - DARKER[0]))
     }
 
+    /// What of a mask lies on the ground, and not on darker things.
+    pub(super) fn on(&self, mask: &Mask) -> Mask {
+        let (rect, width) = (mask.rect, mask.width());
+        let mut on_ground = mask.clone();
+        for (k, bit) in on_ground.bits.iter_mut().enumerate() {
+            let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
+            *bit &= u8::from(self.share_at(x, y) >= 0.5);
+        }
+        on_ground
+    }
+
     /// Clears what is faint where a mask lies on darker things and is mostly of another color than the coat there: an image
     /// may be as dark as the animal in its midst, but fades toward its edges. Lines of the scene, such as wires, are too thin
     /// to show one. Returns where images are.
     pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) -> Mask {
-        let (rect, width) = (solid.rect, solid.width());
+        let rect = solid.rect;
         let mut on_dark = mask.clone();
-        for (k, bit) in on_dark.bits.iter_mut().enumerate() {
-            let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
-            *bit &= u8::from(self.share_at(x, y) < 0.5);
+        for (bit, on_ground) in on_dark.bits.iter_mut().zip(self.on(mask).bits) {
+            *bit &= 1 - on_ground;
         }
         let broad = (0..THIN_PX).fold(on_dark.clone(), |mask, _| mask.eroded());
         let mut images = Mask::new(rect);

@@ -38,20 +38,27 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, plate, gain, rect);
     let mask = moved(silhouette, rect);
-    let coat = Coat::of(&mask, &difference, plate);
+    let on_ground = Ground::of(&mask, plate).on(&mask);
+    let coat_of = |mask: &Mask| Coat::of(mask, &difference, plate);
+    let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
     let mut solid = coat.without_halo(&mask, band_px);
     let ground = Ground::of(&solid, plate);
     let images = ground.clear_faded(&mut solid, &mask, &coat);
     ground.clear_images(&mut solid, &images, &coat);
     let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
     let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
+    let closed = (0..GAP_PX).fold(solid.clone(), |mask, _| mask.dilated());
+    let mut closed = (0..GAP_PX).fold(closed, |mask, _| mask.eroded());
+    closed.add(&solid);
     let puller = Puller {
         difference: &difference,
         plate,
         mask: &mask,
         solid: &solid,
         inside: &inside,
+        closed: &closed,
         ground,
+        coat: &coat,
         nearest_inside: nearest_set(&inside, &outer),
         nearest_solid: nearest_set(&solid, &outer),
         band_px,
@@ -142,6 +149,8 @@ fn contrast(difference: &Difference, mask: &Mask) -> f64 {
 
 /// Less alpha is noise, not animal.
 const TRACE: f32 = 0.04;
+/// A gap of up to twice as many pixels, as where a wire goes across the animal, is narrow.
+const GAP_PX: u32 = 2;
 /// Between these differences, as parts of the least that counts, a shadow fades in: it goes on where the silhouette
 /// ends, and its faint rim would show as an edge.
 const FADED: [f32; 2] = [0.5, 2.0];
@@ -152,12 +161,12 @@ fn smooth(share: f32) -> f32 {
     share * share * (3.0 - 2.0 * share)
 }
 
-/// What a pixel near the animal has a share of.
-enum Nearby {
+/// What a pixel near the animal may have a share of.
+struct Nearby {
     /// The animal's color there.
-    Animal([f32; 3]),
-    /// Nothing but less light.
-    Shadow,
+    animal: Option<[f32; 3]>,
+    /// Nothing but less light, of which this share goes with the animal: 0 to 1.
+    shadow: Option<f32>,
 }
 
 struct Puller<'a> {
@@ -168,7 +177,10 @@ struct Puller<'a> {
     solid: &'a Mask,
     /// The solid part less the band along its outline: alpha 1.
     inside: &'a Mask,
+    /// The solid part with its narrow gaps.
+    closed: &'a Mask,
     ground: Ground<'a>,
+    coat: &'a Coat<'a>,
     /// For each pixel an inside pixel near it.
     nearest_inside: Vec<u32>,
     /// For each pixel a solid pixel near it.
@@ -182,48 +194,42 @@ impl Puller<'_> {
         [rgb[0], rgb[1], rgb[2]]
     }
 
+    /// A pixel's place in the plate.
+    fn place(&self, k: usize) -> usize {
+        let (rect, width) = (self.mask.rect, self.mask.width());
+        let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
+        y * self.plate.frame.width as usize + x
+    }
+
+    fn plate_color(&self, k: usize) -> [f32; 3] {
+        let (rect, width) = (self.mask.rect, self.mask.width());
+        let (x, y) = ((k % width) as u32, (k / width) as u32);
+        (self.plate.rgb.pixel(rect.x + x, rect.y + y)).map(f32::from)
+    }
+
     /// A pixel of the band: straight color and alpha.
     fn band_pixel(&self, k: usize) -> [u8; 4] {
-        let rect = self.difference.rect;
-        let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-        let (px, py) = (rect.x + x as u32, rect.y + y as u32);
-        let back = self.plate.rgb.pixel(px, py).map(f32::from);
-        let seen = self.frame_color(k).map(f32::from);
-        let Some(nearby) = self.nearby(x, y) else {
+        let Some(nearby) = self.nearby(k) else {
             return [0; 4];
         };
-        let fore = match nearby {
-            Nearby::Animal(color) => color,
-            Nearby::Shadow => [0.0; 3],
+        let animal = nearby.animal.map(|color| {
+            let alpha = self.share_of(k, color);
+            let most = nearby.shadow.map_or(1.0, |_| self.blurred_solid(k));
+            (alpha.min(most), color)
+        });
+        let shadow = nearby.shadow.map(|share| {
+            let black = [0.0; 3];
+            (share * self.share_of(k, black), black)
+        });
+        let larger = |p: (f32, [f32; 3]), q: (f32, [f32; 3])| if q.0 > p.0 { q } else { p };
+        let Some((alpha, fore)) = animal.into_iter().chain(shadow).reduce(larger) else {
+            return [0; 4];
         };
-        let at = py as usize * self.plate.frame.width as usize + px as usize;
-        let sigma = self.plate.sigma[at];
-        let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
-        let span_squared = dot(span, span);
-        let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
-        let noise_squared = (3.0 * sigma).powi(2);
-        let alpha = if span_squared < noise_squared {
-            // What differs all the same is itself, whole: as a share of something it would be exaggerated.
-            match dot(seen_span, seen_span) < noise_squared {
-                true => self.blurred_solid(x, y),
-                false => 1.0,
-            }
-        } else {
-            (dot(seen_span, span) / span_squared).clamp(0.0, 1.0)
-        };
-        let (alpha, least) = match nearby {
-            Nearby::Animal(_) => (alpha, TRACE),
-            Nearby::Shadow => {
-                let weak = f32::from(self.plate.weak_threshold(at).max(1));
-                let beyond = f32::from(self.difference.levels[k]) / weak - FADED[0];
-                let fade = smooth(beyond / (FADED[1] - FADED[0]));
-                (alpha * fade * self.ground.share_at(px, py), 0.0)
-            }
-        };
-        if alpha < least {
+        if alpha < TRACE && nearby.animal.is_some() {
             return [0; 4];
         }
-        let color = if alpha > 0.2 {
+        let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
+        let color = if alpha > 0.2 || nearby.shadow.is_some() {
             [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
         } else {
             fore
@@ -232,22 +238,69 @@ impl Puller<'_> {
         [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
-    /// What a band pixel has a share of. Outside of what is solid and of the band around it there is only shadow.
-    fn nearby(&self, x: usize, y: usize) -> Option<Nearby> {
+    /// How far a pixel lies from the plate toward a color: 0 to 1.
+    fn share_of(&self, k: usize, fore: [f32; 3]) -> f32 {
+        let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
+        let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
+        let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
+        let noise_squared = (3.0 * self.plate.sigma[self.place(k)]).powi(2);
+        if dot(span, span) >= noise_squared {
+            return (dot(seen_span, span) / dot(span, span)).clamp(0.0, 1.0);
+        }
+        // What differs all the same is itself, whole: as a share of something it would be exaggerated.
+        match dot(seen_span, seen_span) < noise_squared {
+            true => self.blurred_solid(k),
+            false => 1.0,
+        }
+    }
+
+    /// What a band pixel may have a share of. What looks like a shadow may be one near the animal too, but not in a
+    /// narrow gap of it, and is nothing else beyond the band around what is solid.
+    fn nearby(&self, k: usize) -> Option<Nearby> {
         let width = self.mask.width();
+        let (x, y) = (k % width, k / width);
         let place = |found: u32| (found != NOWHERE).then_some(found as usize);
         let steps = |at: usize| (at % width).abs_diff(x).max((at / width).abs_diff(y));
-        let (k, band) = (y * width + x, self.band_px as usize);
+        let band = self.band_px as usize;
         let solid = place(self.nearest_solid[k])?;
-        if steps(solid) > band {
-            return Some(Nearby::Shadow);
-        }
-        let inside = place(self.nearest_inside[k]);
-        let color = match inside.filter(|&at| steps(at) <= 2 * band + 1) {
-            Some(at) => self.mean_inside((at % width) as i64, (at / width) as i64),
-            None => self.starkest((solid % width) as i64, (solid / width) as i64)?,
+        let is_near = steps(solid) <= band;
+        let shadow =
+            (!is_near || (self.closed.bits[k] == 0 && self.coat.is_shadow(k))).then(|| {
+                let fade = if is_near { 1.0 } else { self.fade(k) };
+                fade * self.on_ground(k, solid)
+            });
+        let inside = place(self.nearest_inside[k]).filter(|&at| steps(at) <= 2 * band + 1);
+        let animal = is_near
+            .then(|| match inside {
+                Some(at) => Some(self.mean_inside((at % width) as i64, (at / width) as i64)),
+                None => self.starkest((solid % width) as i64, (solid / width) as i64),
+            })
+            .flatten();
+        Some(Nearby { animal, shadow })
+    }
+
+    /// How far a shadow has faded in, 0 to 1.
+    fn fade(&self, k: usize) -> f32 {
+        let weak = self.plate.weak_threshold(self.place(k));
+        let beyond = f32::from(self.difference.levels[k]) / f32::from(weak.max(1)) - FADED[0];
+        smooth(beyond / (FADED[1] - FADED[0]))
+    }
+
+    /// How much of what is cast on a pixel goes with the animal: as little as on the way to it from what is solid, for
+    /// beyond the edge of its ground it is cast on something else.
+    fn on_ground(&self, k: usize, solid: usize) -> f32 {
+        let (rect, width) = (self.mask.rect, self.mask.width());
+        let (from, to) = ([k % width, k / width], [solid % width, solid / width]);
+        let n_steps = from[0].abs_diff(to[0]).max(from[1].abs_diff(to[1]));
+        let between = |axis: usize, step: usize| {
+            (from[axis] * (n_steps - step) + to[axis] * step + n_steps / 2) / n_steps
         };
-        Some(Nearby::Animal(color))
+        (0..n_steps)
+            .map(|step| {
+                let (x, y) = (between(0, step) as u32, between(1, step) as u32);
+                self.ground.share_at(rect.x + x, rect.y + y)
+            })
+            .fold(1.0, f32::min)
     }
 
     /// Mean color of the inside pixels of a 3 x 3 neighborhood whose middle is one.
@@ -278,7 +331,8 @@ impl Puller<'_> {
     }
 
     /// What is solid, blurred by a Gaussian of 0.7 pixels (5 x 5).
-    fn blurred_solid(&self, x: usize, y: usize) -> f32 {
+    fn blurred_solid(&self, k: usize) -> f32 {
+        let (x, y) = (k % self.mask.width(), k / self.mask.width());
         // exp(-d^2 / (2 * 0.49)) for d = 0, 1, 2.
         const WEIGHTS: [f32; 3] = [1.0, 0.3604, 0.0169];
         let (mut sum, mut total) = (0.0, 0.0);

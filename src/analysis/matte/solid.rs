@@ -1,5 +1,7 @@
 //! What of a silhouette is the animal itself, and what is shadow around it.
 
+use std::ops::RangeInclusive;
+
 use crate::analysis::background::Plate;
 use crate::analysis::silhouette::{Difference, shadow};
 use crate::order::{median, percentile};
@@ -9,6 +11,8 @@ use crate::raster::Mask;
 const FAINT: f64 = 0.3;
 /// What is of the coat is off its color by less than this share of what it is off the plate.
 const MATCH: f64 = 0.25;
+/// How much of its light a place in the shadow has.
+const SHADOW: RangeInclusive<f32> = 0.45..=1.0;
 
 /// What the animal looks like where it differs most from the plate.
 pub(super) struct Coat<'a> {
@@ -42,6 +46,15 @@ impl Coat<'_> {
         coat
     }
 
+    /// The one that differs more from the plate: in the other there is too much of an image in a dark wall, or of shadows
+    /// on a floor that is brighter there.
+    pub(super) fn or_starker(self, other: Self) -> Self {
+        match other.starkest > self.starkest {
+            true => other,
+            false => self,
+        }
+    }
+
     /// How far a pixel lies from the plate.
     fn level(&self, k: usize) -> f64 {
         f64::from(self.difference.levels[k])
@@ -72,25 +85,31 @@ impl Coat<'_> {
         most_off < MATCH * self.level(k)
     }
 
-    /// The mask less the soft shadow around the animal, and less the floor that shows between its parts: pixels that
-    /// differ by little of what the animal mostly differs by and that look like the plate, only darker. So a shadow on the
+    /// Whether a pixel that is faint looks like the plate, only darker.
+    pub(super) fn is_shadow(&self, k: usize) -> bool {
+        let width = self.difference.rect.w as usize;
+        self.is_faint(k)
+            && !self.matches(k)
+            && shadow::has_darker_color(self.difference, self.plate, k % width, k / width, SHADOW)
+    }
+
+    /// Whether a pixel that is faint is as good as the plate.
+    fn is_floor(&self, k: usize) -> bool {
+        let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
+        let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
+        let at = y * self.plate.frame.width as usize + x;
+        self.is_faint(k)
+            && !self.matches(k)
+            && self.difference.levels[k] <= self.plate.weak_threshold(at)
+    }
+
+    /// The mask less the soft shadow around the animal, and less the floor that shows between its parts. So a shadow on the
     /// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
     /// belly over a white floor: solid all the same; and so is what has the coat's color, as black fur before a dark wall.
     pub(super) fn without_halo(&self, mask: &Mask, band_px: u32) -> Mask {
-        let (difference, plate) = (self.difference, self.plate);
         let mut solid = mask.clone();
-        let (rect, width) = (mask.rect, mask.width());
-        for k in 0..solid.bits.len() {
-            let (x, y) = (k % width, k / width);
-            let at = (rect.y as usize + y) * plate.frame.width as usize + rect.x as usize + x;
-            if solid.bits[k] == 1
-                && self.is_faint(k)
-                && !self.matches(k)
-                && (difference.levels[k] <= plate.weak_threshold(at)
-                    || shadow::has_darker_color(difference, plate, x, y, 0.45..=1.0))
-            {
-                solid.bits[k] = 0;
-            }
+        for (k, bit) in solid.bits.iter_mut().enumerate() {
+            *bit &= u8::from(!self.is_shadow(k) && !self.is_floor(k));
         }
         add_midst(&mut solid, 2 * band_px);
         solid.majority()

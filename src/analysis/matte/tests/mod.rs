@@ -1,5 +1,7 @@
 //! What a matte is where the animal casts a shadow, and where the floor shows between its parts.
 
+mod cast;
+
 use super::*;
 use crate::analysis::Params;
 use crate::analysis::background::plate_of;
@@ -180,77 +182,6 @@ fn a_light_spot_on_the_body_covers_and_the_floor_between_two_thin_parts_does_not
 }
 
 /// Paper before a dark wall.
-const WALL: u8 = 50;
-
-fn wall(x: u32, _: u32) -> u8 {
-    if x < 70 { PAPER } else { WALL }
-}
-
-/// A dark body, its shadow on the paper, and in the wall its image, at one place as dark as itself.
-fn with_image(x: u32, y: u32) -> u8 {
-    let is_cast = (BODY.right()..100).contains(&x) && (28..38).contains(&y);
-    let is_clear = (80..92).contains(&x) && (30..36).contains(&y);
-    match (away([x, y], BODY), is_clear, is_cast) {
-        (0, ..) | (_, true, _) => FUR,
-        (_, _, true) => wall(x, y) - wall(x, y) / 5,
-        _ => wall(x, y),
-    }
-}
-
-#[test]
-fn an_image_in_a_dark_wall_stays_behind_and_the_shadow_before_it_does_not() {
-    let drawn = drawn_on(wall, with_image);
-    for (x, y) in (29..37).flat_map(|y| (64..100).map(move |x| (x, y))) {
-        let shown = drawn.over(240, [x, y]);
-        match x {
-            ..70 => assert!(
-                (shown - 0.8 * 240.0).abs() < 4.0,
-                "the shadow at {x}, {y}: {shown}"
-            ),
-            _ => assert_eq!(drawn.pixel(x, y)[3], 0, "the image at {x}, {y}"),
-        }
-    }
-}
-
-/// Black, a little less so on the left.
-fn black(x: u32, _: u32) -> u8 {
-    if x < 62 { 4 } else { 1 }
-}
-
-/// A light animal there, in two parts, of which one is dimmer.
-fn in_the_dark(x: u32, y: u32) -> u8 {
-    let is_leg = (64..76).contains(&x) && (30..34).contains(&y);
-    match (away([x, y], BODY), is_leg) {
-        (0, _) => 200,
-        (_, true) => 120,
-        _ => black(x, y),
-    }
-}
-
-/// Paper, a dark stripe, and paper.
-fn striped(x: u32, _: u32) -> u8 {
-    if (64..84).contains(&x) { WALL } else { PAPER }
-}
-
-/// A body, and its tail, of which a part before the stripe is hidden.
-fn with_a_hidden_part(x: u32, y: u32) -> u8 {
-    let is_tail = ((60..64).contains(&x) || (68..84).contains(&x)) && (30..33).contains(&y);
-    match away([x, y], BODY) == 0 || is_tail {
-        true => FUR,
-        false => striped(x, y),
-    }
-}
-
-#[test]
-fn a_limb_apart_from_the_body_is_no_image() {
-    let light = drawn_on(black, in_the_dark);
-    let tail = drawn_on(striped, with_a_hidden_part);
-    for x in 70..74 {
-        assert_eq!(light.pixel(x, 32)[3], 255, "the leg at {x}");
-        assert_eq!(tail.pixel(x, 31)[3], 255, "the tail at {x}");
-    }
-}
-
 /// What the edge of the next body is before looks like that body.
 fn light_stripe(x: u32, _: u32) -> u8 {
     if x < 58 { 50 } else { 101 }
@@ -269,63 +200,6 @@ fn what_differs_from_plate_and_body_is_shown_as_it_is() {
     let drawn = drawn_on(light_stripe, with_bright_edge);
     for x in [58, 59] {
         assert_eq!(drawn.pixel(x, 32), [140, 140, 140, 255], "{x}");
-    }
-}
-
-/// The same body, half over the wall.
-fn across_the_wall(x: u32, y: u32) -> u8 {
-    match away([x.saturating_sub(25), y], BODY) {
-        0 => FUR,
-        _ => wall(x, y),
-    }
-}
-
-#[test]
-fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
-    let drawn = drawn_on(wall, across_the_wall);
-    for (x, y) in (25..41).flat_map(|y| (55..85).map(move |x| (x, y))) {
-        let shown = drawn.over(240, [x, y]);
-        assert!((shown - f64::from(FUR)).abs() < 4.0, "{shown} at {x}, {y}");
-    }
-}
-
-/// The same, and its image farther on in the wall, as dark as itself.
-fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
-    let is_image = (92..102).contains(&x) && (29..36).contains(&y);
-    if is_image { FUR } else { across_the_wall(x, y) }
-}
-
-#[test]
-fn what_is_as_dark_as_the_animal_and_too_large_for_a_limb_is_an_image() {
-    let drawn = drawn_on(wall, with_image_across_the_wall);
-    assert_eq!(drawn.pixel(80, 33)[3], 255, "the body");
-    for (x, y) in (29..36).flat_map(|y| (92..102).map(move |x| (x, y))) {
-        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
-    }
-}
-
-/// The body that ends at the wall, and in the wall its small image, in its midst as dark as itself, that fades over ten pixels.
-fn with_a_small_image(x: u32, y: u32) -> u8 {
-    let midst = Rect {
-        x: 75,
-        y: 31,
-        w: 3,
-        h: 3,
-    };
-    let faded = away([x, y], midst).min(10) as u8;
-    match away([x.saturating_sub(10), y], BODY) {
-        0 => FUR,
-        _ if wall(x, y) == WALL => FUR + (WALL - FUR) / 10 * faded,
-        _ => wall(x, y),
-    }
-}
-
-#[test]
-fn an_image_that_fades_is_no_limb_however_dark_its_midst() {
-    let drawn = drawn_on(wall, with_a_small_image);
-    assert_eq!(drawn.pixel(50, 33)[3], 255, "the body");
-    for (x, y) in (31..34).flat_map(|y| (75..78).map(move |x| (x, y))) {
-        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
     }
 }
 
@@ -358,5 +232,31 @@ fn a_shadow_on_the_brighter_floor_is_a_shadow() {
                 "the shadow at {x}, {y} shows as {shown}"
             );
         }
+    }
+}
+
+/// A floor with a darker stripe.
+fn with_a_stripe(x: u32, _: u32) -> u8 {
+    if (62..66).contains(&x) { 116 } else { PAPER }
+}
+
+/// Before it, in its own shadow, a body with a pale ear.
+fn with_a_pale_ear(x: u32, y: u32) -> u8 {
+    let is_ear = (BODY.right() - 6..BODY.right() + 1).contains(&x) && (28..38).contains(&y);
+    let is_cast = (BODY.right()..70).contains(&x) && (26..40).contains(&y);
+    match (is_ear, away([x, y], BODY), is_cast) {
+        (true, ..) => 105,
+        (_, 0, _) => FUR,
+        (.., true) => with_a_stripe(x, y) / 20 * 17,
+        _ => with_a_stripe(x, y),
+    }
+}
+
+#[test]
+fn a_shadow_on_what_has_the_color_of_the_animal_beside_it_is_a_shadow() {
+    let drawn = drawn_on(with_a_stripe, with_a_pale_ear);
+    for (x, y) in (30..36).flat_map(|y| (62..66).map(move |x| (x, y))) {
+        let alpha = drawn.pixel(x, y)[3];
+        assert!(alpha < 80, "{alpha} at {x}, {y}");
     }
 }

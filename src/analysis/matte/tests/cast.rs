@@ -1,0 +1,186 @@
+//! What the animal casts on things darker than its ground.
+
+use super::*;
+
+const WALL: u8 = 50;
+
+fn wall(x: u32, _: u32) -> u8 {
+    if x < 70 { PAPER } else { WALL }
+}
+
+/// A dark body, its shadow on the paper, and in the wall its image, at one place as dark as itself.
+fn with_image(x: u32, y: u32) -> u8 {
+    let is_cast = (BODY.right()..100).contains(&x) && (28..38).contains(&y);
+    let is_clear = (80..92).contains(&x) && (30..36).contains(&y);
+    match (away([x, y], BODY), is_clear, is_cast) {
+        (0, ..) | (_, true, _) => FUR,
+        (_, _, true) => wall(x, y) - wall(x, y) / 5,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn an_image_in_a_dark_wall_stays_behind_and_the_shadow_before_it_does_not() {
+    let drawn = drawn_on(wall, with_image);
+    for (x, y) in (29..37).flat_map(|y| (64..100).map(move |x| (x, y))) {
+        let shown = drawn.over(240, [x, y]);
+        match x {
+            ..70 => assert!(
+                (shown - 0.8 * 240.0).abs() < 4.0,
+                "the shadow at {x}, {y}: {shown}"
+            ),
+            _ => assert_eq!(drawn.pixel(x, y)[3], 0, "the image at {x}, {y}"),
+        }
+    }
+}
+
+/// Black, a little less so on the left.
+fn black(x: u32, _: u32) -> u8 {
+    if x < 62 { 4 } else { 1 }
+}
+
+/// A light animal there, in two parts, of which one is dimmer.
+fn in_the_dark(x: u32, y: u32) -> u8 {
+    let is_leg = (64..76).contains(&x) && (30..34).contains(&y);
+    match (away([x, y], BODY), is_leg) {
+        (0, _) => 200,
+        (_, true) => 120,
+        _ => black(x, y),
+    }
+}
+
+/// Paper, a dark stripe, and paper.
+fn striped(x: u32, _: u32) -> u8 {
+    if (64..84).contains(&x) { WALL } else { PAPER }
+}
+
+/// A body, and its tail, of which a part before the stripe is hidden.
+fn with_a_hidden_part(x: u32, y: u32) -> u8 {
+    let is_tail = ((60..64).contains(&x) || (68..84).contains(&x)) && (30..33).contains(&y);
+    match away([x, y], BODY) == 0 || is_tail {
+        true => FUR,
+        false => striped(x, y),
+    }
+}
+
+#[test]
+fn a_limb_apart_from_the_body_is_no_image() {
+    let light = drawn_on(black, in_the_dark);
+    let tail = drawn_on(striped, with_a_hidden_part);
+    for x in 70..74 {
+        assert_eq!(light.pixel(x, 32)[3], 255, "the leg at {x}");
+        assert_eq!(tail.pixel(x, 31)[3], 255, "the tail at {x}");
+    }
+}
+
+/// The same body, half over the wall.
+fn across_the_wall(x: u32, y: u32) -> u8 {
+    match away([x.saturating_sub(25), y], BODY) {
+        0 => FUR,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
+    let drawn = drawn_on(wall, across_the_wall);
+    for (x, y) in (25..41).flat_map(|y| (55..85).map(move |x| (x, y))) {
+        let shown = drawn.over(240, [x, y]);
+        assert!((shown - f64::from(FUR)).abs() < 4.0, "{shown} at {x}, {y}");
+    }
+}
+
+/// The same, and its image farther on in the wall, as dark as itself.
+fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
+    let is_image = (92..102).contains(&x) && (29..36).contains(&y);
+    if is_image { FUR } else { across_the_wall(x, y) }
+}
+
+#[test]
+fn what_is_as_dark_as_the_animal_and_too_large_for_a_limb_is_an_image() {
+    let drawn = drawn_on(wall, with_image_across_the_wall);
+    assert_eq!(drawn.pixel(80, 33)[3], 255, "the body");
+    for (x, y) in (29..36).flat_map(|y| (92..102).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
+
+/// The body that ends at the wall, and in the wall its small image, in its midst as dark as itself, that fades over ten pixels.
+fn with_a_small_image(x: u32, y: u32) -> u8 {
+    let midst = Rect {
+        x: 75,
+        y: 31,
+        w: 3,
+        h: 3,
+    };
+    let faded = away([x, y], midst).min(10) as u8;
+    match away([x.saturating_sub(10), y], BODY) {
+        0 => FUR,
+        _ if wall(x, y) == WALL => FUR + (WALL - FUR) / 10 * faded,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn an_image_that_fades_is_no_limb_however_dark_its_midst() {
+    let drawn = drawn_on(wall, with_a_small_image);
+    assert_eq!(drawn.pixel(50, 33)[3], 255, "the body");
+    for (x, y) in (31..34).flat_map(|y| (75..78).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
+
+/// The floor, the dark line where it ends, and a wall that is less dark.
+fn floor_and_wall(x: u32, _: u32) -> u8 {
+    match x {
+        ..68 => PAPER,
+        68..72 => WALL,
+        _ => 120,
+    }
+}
+
+/// A body that casts its shadow on all three.
+fn with_shadow_up_the_wall(x: u32, y: u32) -> u8 {
+    let is_cast = (BODY.right()..82).contains(&x) && (28..38).contains(&y);
+    match (away([x, y], BODY), is_cast) {
+        (0, _) => FUR,
+        (_, true) => floor_and_wall(x, y) / 5 * 4,
+        _ => floor_and_wall(x, y),
+    }
+}
+
+#[test]
+fn a_shadow_stays_behind_where_the_ground_ends() {
+    let drawn = drawn_on(floor_and_wall, with_shadow_up_the_wall);
+    for (x, y) in (29..37).flat_map(|y| (62..82).map(move |x| (x, y))) {
+        let alpha = drawn.pixel(x, y)[3];
+        match x {
+            ..68 => assert!(
+                (46..=56).contains(&alpha),
+                "on the floor at {x}, {y}: {alpha}"
+            ),
+            _ => assert_eq!(alpha, 0, "beyond it at {x}, {y}"),
+        }
+    }
+}
+
+/// A body that casts a shadow, and an image in the wall that is larger than itself.
+fn with_a_large_image(x: u32, y: u32) -> u8 {
+    let is_cast = (BODY.right()..68).contains(&x) && (28..38).contains(&y);
+    let is_image = x >= 72 && (18..48).contains(&y);
+    match (away([x, y], BODY), is_cast, is_image) {
+        (0, ..) => FUR,
+        (_, true, _) => PAPER / 5 * 4,
+        (.., true) => WALL - 12,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn a_large_image_does_not_make_the_shadow_part_of_the_animal() {
+    let drawn = drawn_on(wall, with_a_large_image);
+    for (x, y) in (29..37).flat_map(|y| (63..68).map(move |x| (x, y))) {
+        let alpha = drawn.pixel(x, y)[3];
+        assert!((46..=56).contains(&alpha), "{alpha} at {x}, {y}");
+    }
+}
