@@ -213,13 +213,13 @@ impl Puller<'_> {
             return [0; 4];
         };
         let animal = nearby.animal.map(|color| {
-            let alpha = self.share_of(k, color);
+            let alpha = (self.toward(color, k)).unwrap_or_else(|| self.alike(k));
             let most = nearby.shadow.map_or(1.0, |_| self.blurred_solid(k));
             (alpha.min(most), color)
         });
         let shadow = nearby.shadow.map(|share| {
             let black = [0.0; 3];
-            (share * self.share_of(k, black), black)
+            (share * self.toward(black, k).unwrap_or(0.0), black)
         });
         let larger = |p: (f32, [f32; 3]), q: (f32, [f32; 3])| if q.0 > p.0 { q } else { p };
         let Some((alpha, fore)) = animal.into_iter().chain(shadow).reduce(larger) else {
@@ -238,20 +238,26 @@ impl Puller<'_> {
         [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
-    /// How far a pixel lies from the plate toward a color: 0 to 1.
-    fn share_of(&self, k: usize, fore: [f32; 3]) -> f32 {
+    /// How far a pixel lies from the plate toward a color, 0 to 1, where the color stands out from the plate.
+    fn toward(&self, fore: [f32; 3], k: usize) -> Option<f32> {
         let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
-        let span = [fore[0] - back[0], fore[1] - back[1], fore[2] - back[2]];
-        let seen_span = [seen[0] - back[0], seen[1] - back[1], seen[2] - back[2]];
-        let noise_squared = (3.0 * self.plate.sigma[self.place(k)]).powi(2);
-        if dot(span, span) >= noise_squared {
-            return (dot(seen_span, span) / dot(span, span)).clamp(0.0, 1.0);
-        }
-        // What differs all the same is itself, whole: as a share of something it would be exaggerated.
-        match dot(seen_span, seen_span) < noise_squared {
+        let (span, seen_span) = (minus(fore, back), minus(seen, back));
+        let is_distinct = dot(span, span) >= self.noise_squared(k);
+        is_distinct.then(|| (dot(seen_span, span) / dot(span, span)).clamp(0.0, 1.0))
+    }
+
+    /// Alpha where the animal's color is that of the plate. What differs all the same is itself, whole: as a share of
+    /// something it would be exaggerated.
+    fn alike(&self, k: usize) -> f32 {
+        let off = minus(self.frame_color(k).map(f32::from), self.plate_color(k));
+        match dot(off, off) < self.noise_squared(k) {
             true => self.blurred_solid(k),
             false => 1.0,
         }
+    }
+
+    fn noise_squared(&self, k: usize) -> f32 {
+        (3.0 * self.plate.sigma[self.place(k)]).powi(2)
     }
 
     /// What a band pixel may have a share of. What looks like a shadow may be one near the animal too, but not in a
@@ -350,6 +356,10 @@ impl Puller<'_> {
         let (w, h) = (i64::from(self.mask.rect.w), i64::from(self.mask.rect.h));
         ((0..w).contains(&x) && (0..h).contains(&y)).then_some((y * w + x) as usize)
     }
+}
+
+fn minus(p: [f32; 3], q: [f32; 3]) -> [f32; 3] {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
 }
 
 fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
