@@ -115,6 +115,16 @@ impl Mask {
         self.counted(|n, _| n > 0)
     }
 
+    /// Eroded so many times.
+    pub fn eroded_by(&self, n_px: u32) -> Mask {
+        (0..n_px).fold(self.clone(), |mask, _| mask.eroded())
+    }
+
+    /// Dilated so many times.
+    pub fn dilated_by(&self, n_px: u32) -> Mask {
+        (0..n_px).fold(self.clone(), |mask, _| mask.dilated())
+    }
+
     /// Eroded, then dilated: without anything thinner than 3 pixels.
     pub fn opened(&self) -> Mask {
         self.eroded().dilated()

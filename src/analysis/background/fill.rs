@@ -82,7 +82,7 @@ impl<'a> Hole<'a> {
             size: [i64::from(image.width), i64::from(image.height)],
             image,
             known: unknown.iter().map(|&unknown| !unknown).collect(),
-            whole: known.eroded().eroded().eroded().bits,
+            whole: known.eroded_by(3).bits,
             copied_from: (0..unknown.len()).collect(),
         }
     }

@@ -240,12 +240,12 @@ fn occupancy(samples: &Samples, plate: &Plate) -> Occupancy {
                 .inflated(3, plate.frame.width, plate.frame.height);
             let mut mask = component.mask(rect);
             if scenery::is_scenery(&found, k, component) {
-                let around = mask.dilated().dilated().dilated();
+                let around = mask.dilated_by(3);
                 pixels_of(&around, plate.frame.width).for_each(|px| seen.scenery[px] = true);
                 // An animal that rests before a plant hangs together with it.
                 mask = without_displaced(&mask, &samples.frames[k], &plate.frame);
             }
-            let mask = mask.dilated().dilated().dilated();
+            let mask = mask.dilated_by(3);
             let set = pixels_of(&mask, plate.frame.width);
             if is_ghost(&samples.frames[k], plate, component) {
                 set.for_each(|px| seen.ghost[px] |= 1 << k);

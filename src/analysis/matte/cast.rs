@@ -72,7 +72,7 @@ impl Ground<'_> {
         for (bit, on_ground) in on_dark.bits.iter_mut().zip(self.on(mask).bits) {
             *bit &= 1 - on_ground;
         }
-        let broad = (0..THIN_PX).fold(on_dark.clone(), |mask, _| mask.eroded());
+        let broad = on_dark.eroded_by(THIN_PX);
         let mut images = Mask::new(rect);
         for region in components(&on_dark) {
             let pixels = numbers(&region, rect);

@@ -45,10 +45,9 @@ pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length
     let ground = Ground::of(&solid, plate);
     let images = ground.clear_faded(&mut solid, &mask, &coat);
     ground.clear_images(&mut solid, &images, &coat);
-    let inside = (0..band_px).fold(solid.clone(), |mask, _| mask.eroded());
-    let outer = (0..band_px).fold(mask.clone(), |mask, _| mask.dilated());
-    let closed = (0..GAP_PX).fold(solid.clone(), |mask, _| mask.dilated());
-    let mut closed = (0..GAP_PX).fold(closed, |mask, _| mask.eroded());
+    let inside = solid.eroded_by(band_px);
+    let outer = mask.dilated_by(band_px);
+    let mut closed = solid.dilated_by(GAP_PX).eroded_by(GAP_PX);
     closed.add(&solid);
     let puller = Puller {
         difference: &difference,
@@ -162,6 +161,7 @@ fn smooth(share: f32) -> f32 {
 }
 
 /// What a pixel near the animal may have a share of.
+#[derive(Default)]
 struct Nearby {
     /// The animal's color there.
     animal: Option<[f32; 3]>,
@@ -202,40 +202,35 @@ impl Puller<'_> {
     }
 
     fn plate_color(&self, k: usize) -> [f32; 3] {
-        let (rect, width) = (self.mask.rect, self.mask.width());
-        let (x, y) = ((k % width) as u32, (k / width) as u32);
-        (self.plate.rgb.pixel(rect.x + x, rect.y + y)).map(f32::from)
+        let at = 3 * self.place(k);
+        [0, 1, 2].map(|c| f32::from(self.plate.rgb.pixels[at + c]))
     }
 
     /// A pixel of the band: straight color and alpha.
     fn band_pixel(&self, k: usize) -> [u8; 4] {
-        let Some(nearby) = self.nearby(k) else {
-            return [0; 4];
-        };
-        let animal = nearby.animal.map(|color| {
-            let alpha = (self.toward(color, k)).unwrap_or_else(|| self.alike(k));
+        let nearby = self.nearby(k);
+        let animal = nearby.animal.map_or(0.0, |color| {
             let most = nearby.shadow.map_or(1.0, |_| self.blurred_solid(k));
-            (alpha.min(most), color)
+            let alpha = self.toward(color, k).unwrap_or_else(|| self.alike(k));
+            alpha.min(most)
         });
-        let shadow = nearby.shadow.map(|share| {
-            let black = [0.0; 3];
-            (share * self.toward(black, k).unwrap_or(0.0), black)
-        });
-        let larger = |p: (f32, [f32; 3]), q: (f32, [f32; 3])| if q.0 > p.0 { q } else { p };
-        let Some((alpha, fore)) = animal.into_iter().chain(shadow).reduce(larger) else {
-            return [0; 4];
-        };
-        if alpha < TRACE && nearby.animal.is_some() {
+        let shadow = nearby
+            .shadow
+            .map_or(0.0, |share| share * self.toward([0.0; 3], k).unwrap_or(0.0));
+        let alpha = f32::max(animal, shadow);
+        let level = (alpha * 255.0 + 0.5) as u8;
+        if level == 0 || (alpha < TRACE && nearby.animal.is_some()) {
             return [0; 4];
         }
-        let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
-        let color = if alpha > 0.2 || nearby.shadow.is_some() {
-            [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
-        } else {
-            fore
+        let color = match nearby.animal {
+            Some(color) if nearby.shadow.is_none() && alpha <= 0.2 => color,
+            _ => {
+                let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
+                [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
+            }
         };
         let [r, g, b] = color.map(|c| (c + 0.5) as u8);
-        [r, g, b, (alpha * 255.0 + 0.5) as u8]
+        [r, g, b, level]
     }
 
     /// How far a pixel lies from the plate toward a color, 0 to 1, where the color stands out from the plate.
@@ -262,27 +257,34 @@ impl Puller<'_> {
 
     /// What a band pixel may have a share of. What looks like a shadow may be one near the animal too, but not in a
     /// narrow gap of it, and is nothing else beyond the band around what is solid.
-    fn nearby(&self, k: usize) -> Option<Nearby> {
-        let width = self.mask.width();
-        let (x, y) = (k % width, k / width);
-        let place = |found: u32| (found != NOWHERE).then_some(found as usize);
-        let steps = |at: usize| (at % width).abs_diff(x).max((at / width).abs_diff(y));
+    fn nearby(&self, k: usize) -> Nearby {
         let band = self.band_px as usize;
-        let solid = place(self.nearest_solid[k])?;
-        let is_near = steps(solid) <= band;
-        let shadow =
-            (!is_near || (self.closed.bits[k] == 0 && self.coat.is_shadow(k))).then(|| {
-                let fade = if is_near { 1.0 } else { self.fade(k) };
-                fade * self.on_ground(k, solid)
-            });
-        let inside = place(self.nearest_inside[k]).filter(|&at| steps(at) <= 2 * band + 1);
-        let animal = is_near
-            .then(|| match inside {
-                Some(at) => Some(self.mean_inside((at % width) as i64, (at / width) as i64)),
-                None => self.starkest((solid % width) as i64, (solid / width) as i64),
-            })
-            .flatten();
-        Some(Nearby { animal, shadow })
+        let mut nearby = Nearby::default();
+        let solid = self.nearest_solid[k];
+        if solid == NOWHERE {
+            return nearby;
+        }
+        let is_near = self.steps(k, solid as usize) <= band;
+        if !is_near || (self.closed.bits[k] == 0 && self.coat.is_shadow(k)) {
+            let fade = if is_near { 1.0 } else { self.fade(k) };
+            nearby.shadow = Some(fade * self.least_share(k, solid as usize));
+        }
+        if is_near {
+            let inside = self.nearest_inside[k];
+            nearby.animal =
+                match inside != NOWHERE && self.steps(k, inside as usize) <= 2 * band + 1 {
+                    true => Some(self.mean_inside(inside as usize)),
+                    false => self.starkest(solid as usize),
+                };
+        }
+        nearby
+    }
+
+    /// How many steps it is from one pixel to another (8-connected).
+    fn steps(&self, from: usize, to: usize) -> usize {
+        let width = self.mask.width();
+        let along_x = (from % width).abs_diff(to % width);
+        along_x.max((from / width).abs_diff(to / width))
     }
 
     /// How far a shadow has faded in, 0 to 1.
@@ -294,10 +296,10 @@ impl Puller<'_> {
 
     /// How much of what is cast on a pixel goes with the animal: as little as on the way to it from what is solid, for
     /// beyond the edge of its ground it is cast on something else.
-    fn on_ground(&self, k: usize, solid: usize) -> f32 {
+    fn least_share(&self, k: usize, solid: usize) -> f32 {
         let (rect, width) = (self.mask.rect, self.mask.width());
         let (from, to) = ([k % width, k / width], [solid % width, solid / width]);
-        let n_steps = from[0].abs_diff(to[0]).max(from[1].abs_diff(to[1]));
+        let n_steps = self.steps(k, solid);
         let between = |axis: usize, step: usize| {
             (from[axis] * (n_steps - step) + to[axis] * step + n_steps / 2) / n_steps
         };
@@ -310,7 +312,8 @@ impl Puller<'_> {
     }
 
     /// Mean color of the inside pixels of a 3 x 3 neighborhood whose middle is one.
-    fn mean_inside(&self, x: i64, y: i64) -> [f32; 3] {
+    fn mean_inside(&self, at: usize) -> [f32; 3] {
+        let [x, y] = self.xy(at);
         let (mut sum, mut n) = ([0.0; 3], 0.0);
         for (dx, dy) in (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (dx, dy))) {
             if let Some(at) = self
@@ -327,7 +330,8 @@ impl Puller<'_> {
     }
 
     /// The color of the solid pixel within 2 pixels that differs most from the plate.
-    fn starkest(&self, x: i64, y: i64) -> Option<[f32; 3]> {
+    fn starkest(&self, at: usize) -> Option<[f32; 3]> {
+        let [x, y] = self.xy(at);
         let around = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dx, dy)));
         around
             .filter_map(|(dx, dy)| self.at(x + dx, y + dy))
@@ -338,18 +342,23 @@ impl Puller<'_> {
 
     /// What is solid, blurred by a Gaussian of 0.7 pixels (5 x 5).
     fn blurred_solid(&self, k: usize) -> f32 {
-        let (x, y) = (k % self.mask.width(), k / self.mask.width());
+        let [x, y] = self.xy(k);
         // exp(-d^2 / (2 * 0.49)) for d = 0, 1, 2.
         const WEIGHTS: [f32; 3] = [1.0, 0.3604, 0.0169];
         let (mut sum, mut total) = (0.0, 0.0);
         for (dx, dy) in (-2..=2i64).flat_map(|dy| (-2..=2i64).map(move |dx| (dx, dy))) {
             let weight = WEIGHTS[dx.unsigned_abs() as usize] * WEIGHTS[dy.unsigned_abs() as usize];
             total += weight;
-            if let Some(at) = self.at(x as i64 + dx, y as i64 + dy) {
+            if let Some(at) = self.at(x + dx, y + dy) {
                 sum += weight * f32::from(self.solid.bits[at]);
             }
         }
         sum / total
+    }
+
+    fn xy(&self, k: usize) -> [i64; 2] {
+        let width = self.mask.width();
+        [k % width, k / width].map(|at| at as i64)
     }
 
     fn at(&self, x: i64, y: i64) -> Option<usize> {

@@ -124,10 +124,9 @@ fn add_midst(solid: &mut Mask, reach_px: u32) {
     if filled == *solid {
         return;
     }
-    let mut midst = (0..reach_px).fold(solid.clone(), |mask, _| mask.eroded());
+    let mut midst = solid.eroded_by(reach_px);
     midst.fill_holes();
-    let midst = (0..reach_px).fold(midst, |mask, _| mask.dilated());
-    for (bit, within) in solid.bits.iter_mut().zip(midst.bits) {
+    for (bit, within) in solid.bits.iter_mut().zip(midst.dilated_by(reach_px).bits) {
         *bit |= within;
     }
 }

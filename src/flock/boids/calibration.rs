@@ -40,8 +40,9 @@ const STEEPER: f64 = 0.02;
 /// Share of the frames that rise more steeply in the picture than a boid may be seen to, and of those that sink so: few
 /// frames, for which no plan finds one that follows.
 const STEEPER_IN_PICTURE: f64 = 0.15;
+/// Share of the frames that are slower, or turn less, than a boid may at most.
 const FASTEST: f64 = 0.95;
-/// And the slowest.
+/// And of those that are slower than it must be.
 const SLOWEST: f64 = 0.05;
 /// A boid may point this steeply whatever was seen.
 const LEAST_STEEP_RAD: f64 = 0.05;

@@ -4,6 +4,7 @@ use super::*;
 
 const WALL: u8 = 50;
 
+/// Paper before a dark wall.
 fn wall(x: u32, _: u32) -> u8 {
     if x < 70 { PAPER } else { WALL }
 }
@@ -35,7 +36,7 @@ fn an_image_in_a_dark_wall_stays_behind_and_the_shadow_before_it_does_not() {
 }
 
 /// Black, a little less so on the left.
-fn black(x: u32, _: u32) -> u8 {
+fn nearly_black(x: u32, _: u32) -> u8 {
     if x < 62 { 4 } else { 1 }
 }
 
@@ -45,7 +46,7 @@ fn in_the_dark(x: u32, y: u32) -> u8 {
     match (away([x, y], BODY), is_leg) {
         (0, _) => 200,
         (_, true) => 120,
-        _ => black(x, y),
+        _ => nearly_black(x, y),
     }
 }
 
@@ -65,7 +66,7 @@ fn with_a_hidden_part(x: u32, y: u32) -> u8 {
 
 #[test]
 fn a_limb_apart_from_the_body_is_no_image() {
-    let light = drawn_on(black, in_the_dark);
+    let light = drawn_on(nearly_black, in_the_dark);
     let tail = drawn_on(striped, with_a_hidden_part);
     for x in 70..74 {
         assert_eq!(light.pixel(x, 32)[3], 255, "the leg at {x}");

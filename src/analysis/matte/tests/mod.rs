@@ -181,7 +181,6 @@ fn a_light_spot_on_the_body_covers_and_the_floor_between_two_thin_parts_does_not
     }
 }
 
-/// Paper before a dark wall.
 /// What the edge of the next body is before looks like that body.
 fn light_stripe(x: u32, _: u32) -> u8 {
     if x < 58 { 50 } else { 101 }
@@ -236,7 +235,7 @@ fn a_shadow_on_the_brighter_floor_is_a_shadow() {
 }
 
 /// A floor with a darker stripe.
-fn with_a_stripe(x: u32, _: u32) -> u8 {
+fn striped_floor(x: u32, _: u32) -> u8 {
     if (62..66).contains(&x) { 116 } else { PAPER }
 }
 
@@ -247,16 +246,45 @@ fn with_a_pale_ear(x: u32, y: u32) -> u8 {
     match (is_ear, away([x, y], BODY), is_cast) {
         (true, ..) => 105,
         (_, 0, _) => FUR,
-        (.., true) => with_a_stripe(x, y) / 20 * 17,
-        _ => with_a_stripe(x, y),
+        (.., true) => striped_floor(x, y) / 20 * 17,
+        _ => striped_floor(x, y),
     }
 }
 
 #[test]
 fn a_shadow_on_what_has_the_color_of_the_animal_beside_it_is_a_shadow() {
-    let drawn = drawn_on(with_a_stripe, with_a_pale_ear);
+    let drawn = drawn_on(striped_floor, with_a_pale_ear);
     for (x, y) in (30..36).flat_map(|y| (62..66).map(move |x| (x, y))) {
         let alpha = drawn.pixel(x, y)[3];
         assert!(alpha < 80, "{alpha} at {x}, {y}");
+    }
+}
+
+fn black(_: u32, _: u32) -> u8 {
+    0
+}
+
+/// A light animal with a thin loop, in which it is hardly brighter than black.
+fn with_a_loop(x: u32, y: u32) -> u8 {
+    const LOOP: Rect = Rect {
+        x: 66,
+        y: 26,
+        w: 14,
+        h: 14,
+    };
+    match (away([x, y], BODY), away([x, y], LOOP)) {
+        (0, _) => 200,
+        (_, 1..=3) => 120,
+        (_, 0) => 9,
+        _ => 0,
+    }
+}
+
+#[test]
+fn on_black_nothing_is_a_shadow() {
+    let drawn = drawn_on(black, with_a_loop);
+    assert_eq!(drawn.pixel(64, 33)[3], 255, "the loop");
+    for (x, y) in (30..36).flat_map(|y| (70..76).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y), [0; 4], "{x}, {y}");
     }
 }
