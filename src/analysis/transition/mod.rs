@@ -22,10 +22,14 @@ use crate::cpu::Level;
 use crate::library::{Patch, Playback, Poses, Sprites, Transition};
 use crate::progress::Progress;
 
-/// Larger multiples of the natural step, tried while the component holds too little.
+/// Larger multiples of the natural step, tried where the component holds too little.
 const KAPPA_LADDER: [f64; 3] = [2.5, 3.0, 4.0];
+/// Beyond them each multiple is so many times the one before.
+const KAPPA_GROWTH: f64 = 1.5;
 /// A component that lasts shorter than this is too little.
 const LEAST_COMPONENT_S: f64 = 2.0;
+/// So is one that holds less than this share of the frames that the largest multiple joins.
+const LEAST_SHARE: f64 = 0.75;
 /// Plain pairs of clips are at least this far apart.
 const LEAST_GAP_S: f64 = 0.5;
 
@@ -83,7 +87,6 @@ pub fn connect_compared(
     let clips = Clips::new(sprites, poses, clip_frames);
     let clip = params.clip(clip_frames);
     let steps = natural_steps(pixels.steps(cpu), &clips, &clip.weights());
-    let rungs = rungs(params, steps);
     let mut usable = Marks::none(clips.usable.len());
     usable.mark_where(&clips.usable, |&usable| usable);
     let search = Search {
@@ -102,19 +105,46 @@ pub fn connect_compared(
         }),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
-    let mut connections = None;
-    for rung in &rungs {
-        let found = search
-            .run(rung, params.mirror, progress)
-            .map_err(|Cancelled| Error::Cancelled)?;
-        let found = found.connections(rung, &clips, steps.median, params.approximate);
-        let long_enough = found.playback.component.len() as f64 >= LEAST_COMPONENT_S * poses.fps;
-        connections = Some(found);
-        if long_enough {
-            break;
-        }
+    let at = |rung: Rung| -> Result<Connections, Error> {
+        let found = search.run(rung, params.mirror, progress);
+        let found = found.map_err(|Cancelled| Error::Cancelled)?;
+        Ok(found.connections(rung, &clips, steps.median, params.approximate))
+    };
+    strictest_enough(&rungs(params, steps), &clips, poses.fps, at)
+}
+
+/// What the strictest epsilon joins whose component lasts long enough and holds most of what the widest joins: a
+/// wider one costs jumps that are seen more, and is worth it only where much more can be played.
+fn strictest_enough(
+    rungs: &[Rung],
+    clips: &Clips,
+    fps: f64,
+    mut at: impl FnMut(Rung) -> Result<Connections, Error>,
+) -> Result<Connections, Error> {
+    let least = |n_frames: usize| (LEAST_SHARE * n_frames as f64).max(LEAST_COMPONENT_S * fps);
+    let n_played = |playback: &Playback| playback.component.len() as f64;
+    let (first, last) = (0, rungs.len() - 1);
+    let strictest = at(rungs[first])?;
+    let n_shown = clips.shown.iter().filter(|&&shown| shown).count();
+    if last == first || n_played(&strictest.playback) >= least(n_shown) {
+        return Ok(strictest);
     }
-    Ok(connections.expect("there is always a first rung"))
+    let widest = at(rungs[last])?;
+    // What is nearest around at the widest epsilon is so at every stricter one.
+    let is_enough = |rung: &Rung| {
+        let nearer = widest
+            .transitions
+            .iter()
+            .copied()
+            .filter(|t| t.distance < rung.epsilon);
+        let playback = clips.playback(&nearer.collect::<Vec<_>>());
+        n_played(&playback) >= least(widest.playback.component.len())
+    };
+    match rungs.iter().position(is_enough) {
+        Some(rung_idx) if rung_idx == first => Ok(strictest),
+        Some(rung_idx) if rung_idx < last => at(rungs[rung_idx]),
+        _ => Ok(widest),
+    }
 }
 
 /// Which frames and clips can be used.
@@ -148,6 +178,10 @@ impl Clips {
             shown,
         }
     }
+
+    fn playback(&self, transitions: &[Transition]) -> Playback {
+        playback::playback(transitions, &self.shown, self.clip_frames)
+    }
 }
 
 /// How much the animal changes from one frame to the next.
@@ -176,13 +210,14 @@ fn natural_steps(steps: Vec<u64>, clips: &Clips, weights: &[u64]) -> NaturalStep
 }
 
 /// An epsilon to try, and the kappa that it comes from.
+#[derive(Clone, Copy)]
 struct Rung {
     kappa: Option<f64>,
     epsilon: u64,
 }
 
 /// The epsilons to try, the strictest first. An animal that rests most of the time has a natural step
-/// of nearly nothing: for it the last rung is the 99th percentile of its steps, what it changes by
+/// of nearly nothing: for it they grow up to the 99th percentile of its steps, what it changes by
 /// when it moves.
 fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
     if let Some(epsilon) = params.epsilon {
@@ -191,11 +226,12 @@ fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
             epsilon,
         }];
     }
-    let larger = KAPPA_LADDER.into_iter().filter(|&k| k > params.kappa);
     let liveliest = steps.p99 as f64 / steps.median.max(1) as f64;
     let highest = KAPPA_LADDER[KAPPA_LADDER.len() - 1].max(params.kappa);
+    let growing = std::iter::successors(Some(highest), |kappa| Some(KAPPA_GROWTH * kappa)).skip(1);
     std::iter::once(params.kappa)
-        .chain(larger)
+        .chain(KAPPA_LADDER.into_iter().filter(|&k| k > params.kappa))
+        .chain(growing.take_while(|&kappa| kappa < liveliest))
         .chain((liveliest > highest).then_some(liveliest))
         .map(|kappa| Rung {
             kappa: Some(kappa),
@@ -228,7 +264,7 @@ struct Found {
 }
 
 impl Search<'_> {
-    fn run(&self, rung: &Rung, mirror: bool, progress: &dyn Progress) -> Result<Found, Cancelled> {
+    fn run(&self, rung: Rung, mirror: bool, progress: &dyn Progress) -> Result<Found, Cancelled> {
         let mut found = Found::default();
         self.one_side(Side::Plain, rung.epsilon, progress, &mut found)?;
         if mirror {
@@ -321,12 +357,12 @@ impl Found {
     /// What these transitions make of the footage.
     fn connections(
         self,
-        rung: &Rung,
+        rung: Rung,
         clips: &Clips,
         natural_step: u64,
         is_approximate: bool,
     ) -> Connections {
-        let playback = playback::playback(&self.transitions, &clips.shown, clips.clip_frames);
+        let playback = clips.playback(&self.transitions);
         let n_frames = clips.shown.len();
         Connections {
             clip_frames: clips.clip_frames,

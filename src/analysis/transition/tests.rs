@@ -74,7 +74,7 @@ fn connections(moments: &[Option<Moment>], params: &Params) -> Connections {
 
 #[test]
 fn an_animal_that_repeats_its_stroke_may_jump_by_whole_strokes() {
-    let found = connections(&strokes(61, 0.0), &params());
+    let found = connections(&strokes(201, 0.0), &params());
     assert!(found.natural_step > 0);
     assert_eq!(found.epsilon, 2 * found.natural_step);
     assert_eq!(found.kappa_used, Some(2.0));
@@ -329,6 +329,45 @@ fn epsilon_grows_while_the_component_is_short() {
     assert_eq!(found.kappa_used, Some(4.0));
     assert_eq!(found.epsilon, 4 * found.natural_step);
     assert!(found.playback.component.len() < 20);
+}
+
+#[test]
+fn epsilon_grows_where_much_more_is_joined_by_it() {
+    // Two seconds of strokes that come again, and as much that is like them at a wider epsilon only: it turns the
+    // other way, and faster.
+    let mut moments = strokes(41, 0.0);
+    moments.extend((0..30).map(|k| Some(((1.0 - 0.18 * f64::from(k)).rem_euclid(1.0), 0.0))));
+    let grown = connections(&moments, &params());
+    assert_eq!(grown.kappa_used, Some(2.5));
+    let strict = Params {
+        epsilon: Some(2 * grown.natural_step),
+        ..params()
+    };
+    let n_strict = connections(&moments, &strict).playback.component.len();
+    assert!((20..45).contains(&n_strict), "{n_strict}");
+    assert!(grown.playback.component.len() > 60);
+}
+
+#[test]
+fn epsilon_stays_where_nothing_joins_the_rest() {
+    let mut moments = strokes(41, 0.0);
+    moments.extend((0..30).map(|k| Some((f64::from(k) / 35.0, 0.5))));
+    let found = connections(&moments, &params());
+    assert_eq!(found.kappa_used, Some(2.0));
+    assert!(found.component_share < 0.6);
+}
+
+#[test]
+fn epsilon_grows_to_the_steps_of_an_animal_that_rests() {
+    let kappas = |p99| {
+        let rungs = rungs(&params(), NaturalSteps { median: 10, p99 });
+        rungs
+            .iter()
+            .map(|rung| rung.kappa.expect("not given"))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(kappas(30), [2.0, 2.5, 3.0, 4.0]);
+    assert_eq!(kappas(100), [2.0, 2.5, 3.0, 4.0, 6.0, 9.0, 10.0]);
 }
 
 #[test]
