@@ -221,13 +221,15 @@ impl<'a> Tracker<'a> {
         let Some(predicted) = self.predicted().filter(|_| self.areas.len() >= LEAST_AREAS) else {
             return components;
         };
-        let usual = self.usual_area();
-        let far_off = |area: u64| libm::log(area as f64 / usual).abs();
+        let known = parting::Known {
+            usual_area: self.usual_area(),
+            last_area: self.areas.last().copied().unwrap_or(1.0),
+            place_px: predicted,
+        };
         for component in &mut components {
-            if component.area as f64 > MERGED * usual {
+            if component.area as f64 > MERGED * known.usual_area {
                 let difference = silhouette::difference(frame, self.plate, gain, component.rect);
-                let part = parting::part_at(component, &difference, usual, predicted);
-                if let Some(part) = part.filter(|p| far_off(p.area) < far_off(component.area)) {
+                if let Some(part) = parting::part_of(component, &difference, &known) {
                     *component = part;
                 }
             }

@@ -17,13 +17,42 @@ use crate::raster::runs::{self, Component};
 const LEAST_SHARE: f64 = 0.15;
 /// The pass lies below this share of the lower summit.
 const PASS: f64 = 0.7;
+/// They touch along at most so many sides of a square as large as the smaller: an animal and its image meet at a nose, a
+/// foot or a part of a flank, while an animal that is dull somewhere hangs together along a ragged line.
+const CONTACT: f64 = 1.2;
 /// How many heights are tried for the pass.
 const N_HEIGHTS: usize = 24;
+/// How much the last area counts beside the usual one.
+const LAST_WEIGHT: f64 = 0.5;
 
-/// The part of a component that holds what is nearest `place_px`, where two summits show; `None` where the
-/// component is one thing. `difference` is that of the component's box, `usual_area` the animal's area
-/// before, pixels.
-pub fn part_at(
+/// What is known of the animal before a frame.
+pub struct Known {
+    /// The median of its last areas, pixels.
+    pub usual_area: f64,
+    /// Its last area, pixels.
+    pub last_area: f64,
+    /// Where its centroid should be.
+    pub place_px: [f64; 2],
+}
+
+impl Known {
+    /// How far an area is off what it should be: both the usual one, and the last, for what was one thing a moment ago is so
+    /// still.
+    fn off(&self, area: u64) -> f64 {
+        let from = |other: f64| libm::log(area as f64 / other).abs();
+        from(self.usual_area) + LAST_WEIGHT * from(self.last_area)
+    }
+}
+
+/// The part of a component that is the animal, where two summits show and its area is nearer to what it should be than
+/// the whole's; `None` where the component is one thing. `difference` is that of the component's box.
+pub fn part_of(component: &Component, difference: &Difference, known: &Known) -> Option<Component> {
+    let part = part_at(component, difference, known.usual_area, known.place_px)?;
+    (known.off(part.area) < known.off(component.area)).then_some(part)
+}
+
+/// The part that holds what is nearest `place_px`, whatever its area.
+fn part_at(
     component: &Component,
     difference: &Difference,
     usual_area: f64,
@@ -47,9 +76,28 @@ pub fn part_at(
             .map(|label| u8::from(label == Some(mine)))
             .collect(),
     };
+    if contact(&part, &mask) > CONTACT {
+        return None;
+    }
     runs::components(&part)
         .into_iter()
         .reduce(|all, part| all.joined(part))
+}
+
+/// Along how many sides of a square as large as the smaller a part of a mask touches the rest.
+fn contact(part: &Mask, all: &Mask) -> f64 {
+    let (w, n) = (all.width(), all.bits.len());
+    let is_rest = |at: usize| all.bits[at] == 1 && part.bits[at] == 0;
+    let touches = |&at: &usize| {
+        part.bits[at] == 1
+            && ((at % w > 0 && is_rest(at - 1))
+                || (at % w < w - 1 && is_rest(at + 1))
+                || (at >= w && is_rest(at - w))
+                || (at + w < n && is_rest(at + w)))
+    };
+    let length = (0..n).filter(touches).count() as f64;
+    let smaller = part.area().min(all.area() - part.area());
+    length / (smaller.max(1) as f64).sqrt()
 }
 
 /// The mask's differences, each the mean over a square of 2 `radius` + 1 pixels a side; 0 outside.
@@ -203,6 +251,40 @@ mod tests {
         let usual_area = std::f64::consts::PI * 25.0 * 12.0;
         let part = part_at(&both, &difference, usual_area, [45.0, 58.0]).expect("two things");
         assert!(part.rect.y > 8, "{:?}", part.rect);
+    }
+
+    #[test]
+    fn what_was_one_thing_a_moment_ago_is_so_still() {
+        let (both, difference) = scene(|x, y| {
+            let other = ellipse(x, y, [45.0, 38.0], [15.0, 6.0]);
+            let bridge = (42.0..48.0).contains(&x) && (42.0..50.0).contains(&y);
+            match animal(x, y) || other {
+                true => 180.0,
+                false => f64::from(u8::from(bridge)) * 40.0,
+            }
+        });
+        let alone = std::f64::consts::PI * 25.0 * 12.0;
+        let part = |last_area| {
+            let known = Known {
+                usual_area: 1.1 * alone,
+                last_area,
+                place_px: [45.0, 60.0],
+            };
+            part_of(&both, &difference, &known)
+        };
+        assert!(part(both.area as f64).is_none());
+        let share = part(alone).expect("something came near").area as f64 / alone;
+        assert!((0.95..1.1).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn an_animal_with_a_dull_middle_is_one_thing() {
+        let (whole, difference) = scene(|x, y| match ellipse(x, y, [45.0, 60.0], [21.0, 15.0]) {
+            true if (42.0..50.0).contains(&x) => 40.0,
+            true => 180.0,
+            false => 0.0,
+        });
+        assert!(part_at(&whole, &difference, 500.0, [30.0, 60.0]).is_none());
     }
 
     #[test]
