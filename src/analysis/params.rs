@@ -38,7 +38,7 @@ pub struct Params {
     pub clip_weights: ClipWeights,
     /// Clips nearer than this are alike; null = kappa times the natural step.
     pub epsilon: Option<u64>,
-    /// Multiple of the natural step, > 0, when epsilon is null.
+    /// Multiple of the natural step, > 0, when epsilon is null; larger ones are tried where it joins too little.
     pub kappa: f64,
     /// Whether only clips that look roughly alike are compared, which is faster above 50 000 frames and misses
     /// some transitions: `stats.recall` says how many. Those found are transitions all the same.
