@@ -29,6 +29,9 @@ const LEVEL: f64 = 4.0;
 const LEAST_WINDOWS: usize = 4;
 /// Share of a window's frames that must be measured.
 const LEAST_SHARE: f64 = 0.6;
+/// Fewest frames in a window: four for its cubic trend, two for the wave, three that can contradict both. Below
+/// 4 frames a second a window holds fewer, and no beat is measured.
+const LEAST_WINDOW_FRAMES: usize = 9;
 
 /// The tail beat of an animal, where it can be told; `None` where it nowhere can.
 pub fn measure(poses: &Poses) -> Option<TailBeat> {
@@ -93,6 +96,9 @@ impl Window {
 
 fn spans(signals: &[Signal], fps: f64) -> Vec<BeatSpan> {
     let band = Band::new(fps);
+    if band.weights.len() < LEAST_WINDOW_FRAMES {
+        return Vec::new();
+    }
     let hop = ((HOP_S * fps).round() as usize).max(1);
     let n_frames = signals[0].len();
     let middles = (band.half..n_frames.saturating_sub(band.half)).step_by(hop);
@@ -362,6 +368,15 @@ mod tests {
             .map(|span| span.frames[1] - span.frames[0])
             .sum();
         assert!(n_frames < 300, "{n_frames} of 6000");
+    }
+
+    #[test]
+    fn below_4_fps_no_beat_is_measured_and_above_it_is_found() {
+        for fps in [0.01, 0.2, 0.45, 1.0, 1.2, 3.0, 10.0, 60.0] {
+            let poses = bending(30.0 * 0.2, 0.2, 3);
+            let beat = measure(&Poses { fps, ..poses });
+            assert_eq!(beat.is_some(), fps > 4.0, "{fps} fps");
+        }
     }
 
     #[test]
