@@ -105,6 +105,10 @@ fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
             tracing::error!(%error, "a request failed inside");
             code.into()
         }
+        Code::StorageFull => {
+            tracing::warn!(%error, "a request found no room on the disk");
+            code.into()
+        }
         _ => Problem::new(code, error.to_string()),
     }
 }

@@ -1,7 +1,7 @@
 //! Deleting what people made, with all that came of it. The rows go in one transaction, the files after
 //! it (a crash between leaves folders without rows, which are swept). A job's row goes with its result
 //! (RELIABILITY.md, I4); where it was running its worker finds no row at the next heartbeat, lets go, and
-//! can link nothing because no fence stands.
+//! can link nothing because no fence stands. Deleting works on a full disk, in the room of the reserve.
 
 use sqlx::types::Uuid;
 
@@ -10,7 +10,11 @@ use super::{Error, Store, Transaction, sql};
 impl Store {
     /// Deletes a footage, its libraries and all that was made of them; false where it is not there.
     pub async fn delete_footage(&self, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.begin().await?;
+        self.reserve.lend(|| self.delete_footage_now(id)).await
+    }
+
+    async fn delete_footage_now(&self, id: Uuid) -> Result<bool, Error> {
+        let mut transaction = self.writer.begin().await?;
         let folder: Option<String> = sql::query_scalar("select folder from footage where id = $1")
             .bind(id)
             .fetch_optional(&mut transaction)
@@ -38,7 +42,11 @@ impl Store {
 
     /// Deletes a library and all that was made of it; false where it is not there.
     pub async fn delete_library(&self, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.begin().await?;
+        self.reserve.lend(|| self.delete_library_now(id)).await
+    }
+
+    async fn delete_library_now(&self, id: Uuid) -> Result<bool, Error> {
+        let mut transaction = self.writer.begin().await?;
         let folders = delete_library_rows(&mut transaction, id).await?;
         let was_there = !folders.is_empty();
         self.forget(transaction, folders).await?;
@@ -48,7 +56,11 @@ impl Store {
 
     /// Deletes a flock or a virtual fish; false where it is not there.
     pub async fn delete_film(&self, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.begin().await?;
+        self.reserve.lend(|| self.delete_film_now(id)).await
+    }
+
+    async fn delete_film_now(&self, id: Uuid) -> Result<bool, Error> {
+        let mut transaction = self.writer.begin().await?;
         sql::query("select 1 from jobs where result_id = $1 for update")
             .bind(id)
             .execute(&mut transaction)

@@ -8,6 +8,11 @@ use sqlx::sqlite::SqliteError;
 
 use crate::code::Code;
 
+/// SQLITE_FULL, the low byte of its extended codes.
+const SQLITE_FULL: u32 = 13;
+/// SQLITE_IOERR_SHMSIZE: the index of the write-ahead log cannot grow.
+const SQLITE_IOERR_SHMSIZE: u32 = 4874;
+
 /// The reasons, one variant each.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -102,11 +107,12 @@ fn is_full(error: &std::io::Error) -> bool {
     )
 }
 
-/// SQLITE_FULL is 13, and so are the lowest eight bits of its extended forms; PostgreSQL says `disk_full`.
+/// Whether the database found no room on its disk; PostgreSQL says `disk_full`.
 fn has_no_room(error: &dyn DatabaseError) -> bool {
     let code = error.code().unwrap_or_default();
     match error.try_downcast_ref::<SqliteError>() {
-        Some(_) => code.parse::<u32>().is_ok_and(|code| code & 0xff == 13),
+        Some(_) => (code.parse::<u32>())
+            .is_ok_and(|code| code & 0xff == SQLITE_FULL || code == SQLITE_IOERR_SHMSIZE),
         None => code == "53100",
     }
 }

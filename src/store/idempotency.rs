@@ -65,7 +65,7 @@ impl Store {
         body_sha256: Option<&[u8]>,
         now_ms: i64,
     ) -> Result<Begun, Error> {
-        let mut transaction = self.begin().await?;
+        let mut transaction = self.writer.begin().await?;
         // Two at once: one begins, and the other one learns of it.
         let name = format!("key {} {} {}", scope.caller, scope.route, scope.key);
         transaction.lock(&name).await?;
@@ -97,6 +97,7 @@ impl Store {
             Some((_, ids, ..)) => ids,
             None => Uuid::now_v7(),
         };
+        self.reserve.require().await?;
         sql::query(
             "insert into idempotency (caller, route, key, ids, state, body_sha256, created_ms) \
              values ($1, $2, $3, $4, 'running', $5, $6) \
@@ -117,11 +118,13 @@ impl Store {
 
     /// Forgets answers that nobody may ask for again, also where no other key ever comes.
     pub async fn forget_old_answers(&self, now_ms: i64) -> Result<(), Error> {
-        sql::query("delete from idempotency where created_ms <= $1")
-            .bind(now_ms - KEPT_MS)
-            .execute(&self.writer)
-            .await?;
-        Ok(())
+        let forget = || async {
+            let sql = "delete from idempotency where created_ms <= $1";
+            let delete = sql::query(sql).bind(now_ms - KEPT_MS);
+            delete.execute(&self.writer).await?;
+            Ok(())
+        };
+        self.reserve.lend(forget).await
     }
 
     /// Whether a request that was last heard of then is not under way any more.
@@ -150,42 +153,51 @@ impl Store {
 
     /// Notes the answer to the request that holds the key.
     pub async fn finish_key(&self, scope: &Scope, answer: &Answer) -> Result<(), Error> {
-        sql::query(
-            "update idempotency set state = 'done', body_sha256 = $4, status = $5, headers = $6, \
-             answer = $7 where caller = $1 and route = $2 and key = $3 and state = 'running'",
-        )
-        .bind(&scope.caller)
-        .bind(&scope.route)
-        .bind(&scope.key)
-        .bind(&answer.body_sha256)
-        .bind(i64::from(answer.status))
-        .bind(&answer.headers)
-        .bind(&answer.answer)
-        .execute(&self.writer)
-        .await?;
-        Ok(())
+        let finish = || async {
+            sql::query(
+                "update idempotency set state = 'done', body_sha256 = $4, status = $5, headers = $6, \
+                 answer = $7 where caller = $1 and route = $2 and key = $3 and state = 'running'",
+            )
+            .bind(&scope.caller)
+            .bind(&scope.route)
+            .bind(&scope.key)
+            .bind(&answer.body_sha256)
+            .bind(i64::from(answer.status))
+            .bind(&answer.headers)
+            .bind(&answer.answer)
+            .execute(&self.writer)
+            .await?;
+            Ok(())
+        };
+        self.reserve.lend(finish).await
     }
 
     /// Gives the key back: its request ended without an answer to keep.
     pub async fn interrupt_key(&self, scope: &Scope) -> Result<(), Error> {
-        sql::query(
-            "update idempotency set state = 'interrupted' \
-             where caller = $1 and route = $2 and key = $3 and state = 'running'",
-        )
-        .bind(&scope.caller)
-        .bind(&scope.route)
-        .bind(&scope.key)
-        .execute(&self.writer)
-        .await?;
-        Ok(())
+        let interrupt = || async {
+            sql::query(
+                "update idempotency set state = 'interrupted' \
+                 where caller = $1 and route = $2 and key = $3 and state = 'running'",
+            )
+            .bind(&scope.caller)
+            .bind(&scope.route)
+            .bind(&scope.key)
+            .execute(&self.writer)
+            .await?;
+            Ok(())
+        };
+        self.reserve.lend(interrupt).await
     }
 
     /// Gives every key back, at the start of the process: whoever held one is gone, because the store is
     /// this process's alone.
     pub async fn interrupt_all_keys(&self) -> Result<(), Error> {
         let sql = "update idempotency set state = 'interrupted' where state = 'running'";
-        sql::query(sql).execute(&self.writer).await?;
-        Ok(())
+        let interrupt = || async {
+            sql::query(sql).execute(&self.writer).await?;
+            Ok(())
+        };
+        self.reserve.lend(interrupt).await
     }
 }
 

@@ -33,7 +33,7 @@ pub use error::Error;
 pub use spill::Spill;
 
 use crate::config::{Database, Storage};
-use sql::{Pool, Transaction};
+use sql::{Pool, Reserve, Transaction};
 
 #[cfg(test)]
 mod fresh;
@@ -43,6 +43,7 @@ mod fresh;
 pub struct Store {
     writer: Pool,
     reader: Pool,
+    reserve: Reserve,
     blobs: Blobs,
     holders: uploads::Holders,
     /// Held while the store is open: whoever holds them knows that no other process serves the same folder.
@@ -81,19 +82,26 @@ impl Store {
     async fn connect(storage: &Storage, locks: Vec<File>) -> Result<Store, Error> {
         let is_locked = !locks.is_empty();
         let blobs = Blobs::open(storage).await?;
-        let (writer, reader, is_alone) = match storage.database() {
+        let (writer, reader, reserve) = match storage.database() {
             Database::Sqlite(file) => {
-                let [writer, reader] = Pool::open_sqlite(&file, is_locked).await?;
-                (writer, reader, is_locked)
+                let reserve = Reserve::beside(&file);
+                let open = || Pool::open_sqlite(&file, is_locked);
+                let [writer, reader] = reserve.lend(open).await?;
+                (writer, reader, reserve)
             }
             Database::Postgres(url) => {
                 let pool = Pool::open_postgres(&url).await?;
-                (pool.clone(), pool, false)
+                (pool.clone(), pool, Reserve::none())
             }
         };
+        let is_alone = is_locked && writer.is_file();
+        if let Err(error) = reserve.require().await {
+            tracing::warn!(%error, "there is no room for the reserve: nothing new is stored");
+        }
         let store = Store {
             writer,
             reader,
+            reserve,
             blobs,
             holders: uploads::Holders::default(),
             locks: Arc::new(locks),
@@ -125,7 +133,7 @@ impl Store {
 
     /// Whether the database can be written now: for readiness.
     pub async fn is_writable(&self) -> bool {
-        let probe = async { self.begin().await?.rollback().await };
+        let probe = async { self.writer.begin().await?.rollback().await };
         matches!(
             tokio::time::timeout(Duration::from_secs(2), probe).await,
             Ok(Ok(()))
@@ -139,7 +147,10 @@ impl Store {
         self.blobs.work().close();
     }
 
+    /// Begins a transaction that adds rows: fails where the disk has no room but the reserve. A transaction that
+    /// removes or ends things begins at the writer, within [`Reserve::lend`].
     async fn begin(&self) -> Result<Transaction, sqlx::Error> {
+        self.reserve.require().await?;
         self.writer.begin().await
     }
 }

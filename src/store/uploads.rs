@@ -68,17 +68,20 @@ pub struct Growing {
 impl Store {
     /// Adds an upload without bytes.
     pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
+        self.reserve.require().await?;
         File::create_new(self.upload_path(upload.id)).await?;
         let sql = "insert into uploads (id, name, size_bytes, expires_ms, owner) \
                    values ($1, $2, $3, $4, $5)";
-        sql::query(sql)
+        let insert = sql::query(sql)
             .bind(upload.id)
             .bind(&upload.name)
             .bind(upload.size_bytes)
             .bind(upload.expires_ms)
-            .bind(&upload.owner)
-            .execute(&self.writer)
-            .await?;
+            .bind(&upload.owner);
+        if let Err(error) = insert.execute(&self.writer).await {
+            self.remove_upload_file(upload.id)?;
+            return Err(error.into());
+        }
         Ok(())
     }
 
@@ -163,8 +166,11 @@ impl Store {
 
     /// Gives an upload up, with its bytes.
     pub async fn delete_upload(&self, id: Uuid) -> Result<(), Error> {
-        let delete = sql::query("delete from uploads where id = $1").bind(id);
-        delete.execute(&self.writer).await?;
+        let delete = || async {
+            let delete = sql::query("delete from uploads where id = $1").bind(id);
+            Ok(delete.execute(&self.writer).await?)
+        };
+        self.reserve.lend(delete).await?;
         self.remove_upload_file(id)
     }
 
@@ -172,10 +178,11 @@ impl Store {
     /// [`Store::create_upload`], which makes the file before the row: at the start, or for expired rows alone.
     pub async fn sweep_uploads(&self, now_ms: i64) -> Result<usize, Error> {
         let sql = "delete from uploads where expires_ms <= $1 returning id";
-        let expired: Vec<Uuid> = sql::query_scalar(sql)
-            .bind(now_ms)
-            .fetch_all(&self.writer)
-            .await?;
+        let delete = || async {
+            let delete = sql::query_scalar(sql).bind(now_ms);
+            Ok(delete.fetch_all(&self.writer).await?)
+        };
+        let expired: Vec<Uuid> = self.reserve.lend(delete).await?;
         for id in &expired {
             self.remove_upload_file(*id)?;
         }

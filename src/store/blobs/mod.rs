@@ -30,6 +30,7 @@ use draft::Workplace;
 use shelf::Shelf;
 
 use super::{Error, Store, Transaction, sql};
+use crate::code::Code;
 use crate::config::{Files, Storage};
 
 /// The kinds of folders.
@@ -267,7 +268,10 @@ impl Store {
     pub async fn is_linked_after(&self, folder: &str, error: &Error) -> Result<bool, Error> {
         match self.is_folder_known(folder).await {
             Ok(true) => return Ok(true),
-            Ok(false) if matches!(error, Error::Sql(sqlx::Error::Database(_))) => {
+            Ok(false)
+                if matches!(error, Error::Sql(sqlx::Error::Database(_)))
+                    || error.code() == Code::StorageFull =>
+            {
                 self.blobs.discard(folder).await?;
             }
             Ok(false) => tracing::warn!(folder, "a folder without a row is left to the sweep"),

@@ -22,7 +22,12 @@ pub enum Cancel {
 impl Store {
     /// Cancels a queued job at once, asks the worker of a running one to stop.
     pub async fn cancel(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
-        let mut transaction = self.begin().await?;
+        let cancel = || self.cancel_now(job, reach, now_ms);
+        self.reserve.lend(cancel).await
+    }
+
+    async fn cancel_now(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
+        let mut transaction = self.writer.begin().await?;
         let sql = "select state from jobs where id = $1 and ($2 is null or owner = $2) for update";
         let state: Option<String> = sql::query_scalar(sql)
             .bind(job.0)

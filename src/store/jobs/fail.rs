@@ -14,7 +14,18 @@ impl Store {
         detail: &str,
         now_ms: i64,
     ) -> Result<Change, Error> {
-        let mut transaction = self.begin().await?;
+        let fail = || self.fail_now(lease, code, detail, now_ms);
+        self.reserve.lend(fail).await
+    }
+
+    async fn fail_now(
+        &self,
+        lease: &Lease,
+        code: Code,
+        detail: &str,
+        now_ms: i64,
+    ) -> Result<Change, Error> {
+        let mut transaction = self.writer.begin().await?;
         let n_rows = sql::query(
             "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
              code = $3, detail = $4, finished_ms = $5 \
@@ -37,7 +48,11 @@ impl Store {
 
     /// Ends a running job as cancelled: its worker has let go of it.
     pub async fn stop(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
-        let mut transaction = self.begin().await?;
+        self.reserve.lend(|| self.stop_now(lease, now_ms)).await
+    }
+
+    async fn stop_now(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
+        let mut transaction = self.writer.begin().await?;
         let n_rows = sql::query(
             "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, \
              finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",

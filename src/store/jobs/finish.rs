@@ -41,7 +41,17 @@ impl Store {
         outcome: &Outcome,
         now_ms: i64,
     ) -> Result<Change, Error> {
-        let mut transaction = self.begin().await?;
+        let finish = || self.finish_now(lease, outcome, now_ms);
+        self.reserve.lend(finish).await
+    }
+
+    async fn finish_now(
+        &self,
+        lease: &Lease,
+        outcome: &Outcome,
+        now_ms: i64,
+    ) -> Result<Change, Error> {
+        let mut transaction = self.writer.begin().await?;
         let n_rows = sql::query(
             "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
              progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",

@@ -23,6 +23,17 @@ impl Store {
         stage: &str,
         progress: f64,
     ) -> Result<Beat, Error> {
+        let beat = || self.heartbeat_now(lease, lease_until_ms, stage, progress);
+        self.reserve.lend(beat).await
+    }
+
+    async fn heartbeat_now(
+        &self,
+        lease: &Lease,
+        lease_until_ms: i64,
+        stage: &str,
+        progress: f64,
+    ) -> Result<Beat, Error> {
         let cancel_requested: Option<bool> = sql::query_scalar(
             "update jobs set lease_until_ms = $3, stage = $4, progress = $5 \
              where id = $1 and fence = $2 and state = 'running' returning cancel_requested",

@@ -7,6 +7,10 @@ use crate::store::{Error, Store, sql};
 impl Store {
     /// Puts the job back in the queue as if it had not been claimed, its fence apart.
     pub async fn release(&self, lease: &Lease) -> Result<Change, Error> {
+        self.reserve.lend(|| self.release_now(lease)).await
+    }
+
+    async fn release_now(&self, lease: &Lease) -> Result<Change, Error> {
         let n_rows = sql::query(
             "update jobs set state = 'queued', worker = null, lease_until_ms = null, \
              stage = null, progress = 0, attempt = attempt - 1 \

@@ -16,13 +16,15 @@ impl Store {
     /// Rescues every job whose lease ended before `now_ms`: back to the queue; cancelled, where that
     /// had been asked for; failed as `crashed_worker` at its second crash. Returns where each went.
     pub async fn rescue(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
-        self.rescue_leases_before(now_ms, now_ms).await
+        let rescue = || self.rescue_leases_before(now_ms, now_ms);
+        self.reserve.lend(rescue).await
     }
 
     /// The same at the start of the process, whatever the leases say. Sound because the store's lock
     /// on the data folder is held: whoever gave those leases is gone.
     pub async fn rescue_all(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
-        self.rescue_leases_before(i64::MAX, now_ms).await
+        let rescue = || self.rescue_leases_before(i64::MAX, now_ms);
+        self.reserve.lend(rescue).await
     }
 
     async fn rescue_leases_before(
@@ -30,7 +32,7 @@ impl Store {
         lease_end_ms: i64,
         now_ms: i64,
     ) -> Result<Vec<(JobId, JobState)>, Error> {
-        let mut transaction = self.begin().await?;
+        let mut transaction = self.writer.begin().await?;
         let silent: Vec<(Uuid, i64, bool)> = sql::query(
             "select id, crashes + 1, cancel_requested from jobs \
              where state = 'running' and lease_until_ms < $1 order by id for update skip locked",

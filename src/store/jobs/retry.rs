@@ -6,6 +6,10 @@ use crate::store::{Error, Store, sql};
 impl Store {
     /// Puts the job back in the queue, not to be claimed before `run_at_ms`.
     pub async fn retry(&self, lease: &Lease, run_at_ms: i64) -> Result<Change, Error> {
+        self.reserve.lend(|| self.retry_now(lease, run_at_ms)).await
+    }
+
+    async fn retry_now(&self, lease: &Lease, run_at_ms: i64) -> Result<Change, Error> {
         let n_rows = sql::query(
             "update jobs set state = 'queued', worker = null, lease_until_ms = null, \
              stage = null, progress = 0, run_at_ms = $3 \

@@ -5,6 +5,7 @@
 //! are PostgreSQL's alone: SQLite's one writer holds all rows anyway, so its text goes without them.
 
 mod pool;
+mod reserve;
 mod value;
 
 use std::borrow::Cow;
@@ -15,6 +16,7 @@ use sqlx::{AssertSqlSafe, Decode, FromRow, Postgres, Sqlite, Type};
 
 use pool::On;
 pub(super) use pool::{Listener, Pool, Transaction};
+pub(super) use reserve::Reserve;
 use value::{Value, arguments};
 
 /// The clauses that SQLite does not know, the longest first.

@@ -13,7 +13,7 @@ use sqlx::postgres::{PgConnectOptions, PgConnection, PgListener, PgPoolOptions};
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteConnection, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous,
 };
-use sqlx::{PgPool, Postgres, Sqlite, SqlitePool};
+use sqlx::{Connection, Executor, PgPool, Postgres, Sqlite, SqlitePool};
 
 use super::{query, query_scalar};
 use crate::store::Error;
@@ -64,6 +64,7 @@ impl Pool {
         let writer = pool
             .clone()
             .max_connections(1)
+            .after_release(|connection, _| Box::pin(async { Ok(is_idle(connection).await) }))
             .connect_with(options.clone())
             .await?;
         if migrates {
@@ -152,6 +153,21 @@ impl Pool {
     }
 }
 
+/// Whether a connection that comes back is in no transaction, by SQLite's count and by sqlx's. They differ after
+/// SQLite has ended a transaction by itself, as it does when the disk is full: sqlx's rollback then fails, and every
+/// later transaction would. Such a connection is closed, and the next one who needs it opens another. Statements
+/// run in order, so a rollback that is under way comes first; a deferred `begin` takes no lock.
+///
+/// PostgreSQL's connections need no such test: there a rollback succeeds outside of transactions too.
+async fn is_idle(connection: &mut SqliteConnection) -> bool {
+    let begun = connection.execute(sqlx::raw_sql("begin; rollback")).await;
+    let is_idle = begun.is_ok() && !connection.is_in_transaction();
+    if !is_idle {
+        tracing::warn!("the database's connection is opened again after a transaction that failed");
+    }
+    is_idle
+}
+
 fn options(file: &Path) -> SqliteConnectOptions {
     SqliteConnectOptions::new()
         .filename(file)
@@ -238,5 +254,35 @@ impl<'a> From<&'a mut Transaction> for On<'a> {
             Transaction::Sqlite(transaction) => On::Sqlite(transaction),
             Transaction::Postgres(transaction) => On::Postgres(transaction),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::Code;
+
+    #[tokio::test]
+    async fn a_connection_whose_transaction_sqlite_ended_is_opened_again() {
+        let data = tempfile::tempdir().unwrap();
+        let file = data.path().join("rows.db");
+        let [writer, _] = Pool::open_sqlite(&file, true).await.unwrap();
+        let run = async |sql| query(sql).execute(&writer).await.unwrap();
+        run("create table films (bytes blob)").await;
+        for _ in 0..3 {
+            // As on a full disk, the database cannot grow. The limit is the connection's own.
+            run("pragma max_page_count = 1").await;
+            let mut transaction = writer.begin().await.unwrap();
+            let insert = query("insert into films values (zeroblob(1000000))");
+            let full = insert.execute(&mut transaction).await.unwrap_err();
+            assert_eq!(Error::from(full).code(), Code::StorageFull);
+            drop(transaction);
+            let mut transaction = writer.begin().await.unwrap();
+            let insert = query("insert into films values (zeroblob(1000000))");
+            insert.execute(&mut transaction).await.unwrap();
+            transaction.commit().await.unwrap();
+        }
+        let count = query_scalar("select count(*) from films");
+        assert_eq!(count.fetch_one::<i64>(&writer).await.unwrap(), 3);
     }
 }

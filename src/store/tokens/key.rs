@@ -11,6 +11,7 @@ impl Store {
         if let Some(key) = found {
             return Ok(key);
         }
+        self.reserve.require().await?;
         // Two at once: the first one's stays.
         sql::query("insert into keys (name, secret) values ('links', $1) on conflict do nothing")
             .bind(random_key()?.as_slice())

@@ -85,6 +85,7 @@ impl Store {
             expires_ms: new.expires_ms,
             revoked_ms: None,
         };
+        self.reserve.require().await?;
         sql::query(
             "insert into tokens (id, name, owner, sha256, scope, quota, created_ms, expires_ms) \
              values ($1, $2, $3, $4, $5, $6, $7, $8)",
@@ -120,8 +121,11 @@ impl Store {
     /// Ends a token and its sessions; false where there is none of that id that still held.
     pub async fn revoke_token(&self, id: &str, now_ms: i64) -> Result<bool, Error> {
         let sql = "update tokens set revoked_ms = $2 where id = $1 and revoked_ms is null";
-        let update = sql::query(sql).bind(id).bind(now_ms);
-        let n_rows = update.execute(&self.writer).await?;
+        let revoke = || async {
+            let update = sql::query(sql).bind(id).bind(now_ms);
+            Ok(update.execute(&self.writer).await?)
+        };
+        let n_rows = self.reserve.lend(revoke).await?;
         tracing::info!(token.id = id, n_rows, "token revoked");
         Ok(n_rows > 0)
     }

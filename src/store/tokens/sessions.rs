@@ -55,10 +55,13 @@ impl Store {
 
     /// Ends a session; absence is no error.
     pub async fn end_session(&self, cookie: &str) -> Result<(), Error> {
-        sql::query("delete from sessions where sha256 = $1")
-            .bind(secret::hash(cookie).as_slice())
-            .execute(&self.writer)
-            .await?;
-        Ok(())
+        let end = || async {
+            sql::query("delete from sessions where sha256 = $1")
+                .bind(secret::hash(cookie).as_slice())
+                .execute(&self.writer)
+                .await?;
+            Ok(())
+        };
+        self.reserve.lend(end).await
     }
 }

@@ -73,8 +73,11 @@ impl Store {
                 now_ms - KEPT_MS,
             ),
         ] {
-            let delete = sql::query(sql).bind(until_ms);
-            delete.execute(&self.writer).await?;
+            let delete = || async {
+                let delete = sql::query(sql).bind(until_ms);
+                Ok(delete.execute(&self.writer).await?)
+            };
+            self.reserve.lend(delete).await?;
         }
         Ok(waste)
     }

@@ -1,16 +1,22 @@
 //! A full disk is a clean no (RELIABILITY.md, R7): uploads are refused with 507 and leave nothing, a job fails
 //! with `storage_full`, what is there can be read and deleted, and all works again once there is room.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::{Duration, Instant};
 
-use reqwest::StatusCode;
+use reqwest::{Method, Response, StatusCode};
 use serde_json::{Value, json};
 
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::{SWIM, TINY};
-use crate::common::process::Server;
+use crate::common::process::{Server, numbered_film};
 use crate::common::{Place, client};
+
+/// Within this time of room being there everything works.
+const RECOVERY: Duration = Duration::from_secs(2);
 
 /// A small disk of memory over a folder, until dropped.
 struct SmallDisk(PathBuf);
@@ -33,6 +39,18 @@ impl SmallDisk {
         std::fs::write(self.0.join("filler"), filler).unwrap();
     }
 
+    /// Fills it to the last byte.
+    fn fill(&self) {
+        let mut filler = File::options();
+        let mut filler = filler
+            .create(true)
+            .append(true)
+            .open(self.0.join("filler"))
+            .unwrap();
+        while filler.write_all(&[7; 4096]).is_ok() {}
+        assert_eq!(self.n_free_bytes(), 0);
+    }
+
     fn n_free_bytes(&self) -> u64 {
         let disk = rustix::fs::statvfs(&self.0).unwrap();
         disk.f_bavail * disk.f_frsize
@@ -53,7 +71,7 @@ impl Drop for SmallDisk {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     let place = Place::local();
-    let Some(disk) = SmallDisk::over(place.data(), "48m") else {
+    let Some(disk) = SmallDisk::over(place.data(), "64m") else {
         println!("skipped: no small disk can be mounted here, that takes root");
         return;
     };
@@ -102,4 +120,156 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     assert_eq!(server.terminate(), Some(0));
     assert_eq!(place.n_drafts(), 0);
     drop(disk);
+}
+
+/// A service on a disk of its own that is not kept from filling it.
+fn careless() -> Option<(Place, SmallDisk, Server)> {
+    let place = Place::local();
+    let Some(disk) = SmallDisk::over(place.data(), "64m") else {
+        println!("skipped: no small disk can be mounted here, that takes root");
+        return None;
+    };
+    let server = Server::start_with(place.data(), &["--disk-reserve-bytes", "0"]);
+    Some((place, disk, server))
+}
+
+async fn id_of(uploaded: Response) -> String {
+    let footage = json_of(uploaded, StatusCode::CREATED).await;
+    footage["id"].as_str().unwrap().to_owned()
+}
+
+/// Asks for an upload, a resumable upload and a job, each of which must be refused for want of room.
+async fn assert_refused(server: &Server, number: usize, footage: &str) {
+    let refused = server.upload(numbered_film(number)).await;
+    assert!(refused.headers().contains_key("retry-after"));
+    assert_eq!(code_of(refused, 507).await, "storage_full");
+    let resumable = client().post(format!("{}/v1/uploads", server.base));
+    let resumable = resumable.header("tus-resumable", "1.0.0");
+    let refused = resumable.header("upload-length", "1000").send().await;
+    assert_eq!(code_of(refused.unwrap(), 507).await, "storage_full");
+    let job = client().post(format!("{}/v1/analyses", server.base));
+    let refused = job.json(&json!({"footage_id": footage})).send().await;
+    assert_eq!(code_of(refused.unwrap(), 507).await, "storage_full");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_disk_at_zero_bytes_lets_things_be_deleted_and_needs_no_restart() {
+    let Some((place, disk, server)) = careless() else {
+        return;
+    };
+    let swim = id_of(server.upload(SWIM.clone()).await).await;
+    let wish = json!({"footage_id": swim});
+    for round in 0..3 {
+        let mut films = Vec::new();
+        for k in 0..4 {
+            films.push(id_of(server.upload(numbered_film(10 * round + k)).await).await);
+        }
+        disk.fill();
+        assert_refused(&server, 10 * round + 5, &swim).await;
+        for film in films {
+            // What the last deletion freed is taken by others.
+            disk.fill();
+            let gone = server.delete(&format!("/v1/footage/{film}")).await;
+            assert_eq!(gone.status(), 204);
+            let absent = server.get(&format!("/v1/footage/{film}")).await;
+            assert_eq!(absent.status(), 404);
+        }
+        disk.fill();
+        assert_refused(&server, 10 * round + 6, &swim).await;
+        let film = server.get(&format!("/v1/footage/{swim}/file")).await;
+        assert!(film.bytes().await.unwrap() == SWIM.as_slice());
+        disk.free();
+        let freed = Instant::now();
+        id_of(server.upload(numbered_film(10 * round + 7)).await).await;
+        let accepted = server.accept("/v1/analyses", wish.clone()).await;
+        let is_claimed = |job: &Value| job["state"] != "queued";
+        server.job_when(&accepted["job_id"], is_claimed).await;
+        assert!(freed.elapsed() < RECOVERY, "{:?}", freed.elapsed());
+        let done = server.ended(&accepted["job_id"]).await;
+        assert_eq!(done["state"], "done", "{done}");
+    }
+    assert_eq!(server.terminate(), Some(0));
+    assert_sound(place.data());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_job_that_fills_the_disk_fails_while_the_disk_is_full() {
+    let Some((place, disk, server)) = careless() else {
+        return;
+    };
+    let footage = id_of(server.upload(SWIM.clone()).await).await;
+    let wish = json!({"footage_id": footage});
+    let accepted = server.accept("/v1/analyses", wish).await;
+    let is_running = |job: &Value| job["state"] == "running";
+    server.job_when(&accepted["job_id"], is_running).await;
+    disk.fill();
+    let failed = server.ended(&accepted["job_id"]).await;
+    assert_eq!(failed["error"]["code"], "storage_full", "{failed}");
+    assert_eq!(server.terminate(), Some(0));
+    assert_sound(place.data());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_request_is_answered_while_the_disk_fills_and_empties_under_load() {
+    let Some((place, disk, server)) = careless() else {
+        return;
+    };
+    let base = server.base.clone();
+    let senders = (0..4).map(|sender| tokio::spawn(send_all(base.clone(), sender)));
+    let senders: Vec<_> = senders.collect();
+    for _ in 0..4 {
+        disk.fill();
+        for _ in 0..5 {
+            tokio::time::sleep(Duration::from_millis(200)).await;
+            disk.fill();
+        }
+        disk.free();
+        tokio::time::sleep(Duration::from_millis(500)).await;
+    }
+    let (mut n_taken, mut n_refused) = (0, 0);
+    for sender in senders {
+        let (taken, refused) = sender.await.unwrap();
+        n_taken += taken;
+        n_refused += refused;
+    }
+    assert!(n_taken > 0 && n_refused > 0, "{n_taken} {n_refused}");
+    assert_eq!(server.terminate(), Some(0));
+    assert_sound(place.data());
+}
+
+/// Uploads films, reads each and deletes it, for seven seconds. Returns how many were taken and how many refused.
+async fn send_all(base: String, sender: usize) -> (usize, usize) {
+    let (client, start) = (client(), Instant::now());
+    let ask = async |method: Method, path: &str, film: Vec<u8>| {
+        let request = client.request(method, format!("{base}{path}"));
+        request.body(film).send().await.unwrap()
+    };
+    let (mut n_taken, mut n_refused) = (0, 0);
+    while start.elapsed() < Duration::from_secs(7) {
+        let number = 1_000_000 * (sender + 1) + n_taken + n_refused;
+        let answer = ask(Method::POST, "/v1/footage", numbered_film(number)).await;
+        if answer.status() != StatusCode::CREATED {
+            assert_eq!(code_of(answer, 507).await, "storage_full");
+            n_refused += 1;
+            continue;
+        }
+        n_taken += 1;
+        let path = format!("/v1/footage/{}", id_of(answer).await);
+        let read = ask(Method::GET, &path, Vec::new()).await;
+        assert_eq!(read.status(), 200);
+        let gone = ask(Method::DELETE, &path, Vec::new()).await;
+        assert!([204, 507].contains(&gone.status().as_u16()), "{gone:?}");
+    }
+    (n_taken, n_refused)
+}
+
+/// Has `flockreel check` verify the data folder.
+fn assert_sound(data: &Path) {
+    let check = Command::new(env!("CARGO_BIN_EXE_flockreel"))
+        .args(["check", "--data"])
+        .arg(data)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&check.stderr);
+    assert!(check.status.success(), "{said}");
 }

@@ -1,0 +1,206 @@
+//! Room on the disk that is kept for the database (RELIABILITY.md, R7): a file beside it whose bytes are given
+//! to transactions that remove or end things while the disk is full. Transactions that add rows are refused until
+//! the file is whole again, so that they cannot use that room up.
+
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use rustix::fs::{FallocateFlags, fallocate};
+use rustix::io::Errno;
+use tokio::sync::Mutex;
+use tokio::task::spawn_blocking;
+
+use crate::code::Code;
+use crate::store::Error;
+
+/// Size of the file, bytes: twice the size that SQLite's write-ahead log reaches between two checkpoints
+/// (1000 pages of 4 KiB), once for the log and once for the pages that it moves into the database.
+const RESERVE_BYTES: u64 = 8 << 20;
+/// Step in which a reserve that does not fit as a whole is taken, bytes: the block of most file systems.
+const BLOCK_BYTES: u64 = 4096;
+
+/// The reserve of one database; clones share it.
+#[derive(Clone, Debug)]
+pub(in crate::store) struct Reserve(Option<Arc<Kept>>);
+
+#[derive(Debug)]
+struct Kept {
+    file: PathBuf,
+    /// Locked while the room is lent, and while it is taken back.
+    lent: Mutex<()>,
+}
+
+impl Reserve {
+    /// Returns the reserve of a database file. The file is made by the first [`Reserve::require`].
+    pub(in crate::store) fn beside(database: &Path) -> Reserve {
+        Reserve(Some(Arc::new(Kept {
+            file: database.with_extension("reserve"),
+            lent: Mutex::new(()),
+        })))
+    }
+
+    /// Returns the reserve of a database server: none, because the server's disk is not ours.
+    pub(in crate::store) fn none() -> Reserve {
+        Reserve(None)
+    }
+
+    /// Succeeds if the reserve is in place, which it makes if there is room. Fails with
+    /// [`ErrorKind::StorageFull`] if there is none.
+    pub(in crate::store) async fn require(&self) -> io::Result<()> {
+        match &self.0 {
+            Some(kept) if !kept.is_whole() => {
+                let _lent = kept.lent.lock().await;
+                kept.make().await
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Runs `work`. If it fails for want of room, runs it once more in the room of the reserve, which is then
+    /// taken back. `work` must leave nothing behind when it fails. Fails as the last run failed.
+    pub(in crate::store) async fn lend<T, Run>(&self, work: impl Fn() -> Run) -> Result<T, Error>
+    where
+        Run: Future<Output = Result<T, Error>>,
+    {
+        let full = match work().await {
+            Err(error) if error.code() == Code::StorageFull => error,
+            ended => return ended,
+        };
+        let Some(kept) = &self.0 else {
+            return Err(full);
+        };
+        let _lent = kept.lent.lock().await;
+        kept.give()?;
+        let ended = work().await;
+        if let Err(error) = kept.make().await {
+            tracing::warn!(%error, "the disk is full: nothing new is stored until there is room");
+        }
+        ended
+    }
+}
+
+impl Kept {
+    fn is_whole(&self) -> bool {
+        fs::metadata(&self.file).is_ok_and(|file| file.len() >= RESERVE_BYTES)
+    }
+
+    fn give(&self) -> io::Result<()> {
+        match fs::remove_file(&self.file) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            given => given,
+        }
+    }
+
+    /// Makes the file whole. If there is less room than that, fails, and the file takes the room that there is.
+    async fn make(&self) -> io::Result<()> {
+        if self.is_whole() {
+            return Ok(());
+        }
+        let path = self.file.clone();
+        let make = move || {
+            let mut file = File::options();
+            let file = file.create(true).truncate(false).write(true).open(path)?;
+            grow(&file, RESERVE_BYTES).inspect_err(|_| {
+                // The rest still serves for a few deletions. Failure is ignored: the error is reported anyway.
+                take_rest(&file).ok();
+            })
+        };
+        spawn_blocking(make).await.map_err(io::Error::other)?
+    }
+}
+
+/// Gives the file the blocks of its first `n_bytes`, which it may have in part.
+fn grow(mut file: &File, n_bytes: u64) -> io::Result<()> {
+    match fallocate(file, FallocateFlags::empty(), 0, n_bytes) {
+        // A file system that cannot allocate ahead is written to.
+        Err(Errno::OPNOTSUPP) => {
+            let mut n_written = file.seek(SeekFrom::End(0))?;
+            while n_written < n_bytes {
+                n_written += file.write(&vec![0; BLOCK_BYTES as usize])? as u64;
+            }
+            file.sync_all()
+        }
+        allocated => Ok(allocated?),
+    }
+}
+
+/// Gives the file what room there is, in whole blocks.
+fn take_rest(file: &File) -> io::Result<()> {
+    let disk = rustix::fs::fstatvfs(file)?;
+    let n_free = disk.f_bavail.saturating_mul(disk.f_frsize);
+    let n_bytes = (file.metadata()?.len() + n_free).min(RESERVE_BYTES) / BLOCK_BYTES * BLOCK_BYTES;
+    match n_bytes {
+        0 => Ok(()),
+        _ => grow(file, n_bytes),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    fn full() -> Error {
+        Error::Io(ErrorKind::StorageFull.into())
+    }
+
+    #[tokio::test]
+    async fn room_is_lent_to_the_second_run_and_taken_back() {
+        let data = tempfile::tempdir().unwrap();
+        let reserve = Reserve::beside(&data.path().join("rows.db"));
+        reserve.require().await.unwrap();
+        let file = data.path().join("rows.reserve");
+        let blocks = || std::os::unix::fs::MetadataExt::blocks(&fs::metadata(&file).unwrap());
+        assert!(blocks() * 512 >= RESERVE_BYTES, "{} blocks", blocks());
+        let n_runs = AtomicUsize::new(0);
+        let work = || async {
+            match n_runs.fetch_add(1, Ordering::Relaxed) {
+                0 => Err(full()),
+                _ => Ok(file.exists()),
+            }
+        };
+        assert!(!reserve.lend(work).await.unwrap(), "the room was not lent");
+        assert_eq!(n_runs.load(Ordering::Relaxed), 2);
+        assert!(blocks() * 512 >= RESERVE_BYTES);
+    }
+
+    #[tokio::test]
+    async fn work_that_fails_for_another_reason_runs_once_and_keeps_the_reserve() {
+        let data = tempfile::tempdir().unwrap();
+        let reserve = Reserve::beside(&data.path().join("rows.db"));
+        reserve.require().await.unwrap();
+        let n_runs = AtomicUsize::new(0);
+        let work = || async {
+            n_runs.fetch_add(1, Ordering::Relaxed);
+            Err::<(), _>(Error::RowsElsewhere)
+        };
+        reserve.lend(work).await.unwrap_err();
+        assert_eq!(n_runs.load(Ordering::Relaxed), 1);
+        assert!(data.path().join("rows.reserve").exists());
+    }
+
+    #[tokio::test]
+    async fn what_needs_the_reserve_waits_while_it_is_lent() {
+        let data = tempfile::tempdir().unwrap();
+        let reserve = Reserve::beside(&data.path().join("rows.db"));
+        reserve.require().await.unwrap();
+        let was_taken = AtomicUsize::new(0);
+        let n_runs = AtomicUsize::new(0);
+        let work = || async {
+            if n_runs.fetch_add(1, Ordering::Relaxed) == 0 {
+                return Err(full());
+            }
+            let wanted = reserve.require();
+            let patience = std::time::Duration::from_millis(50);
+            let taken = tokio::time::timeout(patience, wanted).await.is_ok();
+            was_taken.store(usize::from(taken), Ordering::Relaxed);
+            Ok(())
+        };
+        reserve.lend(work).await.unwrap();
+        assert_eq!(was_taken.load(Ordering::Relaxed), 0);
+        reserve.require().await.unwrap();
+    }
+}
