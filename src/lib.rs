@@ -24,6 +24,7 @@ pub mod formats; // values to bytes and back
 
 // Ring 3, the outside world.
 pub mod config;
+pub mod logging; // lines on stderr
 pub mod media; // ffmpeg behind its gate
 pub mod store; // SQLite rows and blobs // every setting
 

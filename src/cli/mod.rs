@@ -22,20 +22,20 @@ pub mod token;
 pub mod worker;
 
 use std::ffi::OsString;
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand};
 use serde_json::Value;
-use tracing_subscriber::EnvFilter;
 
 pub use error::Error;
 pub use progress::Listener;
 
 use crate::config;
 use crate::formats::library_dir::{self, StoredLibrary};
+use crate::logging::{self, LogFormat, say};
 use crate::media::{self, Tool};
 use crate::scratch::Scratch;
 use crate::store::Spill;
@@ -68,15 +68,6 @@ pub struct Cli {
     /// What to do.
     #[command(subcommand)]
     command: Command,
-}
-
-/// How log lines are written.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum LogFormat {
-    /// Lines for people.
-    Text,
-    /// A JSON object a line, with the ids of the request and the job that it belongs to.
-    Json,
 }
 
 /// The commands, in the order in which a newcomer meets them.
@@ -126,7 +117,12 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
         }
     };
     let serves = matches!(cli.command, Command::Serve(_) | Command::Worker(_));
-    start_logging(cli.log.as_deref(), cli.log_format, serves);
+    // Everything worth knowing of a service, only warnings of the other commands.
+    let default = if serves { "info" } else { "warn" };
+    let _log = logging::start(cli.log.as_deref().unwrap_or(default), cli.log_format);
+    if serves {
+        logging::log_panics();
+    }
     media::set_up(&cli.media);
     match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
@@ -169,24 +165,6 @@ fn scratch_beside(output: &Path) -> Arc<dyn Scratch> {
     Arc::new(Spill::into(folder.unwrap_or(Path::new("."))))
 }
 
-/// Logs go to stderr: everything worth knowing of a service, only warnings of the other commands.
-fn start_logging(filter: Option<&str>, format: LogFormat, serves: bool) {
-    let default = if serves { "info" } else { "warn" };
-    let lines = tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::new(filter.unwrap_or(default)))
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_target(false);
-    match format {
-        LogFormat::Text => lines.init(),
-        LogFormat::Json => lines
-            .json()
-            .flatten_event(true)
-            .with_span_list(false)
-            .init(),
-    }
-}
-
 fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
     let Some(Summary(value)) = summary.as_ref().filter(|_| json) else {
         return ExitCode::SUCCESS;
@@ -221,9 +199,4 @@ fn check_walls() -> Result<(), Error> {
 fn print_lines(lines: &[String]) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     lines.iter().try_for_each(|line| writeln!(out, "{line}"))
-}
-
-/// Writes one line to stderr. A closed stderr is nobody's loss: there is nowhere left to say so.
-fn say(line: &str) {
-    writeln!(std::io::stderr(), "{line}").ok();
 }

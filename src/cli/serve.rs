@@ -6,13 +6,14 @@ use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::{Error, Summary, say};
+use super::{Error, Summary};
 use crate::api::server::Stop;
 use crate::api::{self, AppState};
 use crate::config::{Auth, Config};
 use crate::jobs::clock::now_ms;
 use crate::jobs::supervisor::Supervisor;
 use crate::jobs::{self, Context, sample};
+use crate::logging::say;
 use crate::store::{self, Store};
 
 /// Arguments of `serve`.

@@ -7,12 +7,13 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use super::serve::{from_store, listen, wait_for_signal};
-use super::{Error, Summary, say};
+use super::{Error, Summary};
 use crate::api;
 use crate::api::server::Stop;
 use crate::config::{Config, Crew, Database, Storage, Watch};
 use crate::jobs::Context;
 use crate::jobs::supervisor::{Supervisor, recover};
+use crate::logging::say;
 use crate::media;
 use crate::store::Store;
 

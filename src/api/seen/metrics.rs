@@ -2,6 +2,7 @@
 //! and what the store holds when it is asked. It tells of everybody's work, so beyond this machine it wants an
 //! administrator's token, or a listener of its own (`--metrics-bind`) that a firewall can keep.
 
+use std::fmt;
 use std::sync::Arc;
 
 use axum::Router;
@@ -11,8 +12,10 @@ use axum::http::{HeaderValue, Response, header};
 use axum::middleware;
 use axum::response::IntoResponse;
 use axum::routing::get;
-use prometheus_client::encoding::EncodeLabelSet;
+use prometheus_client::collector::Collector;
 use prometheus_client::encoding::text::encode;
+use prometheus_client::encoding::{DescriptorEncoder, EncodeLabelSet, EncodeMetric};
+use prometheus_client::metrics::counter::ConstCounter;
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::info::Info;
@@ -25,6 +28,7 @@ use crate::api::problem::{Problem, ProblemBody};
 use crate::code::Code;
 use crate::jobs::Meters;
 use crate::jobs::clock::now_ms;
+use crate::logging;
 use crate::store::jobs::{JobState, Kind};
 use crate::store::upkeep::census::Census;
 
@@ -140,11 +144,27 @@ pub fn worker_metrics_router(meters: &Meters) -> Router {
         .layer(middleware::from_fn_with_state(Names::Any, guard))
 }
 
-/// What every process tells: its version, and its jobs.
+/// Log lines that were dropped, read when the metrics are.
+#[derive(Debug)]
+struct LostLines;
+
+impl Collector for LostLines {
+    fn encode(&self, mut encoder: DescriptorEncoder<'_>) -> Result<(), fmt::Error> {
+        let lost = ConstCounter::new(logging::n_lost_lines());
+        let (name, help) = (
+            "flockreel_log_lines_lost",
+            "Log lines dropped because stderr did not take them in time",
+        );
+        lost.encode(encoder.encode_descriptor(name, help, None, lost.metric_type())?)
+    }
+}
+
+/// What every process tells: its version, its lost log lines, and its jobs.
 fn counted(meters: &Meters) -> Registry {
     let mut registry = Registry::default();
     let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
     registry.register("flockreel_build", "What is running", version);
+    registry.register_collector(Box::new(LostLines));
     meters.register(&mut registry);
     registry
 }

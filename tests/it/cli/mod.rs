@@ -2,6 +2,7 @@
 //! Command line). What it makes of a film is tested in `film`.
 
 mod doctor;
+mod stderr;
 mod upkeep;
 
 use std::process::{Command, Output};

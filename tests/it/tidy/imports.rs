@@ -16,7 +16,7 @@ pub(super) fn may_use(file: &str, module: &str, used: &str) -> bool {
             _ if MIDDLE.contains(&module) => within(&[VALUES, MIDDLE]),
             _ if ALGORITHMS.contains(&module) => within(&[VALUES, MIDDLE]),
             "formats" => within(&[VALUES, MIDDLE, ALGORITHMS]),
-            "config" => false,
+            "config" | "logging" => false,
             "media" => ["raster", "footage", "progress", "code", "config"].contains(&used),
             "store" => ["ids", "code", "scratch", "config"].contains(&used),
             "jobs" => !["api", "cli"].contains(&used),

@@ -1,0 +1,166 @@
+//! A stderr that takes no lines costs the service no answer: its reader has died, stalls, or its disk is full.
+
+use std::fs::File;
+use std::io::{PipeReader, Read, pipe};
+use std::net::TcpListener;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::common::{Place, client};
+
+/// More than any of these tests needs to become ready, or to stop.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// A service whose stderr is given.
+struct Service {
+    child: Child,
+    base: String,
+    _place: Place,
+}
+
+impl Service {
+    /// Starts it and waits until it answers.
+    async fn start(stderr: impl Into<Stdio>, filter: &str) -> Service {
+        Service::start_with(Stdio::null(), stderr, filter).await
+    }
+
+    async fn start_with(
+        stdout: impl Into<Stdio>,
+        stderr: impl Into<Stdio>,
+        filter: &str,
+    ) -> Service {
+        let place = Place::local();
+        let free = TcpListener::bind("127.0.0.1:0").unwrap();
+        let bind = free.local_addr().unwrap().to_string();
+        drop(free);
+        let child = Command::new(env!("CARGO_BIN_EXE_flockreel"))
+            .args(["serve", "--no-sample", "--log", filter, "--bind", &bind])
+            .args(place.flags())
+            .stdout(stdout)
+            .stderr(stderr)
+            .spawn()
+            .unwrap();
+        let service = Service {
+            child,
+            base: format!("http://{bind}"),
+            _place: place,
+        };
+        let start = Instant::now();
+        while client()
+            .get(format!("{}/healthz", service.base))
+            .send()
+            .await
+            .is_err()
+        {
+            assert!(start.elapsed() < PATIENCE, "it does not start");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+        service
+    }
+
+    /// Sends requests that are logged, each of which must be answered.
+    async fn assert_answers(&self, n_requests: usize) {
+        let client = client();
+        for _ in 0..n_requests {
+            let request = client.get(format!("{}/v1/footage", self.base));
+            let answer = request.timeout(PATIENCE).send().await.unwrap();
+            assert_eq!(answer.status(), 200);
+        }
+    }
+
+    async fn n_lost_lines(&self) -> u64 {
+        let metrics = client().get(format!("{}/metrics", self.base));
+        let metrics = metrics.send().await.unwrap().text().await.unwrap();
+        let lost = metrics
+            .lines()
+            .find_map(|line| line.strip_prefix("flockreel_log_lines_lost_total "));
+        lost.unwrap().parse().unwrap()
+    }
+
+    /// Waits until so many lines are counted as lost.
+    async fn assert_lost_lines(&self, n_lines: u64) {
+        let start = Instant::now();
+        while self.n_lost_lines().await < n_lines {
+            assert!(start.elapsed() < PATIENCE, "lost lines are not counted");
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+
+    /// SIGTERM; the exit code.
+    fn terminate(&mut self) -> Option<i32> {
+        kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
+        let start = Instant::now();
+        loop {
+            if let Some(ended) = self.child.try_wait().unwrap() {
+                return ended.code();
+            }
+            assert!(start.elapsed() < PATIENCE, "it does not stop");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        // Already gone, where the test ended well.
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+fn read_all(mut stderr: PipeReader) -> String {
+    let mut text = String::new();
+    stderr.read_to_string(&mut text).unwrap();
+    text
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_full_stderr_costs_no_answer() {
+    let full = File::options().write(true).open("/dev/full").unwrap();
+    let mut service = Service::start(full, "info").await;
+    service.assert_answers(50).await;
+    service.assert_lost_lines(50).await;
+    assert_eq!(service.terminate(), Some(0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_dead_reader_of_stderr_costs_no_answer() {
+    let (reader, stderr) = pipe().unwrap();
+    let mut service = Service::start(stderr, "info").await;
+    drop(reader);
+    service.assert_answers(50).await;
+    service.assert_lost_lines(50).await;
+    assert_eq!(service.terminate(), Some(0));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stalled_reader_of_stderr_costs_no_answer() {
+    let (reader, stderr) = pipe().unwrap();
+    // Both go to the reader that stalls, as with `2>&1`.
+    let stdout = stderr.try_clone().unwrap();
+    let mut service = Service::start_with(stdout, stderr, "trace").await;
+    let start = Instant::now();
+    while service.n_lost_lines().await == 0 {
+        service.assert_answers(50).await;
+        assert!(start.elapsed() < 6 * PATIENCE, "no line was lost");
+    }
+    assert_eq!(service.terminate(), Some(0));
+    drop(reader);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn lines_are_written_in_order_and_to_the_last_one() {
+    let (reader, stderr) = pipe().unwrap();
+    let mut service = Service::start(stderr, "info").await;
+    let log = std::thread::spawn(move || read_all(reader));
+    service.assert_answers(500).await;
+    assert_eq!(service.n_lost_lines().await, 0);
+    assert_eq!(service.terminate(), Some(0));
+    let log = log.join().unwrap();
+    let at = |words: &str| log.find(words).unwrap_or_else(|| panic!("{words}: {log}"));
+    assert!(at("the page is at") < at("request answered"));
+    assert!(at("request answered") < at("stopping"));
+    assert_eq!(log.matches("route=\"/v1/footage\"").count(), 500, "{log}");
+}
