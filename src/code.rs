@@ -89,6 +89,8 @@ codes! {
         "Look at that job's own error, mend it there, and ask again."
     CrashedWorker "crashed_worker" "The work crashed its worker twice and is not tried again."
         "Try other parameters or another film, and tell whoever runs the service."
+    AlreadyStored "already_stored" "The same film is stored already."
+        "Use the footage that is there: the list of all footage has it under its own id."
     InvalidParams "invalid_params" "A parameter is unknown, malformed or out of its range."
         "The sentence names what is wrong; the API's description has every range and default."
     Cancelled "cancelled" "The work was cancelled."

@@ -112,7 +112,7 @@ async fn measure(
     params: Params,
 ) -> Result<Response<Body>, Problem> {
     let input = Input { footage_id, params };
-    let (job_id, library_id) = enqueue(&state.context, &input, &caller.account).await?;
+    let (job_id, library_id) = enqueue(&state.context, &input, None, &caller.account).await?;
     let result = format!("/v1/libraries/{library_id}");
     Ok(accepted(
         job_id,

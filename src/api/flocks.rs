@@ -153,7 +153,7 @@ async fn create_flock_of_film(
         footage_id: FootageId(footage.id),
         params: analysis,
     };
-    let queued = analysis::enqueue(&state.context, &input, &caller.account);
+    let queued = analysis::enqueue(&state.context, &input, None, &caller.account);
     let (job_id, library_id) = queued.await?;
     make(state, caller, (library_id, Some(job_id)), params).await
 }

@@ -13,6 +13,7 @@ use super::AppState;
 use super::access::Caller;
 use super::download::{Download, disposition};
 use super::extract::{Conditions, Id};
+use super::jobs::absent_result;
 use super::paging::{Page, Paging};
 use super::problem::{Problem, ProblemBody, gone};
 use super::receive::receive;
@@ -170,8 +171,10 @@ pub(super) async fn get_footage_file(
 }
 
 pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Footage, Problem> {
-    let footage = state.context.store.footage(id, &caller.reach).await?;
-    footage.ok_or_else(Problem::not_found)
+    match state.context.store.footage(id, &caller.reach).await? {
+        Some(footage) => Ok(footage),
+        None => Err(absent_result(state, caller, id).await?),
+    }
 }
 
 impl FootageView {

@@ -193,9 +193,10 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         // A status of tus that HTTP has no name for.
         Code::ChecksumMismatch => StatusCode::from_u16(460).unwrap_or(StatusCode::BAD_REQUEST),
         Code::TusVersionNotSupported => StatusCode::PRECONDITION_FAILED,
-        Code::AlreadyFinished | Code::RequestInProgress | Code::OffsetDiffers => {
-            StatusCode::CONFLICT
-        }
+        Code::AlreadyFinished
+        | Code::AlreadyStored
+        | Code::RequestInProgress
+        | Code::OffsetDiffers => StatusCode::CONFLICT,
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,
         Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
         Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,

@@ -67,7 +67,6 @@ pub(super) async fn receive_with(
         video,
         background: None,
         name: label(name.as_deref().unwrap_or_default()),
-        sample: false,
         owner,
     };
     Ok((arrival, Wishes::new()))
@@ -114,7 +113,6 @@ async fn receive_form(
         video: video.ok_or_else(|| malformed("the form has no field: video"))?,
         background,
         name: label(&name.or(file_name).unwrap_or_default()),
-        sample: false,
         owner,
     };
     Ok((arrival, wished))

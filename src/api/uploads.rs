@@ -269,7 +269,6 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
         video,
         background: None,
         name: upload.name.clone(),
-        sample: false,
         owner: upload.owner.clone(),
     };
     match super::footage::admit(state, arrival).await {

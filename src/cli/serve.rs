@@ -11,8 +11,8 @@ use crate::api::server::Stop;
 use crate::api::{self, AppState};
 use crate::config::{Auth, Config};
 use crate::jobs::clock::now_ms;
+use crate::jobs::sample;
 use crate::jobs::supervisor::Supervisor;
-use crate::jobs::{self, Context, sample};
 use crate::logging::say;
 use crate::store::{self, Store};
 
@@ -46,8 +46,8 @@ async fn serve(config: Config) -> Result<(), Error> {
     };
     let context = state.context.clone();
     let supervisor = Supervisor::start(context.clone(), n_workers);
-    if with_sample {
-        tokio::spawn(fill(context.clone()));
+    if with_sample && let Err(error) = sample::fill(&context).await {
+        tracing::error!(%error, "the sample could not be queued");
     }
     let stop = Stop::default();
     if let Some((listener, address)) = metrics {
@@ -102,13 +102,6 @@ async fn refuse_open_door(config: &Config) -> Result<(), Error> {
              --name NAME`, or bind to 127.0.0.1 instead of: {}",
             config.bind
         ))),
-    }
-}
-
-async fn fill(context: Context) {
-    match sample::fill(&context).await {
-        Ok(()) | Err(jobs::Error::Cancelled) => {}
-        Err(error) => tracing::error!(%error, "the sample could not be made"),
     }
 }
 

@@ -1,5 +1,5 @@
 //! Admission: received bytes become a footage, or are refused with the gate's reason and leave
-//! nothing behind (RELIABILITY.md, store rules and gate). One way in, for uploads and the sample.
+//! nothing behind (RELIABILITY.md, store rules and gate). One way in for every upload.
 
 use uuid::Uuid;
 
@@ -21,8 +21,6 @@ pub struct Arrival {
     pub background: Option<BlobFile>,
     /// A label for people.
     pub name: String,
-    /// Made by the program itself.
-    pub sample: bool,
     /// Whose it is.
     pub owner: Owner,
 }
@@ -74,7 +72,7 @@ fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
         height: i64::from(format.height),
         fps: format.fps,
         n_frames_hint: i64::try_from(format.n_frames_hint).unwrap_or(i64::MAX),
-        sample: arrival.sample,
+        sample: false,
         created_ms: now_ms(),
     }
 }
@@ -103,7 +101,6 @@ mod tests {
             video,
             background: None,
             name: String::new(),
-            sample: false,
             owner: Owner::local(),
         };
         let refused = admit(&context, arrival).await.unwrap_err();

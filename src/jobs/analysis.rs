@@ -75,13 +75,15 @@ pub struct Advice {
     pub sentence: String,
 }
 
-/// Queues an analysis; the library will have the id given back.
+/// Queues an analysis, after the job that makes its footage if that is not done yet. Returns the job's id and
+/// the id that the library will have.
 pub async fn enqueue(
     context: &Context,
     input: &Input,
+    after_job: Option<JobId>,
     account: &Account,
 ) -> Result<(JobId, LibraryId), store::Error> {
-    let queued = context.enqueue(Kind::Analysis, input, None, account);
+    let queued = context.enqueue(Kind::Analysis, input, after_job, account);
     let (job_id, library_id) = queued.await?;
     Ok((job_id, LibraryId(library_id)))
 }

@@ -90,6 +90,7 @@ impl<'a> Attempt<'a> {
 /// Where the files of a result lie in the store: the fence keeps two runs apart.
 pub(super) fn folder_of(made: Made, result: Uuid, fence: i64) -> String {
     let kind = match made {
+        Made::Sample(_) => "footage",
         Made::Library(_) => "libraries",
         Made::Flock(_) => "flocks",
         Made::Fish(_) => "fish",

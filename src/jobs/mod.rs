@@ -1,6 +1,6 @@
 //! Jobs: what the queue holds and who works on it (DESIGN.md, names; RELIABILITY.md, R2 to R5, R8).
 //!
-//! The three kinds are a closed enum. A job's `run` is a plain function on a blocking thread: it
+//! The kinds are a closed enum. A job's `run` is a plain function on a blocking thread: it
 //! loads, computes by ring 2 and leaves files in its draft; the worker stores them. A job may be run
 //! twice, and only one of the runs is kept.
 
@@ -22,6 +22,8 @@ mod decoding; // a film that counts its frames
 // What jobs do.
 pub mod admit; // received bytes -> footage
 
+pub mod sample; // nothing -> footage, for the first visit
+
 pub mod analysis; // footage -> library
 
 pub mod flock; // library -> flock
@@ -32,8 +34,6 @@ pub mod overlay; // footage -> the same with its poses drawn over it
 pub mod at_once; // library -> what somebody waits for
 
 pub mod places; // how much of that at once
-
-pub mod sample; // the first film of an empty data folder
 
 pub mod clock;
 pub mod error;
@@ -150,6 +150,8 @@ impl Context {
 /// A job with its input, decoded.
 #[derive(Clone, Debug)]
 pub enum Job {
+    /// Nothing to footage.
+    Sample(sample::Input),
     /// Footage to library.
     Analysis(analysis::Input),
     /// Library to flock.
@@ -162,6 +164,7 @@ impl Job {
     /// Reads the input of a claimed job.
     pub fn decode(lease: &Lease) -> Result<Job, Error> {
         Ok(match lease.kind {
+            Kind::Sample => Job::Sample(serde_json::from_str(&lease.input)?),
             Kind::Analysis => Job::Analysis(serde_json::from_str(&lease.input)?),
             Kind::Flock => Job::Flock(serde_json::from_str(&lease.input)?),
             Kind::Fish => Job::Fish(serde_json::from_str(&lease.input)?),
@@ -171,6 +174,7 @@ impl Job {
     /// Does the work, on the thread that calls.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         match self {
+            Job::Sample(input) => input.run(attempt),
             Job::Analysis(input) => input.run(attempt),
             Job::Flock(input) => input.run(attempt),
             Job::Fish(input) => input.run(attempt),
@@ -181,6 +185,7 @@ impl Job {
 /// The stages of a kind of job.
 pub fn stages(kind: Kind) -> Stages {
     match kind {
+        Kind::Sample => sample::STAGES,
         Kind::Analysis => analysis::STAGES,
         Kind::Flock => flock::STAGES,
         Kind::Fish => fish::STAGES,

@@ -1,94 +1,117 @@
-//! The first film of an empty data folder: the virtual fish, filmed, admitted as any upload is, and
-//! queued for its analysis and its flock, so that a first visit shows the result. Marked as sample.
+//! The sample job: films the virtual fish as footage, so that the first visit to an empty service has a
+//! flock to show. [`fill`] queues it together with the analysis and the flock that follow it.
 
 use std::path::Path;
 
-use sha2::{Digest, Sha256};
-use uuid::Uuid;
+use serde::{Deserialize, Serialize};
 
-use super::admit::{Arrival, admit};
-use super::{Context, Error, analysis, flock};
+use super::{Attempt, Context, Error, Product, Stages, analysis, flock};
 use crate::fish::sample::{SampleFilm, SampleParams};
 use crate::footage::FrameSource;
-use crate::ids::FootageId;
+use crate::ids::{FootageId, JobId};
 use crate::media::VideoWriter;
+use crate::progress::Progress;
 use crate::raster::Frame;
-use crate::store::footage::{Added, VIDEO};
-use crate::store::owners::{Account, Owner, Reach};
-use crate::store::{BlobFile, Draft};
+use crate::store;
+use crate::store::footage::{Filmed, VIDEO};
+use crate::store::jobs::Kind;
+use crate::store::jobs::finish::Made;
+use crate::store::owners::{Account, Reach};
 
-/// Long enough for transitions in every direction.
-const N_FRAMES: usize = 1200;
+/// The stages, with their shares.
+pub const STAGES: Stages = &[("filming", 1.0)];
 
-/// Fills an empty store; a store that has any footage is left alone. A process that dies on the way
-/// leaves the store empty, and the next start begins again.
-pub async fn fill(context: &Context) -> Result<(), Error> {
-    if !context
-        .store
-        .list_footage(1, None, &Reach::All)
-        .await?
-        .is_empty()
-    {
+/// What the sample film needs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Input {
+    /// Frames to film, at least 1.
+    pub n_frames: usize,
+}
+
+impl Default for Input {
+    /// Returns 1200 frames: long enough for transitions in every direction.
+    fn default() -> Input {
+        Input { n_frames: 1200 }
+    }
+}
+
+/// Queues the sample, its analysis and its flock in an empty store. Does nothing where the store has
+/// footage, or jobs under way: a restart finds the jobs of the first start in the queue.
+pub async fn fill(context: &Context) -> Result<(), store::Error> {
+    let store = &context.store;
+    let has_footage = !store.list_footage(1, None, &Reach::All).await?.is_empty();
+    if has_footage || store.has_jobs_under_way().await? {
         return Ok(());
     }
-    tracing::info!("filming the sample");
-    let draft = context.store.blobs().draft(&Uuid::now_v7().to_string())?;
-    let stop = context.draining.clone();
-    let filmed = tokio::task::spawn_blocking(move || film(draft, || stop.is_cancelled()));
-    let arrival = filmed.await.unwrap_or(Err(Error::Panicked))?;
-    let (Added::New(footage) | Added::Known(footage)) = admit(context, arrival).await?;
+    let account = Account::local();
+    let (sample_job, footage_id) = enqueue(context, &Input::default(), &account).await?;
     let measure = analysis::Input {
-        footage_id: FootageId(footage.id),
+        footage_id,
         params: crate::analysis::Params::default(),
     };
-    let (job_id, library_id) = analysis::enqueue(context, &measure, &Account::local()).await?;
+    let queued = analysis::enqueue(context, &measure, Some(sample_job), &account);
+    let (analysis_job, library_id) = queued.await?;
     let make = flock::Input {
         library_id,
         params: crate::flock::Params::default(),
     };
-    flock::enqueue(context, &make, Some(job_id), &Account::local()).await?;
+    flock::enqueue(context, &make, Some(analysis_job), &account).await?;
     Ok(())
 }
 
-fn film(draft: Draft, stopped: impl Fn() -> bool) -> Result<Arrival, Error> {
-    let params = SampleParams {
-        n_frames: N_FRAMES,
-        ..SampleParams::default()
-    };
-    let path = draft.path().join(VIDEO);
-    // The writer names its container by the file's ending.
-    let written = path.with_extension("mp4");
-    write(&SampleFilm::new(params)?, &written, stopped)?;
-    std::fs::rename(&written, &path)?;
-    Ok(Arrival {
-        video: described(&path)?,
-        background: None,
-        name: "sample.mp4".to_owned(),
-        sample: true,
-        owner: Owner::local(),
-        draft,
-    })
+/// Queues a sample film. Returns the job's id and the id that the footage will have.
+pub async fn enqueue(
+    context: &Context,
+    input: &Input,
+    account: &Account,
+) -> Result<(JobId, FootageId), store::Error> {
+    let queued = context.enqueue(Kind::Sample, input, None, account);
+    let (job_id, footage_id) = queued.await?;
+    Ok((job_id, FootageId(footage_id)))
 }
 
-fn write(film: &SampleFilm, path: &Path, stopped: impl Fn() -> bool) -> Result<(), Error> {
+impl Input {
+    /// Films the virtual fish and leaves the file as a footage's video.
+    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+        let film = SampleFilm::new(SampleParams {
+            n_frames: self.n_frames,
+            ..SampleParams::default()
+        })?;
+        let path = attempt.folder().join(VIDEO);
+        // The writer chooses the container by the file's extension.
+        let written = path.with_extension("mp4");
+        write(&film, &written, attempt.listener)?;
+        std::fs::rename(&written, &path)?;
+        let format = film.format();
+        Ok(Product {
+            made: Made::Sample(Filmed {
+                name: "sample.mp4",
+                width: format.width,
+                height: format.height,
+                fps: format.fps,
+                n_frames: format.n_frames_hint,
+            }),
+            params: String::new(),
+            summary: String::new(),
+        })
+    }
+}
+
+fn write(film: &SampleFilm, path: &Path, progress: &dyn Progress) -> Result<(), Error> {
+    let n_frames = film.format().n_frames_hint;
+    progress.report("filming", 0.0);
     let mut writer = VideoWriter::create(path, &film.format().into())?;
     let mut stream = film.open()?;
     let mut frame = Frame::default();
-    while stream.next_frame(&mut frame)?.is_some() {
-        if stopped() {
+    for n_written in 1.. {
+        if progress.cancelled() {
             return Err(Error::Cancelled);
         }
+        if stream.next_frame(&mut frame)?.is_none() {
+            break;
+        }
         writer.write(&frame)?;
+        progress.report("filming", n_written as f64 / n_frames as f64);
     }
     Ok(writer.finish()?)
-}
-
-fn described(path: &Path) -> Result<BlobFile, Error> {
-    let bytes = std::fs::read(path)?;
-    std::fs::File::open(path)?.sync_all()?;
-    Ok(BlobFile {
-        name: VIDEO.to_owned(),
-        size_bytes: bytes.len() as i64,
-        sha256: Sha256::digest(&bytes).to_vec(),
-    })
 }

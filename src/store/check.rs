@@ -108,7 +108,8 @@ const RULES_OF_JOBS: &[(&str, &str)] = &[
     (
         "I4: done without exactly one result of its fence, or a result without done",
         "select j.id from jobs j where $1 is not null and (case when j.state = 'done' then 1 else 0 end) != ( \
-         (select count(*) from libraries r where r.job_id = j.id and r.fence = j.fence) \
+         (select count(*) from footage r where r.job_id = j.id and r.fence = j.fence) \
+         + (select count(*) from libraries r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from flocks r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from fish r where r.job_id = j.id and r.fence = j.fence))",
     ),

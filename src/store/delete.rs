@@ -33,8 +33,12 @@ impl Store {
         for library in libraries {
             folders.extend(delete_library_rows(&mut transaction, library).await?);
         }
-        let delete = sql::query("delete from footage where id = $1").bind(id);
-        delete.execute(&mut transaction).await?;
+        for sql in [
+            "delete from footage where id = $1",
+            "delete from jobs where result_id = $1",
+        ] {
+            sql::query(sql).bind(id).execute(&mut transaction).await?;
+        }
         self.forget(transaction, folders).await?;
         tracing::info!(footage.id = %id, "footage deleted");
         Ok(true)

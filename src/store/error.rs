@@ -49,6 +49,9 @@ pub enum Error {
         /// The limit.
         limit_bytes: u64,
     },
+    /// The film that a job made is stored already, under another id.
+    #[error("the same film was uploaded while this one was made")]
+    FilmIsKnown,
     /// A request that comes again under its ids asks for something else.
     #[error("the request was another one when it came first: {0}")]
     IdInUse(sqlx::types::Uuid),
@@ -80,6 +83,7 @@ impl Error {
         match self {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
+            Error::FilmIsKnown => Code::AlreadyStored,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::QueueFull { .. } => Code::QueueFull,
             Error::Io(error) if is_full(error) => Code::StorageFull,

@@ -1,9 +1,12 @@
 //! The table of footage: one row per uploaded video and given background.
 
+use std::io;
+
 use sqlx::types::Uuid;
 
+use super::jobs::Lease;
 use super::owners::{Owner, Reach};
-use super::{BlobFile, Draft, Error, Store, blobs, sql};
+use super::{BlobFile, Draft, Error, Store, Transaction, blobs, sql};
 
 /// The name of the video's file in its folder.
 pub const VIDEO: &str = "video";
@@ -39,6 +42,21 @@ pub struct Footage {
     pub sample: bool,
     /// When it was stored, milliseconds since 1970.
     pub created_ms: i64,
+}
+
+/// A film that a job made, as it is known beside its file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Filmed {
+    /// What it is called.
+    pub name: &'static str,
+    /// Columns, square pixels.
+    pub width: u32,
+    /// Rows, square pixels.
+    pub height: u32,
+    /// Frames a second.
+    pub fps: f64,
+    /// How many frames there are.
+    pub n_frames: usize,
 }
 
 /// Whether the bytes were new.
@@ -143,6 +161,43 @@ impl Store {
         .await?;
         blobs::insert(&mut transaction, &footage.folder, files).await?;
         transaction.commit().await
+    }
+}
+
+/// Adds the row of the sample that a finished job filmed; `files` hold its video. Fails with
+/// [`Error::FilmIsKnown`] where the owner has uploaded the same bytes meanwhile.
+pub(super) async fn insert_filmed(
+    transaction: &mut Transaction,
+    lease: &Lease,
+    (filmed, folder, files): (&Filmed, &str, &[BlobFile]),
+    now_ms: i64,
+) -> Result<(), Error> {
+    let video = files.iter().find(|file| file.name == VIDEO);
+    let video = video.ok_or_else(|| io::Error::other("a job that films left no video"))?;
+    let added = sql::query(
+        "insert into footage (id, job_id, fence, folder, sha256, background_sha256, name, size_bytes, width, \
+         height, fps, n_frames_hint, sample, created_ms, owner) \
+         values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, true, $13, \
+         (select owner from jobs where id = $2))",
+    )
+    .bind(lease.result_id)
+    .bind(lease.job_id.0)
+    .bind(lease.fence)
+    .bind(folder)
+    .bind(&video.sha256)
+    .bind(&b""[..])
+    .bind(filmed.name)
+    .bind(video.size_bytes)
+    .bind(i64::from(filmed.width))
+    .bind(i64::from(filmed.height))
+    .bind(filmed.fps)
+    .bind(i64::try_from(filmed.n_frames).unwrap_or(i64::MAX))
+    .bind(now_ms)
+    .execute(transaction)
+    .await;
+    match added {
+        Err(sqlx::Error::Database(error)) if error.is_unique_violation() => Err(Error::FilmIsKnown),
+        added => Ok(added.map(drop)?),
     }
 }
 

@@ -33,7 +33,7 @@ pub struct Library {
 impl Store {
     /// One library, if it is finished, there and within reach.
     pub async fn library(&self, id: Uuid, reach: &Reach) -> Result<Option<Library>, Error> {
-        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
+        let sql = "select l.id, l.job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
                    from libraries l join footage f on f.id = footage_id where l.id = $1 \
                    and ($2 is null or l.owner = $2)";
@@ -47,7 +47,7 @@ impl Store {
         before: Option<Uuid>,
         reach: &Reach,
     ) -> Result<Vec<Library>, Error> {
-        let sql = "select l.id, job_id, footage_id, l.folder, params, summary, f.name, sample, \
+        let sql = "select l.id, l.job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
                    from libraries l join footage f on f.id = footage_id \
                    where ($1 is null or l.id < $1) and ($3 is null or l.owner = $3) \

@@ -32,7 +32,7 @@ use crate::store::jobs::{JobState, Kind};
 pub(super) struct JobView {
     #[schema(value_type = Uuid)]
     id: JobId,
-    /// `analysis`, `flock` or `fish`.
+    /// `sample` (the film of the first start), `analysis`, `flock` or `fish`.
     kind: &'static str,
     /// `queued`, `running`, `done`, `failed` or `cancelled`.
     state: &'static str,
@@ -48,7 +48,17 @@ pub(super) struct JobView {
     created_at: String,
     started_at: Option<String>,
     finished_at: Option<String>,
+    /// The footage or library that the job works on; null for a `sample`, which needs neither.
+    subject: Option<JobSubject>,
     links: JobLinks,
+}
+
+/// A footage or a library that a job works on. It may be absent while its own job is under way.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub(super) struct JobSubject {
+    /// `footage` or `library`.
+    kind: &'static str,
+    id: Uuid,
 }
 
 /// Why a job failed.
@@ -185,11 +195,22 @@ pub(super) async fn job_to_follow(
 /// Where a job's result is, or will be.
 pub(super) fn result_of(row: &JobRow) -> String {
     let noun = match row.kind {
+        Kind::Sample => "footage",
         Kind::Analysis => "libraries",
         Kind::Flock => "flocks",
         Kind::Fish => "fish",
     };
     format!("/v1/{noun}/{}", row.result_id)
+}
+
+/// What a job works on.
+fn subject_of(row: &JobRow) -> Option<JobSubject> {
+    let kind = match row.kind {
+        Kind::Sample => return None,
+        Kind::Analysis => "footage",
+        Kind::Flock | Kind::Fish => "library",
+    };
+    row.subject_id.map(|id| JobSubject { kind, id })
 }
 
 fn is_lost(state: JobState) -> bool {
@@ -202,7 +223,7 @@ fn is_final(job: &JobView) -> bool {
 
 impl JobView {
     fn of(row: JobRow) -> JobView {
-        let result = result_of(&row);
+        let (result, subject) = (result_of(&row), subject_of(&row));
         JobView {
             id: row.id,
             kind: row.kind.name(),
@@ -219,6 +240,7 @@ impl JobView {
             created_at: rfc3339(row.created_ms),
             started_at: row.started_ms.map(rfc3339),
             finished_at: row.finished_ms.map(rfc3339),
+            subject,
             links: JobLinks {
                 this: format!("/v1/jobs/{}", row.id),
                 events: format!("/v1/jobs/{}/events", row.id),

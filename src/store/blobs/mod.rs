@@ -269,8 +269,10 @@ impl Store {
         match self.is_folder_known(folder).await {
             Ok(true) => return Ok(true),
             Ok(false)
-                if matches!(error, Error::Sql(sqlx::Error::Database(_)))
-                    || error.code() == Code::StorageFull =>
+                if matches!(
+                    error,
+                    Error::Sql(sqlx::Error::Database(_)) | Error::FilmIsKnown
+                ) || error.code() == Code::StorageFull =>
             {
                 self.blobs.discard(folder).await?;
             }

@@ -4,7 +4,7 @@
 
 use sqlx::types::Uuid;
 
-use super::read::{JobRow, Row};
+use super::read::{JobRow, Row, columns};
 use crate::store::owners::Reach;
 use crate::store::{Error, Store, sql};
 
@@ -16,10 +16,12 @@ const MAX_UNDER_WAY: i64 = 10_000;
 impl Store {
     /// The jobs within reach that are queued, running, or were made since, the latest ten thousand, oldest first.
     pub async fn jobs_under_way(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
-        let sql = "select id, kind, state, result_id, cancel_requested, attempt, stage, progress, code, \
-                   detail, created_ms, started_ms, finished_ms from jobs \
-                   where (state in ('queued', 'running') or id >= $1) \
-                   and ($2 is null or owner = $2) order by id desc limit $3";
+        let sql = concat!(
+            "select ",
+            columns!(),
+            " from jobs where (state in ('queued', 'running') or id >= $1) \
+             and ($2 is null or owner = $2) order by id desc limit $3"
+        );
         let rows: Vec<Row> = sql::query(sql)
             .bind(first_id_of(since_ms))
             .bind(reach.owner())
@@ -29,12 +31,20 @@ impl Store {
         rows.into_iter().rev().map(JobRow::try_from).collect()
     }
 
+    /// Whether anybody has a job that is queued or running.
+    pub async fn has_jobs_under_way(&self) -> Result<bool, Error> {
+        let sql = "select exists (select 1 from jobs where state in ('queued', 'running'))";
+        Ok(sql::query_scalar(sql).fetch_one(&self.reader).await?)
+    }
+
     /// The jobs within reach that ended since, the latest thousand of them.
     pub async fn jobs_ended(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
-        let sql = "select id, kind, state, result_id, cancel_requested, attempt, stage, progress, code, \
-                   detail, created_ms, started_ms, finished_ms from jobs \
-                   where finished_ms >= $1 and ($2 is null or owner = $2) \
-                   order by finished_ms desc limit $3";
+        let sql = concat!(
+            "select ",
+            columns!(),
+            " from jobs where finished_ms >= $1 and ($2 is null or owner = $2) \
+             order by finished_ms desc limit $3"
+        );
         let rows: Vec<Row> = sql::query(sql)
             .bind(since_ms)
             .bind(reach.owner())

@@ -4,6 +4,7 @@
 use sqlx::types::Uuid;
 
 use super::{Change, Lease};
+use crate::store::footage::{self, Filmed};
 use crate::store::{BlobFile, Error, Store, Transaction, blobs, fish, flocks, libraries, sql};
 
 /// What a finished job leaves: files already in place, and the row that names them.
@@ -15,15 +16,17 @@ pub struct Outcome {
     pub folder: String,
     /// The files in it.
     pub files: Vec<BlobFile>,
-    /// The parameters in full, JSON.
+    /// The parameters in full, JSON; not kept of a film.
     pub params: String,
-    /// What is worth knowing at a glance, JSON.
+    /// What is worth knowing at a glance, JSON; not kept of a film.
     pub summary: String,
 }
 
 /// What was made, and of what.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Made {
+    /// The sample, of nothing.
+    Sample(Filmed),
     /// A library of this footage.
     Library(Uuid),
     /// A flock of this library.
@@ -86,8 +89,12 @@ async fn insert(
     lease: &Lease,
     outcome: &Outcome,
     now_ms: i64,
-) -> Result<(), sqlx::Error> {
+) -> Result<(), Error> {
     let (sql, made_of) = match outcome.made {
+        Made::Sample(filmed) => {
+            let film = (&filmed, outcome.folder.as_str(), &outcome.files[..]);
+            return footage::insert_filmed(transaction, lease, film, now_ms).await;
+        }
         Made::Library(footage_id) => (libraries::INSERT, footage_id),
         Made::Flock(library_id) => (flocks::INSERT, library_id),
         Made::Fish(library_id) => (fish::INSERT, library_id),

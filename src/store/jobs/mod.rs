@@ -34,6 +34,8 @@ use crate::ids::JobId;
 /// The closed set of kinds of job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
+    /// Nothing to footage: the sample is filmed.
+    Sample,
     /// Footage to library.
     Analysis,
     /// Library to flock.
@@ -86,11 +88,12 @@ pub enum Change {
 
 impl Kind {
     /// Every kind.
-    pub const ALL: [Kind; 3] = [Kind::Analysis, Kind::Flock, Kind::Fish];
+    pub const ALL: [Kind; 4] = [Kind::Sample, Kind::Analysis, Kind::Flock, Kind::Fish];
 
     /// The name in the database and the API.
     pub fn name(self) -> &'static str {
         match self {
+            Kind::Sample => "sample",
             Kind::Analysis => "analysis",
             Kind::Flock => "flock",
             Kind::Fish => "fish",

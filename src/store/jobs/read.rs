@@ -19,6 +19,8 @@ pub struct JobRow {
     pub state: JobState,
     /// The id of the result that it makes.
     pub result_id: Uuid,
+    /// The id of the footage or library that it works on; `None` for a sample, which needs neither.
+    pub subject_id: Option<Uuid>,
     /// Whether somebody asked to cancel it.
     pub cancel_requested: bool,
     /// How often it has been tried.
@@ -37,6 +39,17 @@ pub struct JobRow {
     pub finished_ms: Option<i64>,
 }
 
+/// The columns of a [`Row`].
+macro_rules! columns {
+    () => {
+        "id, kind, state, result_id, cancel_requested, attempt, stage, progress, code, detail, \
+         created_ms, started_ms, finished_ms, \
+         case kind when 'sample' then null when 'analysis' then json_extract(input, '$.footage_id') \
+         else json_extract(input, '$.library_id') end as subject"
+    };
+}
+pub(super) use columns;
+
 #[derive(sqlx::FromRow)]
 pub(super) struct Row {
     id: Uuid,
@@ -52,12 +65,17 @@ pub(super) struct Row {
     created_ms: i64,
     started_ms: Option<i64>,
     finished_ms: Option<i64>,
+    subject: Option<String>,
 }
 
 impl Store {
     /// One job, if it is there and within reach.
     pub async fn job(&self, id: JobId, reach: &Reach) -> Result<Option<JobRow>, Error> {
-        let sql = "select * from jobs where id = $1 and ($2 is null or owner = $2)";
+        let sql = concat!(
+            "select ",
+            columns!(),
+            " from jobs where id = $1 and ($2 is null or owner = $2)"
+        );
         let row: Option<Row> = self.one_of(sql, id.0, reach).await?;
         row.map(JobRow::try_from).transpose()
     }
@@ -68,7 +86,11 @@ impl Store {
         result: Uuid,
         reach: &Reach,
     ) -> Result<Option<JobRow>, Error> {
-        let sql = "select * from jobs where result_id = $1 and ($2 is null or owner = $2)";
+        let sql = concat!(
+            "select ",
+            columns!(),
+            " from jobs where result_id = $1 and ($2 is null or owner = $2)"
+        );
         let row: Option<Row> = self.one_of(sql, result, reach).await?;
         row.map(JobRow::try_from).transpose()
     }
@@ -80,8 +102,12 @@ impl Store {
         before: Option<Uuid>,
         reach: &Reach,
     ) -> Result<Vec<JobRow>, Error> {
-        let sql = "select * from jobs where ($1 is null or id < $1) \
-                   and ($3 is null or owner = $3) order by id desc limit $2";
+        let sql = concat!(
+            "select ",
+            columns!(),
+            " from jobs where ($1 is null or id < $1) \
+             and ($3 is null or owner = $3) order by id desc limit $2"
+        );
         let rows: Vec<Row> = self.newest_of(sql, limit, before, reach).await?;
         rows.into_iter().map(JobRow::try_from).collect()
     }
@@ -100,6 +126,7 @@ impl TryFrom<Row> for JobRow {
             kind: Kind::from_name(&row.kind)?,
             state: JobState::from_name(&row.state)?,
             result_id: row.result_id,
+            subject_id: row.subject.and_then(|id| id.parse().ok()),
             cancel_requested: row.cancel_requested,
             attempt: row.attempt,
             stage: row.stage,

@@ -91,7 +91,7 @@ impl Queue {
              height, fps, n_frames_hint, sample, created_ms) \
              values ($1, $4, $5, $6, $4, 0, 1, 1, 1.0, 1, false, 0)",
             "insert into jobs (id, kind, state, input, result_id, priority, run_at_ms, \
-             created_ms, finished_ms) values ($2, 'analysis', 'done', '', $3, 0, 0, 0, 0)",
+             created_ms, finished_ms) values ($2, 'analysis', 'done', '{}', $3, 0, 0, 0, 0)",
             "insert into libraries (id, job_id, fence, folder, footage_id, params, summary, \
              size_bytes, created_ms) values ($3, $2, 0, $4, $1, '{}', '{}', 0, 0)",
         ] {

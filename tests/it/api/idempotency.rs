@@ -100,7 +100,10 @@ async fn crashed_between(app: &TestApp, footage: &str) -> Value {
         params: flockreel::analysis::Params::default(),
     };
     let account = Account::local();
-    let queued = allotted::under(family, analysis::enqueue(&app.context, &input, &account));
+    let queued = allotted::under(
+        family,
+        analysis::enqueue(&app.context, &input, None, &account),
+    );
     let (job_id, library_id) = queued.await.unwrap();
     recover(&app.context).await.unwrap();
     json!({"job_id": job_id, "library_id": library_id, "footage_id": footage})

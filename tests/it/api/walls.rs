@@ -105,6 +105,7 @@ async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
                 Kind::Analysis => (Made::Library(footage_id), "library.json", library_summary()),
                 Kind::Flock => (Made::Flock(library), "flock.json", flock_summary()),
                 Kind::Fish => (Made::Fish(library), "video.mp4", fish_summary()),
+                Kind::Sample => unreachable!("a request queues no sample"),
             };
             std::fs::write(attempt.folder().join(name), b"{}")?;
             Ok(Product {

@@ -6,6 +6,7 @@ mod kills;
 mod life_cycle;
 mod poison;
 mod races;
+mod sample;
 mod steps;
 mod sweeps;
 mod uploads;

@@ -30,7 +30,6 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
         video,
         background: None,
         name: "swim".into(),
-        sample: false,
         owner: Owner::local(),
     };
     let context = Context::new(store.clone(), 1);

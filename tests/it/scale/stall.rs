@@ -35,7 +35,9 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
         params: Params::default(),
     };
     let account = Account::local();
-    let (job, library) = analysis::enqueue(&context, &input, &account).await.unwrap();
+    let (job, library) = analysis::enqueue(&context, &input, None, &account)
+        .await
+        .unwrap();
 
     let elsewhere = place.elsewhere();
     let stalled = WorkerProcess::start(&elsewhere);
