@@ -9,10 +9,10 @@ import urllib.request
 
 
 @contextlib.contextmanager
-def started(program, data, *flags):
+def started(program, data, *flags, sample=False):
     """The address of the service while it runs; it must end well."""
     address = free_address()
-    service = start(program, data, address, *flags)
+    service = start(program, data, address, *flags, sample=sample)
     try:
         yield address
     finally:
@@ -27,9 +27,10 @@ def free_address():
         return f"http://127.0.0.1:{probe.getsockname()[1]}"
 
 
-def start(program, data, address, *flags):
-    """The process of the service, once it answers."""
-    arguments = ["serve", "--bind", address.removeprefix("http://"), "--data", data, "--no-sample", *flags]
+def start(program, data, address, *flags, sample=False):
+    """The process of the service, once it answers; with `sample`, it fills its empty data folder."""
+    flags = flags if sample else ("--no-sample", *flags)
+    arguments = ["serve", "--bind", address.removeprefix("http://"), "--data", data, *flags]
     service = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL)
     wait_until_ready(service, address)
     return service

@@ -42,6 +42,7 @@ export const beginSession = (token) => call("POST", "/v1/session", { token });
 export const endSession = () => call("DELETE", "/v1/session");
 export const createAnalysis = (footageId, params) => call("POST", "/v1/analyses", { footage_id: footageId, params });
 export const createFlock = (wishes) => call("POST", "/v1/flocks", wishes);
+export const getFootage = (id) => call("GET", `/v1/footage/${id}`);
 export const getLibrary = (id) => call("GET", `/v1/libraries/${id}`);
 export const getPoses = (id) => call("GET", `/v1/libraries/${id}/poses.json`);
 export const getFlock = (id) => call("GET", `/v1/flocks/${id}`);

@@ -1,4 +1,5 @@
-// Follows jobs to their ends: by the one stream of all jobs, and by asking, often while the stream is down.
+// Listens to the stream of all jobs, and follows single jobs to their ends by it and by asking, which is done more
+// often while the stream is down.
 // @ts-check
 import { getJob } from "./api.js";
 import { openEvents } from "./job-events.js";
@@ -6,10 +7,33 @@ import { openEvents } from "./job-events.js";
 const FINAL = ["done", "failed", "cancelled"];
 const ASK_MS = { live: 5000, down: 700 };
 
-/** Whom to tell of which job. @type {Set<{id: string, see: (job: any) => void}>} */
+/** Jobs that are followed, and the callbacks for their states. @type {Set<{id: string, see: (job: any) => void}>} */
 const followers = new Set();
+/** Ids of all jobs that this tab has followed. @type {Set<string>} */
+const known = new Set();
 let live = false;
-let announce = null;
+let onNews = (_job) => {};
+
+/**
+ * Opens the stream for as long as the page is open.
+ * @param {(job: any) => void} tell called with every state of a job that this tab has not followed, and with the id of a deleted one
+ */
+export function listen(tell) {
+  onNews = tell;
+  if (!globalThis.SharedWorker) return void openEvents(hear);
+  const { port } = new SharedWorker("/static/js/job-worker.js", { type: "module" });
+  port.onmessage = ({ data }) => hear(data);
+  port.postMessage({ listening: true });
+  addEventListener("pagehide", () => port.postMessage({ listening: false }));
+  addEventListener("pageshow", (event) => { if (event.persisted) port.postMessage({ listening: true }); });
+}
+
+function hear({ job, live: isLive }) {
+  live = isLive;
+  if (!job) return;
+  for (const { id, see } of followers) if (id === job.id) see(job);
+  if (!known.has(job.id)) onNews(job);
+}
 
 /**
  * @param {string} id
@@ -26,8 +50,7 @@ export async function followJob(id, onChange) {
   };
   const follower = { id, see };
   followers.add(follower);
-  announce ??= connect();
-  announce(followers.size);
+  known.add(id);
   try {
     for (let failures = 0; !ended;) {
       try {
@@ -43,25 +66,5 @@ export async function followJob(id, onChange) {
     return ended;
   } finally {
     followers.delete(follower);
-    announce(followers.size);
   }
-}
-
-/** To the worker that all tabs share; without one, to the service. @returns {(following: number) => void} */
-function connect() {
-  const hear = (message) => {
-    live = message.live;
-    for (const { id, see } of followers) if (id === message.job?.id) see(message.job);
-  };
-  if (!globalThis.SharedWorker) {
-    let close = null;
-    return (following) => {
-      if (following && !close) close = openEvents(hear);
-      if (!following && close) { close(); close = null; }
-    };
-  }
-  const { port } = new SharedWorker("/static/js/job-worker.js", { type: "module" });
-  port.onmessage = ({ data }) => hear(data);
-  addEventListener("pagehide", () => port.postMessage({ following: 0 }));
-  return (following) => port.postMessage({ following });
 }

@@ -1,19 +1,23 @@
 // The page as a whole: what is shown now, and what happens when something was made.
 // @ts-check
-import { getFlock, getLibrary, listFlocks, listJobs, listLibraries } from "./api.js";
+import { getFlock, getFootage, getLibrary, listFlocks, listJobs, listLibraries } from "./api.js";
 import { showEarlier } from "./earlier.js";
-import { byId, showProblem } from "./element.js";
+import { byId, element, showProblem } from "./element.js";
 import { filmForm } from "./film-form.js";
 import { flockForm } from "./flock-form.js";
+import { listen } from "./follow-job.js";
 import { showJob } from "./job-card.js";
 import { showLibrary } from "./library-view.js";
 import { signIn } from "./sign-in.js";
 import { showEmptyStage, showFlock } from "./stage.js";
+import { quoted } from "./words.js";
 
 signIn();
 const current = { library: null, flock: null };
 const made = { libraries: [], flocks: [] };
-const makeFlocksOf = flockForm(async (id) => { await refresh(); await chooseFlock(id); byId("stage").scrollIntoView(); byId("stage").focus(); });
+/** Results shown since the page was opened. They are shown again only when they are chosen. */
+const shown = new Set();
+const makeFlocksOf = flockForm(async (id) => { await refresh(); await watch(id); byId("stage").focus(); });
 filmForm(async (id) => { await refresh(); await chooseLibrary(id); byId("library").scrollIntoView(); byId("library-title").focus(); });
 
 async function refresh() {
@@ -26,20 +30,32 @@ async function refresh() {
 const isReady = (thing) => (thing.state ?? "done") === "done";
 const redrawLists = () => showEarlier(made.libraries, made.flocks, current, { onLibrary: chooseLibrary, onFlock: watch });
 
-async function chooseLibrary(id) {
+/** Shows a library and its newest flock; without a flock, the stage says what is next. */
+async function chooseLibrary(id, next = "Press “Make the flock”, and its flock will play here.") {
+  const flock = made.flocks.find((one) => one.library_id === id);
+  if (flock) return chooseFlock(flock.id);
+  current.flock = null;
+  const { name } = await chooseFilm(id);
+  showEmptyStage(`${quoted(name)} is measured. ${next}`);
+}
+
+async function chooseFilm(id) {
   const library = await getLibrary(id);
   current.library = id;
+  shown.add(id);
   makeFlocksOf(library);
   redrawLists();
   await showLibrary(library);
+  return library;
 }
 
 async function chooseFlock(id) {
   const flock = await getFlock(id);
   current.flock = id;
+  shown.add(id);
   showFlock(flock, made.libraries.find((library) => library.id === flock.library_id)?.name ?? "");
   redrawLists();
-  if (current.library !== flock.library_id) await chooseLibrary(flock.library_id);
+  if (current.library !== flock.library_id) await chooseFilm(flock.library_id);
 }
 
 async function watch(id) {
@@ -47,23 +63,67 @@ async function watch(id) {
   byId("stage").scrollIntoView();
 }
 
-/** The newest of what there is, unless something was chosen; jobs from before the visit are followed. */
-async function open() {
-  await refresh();
-  if (made.flocks[0] && !current.flock) await chooseFlock(made.flocks[0].id);
-  else if (made.libraries[0] && !current.library) await chooseLibrary(made.libraries[0].id);
-  const jobs = (await listJobs()).filter((job) => ["queued", "running"].includes(job.state));
-  if (!current.flock) showEmptyStage(jobs.length ? "The first flock is being made. It will play here." : "No flock yet. Choose a film of one animal, and its flock will play here.");
-  const oldest = jobs.at(-1);
-  if (!oldest || !await showJob(placeOf(oldest), oldest.id)) return;
-  if (oldest.kind === "flock") current.flock = null; // what was waited for takes the stage
-  await open();
+const isUnderWay = (job) => ["queued", "running"].includes(job.state);
+const hasResult = (job) => isUnderWay(job) || (job.state === "done" && job.kind !== "sample");
+
+/** @param {any} job the newest one that has a result or is under way */
+async function showNewest(job) {
+  if (job && isUnderWay(job)) {
+    if (!current.library) await announce(job);
+  } else if (job) {
+    const id = job.links.result.split("/").at(-1);
+    if (!shown.has(id)) await (job.kind === "flock" ? chooseFlock(id) : chooseLibrary(id));
+  } else if (!current.library) {
+    if (made.libraries[0]) await chooseLibrary(made.flocks[0]?.library_id ?? made.libraries[0].id);
+    else showEmptyStage("No flock yet. Choose a film of one animal to make one.");
+  }
 }
 
-/** Where a job that was under way before the visit is shown. */
-function placeOf(job) {
-  if (job.kind !== "flock" || byId("make").hidden) return byId("film-job");
-  return byId("flock-job");
+/** Fills an empty page while a job is under way: with the film of a flock if it is measured, else with a sentence. */
+async function announce({ kind, subject }) {
+  if (made.libraries.some((library) => library.id === subject?.id)) return chooseLibrary(subject.id, "A flock of it is being made and will play here.");
+  if (kind !== "analysis") return showEmptyStage("A flock is being made. It will play here.");
+  const { name } = await getFootage(subject.id).catch(() => ({ name: "" }));
+  showEmptyStage(`${quoted(name)} is being measured. The result will be shown here.`);
 }
 
-open().catch((problem) => { showEmptyStage(""); showProblem(byId("stage-note"), problem); });
+/** Returns where a job is shown that no form of this tab began: out of sight while that form shows its own. */
+function placeOf({ kind }) {
+  const [id, isTaken] = kind === "flock" && !byId("make").hidden ? ["flock-job", byId("make-button").disabled] : ["film-job", byId("film-form").hidden];
+  return isTaken ? element("div") : byId(id);
+}
+
+let isListening = false;
+let isFollowing = false;
+let hasNews = false;
+
+/** Follows the jobs of every tab and program until none is under way; shows the newest result before and after each. */
+async function followJobs() {
+  hasNews = true;
+  if (isFollowing) return;
+  isFollowing = true;
+  try {
+    while (hasNews) {
+      hasNews = false;
+      await refresh();
+      // Not earlier: without a session the stream would be refused.
+      if (!isListening) listen((job) => { if (job.kind !== "fish") followJobs(); });
+      isListening = true;
+      const jobs = (await listJobs()).filter((job) => job.kind !== "fish");
+      await showNewest(jobs.find(hasResult));
+      const next = jobs.find((job) => job.state === "running") ?? jobs.findLast(isUnderWay);
+      if (next) {
+        await showJob(placeOf(next), next.id);
+        hasNews = true;
+      }
+    }
+  } catch (problem) {
+    if (current.library) return; // what is shown stays; the stream reports the next job
+    showEmptyStage("");
+    showProblem(byId("stage-note"), problem);
+  } finally {
+    isFollowing = false;
+  }
+}
+
+followJobs();

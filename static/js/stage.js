@@ -12,7 +12,7 @@ export function showFlock(flock, filmName) {
   if (video.getAttribute("src") !== source) video.src = source;
   video.hidden = false;
   const origin = flock.sample ? "A sample, made of a film of a virtual fish" : filmName && `Made of “${filmName}”`;
-  video.onerror = () => { video.hidden = true; showEmptyStage("This video cannot be played here. It can still be downloaded."); };
+  video.onerror = () => { video.hidden = true; showNote("This video cannot be played here. It can still be downloaded."); };
   video.setAttribute("aria-label", `${flock.count} individuals made of the film ${filmName}`);
   if (!calm.matches) video.play().catch(() => {});
   byId("stage-note").hidden = true;
@@ -30,6 +30,15 @@ export function showFlock(flock, filmName) {
 
 /** @param {string} text what is there instead of a flock */
 export function showEmptyStage(text) {
+  const video = byId("stage-video");
+  video.hidden = true;
+  video.removeAttribute("src");
+  video.load();
+  byId("stage-caption").hidden = true;
+  showNote(text);
+}
+
+function showNote(text) {
   byId("stage-note").textContent = text;
   byId("stage-note").hidden = false;
 }

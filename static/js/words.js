@@ -9,6 +9,7 @@ export const percent = (share) => `${number.format(100 * share)} %`;
 export const degrees = (rad) => (rad * 180) / Math.PI;
 export const seconds = (value) => `${number.format(value)} s`;
 export const megabytes = (bytes) => `${number.format(bytes / 1e6)} MB`;
+export const quoted = (film) => (film ? `“${film}”` : "The film");
 export const day = (time) => (time ? date.format(new Date(time)) : "");
 
 const DIRECTIONS = ["right", "down right", "down", "down left", "left", "up left", "up", "up right"];
@@ -21,10 +22,12 @@ export function direction(heading_rad) {
 }
 
 const STAGES = {
+  filming: "Filming a virtual goldfish",
   background: "Finding the still scene",
   tracking: "Following the animal",
   distances: "Comparing its moments",
-  writing: "Putting it away",
+  writing: "Storing the result",
+  overlay: "Drawing the measurement over the film",
   loading: "Opening the film’s library",
   simulating: "Letting the boids move",
   planning: "Choosing frames for every individual",
@@ -35,5 +38,5 @@ const STAGES = {
 export function stageOf(job) {
   if (job.state === "queued") return "Waiting its turn";
   const stage = job.stage ?? "";
-  return STAGES[stage] ?? (stage ? stage[0].toUpperCase() + stage.slice(1).replaceAll("_", " ") : "Working");
+  return STAGES[stage] ?? (stage ? stage[0].toUpperCase() + stage.slice(1).replaceAll("_", " ") : "Starting");
 }

@@ -20,8 +20,12 @@ CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 @pytest.fixture(scope="session")
 def film(tmp_path_factory):
     """A short film of the virtual fish."""
-    path = tmp_path_factory.mktemp("film") / "goldfish <b>one.mp4"
-    subprocess.run([PROGRAM, "sample", "-o", path, "--frames", "150", "--seed", "1"], check=True)
+    return make_film(tmp_path_factory.mktemp("film") / "goldfish <b>one.mp4", seed=1)
+
+
+def make_film(path, seed):
+    """Makes a film of 150 frames, another one for each seed, and returns its path."""
+    subprocess.run([PROGRAM, "sample", "-o", path, "--frames", "150", "--seed", str(seed)], check=True)
     return path
 
 
@@ -41,6 +45,13 @@ def filled_service(tmp_path_factory, film):
 def empty_service(tmp_path):
     """The address of a service that holds nothing yet."""
     with started(PROGRAM, tmp_path / "data") as address:
+        yield address
+
+
+@pytest.fixture
+def starting_service(tmp_path):
+    """The address of a service that has just begun to film its sample."""
+    with started(PROGRAM, tmp_path / "data", sample=True) as address:
         yield address
 
 

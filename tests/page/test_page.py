@@ -122,16 +122,6 @@ def test_whoever_wants_no_motion_gets_none(browser, filled_service):
     context.close()
 
 
-def test_a_job_goes_on_when_the_page_is_opened_again(page, filled_service):
-    page.goto(filled_service)
-    page.get_by_role("spinbutton", name="Individuals").fill("7")
-    page.get_by_role("spinbutton", name="Frames").fill("300")
-    page.get_by_role("button", name="Make the flock").click()
-    expect(page.locator("#flock-job .job")).to_be_visible()
-    page.reload()
-    expect(page.locator("#stage-title")).to_have_text("A flock of 7", timeout=LONG_MS)
-
-
 def test_a_service_that_asks_who_is_there_is_signed_in_to_and_out_of(page, closed_service, film):
     address, token = closed_service
     page.goto(address)
