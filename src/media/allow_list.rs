@@ -8,18 +8,21 @@ use super::container::Container;
 use super::limits::Limits;
 
 /// Demuxers that may run. `Container` chooses one of them; this list holds inside ffmpeg as well.
-const FORMATS: &str = "mov,matroska,avi,mpegts,asf";
+const FORMATS: &str = "mov,matroska,avi,mpegts,asf,mpeg,flv,ogg,h264,hevc";
 
 /// Decoders that may run, by ffmpeg's names.
 const DECODERS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
-                        ffv1,rawvideo,wmv2,wmv3,vc1";
+                        ffv1,rawvideo,wmv2,wmv3,vc1,mpeg1video,huffyuv,ffvhuff,png,theora,flv,h263";
 
 /// Decoders of sound and titles. Nothing of theirs is ever decoded to the end, but ffprobe gives up
 /// on a file when it may not open one of its streams.
 const OTHER_DECODERS: &str = "aac,mp3float,mp3,mp2float,mp2,ac3,eac3,dca,truehd,opus,libopus,vorbis,\
-    flac,alac,amrnb,amrwb,wmav1,wmav2,wmapro,adpcm_ms,adpcm_ima_wav,pcm_u8,pcm_s8,pcm_s16le,pcm_s16be,\
+    flac,alac,amrnb,amrwb,wmav1,wmav2,wmapro,adpcm_ms,adpcm_ima_wav,adpcm_swf,nellymoser,speex,pcm_u8,pcm_s8,pcm_s16le,pcm_s16be,\
     pcm_s24le,pcm_s24be,pcm_s32le,pcm_s32be,pcm_f32le,pcm_f32be,pcm_alaw,pcm_mulaw,pcm_dvd,pcm_bluray,\
-    mov_text,subrip,srt,ass,ssa,webvtt,dvbsub,pgssub";
+    mov_text,subrip,srt,ass,ssa,webvtt,dvbsub,dvdsub,pgssub";
+
+/// The rate that a bare stream is opened with. A stream that tells its own has another then; no camera has this one.
+pub(super) const NO_RATE: f64 = 997.0 / 7.0;
 
 /// The arguments that close the ways out of a file, then the file as the input.
 pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> Vec<OsString> {
@@ -45,6 +48,9 @@ pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> 
     .into_iter()
     .flat_map(|(name, value)| [name.into(), value.into()])
     .collect();
+    if container.is_bare() {
+        args.extend(["-framerate", "997/7"].map(Into::into));
+    }
     args.extend(["-i".into(), file]);
     args
 }
@@ -128,7 +134,7 @@ mod tests {
         let held = decode(&list, "-nothing", None).expect("a playlist was followed");
         assert!(held.contains("not on whitelist"), "{held}");
 
-        let film = make(folder.path(), "huff.avi", "-c:v huffyuv");
+        let film = make(folder.path(), "magic.avi", "-c:v magicyuv -pix_fmt yuv420p");
         assert_eq!(decode(&film, "-codec_whitelist", None), None);
         let held = decode(&film, "-nothing", None).expect("another decoder ran");
         assert!(held.contains("not on whitelist"), "{held}");

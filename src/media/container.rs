@@ -20,6 +20,16 @@ pub(super) enum Container {
     MpegTs,
     /// ASF, WMV.
     Asf,
+    /// MPEG program stream: MPEG-1 and MPEG-2 files, DVD.
+    MpegPs,
+    /// Flash video.
+    Flv,
+    /// Ogg.
+    Ogg,
+    /// A bare H.264 stream: no container, no times.
+    H264,
+    /// A bare H.265 stream: no container, no times.
+    Hevc,
 }
 
 /// First bytes of files that are no video: (offset, bytes, what it is).
@@ -45,12 +55,13 @@ const SOUNDS: [(usize, &[u8]); 6] = [
 ];
 
 /// First bytes of containers that are not accepted.
-const OTHER_CONTAINERS: [(usize, &[u8], &str); 5] = [
-    (0, b"FLV\x01", "flv"),
-    (0, b"OggS", "ogg"),
-    (0, b"\0\0\x01\xba", "mpeg program stream"),
+const OTHER_CONTAINERS: [(usize, &[u8], &str); 6] = [
     (0, b"DKIF", "ivf"),
     (0, b"YUV4MPEG2", "yuv4mpeg"),
+    (0, b"\0\0\x01\xb3", "a bare MPEG-1 or MPEG-2 stream"),
+    (0, b"\0\0\x01\xb0", "a bare MPEG-4 stream"),
+    (0, b"\x06\x0e\x2b\x34", "mxf"),
+    (0, b".RMF", "realmedia"),
 ];
 
 /// Brands of still images in the MP4 container.
@@ -78,6 +89,18 @@ impl Container {
         if is_transport_stream(head) {
             return Ok(Container::MpegTs);
         }
+        if has(0, b"\0\0\x01\xba") {
+            return Ok(Container::MpegPs);
+        }
+        if has(0, b"FLV\x01") {
+            return Ok(Container::Flv);
+        }
+        if has(0, b"OggS\0") {
+            return Ok(Container::Ogg);
+        }
+        if let Some(bare) = bare_stream(head) {
+            return Ok(bare);
+        }
         if let Some((_, _, name)) = OTHER_CONTAINERS.iter().find(|c| has(c.0, c.1)) {
             return Err(Error::ContainerNotAllowed(name));
         }
@@ -101,8 +124,39 @@ impl Container {
             Container::Avi => "avi",
             Container::MpegTs => "mpegts",
             Container::Asf => "asf",
+            Container::MpegPs => "mpeg",
+            Container::Flv => "flv",
+            Container::Ogg => "ogg",
+            Container::H264 => "h264",
+            Container::Hevc => "hevc",
         }
     }
+
+    /// Whether the file has no times: its rate is in the stream's own header, or nowhere.
+    pub(super) fn is_bare(self) -> bool {
+        matches!(self, Container::H264 | Container::Hevc)
+    }
+}
+
+/// The codec of a bare stream: it begins with a start code, and its head holds a sequence parameter set.
+///
+/// H.264 (ITU-T H.264, 7.3.1): one byte of unit header, type 7 of the low five bits, with a known profile
+/// after it. H.265 (ITU-T H.265, 7.3.1.2): two bytes, type 32 or 33 in bits 1 to 6, layer 0, temporal id 1.
+fn bare_stream(head: &[u8]) -> Option<Container> {
+    const H264_PROFILES: [u8; 10] = [44, 66, 77, 88, 100, 110, 118, 122, 128, 244];
+    let starts = head.windows(3).enumerate();
+    let starts = starts.filter(|(_, bytes)| *bytes == b"\0\0\x01");
+    let mut units = starts.map(|(at, _)| (at, &head[at + 3..])).peekable();
+    if head[..units.peek()?.0].iter().any(|&byte| byte != 0) || units.peek()?.0 > 1 {
+        return None;
+    }
+    units.find_map(|(_, unit)| match *unit {
+        [0x40 | 0x42, 0x01, ..] => Some(Container::Hevc),
+        [kind, profile, ..] if kind & 0x9f == 7 && H264_PROFILES.contains(&profile) => {
+            Some(Container::H264)
+        }
+        _ => None,
+    })
 }
 
 /// The first box of a QuickTime file, whose size must make sense too.
@@ -142,11 +196,20 @@ mod tests {
     fn each_accepted_container_is_known_by_its_first_bytes() {
         let mut packets = vec![0; 188 * 6];
         packets.iter_mut().step_by(188).for_each(|b| *b = 0x47);
-        let cases: [(&[u8], Container); 4] = [
+        let cases: [(&[u8], Container); 10] = [
             (b"\0\0\0\x20ftypisom", Container::Mov),
             (b"\x1a\x45\xdf\xa3\x01", Container::Matroska),
             (b"RIFF\x10\0\0\0AVI LIST", Container::Avi),
             (&packets, Container::MpegTs),
+            (b"\0\0\x01\xba\x44\0", Container::MpegPs),
+            (b"FLV\x01\x05\0\0\0\x09", Container::Flv),
+            (b"OggS\0\x02", Container::Ogg),
+            (b"\0\0\0\x01\x27\x64\0\x28", Container::H264),
+            (
+                b"\0\0\0\x01\x09\x10\0\0\x01\x67\x42\xc0\x1e",
+                Container::H264,
+            ),
+            (b"\0\0\0\x01\x40\x01\x0c\x01", Container::Hevc),
         ];
         for (head, container) in cases {
             assert_eq!(Container::of(head).ok(), Some(container));
@@ -164,7 +227,17 @@ mod tests {
         assert_eq!(code_of(b"\0\0\0\x20ftypheic"), Code::NotAVideo);
         assert_eq!(code_of(b"\x89PNG\r\n"), Code::NotAVideo);
         assert_eq!(code_of(b"RIFF\x10\0\0\0WAVEfmt "), Code::NoVideoStream);
-        assert_eq!(code_of(b"FLV\x01\x05"), Code::ContainerNotAllowed);
+        for head in [
+            &b"DKIF\0\0\x20\0"[..],
+            b"\0\0\x01\xb3\x28\x01",
+            b"\0\0\x01\xb0\xf5\0",
+        ] {
+            assert_eq!(code_of(head), Code::ContainerNotAllowed);
+        }
+        // Start codes alone are no stream: a parameter set must follow, and nothing may come before.
+        assert_eq!(code_of(b"\0\0\x01\x05\xff\xff"), Code::NotAVideo);
+        assert_eq!(code_of(b"\0\0\0\0\0\0\x01\x67\x64"), Code::NotAVideo);
+        assert_eq!(code_of(b"\xff\0\0\x01\x67\x64"), Code::NotAVideo);
     }
 
     #[test]

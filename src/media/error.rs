@@ -6,6 +6,30 @@ use std::io;
 use crate::code::Code;
 use crate::footage::SourceError;
 
+/// What of a film is missing.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Damage {
+    /// Nothing says where its pictures lie.
+    #[error("it has no index")]
+    NoIndex,
+    /// It goes on past its end, by its own structure.
+    #[error("its pictures end after {span_s:.1} s, with number {n_pictures}")]
+    EndsAt {
+        /// Pictures found.
+        n_pictures: usize,
+        /// From the first of them to the last, seconds.
+        span_s: f64,
+    },
+    /// Pictures that cannot be decoded.
+    #[error("{n_decoded} of {n_pictures} pictures can be decoded")]
+    Undecodable {
+        /// Pictures decoded.
+        n_decoded: usize,
+        /// Pictures found.
+        n_pictures: usize,
+    },
+}
+
 /// The reasons. `complaint` is the end of what ffmpeg said, for the log.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -69,16 +93,9 @@ pub enum Error {
         /// Frames a second.
         fps: f64,
     },
-    /// Ends before its header says, or damaged inside.
-    #[error("the file is cut off or damaged: {found} of {promised} {unit}")]
-    Truncated {
-        /// How much there is.
-        found: f64,
-        /// How much was promised.
-        promised: f64,
-        /// Of what: `frames`, `s` or `index` (no index at all).
-        unit: &'static str,
-    },
+    /// Ends inside its own structure, or damaged inside.
+    #[error("the file is cut off or damaged: {0}")]
+    Truncated(Damage),
     /// Encrypted samples.
     #[error("the video is encrypted")]
     Encrypted,
@@ -141,7 +158,7 @@ impl Error {
             Error::TooManyStreams { .. } => Code::TooManyStreams,
             Error::TooLong { .. } => Code::TooLong,
             Error::TooFast { .. } => Code::TooFast,
-            Error::Truncated { .. } => Code::Truncated,
+            Error::Truncated(_) => Code::Truncated,
             Error::Encrypted => Code::Encrypted,
             Error::TimeLimit => Code::TimeLimit,
             Error::MemoryLimit { .. } => Code::MemoryLimit,

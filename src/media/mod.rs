@@ -12,21 +12,23 @@ mod encode; // VideoWriter: frames -> MP4, WebM, ProRes, GIF, WebP
 mod end; // how a child ended
 mod error;
 mod gate; // the one place that starts a process
+mod hints; // what a person says of a film
 mod image; // a given background
 mod limits;
 mod niceness; // who steps back for whom
-mod packets; // when each packet is shown
-mod probe; // what a file holds
+mod note; // what is worth knowing of a film that was accepted
+mod probe; // what a file holds: headers, packets, pictures, times
 mod sandbox; // what the child may do
-mod timeline; // presentation times -> a constant rate
 mod tools; // where the tools lie, and in which walls they work
 mod wanted; // which frames a decoder is asked for
 
 pub use coders::Coders;
 pub use decode::Video;
 pub use encode::{Coding, Quality, VideoFormat, VideoWriter};
-pub use error::Error;
+pub use error::{Damage, Error};
+pub use hints::Hints;
 pub use image::{decode_image, read_image};
 pub use limits::Limits;
+pub use note::Note;
 pub use sandbox::{Layer, Layers};
 pub use tools::{Tool, Walls, demanded_walls, look_for, set_up, tool_version, walls};

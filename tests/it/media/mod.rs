@@ -5,6 +5,8 @@ pub(crate) mod bad;
 pub(crate) mod cage;
 pub(crate) mod corpus;
 mod good;
+mod gray;
+mod headers;
 mod kinds;
 mod real;
 mod speed;

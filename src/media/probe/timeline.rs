@@ -4,8 +4,13 @@
 //! regular grid, up to the rounding of its clock, is left as it is. Any other is given at its
 //! nominal rate, each frame being the one nearest in time, with its own true time.
 
-use super::error::Error;
-use super::limits::Limits;
+use super::clock;
+use crate::media::error::Error;
+use crate::media::limits::Limits;
+use crate::media::note::Note;
+
+/// The rate of a film that tells none: that of most cameras.
+const ASSUMED_FPS: f64 = 30.0;
 
 /// Rates that cameras are sold with; a wandering film was meant to have one of them.
 const COMMON_FPS: [f64; 11] = [
@@ -30,7 +35,7 @@ const RAGGED: usize = 3;
 
 /// Which decoded frame is shown when.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Timeline {
+pub(in crate::media) enum Timeline {
     /// Every decoded frame once, at this rate.
     Constant {
         /// Frames a second.
@@ -50,13 +55,83 @@ pub(super) enum Timeline {
     },
 }
 
+/// What is claimed of a film's rate.
+#[derive(Clone, Debug)]
+pub(in crate::media) struct Claims {
+    /// Frames a second by the header, the likeliest first.
+    pub(in crate::media) fps: Vec<f64>,
+    /// A tick of its clock, seconds.
+    pub(in crate::media) tick_s: f64,
+    /// Frames a second as a person wants them, whatever the file says.
+    pub(in crate::media) wanted_fps: Option<f64>,
+}
+
 impl Timeline {
+    /// The timeline of pictures whose times in the file are `times_s`, in the order in which they are shown,
+    /// within the limits.
+    pub(in crate::media) fn found(
+        times_s: &[Option<f64>],
+        claims: &Claims,
+        limits: &Limits,
+    ) -> Result<(Timeline, Vec<Note>), Error> {
+        let n_pictures = times_s.len();
+        if n_pictures < limits.min_frames {
+            return Err(Error::TooFewFrames {
+                n_frames: n_pictures,
+            });
+        }
+        let mut notes = Vec::new();
+        let timeline = match claims.wanted_fps {
+            Some(fps) => Timeline::even(fps),
+            None => Timeline::by_clock(times_s, claims, limits, &mut notes)?,
+        };
+        let n_frames = match &timeline {
+            Timeline::Constant { .. } => n_pictures,
+            Timeline::Variable { sources, .. } => sources.len(),
+        };
+        let fps = timeline.fps();
+        check_extent(n_frames as f64 / fps, fps, limits)?;
+        Ok((timeline, notes))
+    }
+
+    fn by_clock(
+        times_s: &[Option<f64>],
+        claims: &Claims,
+        limits: &Limits,
+        notes: &mut Vec<Note>,
+    ) -> Result<Timeline, Error> {
+        let Some(mended) = clock::mend(times_s) else {
+            let fps = claims.fps.first().copied().unwrap_or(ASSUMED_FPS);
+            if claims.fps.is_empty() {
+                notes.push(Note::RateAssumed { fps });
+            }
+            return Ok(Timeline::even(fps));
+        };
+        if let Some(&[at_s, by_s]) = mended.leaps_s.first() {
+            let n_leaps = mended.leaps_s.len();
+            notes.push(Note::TimesLeap {
+                at_s,
+                by_s,
+                n_leaps,
+            });
+        }
+        let found = Timeline::of(&mended.times_s, &claims.fps, claims.tick_s, limits)?;
+        found.ok_or(Error::TooFewFrames {
+            n_frames: times_s.len(),
+        })
+    }
+
+    fn even(fps: f64) -> Timeline {
+        let ragged_s = Vec::new();
+        Timeline::Constant { fps, ragged_s }
+    }
+
     /// The timeline of frames shown at `times_s` (ascending), given the rates that the header
     /// claims and the length of a tick of its clock.
     ///
     /// `None` when there are fewer than two times or all are equal. Times that lie far apart, or a rate that
     /// is far too high, are refused before a frame of it is counted out: a few bytes can claim billions.
-    pub(super) fn of(
+    fn of(
         times_s: &[f64],
         claimed_fps: &[f64],
         tick_s: f64,
@@ -99,7 +174,7 @@ impl Timeline {
     }
 
     /// Frames a second, as given.
-    pub(super) fn fps(&self) -> f64 {
+    pub(in crate::media) fn fps(&self) -> f64 {
         match self {
             Timeline::Constant { fps, .. } | Timeline::Variable { fps, .. } => *fps,
         }
@@ -144,7 +219,7 @@ fn nominal_fps(times_s: &[f64], claimed_fps: &[f64]) -> Option<f64> {
 }
 
 /// Whether so many seconds at this rate are within the limits.
-pub(super) fn check_extent(span_s: f64, fps: f64, limits: &Limits) -> Result<(), Error> {
+fn check_extent(span_s: f64, fps: f64, limits: &Limits) -> Result<(), Error> {
     if fps > limits.max_fps {
         return Err(Error::TooFast { fps });
     }

@@ -3,24 +3,32 @@
 //! claims).
 //!
 //! ffmpeg turns nothing and drops nothing by itself: the turn, the square pixels and the
-//! deinterlacing are filters that we choose, and the last of them fixes the size, so that a picture
-//! that changes its size in the middle cannot shift the bytes of the frames after it.
+//! deinterlacing are filters that we choose (`filters`).
+
+mod filters; // between the decoder and us
+mod stretch; // the range of gray that is used
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::allow_list::input_args;
-use super::error::Error;
+use super::error::{Damage, Error};
 use super::gate::{Child, Order};
+
+use super::hints::Hints;
 use super::limits::Limits;
-use super::probe::{Probe, Turn, is_rgb, probe};
-use super::timeline::Timeline;
+use super::note::Note;
+use super::probe::header::gray_bits;
+use super::probe::timeline::Timeline;
+use super::probe::{Probe, probe};
+
 use super::tools::Tool;
 use super::wanted::{MOST_UNTOLD, Wanted};
 use crate::footage::{
     FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
 };
-use crate::raster::{Frame, Matrix, Range};
+use crate::raster::Frame;
+use stretch::Stretch;
 
 /// Most frames that a child may decode without showing one.
 const MOST_SKIPPED: usize = 300;
@@ -34,30 +42,51 @@ pub struct Video {
     path: PathBuf,
     limits: Limits,
     probe: Probe,
+    stretch: Option<Stretch>,
 }
 
 impl Video {
-    /// Looks at the file: container, codec, size, rate, length. Reads it once but decodes nothing.
+    /// As [`Video::open_with`], without hints.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
+        Video::open_with(path, limits, &Hints::default())
+    }
+
+    /// Looks at the file: container, codec, size, rate, length. Reads it once, and decodes it only where its
+    /// packets do not tell its pictures. `hints` override what the file says.
     ///
     /// Fails with the reason of the first limit that the file breaks. `path` must be ours: a
     /// person's file name never comes here.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
+    pub fn open_with(path: &Path, limits: &Limits, hints: &Hints) -> Result<Video, Error> {
         // The child works elsewhere, so that it sees no relative path.
         let path = std::path::absolute(path).map_err(Error::io("finding the footage"))?;
-        Ok(Video {
-            probe: probe(&path, limits)?,
+        let mut video = Video {
+            probe: probe(&path, limits, hints)?,
             limits: limits.clone(),
             path,
-        })
+            stretch: None,
+        };
+        if let Some(bits) = gray_bits(&video.probe.pix_fmt) {
+            let stretch = video.measure_gray()?;
+            video.probe.notes.push(stretch.note(bits));
+            video.stretch = Some(stretch);
+        }
+        Ok(video)
+    }
+
+    /// What is worth knowing of the file: assumptions, and faults that were mended.
+    pub fn notes(&self) -> &[Note] {
+        &self.probe.notes
     }
 
     /// The order to decode every frame, or some.
     fn order(&self, wanted: &Wanted) -> Order {
-        let n_packets = self.probe.n_packets;
-        Order::new(Tool::Ffmpeg, self.args(wanted), &self.limits, n_packets).with_input(&self.path)
+        let n_pictures = self.probe.n_pictures;
+        let filters = filters::filters(&self.probe, self.stretch.as_ref(), wanted);
+        let args = self.args(wanted, &filters);
+        Order::new(Tool::Ffmpeg, args, &self.limits, n_pictures).with_input(&self.path)
     }
 
-    fn args(&self, wanted: &Wanted) -> Vec<OsString> {
+    fn args(&self, wanted: &Wanted, filters: &str) -> Vec<OsString> {
         let probe = &self.probe;
         let threads = self.n_threads().to_string();
         let mut args: Vec<OsString> =
@@ -69,7 +98,6 @@ impl Video {
         }
         args.extend(input_args(probe.container, &self.path, &self.limits));
         let stream = format!("0:{}", probe.stream_idx);
-        let filters = self.filters(wanted);
         args.extend(
             [
                 "-map",
@@ -82,7 +110,7 @@ impl Video {
             ]
             .map(Into::into),
         );
-        args.extend(["-vf", &filters, "-f", "rawvideo"].map(Into::into));
+        args.extend(["-vf", filters, "-f", "rawvideo"].map(Into::into));
         // A frame is written at once, not copied into a buffer first.
         args.extend(["-avioflags", "direct", "pipe:1"].map(Into::into));
         args
@@ -122,59 +150,6 @@ impl Video {
         }
         Ok(n_shown)
     }
-
-    fn filters(&self, wanted: &Wanted) -> String {
-        let probe = &self.probe;
-        let matrix = match probe.color.matrix {
-            Matrix::Bt601 => "bt601",
-            Matrix::Bt709 => "bt709",
-        };
-        let (range, format) = match probe.color.range {
-            Range::Limited => ("tv", "yuv420p"),
-            Range::Full => ("pc", "yuvj420p"),
-        };
-        let mut filters = Vec::new();
-        if probe.interlaced {
-            filters.push("bwdif=mode=send_frame:deint=interlaced".to_owned());
-        }
-        filters.extend(wanted.filter());
-        let turn = turn_filters(probe.turn);
-        filters.extend(turn.iter().map(|&filter| filter.to_owned()));
-        // Bit-exact scaling: the same bytes from every processor.
-        let mut scale = format!(
-            "scale={}:{}:flags=bicubic+accurate_rnd+bitexact",
-            probe.width, probe.height
-        );
-        match is_rgb(&probe.pix_fmt) {
-            true => scale += ":out_range=tv:out_color_matrix=bt601",
-            false => {
-                let stored = if probe.color_space.starts_with("bt2020") {
-                    "bt2020"
-                } else {
-                    matrix
-                };
-                scale += &format!(
-                    ":in_range={range}:out_range={range}:in_color_matrix={stored}:out_color_matrix={matrix}"
-                );
-            }
-        }
-        filters.push(scale);
-        filters.push(format!("format={format}"));
-        filters.join(",")
-    }
-}
-
-fn turn_filters(turn: Turn) -> Vec<&'static str> {
-    match (turn.transpose, turn.flip_x, turn.flip_y) {
-        (true, true, false) => vec!["transpose=clock"],
-        (true, false, true) => vec!["transpose=cclock"],
-        (true, true, true) => vec!["transpose=clock_flip"],
-        (true, false, false) => vec!["transpose=cclock_flip"],
-        (false, x, y) => [(x, "hflip"), (y, "vflip")]
-            .into_iter()
-            .filter_map(|(wanted, filter)| wanted.then_some(filter))
-            .collect(),
-    }
 }
 
 impl FrameSource for Video {
@@ -185,7 +160,7 @@ impl FrameSource for Video {
             height: probe.height,
             fps: probe.timeline.fps(),
             n_frames_hint: match &probe.timeline {
-                Timeline::Constant { .. } => probe.n_packets,
+                Timeline::Constant { .. } => probe.n_pictures,
                 Timeline::Variable { sources, .. } => sources.len(),
             },
             color: probe.color,
@@ -200,13 +175,13 @@ impl FrameSource for Video {
     /// that others refer to, and the first of them after the middle of each part stands for it: that
     /// takes half the time or less.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
-        let n_packets = self.probe.n_packets;
+        let n_pictures = self.probe.n_pictures;
         // A child that shows nothing for long is taken for stalled.
-        if n_packets > MOST_SKIPPED * n {
+        if n_pictures > MOST_SKIPPED * n {
             return spread_by_reading(self, n, visit);
         }
         let format = self.format();
-        if n_packets >= LEAST_SKIPPED * n {
+        if n_pictures >= LEAST_SKIPPED * n && self.probe.has_plain_times {
             let parts_per_s = n as f64 * format.fps / format.n_frames_hint as f64;
             let n_parts = n;
             if self.show(
@@ -247,7 +222,7 @@ impl FrameStream for VideoStream<'_> {
         let video = self.video;
         let time_s = match &video.probe.timeline {
             Timeline::Constant { fps, ragged_s } => {
-                let first_ragged = video.probe.n_packets - ragged_s.len();
+                let first_ragged = video.probe.n_pictures - ragged_s.len();
                 let late = self
                     .n_given
                     .checked_sub(first_ragged)
@@ -308,7 +283,7 @@ impl<'a> VideoStream<'a> {
         }
         self.n_decoded += 1;
         // A packet holds a picture or two; what comes besides is no film any more.
-        let plenty = 2 * self.video.probe.n_packets + MOST_UNTOLD;
+        let plenty = 2 * self.video.probe.n_pictures + MOST_UNTOLD;
         let limit = self.video.limits.max_frames.min(plenty);
         match self.n_decoded > limit {
             true => Err(Error::TooManyFrames { limit }),
@@ -350,18 +325,18 @@ impl<'a> VideoStream<'a> {
             });
         }
         let probe = &self.video.probe;
-        let promised = probe.n_packets;
-        let least = match probe.packets_may_be_silent {
-            true => promised / 2,
-            // A frame or two may be lost to an open start.
-            false => promised - (promised / 50).max(2).min(promised),
+        let n_pictures = probe.n_pictures;
+        // A picture or two may be lost to an open start. More are missing without a complaint only where the
+        // codec may say "the same again" in its own way.
+        let n_least = match end.complaint.is_empty() {
+            true => n_pictures / 2,
+            false => n_pictures - (n_pictures / 50).max(2).min(n_pictures),
         };
-        match self.n_decoded < least.max(1) && !self.video.limits.allow_truncated {
-            true => Err(Error::Truncated {
-                found: self.n_decoded as f64,
-                promised: promised as f64,
-                unit: "frames",
-            }),
+        match self.n_decoded < n_least.max(1) && !self.video.limits.allow_truncated {
+            true => Err(Error::Truncated(Damage::Undecodable {
+                n_decoded: self.n_decoded,
+                n_pictures,
+            })),
             false => Ok(()),
         }
     }

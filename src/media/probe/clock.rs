@@ -1,0 +1,213 @@
+//! The times of pictures as a recorder's clock gives them, mended where the clock is wrong. Recorders stall and
+//! write what they held back in a burst, clocks are set forward or back, several pictures get one time, or none.
+//! The pictures come in the order in which they are shown.
+//!
+//! Steps between half and one and a half of the usual step are regular. Each run of others is judged by where it
+//! ends. Where a clock that went on regularly would have brought it to the same time, its pictures are spaced
+//! evenly. Else a step back or far ahead becomes a usual step, and all later times are shifted with it. What is
+//! left are short gaps and dense stretches, and those are taken for true: pictures were lost, or the rate varies.
+//!
+//! Example with a usual step of 0.1 s: 0, .1, .6, .61, .62, .63, .7, .8 becomes 0, .1, .22, .34, .46, .58, .7, .8.
+
+/// How far from the usual step a regular step may be, share of it. Rates that wander by less are a camera's own.
+const REGULAR: f64 = 0.5;
+
+/// How far off the end of a run may be, usual steps: more than a step, for the picture that a stall began with
+/// may be late itself.
+const ON_TIME: f64 = 1.5;
+
+/// The longest gap taken for true, seconds, or [`LONGEST_GAP_STEPS`] where those are longer. Free choice between
+/// the tenths of a second that a busy recorder loses and the minutes of a pause.
+const LONGEST_GAP_S: f64 = 1.0;
+
+/// The longest gap taken for true in films of few pictures a second, usual steps.
+const LONGEST_GAP_STEPS: f64 = 8.0;
+
+/// Times that were mended.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Mended {
+    /// One for each picture, seconds from the first, never decreasing.
+    pub(super) times_s: Vec<f64>,
+    /// Steps back or far ahead that were taken out: when, in mended time, and by how much, seconds.
+    pub(super) leaps_s: Vec<[f64; 2]>,
+}
+
+/// Mends the times of pictures in the order in which they are shown; `None` marks a picture without a time.
+///
+/// Returns `None` where no two pictures have different times.
+pub(super) fn mend(times_s: &[Option<f64>]) -> Option<Mended> {
+    let told_s = filled(times_s)?;
+    let step_s = usual_step(&told_s)?;
+    let longest_s = LONGEST_GAP_S.max(LONGEST_GAP_STEPS * step_s);
+    let is_regular = |pair: &[f64]| ((pair[1] - pair[0]) / step_s - 1.0).abs() < REGULAR;
+    let mut times_s = told_s.clone();
+    let (mut leaps_s, mut first, mut offset_s) = (Vec::new(), 0, -told_s[0]);
+    times_s[0] = 0.0;
+    while first + 1 < told_s.len() {
+        let irregular = told_s[first..]
+            .windows(2)
+            .take_while(|pair| !is_regular(pair));
+        let last = first + irregular.count().max(1);
+        let is_on_time =
+            last > first + 1 && space_evenly(&mut times_s[first..=last], told_s[first], step_s);
+        for k in first + 1..=last {
+            let leap_s = told_s[k] - told_s[k - 1];
+            if !is_on_time && (leap_s < 0.0 || leap_s > longest_s) {
+                leaps_s.push([times_s[k - 1], leap_s]);
+                offset_s -= leap_s - step_s;
+            }
+            times_s[k] += offset_s;
+        }
+        first = last;
+    }
+    Some(Mended { times_s, leaps_s })
+}
+
+/// Spaces the times of a run that begins at `start_s` evenly where it ends on time; returns whether it does. The
+/// first time is left alone. Pictures that share the last time are counted on from the first of them.
+fn space_evenly(run: &mut [f64], start_s: f64, step_s: f64) -> bool {
+    let end_s = run[run.len() - 1];
+    let n_steps = 1 + run[1..].iter().position(|&time| time == end_s).unwrap_or(0);
+    let even_s = (end_s - start_s) / n_steps as f64;
+    let late_s = (even_s - step_s) * n_steps as f64;
+    if even_s <= 0.0 || late_s.abs() > ON_TIME * step_s {
+        return false;
+    }
+    for (k, time) in run.iter_mut().enumerate().skip(1) {
+        let n_past = k.saturating_sub(n_steps);
+        *time = start_s + k.min(n_steps) as f64 * even_s + n_past as f64 * step_s;
+    }
+    true
+}
+
+/// Gives pictures without a time one between their neighbors', or on from the nearest.
+fn filled(times_s: &[Option<f64>]) -> Option<Vec<f64>> {
+    let known: Vec<(usize, f64)> = (times_s.iter().enumerate())
+        .filter_map(|(k, time)| Some((k, (*time)?)))
+        .collect();
+    let slope = |a: (usize, f64), b: (usize, f64)| (b.1 - a.1) / (b.0 - a.0) as f64;
+    let slopes: Vec<f64> = known
+        .windows(2)
+        .map(|pair| slope(pair[0], pair[1]))
+        .collect();
+    let usual = median(
+        slopes
+            .iter()
+            .copied()
+            .filter(|&slope| slope > 0.0)
+            .collect(),
+    )?;
+    let mut next = 0;
+    let time_of = |k: usize| {
+        while next < known.len() && known[next].0 < k {
+            next += 1;
+        }
+        match (
+            next.checked_sub(1).map(|before| known[before]),
+            known.get(next),
+        ) {
+            (_, Some(&(at, time))) if at == k => time,
+            (Some(before), Some(&after)) => before.1 + slope(before, after) * (k - before.0) as f64,
+            (Some(before), None) => before.1 + usual * (k - before.0) as f64,
+            (None, Some(&after)) => after.1 - usual * (after.0 - k) as f64,
+            (None, None) => 0.0,
+        }
+    };
+    Some((0..times_s.len()).map(time_of).collect())
+}
+
+/// The median over the pictures of the step to the next time, shared by those that have the same time.
+fn usual_step(times_s: &[f64]) -> Option<f64> {
+    let groups: Vec<&[f64]> = times_s.chunk_by(|a, b| a == b).collect();
+    let steps = groups.windows(2).flat_map(|pair| {
+        let step_s = (pair[1][0] - pair[0][0]) / pair[0].len() as f64;
+        std::iter::repeat_n(step_s, pair[0].len())
+    });
+    median(steps.filter(|&step| step > 0.0).collect())
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mended(times_s: &[f64]) -> Mended {
+        let times_s: Vec<_> = times_s.iter().copied().map(Some).collect();
+        mend(&times_s).expect("times")
+    }
+
+    fn grid(n: u32, fps: f64) -> Vec<f64> {
+        (0..n).map(|k| f64::from(k) / fps).collect()
+    }
+
+    fn assert_even(times_s: &[f64], fps: f64) {
+        for (k, time) in times_s.iter().enumerate() {
+            assert!((time - k as f64 / fps).abs() < 1.6 / fps, "{k}: {time}");
+        }
+        let steps = times_s.windows(2).map(|pair| pair[1] - pair[0]);
+        assert!(steps.clone().all(|step| step > 0.3 / fps), "{times_s:?}");
+    }
+
+    #[test]
+    fn a_stall_and_its_burst_are_spaced_evenly() {
+        let mut times = grid(90, 30.0);
+        for (k, time) in times[40..60].iter_mut().enumerate() {
+            *time = 59.0 / 30.0 + k as f64 * 1e-4;
+        }
+        let mended = mended(&times);
+        assert_even(&mended.times_s, 30.0);
+        assert_eq!(mended.leaps_s, Vec::<[f64; 2]>::new());
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_is_carried_on() {
+        let mut times = grid(90, 30.0);
+        times[40..60].fill(40.0 / 30.0);
+        assert_even(&mended(&times).times_s, 30.0);
+        // Whole seconds, as some recorders stamp them.
+        let seconds: Vec<f64> = times.iter().map(|time| time.floor()).collect();
+        assert_even(&mended(&seconds).times_s, 30.0);
+    }
+
+    #[test]
+    fn a_clock_that_is_set_forward_or_back_goes_on() {
+        for leap_s in [3600.0, 1e11, 5.0, -0.5, -1.0, -3600.0] {
+            let mut times = grid(90, 30.0);
+            times[50..].iter_mut().for_each(|time| *time += leap_s);
+            let mended = mended(&times);
+            assert_even(&mended.times_s, 30.0);
+            let [[at_s, by_s]] = mended.leaps_s[..] else {
+                panic!("{leap_s}: {:?}", mended.leaps_s);
+            };
+            assert!((at_s - 49.0 / 30.0).abs() < 0.1, "{leap_s} at {at_s}");
+            assert!((by_s / leap_s - 1.0).abs() < 0.1, "{leap_s}: {by_s}");
+        }
+    }
+
+    #[test]
+    fn lost_pictures_and_a_rate_that_varies_stay_as_they_are() {
+        let mut lossy = grid(90, 30.0);
+        lossy.drain(40..52);
+        lossy.remove(20);
+        let varies: Vec<f64> = (0..40).map(|k| f64::from(k * k) * 0.01).collect();
+        for times in [lossy, varies] {
+            assert_eq!(mended(&times).times_s, times);
+        }
+    }
+
+    #[test]
+    fn missing_times_are_filled_in() {
+        let mut times: Vec<_> = grid(30, 10.0).into_iter().map(Some).collect();
+        for k in [0, 1, 7, 15, 16, 29] {
+            times[k] = None;
+        }
+        assert_even(&mend(&times).unwrap().times_s, 10.0);
+        assert_eq!(mend(&[None, None, Some(1.0)]), None);
+        assert_eq!(mend(&[Some(1.0), Some(1.0)]), None);
+        assert_eq!(mend(&[]), None);
+    }
+}

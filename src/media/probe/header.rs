@@ -1,0 +1,245 @@
+//! What a file's header says of its streams, by ffprobe: codec, size, turn, colors. Claims, to be held against the
+//! limits before anything is decoded.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::media::allow_list::input_args;
+use crate::media::container::Container;
+use crate::media::error::{Damage, Error};
+use crate::media::gate::{Child, Order};
+use crate::media::hints::Hints;
+use crate::media::limits::Limits;
+use crate::media::tools::Tool;
+use crate::raster::{ColorSpec, Matrix, Range};
+
+/// Codecs that are accepted, by ffprobe's names.
+const CODECS: [&str; 21] = [
+    "h264",
+    "hevc",
+    "vp8",
+    "vp9",
+    "av1",
+    "mpeg4",
+    "mpeg2video",
+    "mjpeg",
+    "prores",
+    "ffv1",
+    "rawvideo",
+    "wmv2",
+    "wmv3",
+    "vc1",
+    "mpeg1video",
+    "huffyuv",
+    "ffvhuff",
+    "png",
+    "theora",
+    "flv1",
+    "h263", // the codec of many .3gp files
+];
+
+/// What ffprobe is asked for.
+const HEADER_ENTRIES: &str = "stream=index,codec_name,codec_type,codec_tag_string,\
+    width,height,pix_fmt,sample_aspect_ratio,r_frame_rate,avg_frame_rate,time_base,color_range,color_space,\
+    field_order:stream_disposition=attached_pic:stream_tags=enc_key_id:stream_side_data=displaymatrix";
+
+/// Headers longer than this are not believed.
+const MAX_HEADER_BYTES: usize = 1 << 20;
+
+/// How the stored picture is turned to be shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::media) struct Turn {
+    /// Rows and columns change places, first of all.
+    pub(in crate::media) transpose: bool,
+    /// Then left and right.
+    pub(in crate::media) flip_x: bool,
+    /// And top and bottom.
+    pub(in crate::media) flip_y: bool,
+}
+
+pub(super) fn read_header(
+    container: Container,
+    path: &Path,
+    limits: &Limits,
+) -> Result<Value, Error> {
+    let mut args = vec![
+        "-show_entries".into(),
+        HEADER_ENTRIES.into(),
+        "-of".into(),
+        "json".into(),
+    ];
+    args.extend(input_args(container, path, limits));
+    let order = Order::new(Tool::Ffprobe, args, limits, 0).with_input(path);
+    let mut child = Child::reading(order)?;
+    let mut json = vec![0; MAX_HEADER_BYTES];
+    let n_read = child.read_full(&mut json)?;
+    if n_read == json.len() {
+        return Err(Error::NotAVideo("its header has no end".into()));
+    }
+    let end = child.finish()?;
+    let says = |what| end.complaint.contains(what);
+    if says("Number of streams exceeds") {
+        return Err(Error::TooManyStreams {
+            limit: limits.max_streams,
+        });
+    }
+    if says("moov atom not found") {
+        return Err(Error::Truncated(Damage::NoIndex));
+    }
+    if let Some(codec) = refused_codec(&end.complaint) {
+        return Err(Error::CodecNotAllowed(codec.to_owned()));
+    }
+    match end.check() {
+        Ok(_) => serde_json::from_slice(&json[..n_read])
+            .map_err(|error| Error::NotAVideo(error.to_string())),
+        Err(Error::Crashed { status, complaint }) if status.starts_with("exit") => {
+            Err(Error::NotAVideo(complaint))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// The codec that ffprobe was not allowed to open, by its own words.
+fn refused_codec(complaint: &str) -> Option<&str> {
+    let line = complaint
+        .lines()
+        .find(|line| line.contains(") not on whitelist"))?;
+    Some(line.split_once("Codec (")?.1.split_once(')')?.0)
+}
+
+/// All video streams, at least one.
+pub(super) fn video_streams<'a>(
+    header: &'a Value,
+    limits: &Limits,
+) -> Result<Vec<&'a Value>, Error> {
+    let streams = header["streams"].as_array().map_or(&[][..], Vec::as_slice);
+    if streams.len() > limits.max_streams as usize {
+        return Err(Error::TooManyStreams {
+            limit: limits.max_streams,
+        });
+    }
+    let films = streams.iter().filter(|s| text(&s["codec_type"]) == "video");
+    let films: Vec<&Value> = films.collect();
+    match films.is_empty() {
+        true => Err(Error::NoVideoStream),
+        false => Ok(films),
+    }
+}
+
+pub(super) fn check_codec(stream: &Value) -> Result<(), Error> {
+    let codec = text(&stream["codec_name"]);
+    let tag = text(&stream["codec_tag_string"]);
+    if tag == "encv" || !stream["tags"]["enc_key_id"].is_null() {
+        return Err(Error::Encrypted);
+    }
+    match CODECS.contains(&codec) {
+        true => Ok(()),
+        false => Err(Error::CodecNotAllowed(codec.to_owned())),
+    }
+}
+
+/// Size as shown, and the turn that leads there.
+pub(super) fn shown_size(stream: &Value, hints: &Hints) -> (u64, u64, Turn) {
+    let side = |name: &str| number(&stream[name]).unwrap_or(0.0);
+    let (mut width, mut height) = (side("width"), side("height"));
+    let told = ratio(text(&stream["sample_aspect_ratio"]), ':');
+    let aspect = hints.pixel_aspect.or(told).unwrap_or(1.0);
+    // The smaller count is stretched: no measured detail is lost.
+    match aspect {
+        a if a > 1.0 => width = (width * a).round(),
+        a if a > 0.0 => height = (height / a).round(),
+        _ => {}
+    }
+    let turn = turn_of(stream);
+    if turn.transpose {
+        std::mem::swap(&mut width, &mut height);
+    }
+    (width as u64, height as u64, turn)
+}
+
+/// The turn that a display matrix asks for, to the nearest quarter.
+fn turn_of(stream: &Value) -> Turn {
+    let matrices = stream["side_data_list"]
+        .as_array()
+        .map_or(&[][..], Vec::as_slice);
+    let matrix = matrices
+        .iter()
+        .map(|data| text(&data["displaymatrix"]))
+        .find(|m| !m.is_empty());
+    // Three rows, each "address: a b u".
+    let cells: Vec<f64> = matrix
+        .unwrap_or_default()
+        .lines()
+        .filter_map(|line| line.split_once(':'))
+        .flat_map(|(_, row)| row.split_whitespace().filter_map(|cell| cell.parse().ok()))
+        .collect();
+    let &[a, b, _, c, d, ..] = cells.as_slice() else {
+        return Turn {
+            transpose: false,
+            flip_x: false,
+            flip_y: false,
+        };
+    };
+    // A stored point (x, y) is shown at (a x + c y, b x + d y).
+    let transpose = f64::abs(b) > f64::abs(a);
+    Turn {
+        transpose,
+        flip_x: if transpose { c < 0.0 } else { a < 0.0 },
+        flip_y: if transpose { b < 0.0 } else { d < 0.0 },
+    }
+}
+
+pub(super) fn is_interlaced(stream: &Value) -> bool {
+    ["tt", "bb", "tb", "bt"].contains(&text(&stream["field_order"]))
+}
+
+pub(super) fn index_of(stream: &Value) -> u64 {
+    number(&stream["index"]).unwrap_or(0.0) as u64
+}
+
+pub(super) fn color_of(stream: &Value) -> ColorSpec {
+    let pix_fmt = text(&stream["pix_fmt"]);
+    let matrix = match text(&stream["color_space"]) {
+        // Wider gamuts are converted to it by `decode`.
+        "bt709" | "bt2020nc" | "bt2020c" if !is_rgb(pix_fmt) => Matrix::Bt709,
+        _ => Matrix::Bt601,
+    };
+    let full = pix_fmt.starts_with("yuvj")
+        || pix_fmt.starts_with("gray")
+        || (text(&stream["color_range"]) == "pc" && !is_rgb(pix_fmt));
+    let range = if full { Range::Full } else { Range::Limited };
+    ColorSpec { matrix, range }
+}
+
+/// The bits of a gray pixel format, by ffmpeg's name, where they are more than 8.
+pub(in crate::media) fn gray_bits(pix_fmt: &str) -> Option<u32> {
+    let bits = pix_fmt.strip_prefix("gray")?;
+    let bits = bits.strip_suffix("le").or(bits.strip_suffix("be"))?;
+    bits.parse().ok().filter(|bits| (9..=16).contains(bits))
+}
+
+/// Whether a pixel format, by ffmpeg's name, holds red, green and blue.
+pub(in crate::media) fn is_rgb(pix_fmt: &str) -> bool {
+    [
+        "rgb", "bgr", "gbr", "argb", "abgr", "0rgb", "0bgr", "pal8", "x2rgb", "x2bgr", "mono",
+    ]
+    .iter()
+    .any(|start| pix_fmt.starts_with(start))
+}
+
+pub(super) fn text(value: &Value) -> &str {
+    value.as_str().unwrap_or_default()
+}
+
+/// A number, which ffprobe may have put in quotes.
+pub(super) fn number(value: &Value) -> Option<f64> {
+    value.as_f64().or_else(|| value.as_str()?.parse().ok())
+}
+
+/// `30000/1001` or `4:3`; `None` for `0/0` and the like.
+pub(super) fn ratio(text: &str, sign: char) -> Option<f64> {
+    let (over, under) = text.split_once(sign)?;
+    let value = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
+    value.is_finite().then_some(value)
+}

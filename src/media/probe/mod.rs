@@ -1,0 +1,283 @@
+//! What a file holds, and whether it is within the limits (RELIABILITY.md, "Default limits" and
+//! "Reason codes"). Two runs of ffprobe: the headers, then the time of every packet of the video streams; a third
+//! that decodes, where packets do not tell the pictures. Numbers of the header are only claims.
+
+mod clock; // a recorder's times, mended
+mod ending; // whether a file ends where its structure does
+pub(in crate::media) mod header; // what a file's header says of its streams
+mod packets; // when each packet and picture is shown
+pub(in crate::media) mod timeline; // presentation times -> a constant rate
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::thread;
+
+use serde_json::Value;
+
+use crate::media::allow_list::NO_RATE;
+use crate::media::container::{Container, HEAD_BYTES};
+use crate::media::error::{Damage, Error};
+use crate::media::hints::Hints;
+use crate::media::limits::Limits;
+use crate::media::note::Note;
+use crate::raster::ColorSpec;
+use ending::Ending;
+use header::{
+    Turn, check_codec, color_of, index_of, is_interlaced, number, ratio, read_header, shown_size,
+    text, video_streams,
+};
+use packets::{AllPackets, Packets, Pictures};
+use timeline::{Claims, Timeline};
+
+/// A larger file may turn out to be none of ours: its packets are read only once its headers are good.
+const MOST_READ_EARLY: u64 = 64 << 20;
+
+/// A film that is within the limits.
+#[derive(Clone, Debug)]
+pub(in crate::media) struct Probe {
+    /// For `-f`.
+    pub(in crate::media) container: Container,
+    /// For `-map`.
+    pub(in crate::media) stream_idx: u64,
+    /// Columns as shown, square pixels.
+    pub(in crate::media) width: u32,
+    /// Rows as shown, square pixels.
+    pub(in crate::media) height: u32,
+    /// How the stored picture is turned.
+    pub(in crate::media) turn: Turn,
+    /// ffmpeg's name of the stored pixel format.
+    pub(in crate::media) pix_fmt: String,
+    /// ffmpeg's name of the stored luma weights.
+    pub(in crate::media) color_space: String,
+    /// How the given frames are to be read.
+    pub(in crate::media) color: ColorSpec,
+    /// Stored in two fields.
+    pub(in crate::media) interlaced: bool,
+    /// Pictures that decoding gives, as far as can be told before.
+    pub(in crate::media) n_pictures: usize,
+    /// The file's own times lead to its pictures: none is missing, none was mended.
+    pub(in crate::media) has_plain_times: bool,
+    /// Which frame is shown when.
+    pub(in crate::media) timeline: Timeline,
+    /// What is worth knowing of the file.
+    pub(in crate::media) notes: Vec<Note>,
+}
+
+/// A file that was looked at from outside.
+struct Outside {
+    container: Container,
+    n_bytes: u64,
+    ending: Ending,
+}
+
+/// Reads the headers and the packet times of a file.
+pub(in crate::media) fn probe(path: &Path, limits: &Limits, hints: &Hints) -> Result<Probe, Error> {
+    let outside = look(path, limits)?;
+    let Outside {
+        container,
+        n_bytes,
+        ending,
+    } = outside;
+    let read_packets = || AllPackets::read(container, path, n_bytes, limits);
+    let (header, early) = thread::scope(|scope| {
+        let early = (n_bytes < MOST_READ_EARLY).then(|| scope.spawn(read_packets));
+        let header = read_header(container, path, limits);
+        (header, early.and_then(|thread| thread.join().ok()))
+    });
+    let header = header.map_err(|error| match (error, ending) {
+        (
+            Error::NotAVideo(_),
+            Ending::AfterPictures | Ending::InsideSamples | Ending::InsideData,
+        ) => Error::Truncated(Damage::NoIndex),
+        (error, _) => error,
+    })?;
+    let streams = video_streams(&header, limits)?;
+    if let [only] = streams[..] {
+        check_stream(only, limits, hints)?;
+    }
+    let all = early.unwrap_or_else(read_packets)?;
+    let stream = choose_stream(&streams, &all)?;
+    let (width, height, turn) = check_stream(stream, limits, hints)?;
+    let found = Found::of(path, &outside, stream, &all, limits)?;
+    let (timeline, mut notes) = found.timeline(stream, limits, hints)?;
+    let is_cut_after = ending != Ending::Whole;
+    if is_cut_after && !limits.allow_truncated {
+        notes.push(Note::CutAfterPictures {
+            n_pictures: found.times_s.len(),
+        });
+    }
+    Ok(Probe {
+        container,
+        stream_idx: index_of(stream),
+        width: width as u32,
+        height: height as u32,
+        turn,
+        pix_fmt: text(&stream["pix_fmt"]).to_owned(),
+        color_space: text(&stream["color_space"]).to_owned(),
+        color: color_of(stream),
+        interlaced: is_interlaced(stream),
+        n_pictures: found.times_s.len(),
+        has_plain_times: found.has_plain_times && notes.is_empty(),
+        timeline,
+        notes,
+    })
+}
+
+fn look(path: &Path, limits: &Limits) -> Result<Outside, Error> {
+    let failed = Error::io("opening the footage");
+    let file = File::open(path).map_err(&failed)?;
+    let n_bytes = file.metadata().map_err(&failed)?.len();
+    if n_bytes > limits.max_bytes {
+        return Err(Error::TooLong {
+            found: n_bytes as f64,
+            unit: "bytes",
+        });
+    }
+    let mut head = Vec::with_capacity(HEAD_BYTES);
+    (&file)
+        .take(HEAD_BYTES as u64)
+        .read_to_end(&mut head)
+        .map_err(&failed)?;
+    let container = Container::of(&head)?;
+    let ending = Ending::of(container, &file, n_bytes).map_err(&failed)?;
+    Ok(Outside {
+        container,
+        n_bytes,
+        ending,
+    })
+}
+
+/// The pictures of the film, before anything is made of their times.
+struct Found {
+    /// Their times as the file tells them, in the order in which they are shown.
+    times_s: Vec<Option<f64>>,
+    has_plain_times: bool,
+}
+
+impl Found {
+    /// Finds the pictures by their packets where those tell them, else by decoding. Refuses a film that is cut
+    /// off or damaged, unless that is allowed.
+    fn of(
+        path: &Path,
+        outside: &Outside,
+        stream: &Value,
+        all: &AllPackets,
+        limits: &Limits,
+    ) -> Result<Found, Error> {
+        let packets = all.of(index_of(stream));
+        if packets.encrypted {
+            return Err(Error::Encrypted);
+        }
+        let shown_s = packets
+            .shown_s()
+            .filter(|_| has_a_picture_a_packet(outside, stream));
+        let has_plain_times = shown_s.is_some();
+        let (times_s, is_damaged) = match shown_s {
+            Some(shown_s) => (shown_s.into_iter().map(Some).collect(), false),
+            None => decoded(path, outside.container, &packets, limits)?,
+        };
+        let found = Found {
+            times_s,
+            has_plain_times,
+        };
+        let is_cut = match outside.ending {
+            Ending::InsideData => true,
+            // The index behind the pictures may be gone; a container without sizes ends where its reader says.
+            Ending::AfterPictures if outside.container == Container::Matroska => false,
+            _ => all.is_cut(packets.stream_idx),
+        };
+        match (is_cut || is_damaged) && !limits.allow_truncated {
+            true => Err(Error::Truncated(Damage::EndsAt {
+                n_pictures: found.times_s.len(),
+                span_s: found.span_s(),
+            })),
+            false => Ok(found),
+        }
+    }
+
+    /// From the first picture to the last, seconds; 0 where that cannot be told.
+    fn span_s(&self) -> f64 {
+        let times = self.times_s.iter().flatten();
+        let (least, most) = times.fold((f64::MAX, f64::MIN), |(least, most), &time| {
+            (least.min(time), most.max(time))
+        });
+        (most - least).max(0.0)
+    }
+
+    fn timeline(
+        &self,
+        stream: &Value,
+        limits: &Limits,
+        hints: &Hints,
+    ) -> Result<(Timeline, Vec<Note>), Error> {
+        let rate = |name: &str| ratio(text(&stream[name]), '/').filter(|fps| *fps > 0.0);
+        let told = [rate("avg_frame_rate"), rate("r_frame_rate")]
+            .into_iter()
+            .flatten();
+        let claims = Claims {
+            fps: told
+                .filter(|fps| (fps / NO_RATE - 1.0).abs() > 1e-3)
+                .collect(),
+            tick_s: ratio(text(&stream["time_base"]), '/').unwrap_or(0.001),
+            wanted_fps: hints.fps,
+        };
+        Timeline::found(&self.times_s, &claims, limits)
+    }
+}
+
+/// The times of the pictures that a stream decodes to, and whether some packets were too damaged for that.
+fn decoded(
+    path: &Path,
+    container: Container,
+    packets: &Packets,
+    limits: &Limits,
+) -> Result<(Vec<Option<f64>>, bool), Error> {
+    let n_packets = packets.n_shown();
+    let pictures = Pictures::read(container, path, (packets.stream_idx, n_packets), limits)?;
+    let n_least = n_packets - (n_packets / 50).max(2).min(n_packets);
+    let is_damaged = pictures.times_s.len() < n_least && !pictures.complaint.is_empty();
+    Ok((pictures.times_s, is_damaged))
+}
+
+/// Whether each packet that has a time rightly gives one picture, which then has that time.
+fn has_a_picture_a_packet(outside: &Outside, stream: &Value) -> bool {
+    let is_told = !outside.container.is_bare() && outside.container != Container::MpegPs;
+    is_told && !is_interlaced(stream) && text(&stream["codec_name"]) != "vp8"
+}
+
+/// The stream with the most pictures, of equals that with the largest picture, of those the first: a thumbnail
+/// beside the film is a stream of one picture, marked as such or not.
+fn choose_stream<'a>(streams: &[&'a Value], packets: &AllPackets) -> Result<&'a Value, Error> {
+    let side = |s: &Value, name: &str| number(&s[name]).unwrap_or(0.0) as u64;
+    let rank = |s: &Value| {
+        let area = side(s, "width").saturating_mul(side(s, "height"));
+        (packets.n_shown(index_of(s)), area)
+    };
+    let is_cover = |s: &Value| {
+        let marked = number(&s["disposition"]["attached_pic"]) == Some(1.0);
+        marked && packets.n_shown(index_of(s)) <= 1
+    };
+    let films = streams.iter().copied().filter(|s| !is_cover(s));
+    (films.rev().max_by_key(|s| rank(s))).ok_or(Error::NoVideoStream)
+}
+
+/// Refuses a stream of a codec or a size that is not accepted; returns the size as shown and the turn to it.
+fn check_stream(stream: &Value, limits: &Limits, hints: &Hints) -> Result<(u64, u64, Turn), Error> {
+    check_codec(stream)?;
+    let (width, height, turn) = shown_size(stream, hints);
+    check_size(width, height, limits)?;
+    Ok((width, height, turn))
+}
+
+pub(in crate::media) fn check_size(width: u64, height: u64, limits: &Limits) -> Result<(), Error> {
+    let too_large = width.max(height) > u64::from(limits.max_side_px)
+        || width.saturating_mul(height) > limits.max_pixels;
+    if too_large {
+        return Err(Error::TooManyPixels { width, height });
+    }
+    match width.min(height) < u64::from(limits.min_side_px) {
+        true => Err(Error::TooFewPixels { width, height }),
+        false => Ok(()),
+    }
+}

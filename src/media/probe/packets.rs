@@ -1,0 +1,281 @@
+//! What is really in a file: the time of every packet of its video streams, and, where packets alone do not tell,
+//! the time of every picture that they decode to (RELIABILITY.md, "Facts": believe what is there, not what is
+//! claimed). Which of several streams is the film, how long it is, and at which rate, all follow from these.
+
+use std::path::Path;
+use std::time::Duration;
+
+use crate::media::allow_list::input_args;
+use crate::media::container::Container;
+use crate::media::error::Error;
+use crate::media::gate::{Child, Order};
+use crate::media::limits::Limits;
+use crate::media::tools::Tool;
+
+/// Disks read at least this fast, bytes a second; the packet times need the whole file.
+const SLOWEST_DISK: u64 = 50_000_000;
+
+/// What is said of one packet is shorter, side data and all.
+const MAX_LINE_BYTES: usize = 64 << 10;
+
+/// What ffprobe says where the structure of a Matroska file breaks off.
+const BROKEN: [&str; 2] = ["File ended prematurely", "EBML number"];
+
+/// Packets up to so many bytes may say "the same picture again", which some decoders answer with no picture.
+const MAX_SILENT_BYTES: u64 = 16;
+
+/// No codec shows a picture so long after others that were stored behind it, seconds.
+const LONGEST_REORDER_S: f64 = 1.0;
+
+/// What the packets of one stream say.
+#[derive(Clone, Debug)]
+pub(super) struct Packets {
+    /// The stream's index in the file.
+    pub(super) stream_idx: u64,
+    /// Presentation times of the packets to be shown, in the order of the file.
+    times_s: Vec<Option<f64>>,
+    /// The packets alone do not tell which pictures are shown when.
+    is_unclear: bool,
+    /// Some packet is encrypted.
+    pub(super) encrypted: bool,
+}
+
+/// What the packets of all video streams say.
+#[derive(Debug)]
+pub(super) struct AllPackets {
+    streams: Vec<Packets>,
+    /// What the tool complained of.
+    complaint: String,
+}
+
+impl AllPackets {
+    /// Reads the packets of all video streams, of each at most as many as the limit.
+    pub(super) fn read(
+        container: Container,
+        path: &Path,
+        n_bytes: u64,
+        limits: &Limits,
+    ) -> Result<AllPackets, Error> {
+        let entries = "packet=stream_index,pts_time,size,flags:packet_side_data=side_data_type";
+        let mut args = vec!["-select_streams".into(), "v".into()];
+        args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
+        args.extend(input_args(container, path, limits));
+        let order = Order::new(Tool::Ffprobe, args, limits, 0)
+            .with_input(path)
+            .with_more_time(Duration::from_secs(n_bytes / SLOWEST_DISK));
+        let mut streams = Vec::new();
+        let complaint = read_lines(order, |line| add(&mut streams, line, limits))?;
+        Ok(AllPackets { streams, complaint })
+    }
+
+    /// The packets of a stream; none where it has none.
+    pub(super) fn of(&self, stream_idx: u64) -> Packets {
+        let packets = self.streams.iter().find(|p| p.stream_idx == stream_idx);
+        packets.cloned().unwrap_or(Packets::none(stream_idx))
+    }
+
+    /// How many packets of a stream are to be shown.
+    pub(super) fn n_shown(&self, stream_idx: u64) -> usize {
+        let packets = self.streams.iter().find(|p| p.stream_idx == stream_idx);
+        packets.map_or(0, Packets::n_shown)
+    }
+
+    /// Whether samples of a stream lie beyond the end of the file, the file ends inside a block, or its blocks are
+    /// damaged.
+    pub(super) fn is_cut(&self, stream_idx: u64) -> bool {
+        let of_stream = format!("stream {stream_idx}, offset ");
+        let lines = self.complaint.lines();
+        let partial = |line: &str| line.contains("partial file") && line.contains(&of_stream);
+        let mut lines =
+            lines.filter(|line| BROKEN.iter().any(|what| line.contains(what)) || partial(line));
+        lines.next().is_some()
+    }
+}
+
+/// One line about a packet: stream, time, size, flags, side data. Side data may go on for further lines.
+fn add(streams: &mut Vec<Packets>, line: &str, limits: &Limits) -> Result<(), Error> {
+    let mut cells = line.split(',');
+    let numbers = (cells.next().map(str::parse), cells.next(), cells.next());
+    let (Some(Ok(stream_idx)), Some(time), Some(size)) = numbers else {
+        let is_encrypted = line.contains("Encryption");
+        streams.iter_mut().for_each(|p| p.encrypted |= is_encrypted);
+        return Ok(());
+    };
+    let at = streams.iter().position(|p| p.stream_idx == stream_idx);
+    let at = at.unwrap_or_else(|| {
+        streams.push(Packets::none(stream_idx));
+        streams.len() - 1
+    });
+    let packets = &mut streams[at];
+    packets.encrypted |= line.contains("Encryption");
+    if cells.next().unwrap_or_default().contains('D') {
+        return Ok(()); // outside the edit list: decoded, never shown
+    }
+    packets.times_s.push(time.parse().ok());
+    packets.is_unclear |= size.parse().is_ok_and(|size: u64| size <= MAX_SILENT_BYTES);
+    match packets.n_shown() > limits.max_frames {
+        true => Err(Error::TooManyFrames {
+            limit: limits.max_frames,
+        }),
+        false => Ok(()),
+    }
+}
+
+impl Packets {
+    fn none(stream_idx: u64) -> Packets {
+        Packets {
+            stream_idx,
+            times_s: Vec::new(),
+            is_unclear: false,
+            encrypted: false,
+        }
+    }
+
+    /// Packets to be shown.
+    pub(super) fn n_shown(&self) -> usize {
+        self.times_s.len()
+    }
+
+    /// The times in the order in which pictures are shown; `None` where only the pictures themselves tell them:
+    /// some packet has no time, may hold no picture, or lies further back than any codec reorders.
+    pub(super) fn shown_s(&self) -> Option<Vec<f64>> {
+        let mut shown_s: Vec<f64> = self.times_s.iter().copied().collect::<Option<_>>()?;
+        let mut latest_s = f64::MIN;
+        let leaps_back = shown_s.iter().any(|&time| {
+            latest_s = latest_s.max(time);
+            time < latest_s - LONGEST_REORDER_S
+        });
+        if self.is_unclear || leaps_back {
+            return None;
+        }
+        shown_s.sort_by(f64::total_cmp);
+        Some(shown_s)
+    }
+}
+
+/// The pictures that a stream decodes to.
+#[derive(Debug)]
+pub(super) struct Pictures {
+    /// Their times in the order in which they are shown; `None` for one without a time.
+    pub(super) times_s: Vec<Option<f64>>,
+    /// What the decoder complained of.
+    pub(super) complaint: String,
+}
+
+impl Pictures {
+    /// Decodes a stream of `n_packets` and reads the times of its pictures, at most as many as the limit.
+    pub(super) fn read(
+        container: Container,
+        path: &Path,
+        (stream_idx, n_packets): (u64, usize),
+        limits: &Limits,
+    ) -> Result<Pictures, Error> {
+        let mut args = vec!["-select_streams".into(), stream_idx.to_string().into()];
+        let entries = "frame=best_effort_timestamp_time";
+        args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
+        args.extend(input_args(container, path, limits));
+        let order = Order::new(Tool::Ffprobe, args, limits, n_packets.max(1)).with_input(path);
+        let mut times_s = Vec::new();
+        let complaint = read_lines(order, |line| {
+            let time = line.split(',').next().unwrap_or_default();
+            if time == "N/A" || time.parse::<f64>().is_ok() {
+                times_s.push(time.parse().ok());
+            }
+            match times_s.len() > limits.max_frames {
+                true => Err(Error::TooManyFrames {
+                    limit: limits.max_frames,
+                }),
+                false => Ok(()),
+            }
+        })?;
+        Ok(Pictures { times_s, complaint })
+    }
+}
+
+/// Runs a tool and hands on each line that it says; returns what it complained of.
+fn read_lines(
+    order: Order,
+    mut take: impl FnMut(&str) -> Result<(), Error>,
+) -> Result<String, Error> {
+    let mut child = Child::reading(order)?;
+    let (mut chunk, mut line) = (vec![0; 1 << 16], Vec::new());
+    loop {
+        let n_read = child.read_some(&mut chunk)?;
+        if n_read == 0 {
+            break;
+        }
+        split_lines(&chunk[..n_read], &mut line, &mut take)?;
+    }
+    Ok(child.finish()?.check()?.complaint)
+}
+
+/// The next piece of the output; `line` is what came of a line that has not ended.
+fn split_lines(
+    piece: &[u8],
+    line: &mut Vec<u8>,
+    take: &mut impl FnMut(&str) -> Result<(), Error>,
+) -> Result<(), Error> {
+    for &byte in piece {
+        if byte == b'\n' {
+            take(&String::from_utf8_lossy(line))?;
+            line.clear();
+        } else if line.len() < MAX_LINE_BYTES {
+            line.push(byte);
+        } else {
+            return Err(Error::NotAVideo("a packet is told without an end".into()));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::code::Code;
+
+    fn packets(lines: &str) -> Packets {
+        let mut streams = Vec::new();
+        for line in lines.lines() {
+            add(&mut streams, line, &Limits::default()).unwrap();
+        }
+        let all = AllPackets {
+            streams,
+            complaint: String::new(),
+        };
+        all.of(1)
+    }
+
+    #[test]
+    fn a_line_may_come_in_pieces_but_must_end() {
+        let (mut line, mut seen) = (Vec::new(), Vec::new());
+        let mut take = |line: &str| {
+            seen.push(line.to_owned());
+            Ok(())
+        };
+        for piece in ["0,0.000000,80,K__\n0,0.04", "0000,70,___\n"] {
+            split_lines(piece.as_bytes(), &mut line, &mut take).unwrap();
+        }
+        let endless = [b'x'; MAX_LINE_BYTES + 1];
+        let refused = split_lines(&endless, &mut line, &mut take).unwrap_err();
+        assert_eq!(refused.code(), Code::NotAVideo);
+        assert_eq!(line.len(), MAX_LINE_BYTES);
+        assert_eq!(seen, ["0,0.000000,80,K__", "0,0.040000,70,___"]);
+    }
+
+    #[test]
+    fn each_stream_is_counted_by_itself_and_what_is_never_shown_is_not() {
+        let lines = "0,0.0,99,K__\n1,0.0,99,K__\n1,0.2,99,___\n1,0.1,99,__\n1,0.3,99,_D_\nEncryption info\n";
+        let packets = packets(lines);
+        assert_eq!(packets.shown_s(), Some(vec![0.0, 0.1, 0.2]));
+        assert!(packets.encrypted);
+    }
+
+    #[test]
+    fn packets_without_times_or_pictures_or_order_do_not_tell() {
+        for unclear in ["1,N/A,99,___", "1,0.2,0,___", "1,-3.0,99,___"] {
+            let lines = format!("1,0.0,99,K__\n1,0.1,99,___\n{unclear}\n");
+            assert_eq!(packets(&lines).shown_s(), None, "{unclear}");
+            assert_eq!(packets(&lines).n_shown(), 3);
+        }
+    }
+}
