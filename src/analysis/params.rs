@@ -12,6 +12,10 @@ use crate::library::{Animal, View};
 #[schema(as = AnalysisParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
+    /// Frames a second, 0.01..=1000; null = as the file says. With a value every picture of the file is used once.
+    pub fps: Option<f64>,
+    /// Width of a pixel over its height, 0.1..=10; null = as the file says.
+    pub pixel_aspect: Option<f64>,
     /// From where the animal is seen; guessed when absent.
     pub view: Option<ViewParam>,
     /// The calibrated camera; without it nothing is given in metres.
@@ -188,6 +192,8 @@ pub enum AxisAndHead {
 impl Default for Params {
     fn default() -> Params {
         Params {
+            fps: None,
+            pixel_aspect: None,
             view: None,
             camera: None,
             animal: None,
@@ -285,6 +291,8 @@ impl Params {
                 .ok_or(format!("{name} must be above 0: {value}"))
         };
         positive("kappa", self.kappa)?;
+        within("fps", self.fps, 0.01..=1000.0)?;
+        within("pixel_aspect", self.pixel_aspect, 0.1..=10.0)?;
         if !(0.0..=180.0).contains(&self.heading_gate_deg) {
             return Err(format!(
                 "heading_gate_deg must lie in 0..=180: {}",
@@ -316,6 +324,22 @@ impl Params {
             positive("animal.height_m", animal.height_m)?;
         }
         Ok(())
+    }
+}
+
+/// Checks that a value, where one is set, lies in a range.
+fn within(
+    name: &str,
+    value: Option<f64>,
+    range: std::ops::RangeInclusive<f64>,
+) -> Result<(), String> {
+    match value {
+        Some(value) if !range.contains(&value) => Err(format!(
+            "{name} must lie in {}..={}: {value}",
+            range.start(),
+            range.end()
+        )),
+        _ => Ok(()),
     }
 }
 

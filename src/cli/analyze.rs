@@ -12,7 +12,7 @@ use crate::analysis::{self, Params};
 use crate::cpu;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
-use crate::jobs::analysis::Advice;
+use crate::jobs::analysis::{Advice, hints};
 use crate::jobs::overlay;
 use crate::library::Library;
 use crate::media::{self, Limits, Tool, Video, read_image};
@@ -43,6 +43,12 @@ pub struct Args {
     /// Follow the largest animal when several move.
     #[arg(long)]
     follow_largest: bool,
+    /// Frames a second, whatever the file says: 0.01 to 1000. Every picture is then used once.
+    #[arg(long, value_name = "F")]
+    fps: Option<f64>,
+    /// Width of a pixel over its height, whatever the file says.
+    #[arg(long, value_name = "R")]
+    pixel_aspect: Option<f64>,
     /// Frames in a clip.
     #[arg(long, value_name = "F")]
     clip_frames: Option<u32>,
@@ -80,7 +86,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
     let limits = Limits::default();
     let unreadable = |error: media::Error| Error::work(error.code(), &error);
-    let video = Video::open(&args.video, &limits).map_err(unreadable)?;
+    let hints = hints(&params);
+    let video = Video::open_with(&args.video, &limits, &hints).map_err(unreadable)?;
     let background = args
         .background
         .as_deref()
@@ -100,7 +107,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         overlay::film(&video, &library.poses, path, &progress)
             .map_err(|error| Error::work(error.code(), &error))?;
     }
-    let advice = Advice::all(&library, &params);
+    let advice = Advice::all(&library, &params, video.notes());
     for Advice { code, sentence } in &advice {
         super::say(&format!("{sentence} ({code})"));
     }
@@ -129,6 +136,9 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     put("preset", args.preset.as_ref().map(|name| json!(name)));
     put("view", args.view.as_ref().map(|view| json!(view)));
     put("follow", args.follow_largest.then(|| json!("largest")));
+    put("fps", args.fps.map(|fps| json!(fps)));
+    let pixel_aspect = args.pixel_aspect;
+    put("pixel_aspect", pixel_aspect.map(|aspect| json!(aspect)));
     put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
     let weights = args.clip_weights.as_ref();
     put("clip_weights", weights.map(|weights| json!(weights)));

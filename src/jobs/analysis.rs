@@ -13,7 +13,7 @@ use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, svg};
 use crate::ids::{FootageId, JobId, LibraryId};
 use crate::library::{Library, View};
-use crate::media::{Limits, Video, read_image};
+use crate::media::{Hints, Limits, Note, Video, read_image};
 use crate::progress::Progress;
 use crate::store::footage::{BACKGROUND, Footage, VIDEO};
 use crate::store::jobs::Kind;
@@ -61,18 +61,27 @@ pub struct Summary {
     pub clip_frames: usize,
     /// Length of the animal when seen at length (80th percentile), pixels.
     pub length_px: Option<f64>,
-    /// What the library lacks and how to film better, the gravest first; empty for a good library.
+    /// What the library lacks and how to film better, the gravest first, then what is worth knowing of the film's
+    /// file; empty for a good library of a good file.
     #[serde(default)]
     pub advice: Vec<Advice>,
 }
 
-/// One thing that a library lacks.
+/// One thing that a library lacks, or that is worth knowing of its film's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Advice {
     /// Its stable name, such as `little_playback` or `lacks_up`.
     pub code: String,
     /// The same for people.
     pub sentence: String,
+}
+
+/// What the parameters say of the film itself.
+pub fn hints(params: &Params) -> Hints {
+    Hints {
+        fps: params.fps,
+        pixel_aspect: params.pixel_aspect,
+    }
 }
 
 /// Queues an analysis, after the job that makes its footage if that is not done yet. Returns the job's id and
@@ -98,7 +107,7 @@ impl Input {
         };
         let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND])?;
         let path_of = |name| files.path().join(name);
-        let video = Video::open(&path_of(VIDEO), &limits)?;
+        let video = Video::open_with(&path_of(VIDEO), &limits, &hints(&self.params))?;
         let background = match footage.background_sha256.is_empty() {
             true => None,
             false => Some(read_image(&path_of(BACKGROUND), &limits)?),
@@ -118,7 +127,7 @@ impl Input {
         Ok(Product {
             made: Made::Library(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
-            summary: serde_json::to_string(&Summary::of(&library, &self.params))?,
+            summary: serde_json::to_string(&Summary::of(&library, &self.params, video.notes()))?,
         })
     }
 
@@ -157,7 +166,7 @@ impl Input {
 }
 
 impl Summary {
-    fn of(library: &Library, params: &Params) -> Summary {
+    fn of(library: &Library, params: &Params, notes: &[Note]) -> Summary {
         let stats = &library.stats;
         Summary {
             fps: library.poses.fps,
@@ -172,19 +181,21 @@ impl Summary {
             component_share: stats.component_share,
             clip_frames: library.clip_frames,
             length_px: stats.length_px,
-            advice: Advice::all(library, params),
+            advice: Advice::all(library, params, notes),
         }
     }
 }
 
 impl Advice {
-    /// What a library lacks, the gravest first.
-    pub fn all(library: &Library, params: &Params) -> Vec<Advice> {
+    /// What a library lacks, the gravest first, then what is worth knowing of its film's file.
+    pub fn all(library: &Library, params: &Params, notes: &[Note]) -> Vec<Advice> {
         let all = analysis::stats::advice(library, params);
-        let plain = |advice: &analysis::stats::Advice| Advice {
-            code: advice.code().to_owned(),
-            sentence: advice.to_string(),
+        let plain = |(code, sentence): (&str, String)| Advice {
+            code: code.to_owned(),
+            sentence,
         };
-        all.iter().map(plain).collect()
+        let of_library = all.iter().map(|one| (one.code(), one.to_string()));
+        let of_file = notes.iter().map(|note| (note.code(), note.to_string()));
+        of_library.chain(of_file).map(plain).collect()
     }
 }

@@ -2,5 +2,6 @@
 
 mod accuracy;
 mod one;
+mod rates;
 mod reproduce;
 mod sample;
