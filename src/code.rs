@@ -37,25 +37,29 @@ macro_rules! codes {
 codes! {
     // The file (RELIABILITY.md, the gate).
     NotAVideo "not_a_video" "The file is not a video that can be read."
-        "Send the film itself, as MP4, MOV, MKV, WebM, AVI, MPEG-TS or ASF; neither a picture nor a playlist."
+        "Send the film itself, as MP4, MOV, 3GP, MKV, WebM, AVI, MPEG, MPEG-TS, ASF, WMV, FLV, OGV, H.264 or H.265; \
+         neither a picture nor a playlist."
     ContainerNotAllowed "container_not_allowed" "The container format is not among those accepted."
-        "Convert it, for example with `ffmpeg -i film -c copy film.mp4`."
+        "Convert it, for example with `ffmpeg -i film -an -c:v libx264 -crf 16 converted.mp4`."
     CodecNotAllowed "codec_not_allowed" "The video codec is not among those accepted."
-        "Encode it anew, for example with `ffmpeg -i film -c:v libx264 film.mp4`."
+        "Convert it, for example with `ffmpeg -i film -an -c:v libx264 -crf 16 converted.mp4`."
     TooManyPixels "too_many_pixels" "The picture is larger than the limit."
-        "Scale it down, for example with `ffmpeg -i film -vf scale=1920:-2 film.mp4`."
+        "Scale it down, for example with `ffmpeg -i film -an -vf scale=1920:-2 -c:v libx264 -crf 16 smaller.mp4`."
     TooFewPixels "too_few_pixels" "The picture is smaller than the limit."
         "Film larger: each side wants at least the pixels that the sentence names."
     TooManyFrames "too_many_frames" "The footage has more frames than the limit."
-        "Send a shorter piece of it."
+        "Send a piece of it, for example with `ffmpeg -i film -an -frames:v 20000 -c:v libx264 -crf 16 piece.mp4`."
     TooManyStreams "too_many_streams" "The file holds more streams than the limit."
-        "Send the picture alone, for example with `ffmpeg -i film -map 0:v:0 -c copy film.mp4`."
+        "Send the film alone, for example with `ffmpeg -i film -an -sn -dn -c:v libx264 -crf 16 film-alone.mp4`."
     TooLong "too_long" "The footage lasts longer than the limit."
-        "Send a shorter piece of it."
+        "Send a piece of it, for example with `ffmpeg -i film -an -t 600 -c:v libx264 -crf 16 piece.mp4`; of a time \
+         lapse all of it is measured at another rate, such as `--fps 30`."
     TooFast "too_fast" "The frame rate is above the limit."
-        "Send it at fewer frames a second, for example with `ffmpeg -i film -r 60 film.mp4`."
+        "Send it at fewer frames a second, for example with \
+         `ffmpeg -i film -an -r 60 -c:v libx264 -crf 16 slower.mp4`, or say the true rate, such as `--fps 240`."
     Truncated "truncated" "The file is cut off or damaged inside."
-        "Copy the file from the camera again, and see whether it plays to its end."
+        "Copy the file from the camera again. Where that is all there is, send what can be read of it, for example \
+         with `ffmpeg -i film -an -c:v libx264 -crf 16 rest.mp4`."
     Encrypted "encrypted" "The video is encrypted."
         "Send it without copy protection."
     NoVideoStream "no_video_stream" "The file holds no video stream."
@@ -67,7 +71,8 @@ codes! {
     MemoryLimit "memory_limit" "The work needed more memory than its limit."
         "Try a shorter or smaller film, or fewer individuals and frames."
     DecoderCrashed "decoder_crashed" "The video decoder or encoder stopped unexpectedly."
-        "Encode the film anew and try again; if it comes back, tell whoever runs the service."
+        "Convert the film with `ffmpeg -i film -an -c:v libx264 -crf 16 converted.mp4` and try again; if it comes \
+         back, tell whoever runs the service."
     StorageFull "storage_full" "There is no room left to store the result."
         "Delete what is no longer needed, or ask whoever runs the service for room; then try again."
     // The analysis (ALGORITHMS.md 2.9).

@@ -39,6 +39,8 @@ pub(super) struct ProblemBody {
     detail: String,
     /// The stable code.
     code: &'static str,
+    /// What to do about it.
+    advice: &'static str,
 }
 
 impl Problem {
@@ -123,6 +125,7 @@ impl IntoResponse for Problem {
             status: status.as_u16(),
             detail: self.detail,
             code: self.code.name(),
+            advice: self.code.advice(),
         };
         let mut response = (status, axum::Json(body)).into_response();
         let headers = response.headers_mut();

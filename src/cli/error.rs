@@ -1,4 +1,4 @@
-//! Why a command ends without success, in one line, and the exit code that goes with it
+//! Why a command ends without success, in one line, what to do about it, and the exit code that goes with it
 //! (DESIGN.md, Command line). Which code of `code.rs` is whose fault is decided here for the
 //! command line, as `api/problem.rs` decides it for HTTP.
 
@@ -53,6 +53,14 @@ impl Error {
     pub fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> Error {
         let what = what.into();
         move |cause| Error::Io { what, cause }
+    }
+
+    /// Returns what to do about it, where the reason has a code.
+    pub fn advice(&self) -> Option<&'static str> {
+        match self {
+            Error::Work { code, .. } => Some(code.advice()),
+            Error::Usage(_) | Error::Io { .. } | Error::Lacks { .. } => None,
+        }
     }
 
     /// 2 where the person can mend it (usage or input), 1 where something failed inside.

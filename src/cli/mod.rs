@@ -128,6 +128,9 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
         Ok(summary) => print(cli.json, &summary),
         Err(error) => {
             say(&format!("flockreel: {error}"));
+            if let Some(advice) = error.advice() {
+                say(&format!("flockreel: {advice}"));
+            }
             ExitCode::from(error.exit_code())
         }
     }

@@ -64,9 +64,14 @@ pub(super) struct JobSubject {
 /// Why a job failed.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub(super) struct JobFailure {
+    /// The stable code.
     code: &'static str,
+    /// What the code means.
     title: &'static str,
+    /// What happened this time.
     detail: String,
+    /// What to do about it.
+    advice: &'static str,
 }
 
 /// Where to look next.
@@ -236,6 +241,7 @@ impl JobView {
                 code: code.name(),
                 title: code.meaning(),
                 detail,
+                advice: code.advice(),
             }),
             created_at: rfc3339(row.created_ms),
             started_at: row.started_ms.map(rfc3339),

@@ -7,6 +7,8 @@ mod upkeep;
 
 use std::process::{Command, Output};
 
+use flockreel::code::Code;
+
 use crate::common::client;
 use crate::common::film::Films;
 use crate::common::process::Server;
@@ -30,7 +32,7 @@ fn names(films: &Films) -> Vec<String> {
 }
 
 #[test]
-fn a_film_that_is_refused_gets_one_sentence_and_leaves_nothing_behind() {
+fn a_film_that_is_refused_gets_a_sentence_with_advice_and_leaves_nothing_behind() {
     let films = Films::new();
     films.write("text.mp4", "no film at all");
     films.run("-f lavfi -i color=gray:size=64x48:rate=25 -frames:v 40 still.mp4");
@@ -38,9 +40,11 @@ fn a_film_that_is_refused_gets_one_sentence_and_leaves_nothing_behind() {
         let done = flockreel(&films, &format!("analyze {film} -o deep/library"));
         let sentence = String::from_utf8(done.stderr).expect("it is text");
         assert_eq!(done.status.code(), Some(2), "{sentence}");
-        let last = sentence.lines().last().expect("it says why");
+        let code = Code::from_name(code).expect("a code");
+        let lines: Vec<&str> = sentence.lines().rev().take(2).collect();
+        assert_eq!(lines[0], format!("flockreel: {}", code.advice()));
         assert!(
-            last.starts_with("flockreel: ") && last.ends_with(&format!("({code})")),
+            lines[1].starts_with("flockreel: ") && lines[1].ends_with(&format!("({code})")),
             "{sentence}"
         );
         assert_eq!(names(&films), ["still.mp4", "text.mp4"]);

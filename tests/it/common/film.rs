@@ -45,6 +45,17 @@ impl Films {
         self.path(args.split_whitespace().last().expect("an output"))
     }
 
+    /// As [`Films::run`], of input that ffmpeg may complain of.
+    pub(crate) fn run_though_damaged(&self, args: &str) -> PathBuf {
+        let done = Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "fatal", "-y"])
+            .args(args.split_whitespace())
+            .current_dir(self.folder())
+            .status();
+        assert!(done.expect("ffmpeg is installed").success(), "{args}");
+        self.path(args.split_whitespace().last().expect("an output"))
+    }
+
     /// A moving test picture, `size` such as 64x48, encoded as `args` say, the output's name last.
     pub(crate) fn test_picture(&self, size: &str, n_frames: usize, args: &str) -> PathBuf {
         self.run(&format!(

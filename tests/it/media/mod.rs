@@ -1,6 +1,7 @@
 //! The gate of RELIABILITY.md from outside: good films whole, bad files with their codes, nothing
 //! else opened, nothing left behind.
 
+mod advice;
 pub(crate) mod bad;
 pub(crate) mod cage;
 pub(crate) mod corpus;

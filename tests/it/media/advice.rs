@@ -1,0 +1,132 @@
+//! The advice of each refusal works: each command and option that `code.rs` names for a file is run on a file that is
+//! refused with that code, and the film it makes is read to its end.
+
+use std::path::{Path, PathBuf};
+
+use flockreel::code::Code;
+use flockreel::media::{Hints, Limits, Video};
+
+use super::{read_all, read_whole};
+use crate::common::film::Films;
+
+/// The commands that an advice names.
+fn commands(code: Code) -> Vec<&'static str> {
+    let quoted = code.advice().split('`').skip(1).step_by(2);
+    quoted.filter(|text| text.starts_with("ffmpeg ")).collect()
+}
+
+/// The rates that an advice names, as options.
+fn rates(code: Code) -> Vec<f64> {
+    let quoted = code.advice().split('`').skip(1).step_by(2);
+    let rates = quoted.filter_map(|text| text.strip_prefix("--fps "));
+    rates.map(|fps| fps.parse().expect("a number")).collect()
+}
+
+/// Films that are refused, one for each code whose advice names a command, more where kinds differ: size, frames, and
+/// how ffmpeg makes them.
+#[rustfmt::skip]
+const REFUSED: [(Code, &str, usize, &str); 12] = [
+    (Code::ContainerNotAllowed, "64x48", 40, "-c:v libvpx -f ivf film.ivf"),
+    (Code::ContainerNotAllowed, "64x48", 40, "-pix_fmt yuv444p film.y4m"),
+    (Code::ContainerNotAllowed, "64x48", 40, "-c:v mpeg2video bare.m2v"),
+    (Code::ContainerNotAllowed, "64x48", 40, "-c:v mpeg2video film.mxf"),
+    (Code::CodecNotAllowed, "64x48", 40, "-c:v magicyuv -pix_fmt gbrp magic.avi"),
+    (Code::CodecNotAllowed, "64x48", 40, "-c:v qtrle animation.mov"),
+    (Code::CodecNotAllowed, "64x48", 40, "-c:v utvideo -pix_fmt yuv422p ut.avi"),
+    (Code::CodecNotAllowed, "64x48", 40, "-c:v cinepak cinepak.avi"),
+    (Code::TooManyPixels, "4096x2176", 3, "-c:v mjpeg -q:v 30 large.avi"),
+    (Code::TooFast, "64x48", 2100, "-vf settb=1/2000,setpts=N -r 2000 -c:v mpeg4 fast.mkv"),
+    (Code::TooLong, "64x48", 80, "-vf setpts=N*50/TB -fps_mode vfr -c:v mpeg4 long.mkv"),
+    (Code::DecoderCrashed, "64x48", 40, "-c:v mpeg4 any.avi"),
+];
+
+/// The refused films, with their codes.
+fn refused(films: &Films) -> Vec<(Code, PathBuf)> {
+    let make = |&(code, size, n, args): &(Code, &str, usize, &str)| {
+        (code, films.test_picture(size, n, args))
+    };
+    let mut cases: Vec<_> = REFUSED.iter().map(make).collect();
+    let many = format!("{} -c:v mpeg4 many.mkv", "-map 0:v ".repeat(40));
+    cases.push((Code::TooManyStreams, films.test_picture("64x48", 5, &many)));
+    for name in ["whole.mkv", "whole.avi", "whole.asf", "whole.flv"] {
+        let film = films.test_picture("160x120", 100, &format!("-c:v {} {name}", codec_of(name)));
+        let cut = films.cut(&film, 0.6, &format!("cut.{name}"));
+        cases.push((Code::Truncated, cut));
+    }
+    cases
+}
+
+fn codec_of(name: &str) -> &'static str {
+    match Path::new(name)
+        .extension()
+        .and_then(|ending| ending.to_str())
+    {
+        Some("asf") => "wmv2",
+        Some("flv") => "flv",
+        _ => "libx264 -pix_fmt yuv420p",
+    }
+}
+
+#[test]
+fn each_command_of_an_advice_makes_a_film_that_is_taken() {
+    let films = Films::new();
+    let mut tried = Vec::new();
+    for (code, film) in refused(&films) {
+        // A decoder that crashes cannot be made: its advice is tried on a good film.
+        let refusal = read_whole(&film, &Limits::default()).err();
+        assert!(
+            refusal == Some(code) || code == Code::DecoderCrashed,
+            "{film:?}: {refusal:?}"
+        );
+        let name = film
+            .file_name()
+            .and_then(|name| name.to_str())
+            .expect("a name");
+        let all = commands(code);
+        assert!(!all.is_empty(), "the advice of {code} names no command");
+        for command in all {
+            let args = command
+                .trim_start_matches("ffmpeg ")
+                .replace("-i film ", &format!("-i {name} "));
+            let made = films.run_though_damaged(&args);
+            let n_frames = read_whole(&made, &Limits::default()).map(|frames| frames.len());
+            assert!(
+                n_frames.is_ok_and(|n| n >= 2),
+                "{name}: {command}: {n_frames:?}"
+            );
+        }
+        for fps in rates(code) {
+            let hints = Hints {
+                fps: Some(fps),
+                ..Hints::default()
+            };
+            let video = Video::open_with(&film, &Limits::default(), &hints).expect("a good film");
+            let n_frames = read_all(&video).expect("frames").len();
+            assert!(n_frames >= 2, "{name}: {fps}: {n_frames}");
+        }
+        tried.push(code);
+    }
+    // Too many frames take too long to make: its command is run on a film within the limit.
+    let film = films.test_picture("64x48", 60, "-c:v ffv1 endless.mkv");
+    let limits = Limits {
+        max_frames: 50,
+        ..Limits::default()
+    };
+    assert_eq!(read_whole(&film, &limits).err(), Some(Code::TooManyFrames));
+    let [command] = commands(Code::TooManyFrames)[..] else {
+        panic!("one command");
+    };
+    let args = command
+        .trim_start_matches("ffmpeg ")
+        .replace("-i film ", "-i endless.mkv ");
+    let made = films.run(&args.replace("20000", "50"));
+    assert_eq!(
+        read_whole(&made, &limits).map(|frames| frames.len()),
+        Ok(50)
+    );
+    tried.push(Code::TooManyFrames);
+    for &code in Code::ALL {
+        let is_told = !commands(code).is_empty() || !rates(code).is_empty();
+        assert_eq!(tried.contains(&code), is_told, "{code}");
+    }
+}
