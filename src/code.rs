@@ -37,8 +37,9 @@ macro_rules! codes {
 codes! {
     // The file (RELIABILITY.md, the gate).
     NotAVideo "not_a_video" "The file is not a video that can be read."
-        "Send the film itself, as MP4, MOV, 3GP, MKV, WebM, AVI, MPEG, MPEG-TS, ASF, WMV, FLV, OGV, H.264 or H.265; \
-         neither a picture nor a playlist."
+        "Send the film itself, as MP4, MOV, 3GP, MKV, WebM, AVI, MPEG, MPEG-TS, ASF, WMV, FLV, OGV, H.264 or H.265, not a \
+         playlist. Pictures are measured as a zip of numbered PNG, JPEG, BMP or TIFF files, as one TIFF of several \
+         pages, or, on the command line, as a folder."
     ContainerNotAllowed "container_not_allowed" "The container format is not among those accepted."
         "Convert it, for example with `ffmpeg -i film -an -c:v libx264 -crf 16 converted.mp4`."
     CodecNotAllowed "codec_not_allowed" "The video codec is not among those accepted."

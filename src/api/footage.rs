@@ -66,7 +66,8 @@ pub(super) struct FootageForm {
     background: Option<Vec<u8>>,
 }
 
-/// Upload a video: as the raw body, or as a form with `video` and, if there is one, `background`.
+/// Upload a video, a zip of numbered pictures or a TIFF of several pages: as the raw body, or as a form with `video`
+/// and, if there is one, `background`.
 #[utoipa::path(post, path = "/v1/footage", params(Naming),
     request_body(content(([u8] = "application/octet-stream"), (FootageForm = "multipart/form-data"))),
     responses(

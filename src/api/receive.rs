@@ -26,6 +26,14 @@ pub(super) const PIECE: Duration = Duration::from_secs(30);
 /// Bytes after which the room on the disk is looked at again: others fill it too, and a body need not say how long
 /// it is.
 pub(super) const CHECK_EVERY_BYTES: u64 = 8 << 20;
+/// Beginnings of the media types of bodies that are footage, or a form with one.
+const FILM_TYPES: [&str; 5] = [
+    "multipart/",
+    "video/",
+    "application/octet-stream",
+    "application/zip",
+    "image/tiff",
+];
 /// The largest given background.
 const MAX_BACKGROUND_BYTES: u64 = 64 << 20;
 
@@ -222,14 +230,12 @@ pub(super) fn check_room(state: &AppState, n_bytes: u64) -> Result<(), Problem> 
     }
 }
 
-/// Whether the body is a film, or a form with one, and not a request in JSON.
+/// Whether the body is a footage, or a form with one, and not a request in JSON.
 pub(super) fn is_film(request: &Request) -> bool {
     let media_type = request.headers().get(header::CONTENT_TYPE);
     let media_type = media_type.and_then(|value| value.to_str().ok());
     let media_type = media_type.unwrap_or_default().to_ascii_lowercase();
-    ["multipart/", "video/", "application/octet-stream"]
-        .iter()
-        .any(|film| media_type.starts_with(film))
+    FILM_TYPES.iter().any(|film| media_type.starts_with(film))
 }
 
 fn is_form(request: &Request) -> bool {

@@ -20,7 +20,7 @@ use crate::media::{self, Limits, Tool, Video, read_image};
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The video: one animal before a camera that stands still.
+    /// The footage: one animal before a camera that stands still; a video, or pictures in a folder, a zip or a TIFF.
     video: PathBuf,
     /// The folder to write the library to.
     #[arg(short, long, value_name = "LIBRARY_DIR")]
@@ -99,7 +99,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let background = background.as_ref();
     let library = analysis::analyze(&video, background, &params, level, &scratch, &progress)
         .map_err(|error| Error::work(error.code(), &error))?;
-    let footage = footage_summary(&args.video)?;
+    let footage = footage_summary(video.files())?;
     library_dir::write(&args.output, &library, &params, &footage)
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
     write_views(&args.output, &library)?;
@@ -173,24 +173,25 @@ fn read_json(path: &Path) -> Result<Value, Error> {
         .map_err(|cause| Error::Usage(format!("{} is not JSON: {cause}", path.display())))
 }
 
-fn footage_summary(path: &Path) -> Result<FootageSummary, Error> {
-    let failed = || Error::io(format!("cannot read {}", path.display()));
-    let mut file = File::open(path).map_err(failed())?;
+/// Hashes the bytes of all files, one after the other.
+fn footage_summary(files: &[PathBuf]) -> Result<FootageSummary, Error> {
     let (mut hash, mut n_bytes) = (Sha256::new(), 0);
     let mut chunk = vec![0; 1 << 20];
-    loop {
-        let n = file.read(&mut chunk).map_err(failed())?;
-        if n == 0 {
-            let sha256 = hash
-                .finalize()
-                .iter()
-                .map(|byte| format!("{byte:02x}"))
-                .collect();
-            return Ok(FootageSummary { sha256, n_bytes });
+    for path in files {
+        let failed = || Error::io(format!("cannot read {}", path.display()));
+        let mut file = File::open(path).map_err(failed())?;
+        loop {
+            let n = file.read(&mut chunk).map_err(failed())?;
+            if n == 0 {
+                break;
+            }
+            hash.update(&chunk[..n]);
+            n_bytes += n as u64;
         }
-        hash.update(&chunk[..n]);
-        n_bytes += n as u64;
     }
+    let hash = hash.finalize();
+    let sha256 = hash.iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(FootageSummary { sha256, n_bytes })
 }
 
 fn summary(library: &Library, output: &Path, advice: &[Advice]) -> Summary {

@@ -14,9 +14,9 @@ pub const SCHEMA: &str = "flockreel/library@1";
 /// Which footage a library was made from.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FootageSummary {
-    /// SHA-256 of the file, hexadecimal.
+    /// SHA-256 of the file, or of the pictures of a folder one after the other, hexadecimal.
     pub sha256: String,
-    /// Size of the file.
+    /// Size of the file or of all those pictures, bytes.
     pub n_bytes: u64,
 }
 

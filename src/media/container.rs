@@ -33,12 +33,10 @@ pub(super) enum Container {
 }
 
 /// First bytes of files that are no video: (offset, bytes, what it is).
-const PICTURES: [(usize, &[u8], &str); 8] = [
+const PICTURES: [(usize, &[u8], &str); 6] = [
     (0, b"\x89PNG", "a still image"),
     (0, b"\xff\xd8\xff", "a still image"),
     (0, b"BM", "a still image"),
-    (0, b"II*\0", "a still image"),
-    (0, b"MM\0*", "a still image"),
     (8, b"WEBP", "a still image"),
     (0, b"GIF8", "an image"),
     (0, b"%PDF", "a document"),

@@ -61,6 +61,19 @@ pub enum Error {
         /// Rows.
         height: u64,
     },
+    /// Pictures of several sizes.
+    #[error(
+        "the pictures differ in size: number {number} is {}x{}, the first {}x{}",
+        found[0], found[1], first[0], first[1]
+    )]
+    PicturesDiffer {
+        /// The first that differs, counted from 1.
+        number: usize,
+        /// Its columns and rows.
+        found: [u32; 2],
+        /// Columns and rows of the first.
+        first: [u32; 2],
+    },
     /// More frames than the limit.
     #[error("the footage has more frames than the limit: {limit}")]
     TooManyFrames {
@@ -147,7 +160,7 @@ impl Error {
     /// The stable code.
     pub fn code(&self) -> Code {
         match self {
-            Error::NotAVideo(_) => Code::NotAVideo,
+            Error::NotAVideo(_) | Error::PicturesDiffer { .. } => Code::NotAVideo,
             Error::ContainerNotAllowed(_) => Code::ContainerNotAllowed,
             Error::CodecNotAllowed(_) => Code::CodecNotAllowed,
             Error::NoVideoStream => Code::NoVideoStream,

@@ -1,10 +1,10 @@
-//! A background that somebody gives: PNG or JPEG, within limits that hold before anything is
+//! Pictures that somebody gives, a background or one of a footage, within limits that hold before anything is
 //! decoded (RELIABILITY.md, "Parse at the door" of STYLE.md, habit 4).
 
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-use image::{ImageError, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
 
 use super::error::Error;
 use super::limits::Limits;
@@ -27,6 +27,21 @@ pub fn read_image(path: &Path, limits: &Limits) -> Result<RgbImage, Error> {
 /// Fails with `not_a_video` for anything else or damaged, and with the codes for too many or too
 /// few pixels.
 pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
+    let image = decode(bytes, &[ImageFormat::Png, ImageFormat::Jpeg], limits)?;
+    let (width, height) = (image.width(), image.height());
+    Ok(RgbImage {
+        width,
+        height,
+        pixels: image.into_rgb8().into_raw(),
+    })
+}
+
+/// Decodes a picture of one of these formats, within limits that hold before anything is decoded.
+pub(super) fn decode(
+    bytes: &[u8],
+    formats: &[ImageFormat],
+    limits: &Limits,
+) -> Result<DynamicImage, Error> {
     if bytes.len() as u64 > largest_file(limits) {
         return Err(Error::TooLong {
             found: bytes.len() as f64,
@@ -34,8 +49,15 @@ pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
         });
     }
     let format = image::guess_format(bytes).map_err(refused)?;
-    if !matches!(format, ImageFormat::Png | ImageFormat::Jpeg) {
-        return Err(Error::NotAVideo("the background is no PNG or JPEG".into()));
+    if !formats.contains(&format) {
+        let accepted: Vec<&str> = formats
+            .iter()
+            .filter_map(|f| f.extensions_str().first().copied())
+            .collect();
+        let accepted = accepted.join(", ");
+        return Err(Error::NotAVideo(format!(
+            "the picture is none of: {accepted}"
+        )));
     }
     let reader = || ImageReader::with_format(Cursor::new(bytes), format);
     let (width, height) = reader().into_dimensions().map_err(refused)?;
@@ -46,21 +68,16 @@ pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
     bounds.max_image_height = Some(limits.max_side_px);
     bounds.max_alloc = Some(limits.max_pixels * 16);
     reader.limits(bounds);
-    let pixels = reader.decode().map_err(refused)?.into_rgb8().into_raw();
-    Ok(RgbImage {
-        width,
-        height,
-        pixels,
-    })
+    reader.decode().map_err(refused)
 }
 
 /// More than any encoder needs for the largest picture.
-fn largest_file(limits: &Limits) -> u64 {
+pub(super) fn largest_file(limits: &Limits) -> u64 {
     limits.max_pixels * 8 + (1 << 20)
 }
 
 fn refused(error: ImageError) -> Error {
-    Error::NotAVideo(format!("the background cannot be read: {error}"))
+    Error::NotAVideo(format!("the picture cannot be read: {error}"))
 }
 
 #[cfg(test)]

@@ -89,6 +89,13 @@ impl Frame {
         }
     }
 
+    /// Writes a canvas of the frame's own size into the planes.
+    ///
+    /// Panics when the canvas has another size than the frame.
+    pub fn draw_all_rgb(&mut self, canvas: &RgbImage) {
+        self.draw_rgb(canvas, Rect::of_size(self.width, self.height));
+    }
+
     /// Writes the box of a canvas of the frame's own size into the planes: luma of the box, chroma
     /// of every 2 x 2 block that the box touches.
     ///

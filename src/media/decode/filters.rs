@@ -2,10 +2,10 @@
 //! ones fix size and format, so that a picture that changes its size in the middle cannot shift the bytes of the
 //! frames after it.
 
-use super::stretch::Stretch;
+use super::wanted::Wanted;
 use crate::media::probe::Probe;
 use crate::media::probe::header::{Turn, is_rgb};
-use crate::media::wanted::Wanted;
+use crate::media::stretch::Stretch;
 use crate::raster::{Matrix, Range};
 
 /// The filters of a film, as ffmpeg takes them.

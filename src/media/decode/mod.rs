@@ -6,10 +6,11 @@
 //! deinterlacing are filters that we choose (`filters`).
 
 mod filters; // between the decoder and us
-mod stretch; // the range of gray that is used
+mod gray; // the range of gray that is used
+mod wanted; // which frames a decoder is asked for
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::allow_list::input_args;
 use super::error::{Damage, Error};
@@ -22,13 +23,13 @@ use super::probe::header::gray_bits;
 use super::probe::timeline::Timeline;
 use super::probe::{Probe, probe};
 
+use super::stretch::Stretch;
 use super::tools::Tool;
-use super::wanted::{MOST_UNTOLD, Wanted};
 use crate::footage::{
     FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
 };
 use crate::raster::Frame;
-use stretch::Stretch;
+use wanted::{MOST_UNTOLD, Wanted};
 
 /// Most frames that a child may decode without showing one.
 const MOST_SKIPPED: usize = 300;
@@ -38,28 +39,18 @@ const LEAST_SKIPPED: usize = 8;
 
 /// A video file that is within its limits and can be read any number of times.
 #[derive(Clone, Debug)]
-pub struct Video {
+pub(super) struct Film {
     path: PathBuf,
     limits: Limits,
     probe: Probe,
     stretch: Option<Stretch>,
 }
 
-impl Video {
-    /// As [`Video::open_with`], without hints.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
-        Video::open_with(path, limits, &Hints::default())
-    }
-
+impl Film {
     /// Looks at the file: container, codec, size, rate, length. Reads it once, and decodes it only where its
-    /// packets do not tell its pictures. `hints` override what the file says.
-    ///
-    /// Fails with the reason of the first limit that the file breaks. `path` must be ours: a
-    /// person's file name never comes here.
-    pub fn open_with(path: &Path, limits: &Limits, hints: &Hints) -> Result<Video, Error> {
-        // The child works elsewhere, so that it sees no relative path.
-        let path = std::path::absolute(path).map_err(Error::io("finding the footage"))?;
-        let mut video = Video {
+    /// packets do not tell its pictures. `path` is absolute, for the child works elsewhere.
+    pub(super) fn open(path: PathBuf, limits: &Limits, hints: &Hints) -> Result<Film, Error> {
+        let mut video = Film {
             probe: probe(&path, limits, hints)?,
             limits: limits.clone(),
             path,
@@ -74,8 +65,13 @@ impl Video {
     }
 
     /// What is worth knowing of the file: assumptions, and faults that were mended.
-    pub fn notes(&self) -> &[Note] {
+    pub(super) fn notes(&self) -> &[Note] {
         &self.probe.notes
+    }
+
+    /// Returns its file.
+    pub(super) fn files(&self) -> &[PathBuf] {
+        std::slice::from_ref(&self.path)
     }
 
     /// The order to decode every frame, or some.
@@ -130,7 +126,7 @@ impl Video {
     /// Calls `visit` with the wanted frames; returns how many there were. They are not compared with
     /// what the header promised: who reads the whole footage finds out whether it is cut off.
     fn show(&self, wanted: &Wanted, visit: &mut Visit<'_>) -> Result<usize, Error> {
-        let mut stream = VideoStream::of(self, self.order(wanted))?;
+        let mut stream = FilmStream::of(self, self.order(wanted))?;
         let mut frame = Frame::default();
         let mut n_shown = 0;
         let most = wanted.most();
@@ -152,7 +148,7 @@ impl Video {
     }
 }
 
-impl FrameSource for Video {
+impl FrameSource for Film {
     fn format(&self) -> FootageFormat {
         let probe = &self.probe;
         FootageFormat {
@@ -168,7 +164,7 @@ impl FrameSource for Video {
     }
 
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
-        Ok(Box::new(VideoStream::of(self, self.order(&Wanted::All))?))
+        Ok(Box::new(FilmStream::of(self, self.order(&Wanted::All))?))
     }
 
     /// The child hands over only the frames that are wanted. Of a long footage it decodes only those
@@ -208,8 +204,8 @@ impl FrameSource for Video {
 }
 
 /// One reading of a video.
-struct VideoStream<'a> {
-    video: &'a Video,
+struct FilmStream<'a> {
+    video: &'a Film,
     child: Option<Child>,
     n_decoded: usize,
     n_given: usize,
@@ -217,7 +213,7 @@ struct VideoStream<'a> {
     held: Frame,
 }
 
-impl FrameStream for VideoStream<'_> {
+impl FrameStream for FilmStream<'_> {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
         let video = self.video;
         let time_s = match &video.probe.timeline {
@@ -239,9 +235,9 @@ impl FrameStream for VideoStream<'_> {
     }
 }
 
-impl<'a> VideoStream<'a> {
-    fn of(video: &'a Video, order: Order) -> Result<VideoStream<'a>, Error> {
-        Ok(VideoStream {
+impl<'a> FilmStream<'a> {
+    fn of(video: &'a Film, order: Order) -> Result<FilmStream<'a>, Error> {
+        Ok(FilmStream {
             video,
             child: Some(Child::reading(order)?),
             n_decoded: 0,

@@ -7,6 +7,7 @@ use serde_json::json;
 use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::TINY;
+use crate::common::pictures::{stack_of_grays, zip_of_grays};
 
 #[tokio::test]
 async fn a_film_is_stored_as_it_was_sent() {
@@ -25,6 +26,31 @@ async fn a_film_is_stored_as_it_was_sent() {
     let disposition = file.headers()["content-disposition"].to_str().unwrap();
     assert!(disposition.starts_with("attachment; filename=\"my fish.mp4\""));
     assert_eq!(file.bytes().await.unwrap(), *TINY);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn a_zip_and_a_stack_of_pictures_are_footage_and_their_rate_is_a_parameter() {
+    let app = TestApp::idle().await;
+    for (media_type, body) in [
+        ("application/zip", zip_of_grays(12)),
+        ("image/tiff", stack_of_grays(12)),
+    ] {
+        let sent = app.post("/v1/footage").header("content-type", media_type);
+        let answer = sent.body(body.clone()).send().await.unwrap();
+        let footage = json_of(answer, StatusCode::CREATED).await;
+        assert_eq!(footage["n_frames_hint"], 12, "{media_type}");
+        assert_eq!(footage["image_size_px"], json!([64, 48]));
+        let body_of_one_call = app.post("/v1/analyses").header("content-type", media_type);
+        let answer = body_of_one_call.body(body).send().await.unwrap();
+        let analysis = json_of(answer, StatusCode::ACCEPTED).await;
+        assert_eq!(analysis["footage_id"], footage["id"]);
+        let wish = json!({"footage_id": footage["id"], "params": {"fps": 12.5, "pixel_aspect": 2}});
+        app.accept("/v1/analyses", wish).await;
+        let bad = json!({"footage_id": footage["id"], "params": {"fps": 0}});
+        let answer = app.post("/v1/analyses").json(&bad).send().await.unwrap();
+        assert_eq!(code_of(answer, 422).await, "invalid_params");
+    }
     app.assert_sound().await;
 }
 

@@ -3,6 +3,7 @@
 pub(crate) mod app;
 pub(crate) mod clip;
 pub(crate) mod film;
+pub(crate) mod pictures;
 pub(crate) mod place;
 pub(crate) mod process;
 

@@ -77,3 +77,16 @@ fn every_rate_gives_a_library_and_its_poses_say_the_rate() {
         );
     }
 }
+
+#[test]
+fn a_folder_of_pictures_is_measured_at_the_rate_that_is_said() {
+    let films = Films::new();
+    filmed(&films);
+    std::fs::create_dir(films.path("shots")).expect("a folder");
+    films.run("-i film.mp4 shots/%d.png");
+    run(&films, "analyze shots -o library --view side --fps 50");
+    let poses = std::fs::read(films.path("library/poses.json")).expect("poses");
+    let poses: Value = serde_json::from_slice(&poses).expect("JSON");
+    assert_eq!(poses["fps"], 50.0);
+    assert_eq!(poses["frames"].as_array().map(Vec::len), Some(64));
+}

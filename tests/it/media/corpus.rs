@@ -139,18 +139,15 @@ impl Corpus<'_> {
                 "dv.avi",
                 Code::CodecNotAllowed,
             ),
-            (
-                "-c:v utvideo -pix_fmt yuv420p",
-                "ut.avi",
-                Code::CodecNotAllowed,
-            ),
+            ("-c:v utvideo", "ut.avi", Code::CodecNotAllowed),
+            ("-update 1", "still.tiff", Code::TooFewFrames),
             ("-c:v gif", "film.gif", Code::NotAVideo),
             ("-c:v libwebp -loop 0", "film.webp", Code::NotAVideo),
         ] {
             let film = self.film(10, &format!("{args} {name}"));
             self.refused(film, &[code]);
         }
-        for name in ["still.png", "still.jpg", "still.bmp", "still.tiff"] {
+        for name in ["still.png", "still.jpg", "still.bmp"] {
             let film = self.film(1, name);
             self.refused(film, &[Code::NotAVideo]);
         }

@@ -9,6 +9,7 @@ mod good;
 mod gray;
 mod headers;
 mod kinds;
+mod pictures;
 mod real;
 mod speed;
 mod traced;

@@ -1,16 +1,10 @@
 //! Gray of more than 8 bits: cameras store 10 or 12 bits in words of 16, microscopes a tenth of their range. What of
 //! it a film uses becomes the whole range from black to white.
 
-use super::{MOST_SKIPPED, Video};
-use crate::footage::spread_idx;
-use crate::media::error::Error;
-use crate::media::gate::{Child, Order};
-use crate::media::note::Note;
-use crate::media::tools::Tool;
-use crate::media::wanted::Wanted;
+use super::note::Note;
 
 /// Fewest frames that are looked at, spread over the film.
-const LEAST_FRAMES: usize = 16;
+pub(super) const LEAST_FRAMES: usize = 16;
 
 /// Share of the pixels that may lie beyond either end of the range: a hot pixel or three of a picture of 640x480,
 /// but fewer than a fluorescent animal of 24 pixels has.
@@ -27,6 +21,12 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
+    /// Returns a level of 16 bits as gray of 8 bits: 0 at the start of the range and below, 255 at its end and above.
+    pub(super) fn gray(&self, level: u16) -> u8 {
+        let (above, range) = (level.saturating_sub(self.from), self.to - self.from);
+        ((u32::from(above.min(range)) * 255 + u32::from(range) / 2) / u32::from(range)) as u8
+    }
+
     /// The filter that makes the range the whole one.
     pub(super) fn filter(&self) -> String {
         let (from, range) = (self.from, self.to - self.from);
@@ -44,7 +44,7 @@ impl Stretch {
     }
 
     /// The range that these counts of each level use.
-    fn of(counts: &[u64]) -> Stretch {
+    pub(super) fn of(counts: &[u64]) -> Stretch {
         let n_beyond = (counts.iter().sum::<u64>() as f64 * BEYOND) as u64;
         let from = beyond(counts.iter(), n_beyond);
         let to = u16::MAX - beyond(counts.iter().rev(), n_beyond);
@@ -66,33 +66,6 @@ fn beyond<'a>(counts: impl Iterator<Item = &'a u64>, n_beyond: u64) -> u16 {
     u16::try_from(n_levels).unwrap_or(u16::MAX)
 }
 
-impl Video {
-    /// Decodes frames spread over the film and returns the range of gray that they use.
-    pub(super) fn measure_gray(&self) -> Result<Stretch, Error> {
-        let (probe, n_pictures) = (&self.probe, self.probe.n_pictures);
-        // A child that shows nothing for long is taken for stalled.
-        let n_frames = LEAST_FRAMES.max(n_pictures / MOST_SKIPPED);
-        let wanted = Wanted::Numbers(spread_idx(n_pictures, n_frames));
-        let size = format!("scale={}:{}:flags=neighbor", probe.width, probe.height);
-        let chosen = wanted.filter().into_iter().chain([size]);
-        let filters: Vec<String> = chosen.chain(["format=gray16le".to_owned()]).collect();
-        let args = self.args(&wanted, &filters.join(","));
-        let order = Order::new(Tool::Ffmpeg, args, &self.limits, n_pictures).with_input(&self.path);
-        let mut child = Child::reading(order)?;
-        let mut picture = vec![0; 2 * probe.width as usize * probe.height as usize];
-        let mut counts = vec![0_u64; 1 << 16];
-        for _ in 0..n_frames {
-            if child.read_full(&mut picture)? < picture.len() {
-                break;
-            }
-            for pixel in picture.chunks_exact(2) {
-                counts[usize::from(u16::from_le_bytes([pixel[0], pixel[1]]))] += 1;
-            }
-        }
-        Ok(Stretch::of(&counts))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -111,6 +84,16 @@ mod tests {
                 to: 4000
             }
         );
+    }
+
+    #[test]
+    fn the_range_becomes_black_to_white() {
+        let stretch = Stretch {
+            from: 1000,
+            to: 5095,
+        };
+        let grays = [0, 1000, 1016, 3048, 5095, 65_535].map(|level| stretch.gray(level));
+        assert_eq!(grays, [0, 0, 1, 128, 255, 255]);
     }
 
     #[test]

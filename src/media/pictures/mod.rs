@@ -1,0 +1,194 @@
+//! Pictures as footage: a folder of them, a zip of them, or the pages of one TIFF, as microscopes and lab cameras
+//! leave them. Libraries without unsafe code of C decode them in this process, under the same limits as films, each
+//! picture whenever it is asked for. Pictures have no rate: it comes from a hint, or is assumed.
+
+mod order; // the order of numbered names
+mod picture; // bytes -> one picture
+mod source; // folder, zip or stack: which pictures there are
+mod stack; // the pages of a TIFF
+
+use std::path::{Path, PathBuf};
+
+use super::error::Error;
+use super::hints::Hints;
+use super::limits::Limits;
+use super::note::Note;
+use super::probe::check_size;
+use super::probe::timeline::{Claims, Timeline};
+use super::stretch::{LEAST_FRAMES, Stretch};
+use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_idx};
+use crate::raster::{ColorSpec, Frame, Matrix, Range, RgbImage};
+use picture::Picture;
+use source::{Reader, Source};
+
+/// Full range: gray keeps its levels.
+const COLOR: ColorSpec = ColorSpec {
+    matrix: Matrix::Bt601,
+    range: Range::Full,
+};
+
+/// Pictures of one size, within the limits.
+#[derive(Clone, Debug)]
+pub(super) struct Pictures {
+    source: Source,
+    limits: Limits,
+    /// Columns and rows as stored.
+    stored: [u32; 2],
+    /// Columns and rows with square pixels.
+    shown: [u32; 2],
+    fps: f64,
+    /// The range of gray that is used, where the first picture is gray of more than 8 bits.
+    stretch: Option<Stretch>,
+    notes: Vec<Note>,
+}
+
+impl Pictures {
+    /// Returns the pictures at `path`: those of a folder, a zip or a TIFF, or `None` for anything else. Decodes the
+    /// first one, and 16 of them where they are gray of 16 bits.
+    pub(super) fn open(
+        path: &Path,
+        limits: &Limits,
+        hints: &Hints,
+    ) -> Result<Option<Pictures>, Error> {
+        let Some(source) = Source::find(path, limits)? else {
+            return Ok(None);
+        };
+        let n_pictures = source.n_pictures();
+        let claims = Claims {
+            fps: Vec::new(),
+            tick_s: 0.0,
+            wanted_fps: hints.fps,
+        };
+        let (timeline, mut notes) = Timeline::found(&vec![None; n_pictures], &claims, limits)?;
+        let first = source.read(limits)?.picture(0)?;
+        let stored = first.size();
+        let shown = shown_size(stored, hints);
+        check_size(u64::from(shown[0]), u64::from(shown[1]), limits)?;
+        let mut pictures = Pictures {
+            source,
+            limits: limits.clone(),
+            stored,
+            shown,
+            fps: timeline.fps(),
+            stretch: None,
+            notes: Vec::new(),
+        };
+        if let Picture::Gray16(_) = first {
+            let stretch = pictures.measure_gray()?;
+            notes.push(stretch.note(16));
+            pictures.stretch = Some(stretch);
+        }
+        pictures.notes = notes;
+        Ok(Some(pictures))
+    }
+
+    /// Assumptions that were made.
+    pub(super) fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+
+    /// Returns the files that hold them.
+    pub(super) fn files(&self) -> &[PathBuf] {
+        self.source.files()
+    }
+
+    /// The range of gray that pictures spread over the footage use.
+    fn measure_gray(&self) -> Result<Stretch, Error> {
+        let mut reader = self.source.read(&self.limits)?;
+        let mut counts = vec![0_u64; 1 << 16];
+        for idx in spread_idx(self.source.n_pictures(), LEAST_FRAMES) {
+            if let Picture::Gray16(picture) = reader.picture(idx)? {
+                picture
+                    .iter()
+                    .for_each(|&level| counts[usize::from(level)] += 1);
+            }
+        }
+        Ok(Stretch::of(&counts))
+    }
+
+    /// Decodes a picture into a frame. Fails where it has another size than the first.
+    fn show(&self, reader: &mut Reader<'_>, idx: usize, frame: &mut Frame) -> Result<(), Error> {
+        let picture = reader.picture(idx)?;
+        if picture.size() != self.stored {
+            return Err(Error::PicturesDiffer {
+                number: idx + 1,
+                found: picture.size(),
+                first: self.stored,
+            });
+        }
+        let pixels = picture.into_rgb(self.stretch.as_ref(), self.shown);
+        let [width, height] = self.shown;
+        let canvas = RgbImage {
+            width,
+            height,
+            pixels,
+        };
+        if (frame.width, frame.height, frame.color) != (width, height, COLOR) {
+            *frame = Frame::new(width, height, COLOR);
+        }
+        frame.draw_all_rgb(&canvas);
+        Ok(())
+    }
+}
+
+/// The size with square pixels. The smaller count is stretched: no measured detail is lost.
+fn shown_size([width, height]: [u32; 2], hints: &Hints) -> [u32; 2] {
+    match hints.pixel_aspect {
+        Some(aspect) if aspect > 1.0 => [(f64::from(width) * aspect).round() as u32, height],
+        Some(aspect) if aspect > 0.0 => [width, (f64::from(height) / aspect).round() as u32],
+        _ => [width, height],
+    }
+}
+
+impl FrameSource for Pictures {
+    fn format(&self) -> FootageFormat {
+        let [width, height] = self.shown;
+        FootageFormat {
+            width,
+            height,
+            fps: self.fps,
+            n_frames_hint: self.source.n_pictures(),
+            color: COLOR,
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(PictureStream {
+            pictures: self,
+            reader: self.source.read(&self.limits)?,
+            n_given: 0,
+        }))
+    }
+
+    /// Decodes the wanted pictures and no others.
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        let mut reader = self.source.read(&self.limits)?;
+        let mut frame = Frame::default();
+        for idx in spread_idx(self.source.n_pictures(), n) {
+            self.show(&mut reader, idx, &mut frame)?;
+            if visit(&frame).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One reading of the pictures.
+struct PictureStream<'a> {
+    pictures: &'a Pictures,
+    reader: Reader<'a>,
+    n_given: usize,
+}
+
+impl FrameStream for PictureStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        let idx = self.n_given;
+        if idx == self.pictures.source.n_pictures() {
+            return Ok(None);
+        }
+        self.pictures.show(&mut self.reader, idx, frame)?;
+        self.n_given += 1;
+        Ok(Some(idx as f64 / self.pictures.fps))
+    }
+}

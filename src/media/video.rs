@@ -1,0 +1,78 @@
+//! Footage of any kind: a film, which the child decodes, or pictures, which are decoded here.
+
+use std::path::{Path, PathBuf};
+
+use super::decode::Film;
+use super::error::Error;
+use super::hints::Hints;
+use super::limits::Limits;
+use super::note::Note;
+use super::pictures::Pictures;
+use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
+
+/// Footage that is within its limits and can be read any number of times.
+#[derive(Clone, Debug)]
+pub struct Video(Kind);
+
+#[derive(Clone, Debug)]
+enum Kind {
+    Film(Box<Film>),
+    Pictures(Box<Pictures>),
+}
+
+impl Video {
+    /// As [`Video::open_with`], without hints.
+    pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
+        Video::open_with(path, limits, &Hints::default())
+    }
+
+    /// Opens a film, a zip of pictures, a TIFF of several pages or a folder of pictures. `hints` override what the
+    /// file says.
+    ///
+    /// Fails with the reason of the first limit that the footage breaks. `path` must be ours or that of who runs
+    /// the command line: the name of an uploaded file never comes here.
+    pub fn open_with(path: &Path, limits: &Limits, hints: &Hints) -> Result<Video, Error> {
+        let path = std::path::absolute(path).map_err(Error::io("finding the footage"))?;
+        Ok(Video(match Pictures::open(&path, limits, hints)? {
+            Some(pictures) => Kind::Pictures(Box::new(pictures)),
+            None => Kind::Film(Box::new(Film::open(path, limits, hints)?)),
+        }))
+    }
+
+    /// Returns what is worth knowing of the file: assumptions, and faults that were mended.
+    pub fn notes(&self) -> &[Note] {
+        match &self.0 {
+            Kind::Film(film) => film.notes(),
+            Kind::Pictures(pictures) => pictures.notes(),
+        }
+    }
+
+    /// Returns the files that are read, in the order of their pictures: more than one for a folder only.
+    pub fn files(&self) -> &[PathBuf] {
+        match &self.0 {
+            Kind::Film(film) => film.files(),
+            Kind::Pictures(pictures) => pictures.files(),
+        }
+    }
+
+    fn source(&self) -> &dyn FrameSource {
+        match &self.0 {
+            Kind::Film(film) => &**film,
+            Kind::Pictures(pictures) => &**pictures,
+        }
+    }
+}
+
+impl FrameSource for Video {
+    fn format(&self) -> FootageFormat {
+        self.source().format()
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        self.source().open()
+    }
+
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        self.source().spread(n, visit)
+    }
+}
