@@ -76,7 +76,7 @@ def test_reload_during_rendering_shows_the_flock_of_that_film(page, filled_servi
     page.locator("#earlier-libraries button", has_text=film.name).click()
     expect(page.locator("#make-of")).to_have_text(f"Of “{film.name}”")
     page.get_by_role("spinbutton", name="Individuals").fill("8")
-    page.get_by_role("spinbutton", name="Frames").fill("300")
+    page.get_by_role("spinbutton", name="Frames").fill("2400")
     page.get_by_role("button", name="Make the flock").click()
     expect(page.locator("#flock-job .job strong")).to_have_text("Painting the flock", timeout=LONG_MS)
     page.reload()
