@@ -77,6 +77,7 @@ fn still(image_size_px: [u32; 2], n_frames: usize) -> Poses {
         fps: 30.0,
         image_size_px,
         view: View::Side,
+        view_confidence: None,
         camera: None,
         animal: None,
         frames: vec![Pose::default(); n_frames],

@@ -127,6 +127,7 @@ fn made_library(n_frames: u32) -> Library {
             fps: 30.0,
             image_size_px: [640, 480],
             view: View::Side,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames,

@@ -202,6 +202,7 @@ impl Swim {
             fps: 30.0,
             image_size_px: [640, 480],
             view: View::Side,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames: self.moments.iter().map(pose).collect(),

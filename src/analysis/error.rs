@@ -29,9 +29,36 @@ pub enum Error {
     /// No component large enough in enough frames.
     #[error("nothing moves before the background")]
     NothingMoves,
-    /// The camera moves, or the scene does.
-    #[error("the background moves: the camera must stand still")]
-    BackgroundNotStatic,
+    /// Much of the picture changes all the time.
+    #[error("the background moves throughout the film, from {at_s:.1} s on")]
+    BackgroundNotStatic {
+        /// When it begins, seconds.
+        at_s: f64,
+    },
+    /// The camera stands at no place long enough.
+    #[error("the camera moves from {at_s:.1} s on")]
+    CameraMoves {
+        /// When it begins, seconds.
+        at_s: f64,
+    },
+    /// The light changes all the time.
+    #[error("the light keeps changing from {at_s:.1} s on")]
+    LightChanges {
+        /// When it begins, seconds.
+        at_s: f64,
+    },
+    /// The film shows several scenes, none of them long enough.
+    #[error("the film cuts to another scene at {at_s:.1} s")]
+    SceneChanges {
+        /// When the first one ends, seconds.
+        at_s: f64,
+    },
+    /// The animal leaves too little of the scene.
+    #[error("the animal covers {:.0} % of the picture, at most 35 % can be measured", 100.0 * share)]
+    AnimalTooLarge {
+        /// Share of the picture, 0..=1.
+        share: f64,
+    },
     /// Two components of comparable area, each persistent.
     #[error(
         "more than one animal moves in the footage: film one alone, or set follow to largest (--follow-largest)"
@@ -53,7 +80,11 @@ impl Error {
             Error::TooFewFrames { .. } => Code::TooFewFrames,
             Error::BackgroundSizeDiffers { .. } => Code::BackgroundSizeDiffers,
             Error::NothingMoves => Code::NothingMoves,
-            Error::BackgroundNotStatic => Code::BackgroundNotStatic,
+            Error::BackgroundNotStatic { .. } => Code::BackgroundNotStatic,
+            Error::CameraMoves { .. } => Code::CameraMoved,
+            Error::LightChanges { .. } => Code::LightChanges,
+            Error::SceneChanges { .. } => Code::SceneChanges,
+            Error::AnimalTooLarge { .. } => Code::AnimalTooLarge,
             Error::SeveralAnimals => Code::SeveralAnimals,
             Error::Full(error) => error.code(),
             Error::Cancelled => Code::Cancelled,

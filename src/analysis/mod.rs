@@ -7,19 +7,18 @@ pub mod params;
 
 pub mod error;
 
-// What the scene looks like, and where a frame differs from it.
-pub mod background;
-pub mod light;
+// What the scene looks like, where a frame differs from it, and what the animal looks like.
+pub mod scene;
 pub mod silhouette;
+pub mod subject;
 
 // The animal followed and cut out.
 pub mod matte;
 pub mod moments;
 pub mod occluders;
 pub mod read_ahead;
-pub mod sighting;
 pub mod sprite;
-pub mod tracking;
+pub mod track;
 
 // What it did.
 pub mod direction;
@@ -66,16 +65,18 @@ pub fn analyze(
     progress: &dyn Progress,
 ) -> Result<Library, Error> {
     let n_frames = source.format().n_frames_hint;
-    let (plate, mut track) = read_ahead::while_reading(source, |batches| {
-        let plate = background::estimate(source, background, params, progress)?;
-        let track = tracking::follow(batches, n_frames, &plate, params, scratch, progress)?;
-        Ok::<_, Error>((plate, track))
+    let (mut scene, mut track) = read_ahead::while_reading(source, |batches| {
+        let scene = scene::estimate(source, background, params, progress)?;
+        let track = track::follow(batches, n_frames, &scene, params, scratch, progress)?;
+        Ok::<_, Error>((scene, track))
     })?;
+    let plate = scene.plates.swap_remove(0);
     let occluders = occluders::take_out(&mut track, &plate, progress)?;
-    let view = pose::view(&track.frames, params);
+    let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
     let mut poses = pose::measure(&track.frames, view, &source.format(), params);
+    poses.view_confidence = view_confidence;
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
     let sprites = match animal_too_small {
@@ -85,11 +86,18 @@ pub fn analyze(
             sprite::align(&track, view, by_depth.then(|| sprite::scales(&poses)))
         }
     };
+    let foreign = || track.frames.iter().filter(|t| t.plate_idx.is_none());
+    let n_foreign_frames = foreign().count();
+    let first_foreign_s = foreign().next().map(|t| t.time_s);
+    let other_movers = std::mem::take(&mut track.movers);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
         never_seen_px: plate.never_seen_px,
-        several_animals: plate.several_animals,
+        several_animals: scene.several_animals,
+        other_movers,
+        n_foreign_frames,
+        first_foreign_s,
         animal_too_small,
         ..stats::of(&poses, &connections)
     };

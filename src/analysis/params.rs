@@ -24,8 +24,6 @@ pub struct Params {
     pub animal: Option<AnimalParams>,
     /// Least difference from the background, of 255, that counts as the animal: 1..=254.
     pub threshold: u8,
-    /// Where the animal is looked for: near its predicted place, or everywhere in every frame.
-    pub search: Search,
     /// What to do when several animals move.
     pub follow: Follow,
     /// Whether sprites are cut out of an animal too small to be looked at.
@@ -116,16 +114,6 @@ pub struct HeadParam {
     pub point: [f64; 2],
 }
 
-/// Where the animal is looked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Search {
-    /// Near the predicted place (N 4).
-    Window,
-    /// In the whole frame, every frame.
-    Full,
-}
-
 /// What to do when several animals move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
@@ -198,7 +186,6 @@ impl Default for Params {
             camera: None,
             animal: None,
             threshold: 18,
-            search: Search::Window,
             follow: Follow::One,
             sprites: CutSprites::Auto,
             scale_mode: ScaleMode::Native,

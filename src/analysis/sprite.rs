@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::sighting::Sighting;
-use super::tracking::{Track, Tracked};
+use super::track::sighting::Sighting;
+use super::track::{Track, Tracked};
 use crate::library::{Matte, Poses, Sprites, View};
 use crate::order::median;
 
@@ -129,6 +129,7 @@ mod tests {
             fps: 1.0,
             image_size_px: [640, 480],
             view: View::Side,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames,

@@ -176,6 +176,10 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::DecoderCrashed
         | Code::NothingMoves
         | Code::BackgroundNotStatic
+        | Code::CameraMoved
+        | Code::LightChanges
+        | Code::SceneChanges
+        | Code::AnimalTooLarge
         | Code::SeveralAnimals
         | Code::AnimalTooSmall
         | Code::BackgroundSizeDiffers

@@ -14,7 +14,7 @@ use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::analysis::{Advice, hints};
 use crate::jobs::overlay;
-use crate::library::Library;
+use crate::library::{Library, Poses, View};
 use crate::media::{self, Limits, Tool, Video, read_image};
 
 /// Arguments of `analyze`.
@@ -107,6 +107,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         overlay::film(&video, &library.poses, path, &progress)
             .map_err(|error| Error::work(error.code(), &error))?;
     }
+    super::say(&view_sentence(&library.poses));
     let advice = Advice::all(&library, &params, video.notes());
     for Advice { code, sentence } in &advice {
         super::say(&format!("{sentence} ({code})"));
@@ -192,6 +193,21 @@ fn footage_summary(files: &[PathBuf]) -> Result<FootageSummary, Error> {
     let hash = hash.finalize();
     let sha256 = hash.iter().map(|byte| format!("{byte:02x}")).collect();
     Ok(FootageSummary { sha256, n_bytes })
+}
+
+/// From where the animal is seen, how sure that is, and how to change it.
+fn view_sentence(poses: &Poses) -> String {
+    let (seen, other) = match poses.view {
+        View::Side => ("from the side", "top"),
+        View::Top => ("from above", "side"),
+    };
+    match poses.view_confidence {
+        None => format!("the animal is seen {seen}, as you said"),
+        Some(probability) => format!(
+            "the animal seems to be seen {seen} ({:.0} % sure; --view {other} if it is not)",
+            100.0 * probability
+        ),
+    }
 }
 
 fn summary(library: &Library, output: &Path, advice: &[Advice]) -> Summary {

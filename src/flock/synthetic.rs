@@ -42,6 +42,7 @@ pub(crate) fn library(view: View) -> Library {
             fps: 30.0,
             image_size_px: SIZE_PX,
             view,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames,

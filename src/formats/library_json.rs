@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
-use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Transition};
+use crate::geometry::Rect;
+use crate::library::{Jump, Library, LibraryStats, Mover, MoverKind, Patch, Playback, Transition};
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/library@1";
@@ -235,6 +236,12 @@ struct StatsFile {
     #[serde(default)]
     several_animals: bool,
     #[serde(default)]
+    other_movers: Vec<MoverFile>,
+    #[serde(default)]
+    n_foreign_frames: usize,
+    #[serde(default)]
+    first_foreign_s: Option<f64>,
+    #[serde(default)]
     animal_too_small: bool,
     n_candidates: u64,
     #[serde(default)]
@@ -254,6 +261,62 @@ struct StatsFile {
 #[derive(Serialize, Deserialize)]
 struct BackgroundStats {
     never_seen_px: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct MoverFile {
+    kind: MoverName,
+    from_s: f64,
+    to_s: f64,
+    box_px: [u32; 4],
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum MoverName {
+    Animal,
+    MirrorImage,
+    FromBorder,
+    InPlace,
+    Other,
+}
+
+impl MoverFile {
+    fn of(mover: &Mover) -> MoverFile {
+        MoverFile {
+            kind: match mover.kind {
+                MoverKind::Animal => MoverName::Animal,
+                MoverKind::MirrorImage => MoverName::MirrorImage,
+                MoverKind::FromBorder => MoverName::FromBorder,
+                MoverKind::InPlace => MoverName::InPlace,
+                MoverKind::Other => MoverName::Other,
+            },
+            from_s: super::poses_json::round(mover.from_s, 3),
+            to_s: super::poses_json::round(mover.to_s, 3),
+            box_px: [
+                mover.box_px.x,
+                mover.box_px.y,
+                mover.box_px.w,
+                mover.box_px.h,
+            ],
+        }
+    }
+
+    fn into_mover(self) -> Mover {
+        let [x, y, w, h] = self.box_px;
+        Mover {
+            kind: match self.kind {
+                MoverName::Animal => MoverKind::Animal,
+                MoverName::MirrorImage => MoverKind::MirrorImage,
+                MoverName::FromBorder => MoverKind::FromBorder,
+                MoverName::InPlace => MoverKind::InPlace,
+                MoverName::Other => MoverKind::Other,
+            },
+            from_s: self.from_s,
+            to_s: self.to_s,
+            box_px: Rect { x, y, w, h },
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -281,6 +344,9 @@ impl StatsFile {
                 never_seen_px: stats.never_seen_px,
             },
             several_animals: stats.several_animals,
+            other_movers: stats.other_movers.iter().map(MoverFile::of).collect(),
+            n_foreign_frames: stats.n_foreign_frames,
+            first_foreign_s: stats.first_foreign_s.map(digits(3)),
             animal_too_small: stats.animal_too_small,
             n_candidates: stats.n_candidates,
             recall: stats.recall.map(digits(5)),
@@ -301,6 +367,13 @@ impl StatsFile {
             n_detected: self.n_detected,
             never_seen_px: self.background.never_seen_px,
             several_animals: self.several_animals,
+            other_movers: self
+                .other_movers
+                .into_iter()
+                .map(MoverFile::into_mover)
+                .collect(),
+            n_foreign_frames: self.n_foreign_frames,
+            first_foreign_s: self.first_foreign_s,
             animal_too_small: self.animal_too_small,
             n_candidates: self.n_candidates,
             recall: self.recall,

@@ -24,6 +24,7 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
             View::Side => ViewName::Side,
             View::Top => ViewName::Top,
         },
+        view_confidence: poses.view_confidence.map(|value| round(value, 3)),
         camera: poses.camera.map(|c| CameraFile {
             z_min_m: c.z_min_m,
             pane_px_per_m: c.pane_px_per_m,
@@ -67,6 +68,7 @@ pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
             ViewName::Side => View::Side,
             ViewName::Top => View::Top,
         },
+        view_confidence: file.view_confidence,
         camera: file.camera.map(|c| Camera {
             z_min_m: c.z_min_m,
             pane_px_per_m: c.pane_px_per_m,
@@ -97,6 +99,8 @@ struct PosesFile<Frames> {
     fps: f64,
     image_size_px: [u32; 2],
     view: ViewName,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    view_confidence: Option<f64>,
     camera: Option<CameraFile>,
     animal: Option<AnimalFile>,
     #[serde(default)]
@@ -320,6 +324,7 @@ mod tests {
             fps: 30.0,
             image_size_px: [64, 48],
             view: View::Top,
+            view_confidence: None,
             camera: None,
             animal: Some(Animal {
                 length_m: 0.1,

@@ -10,6 +10,7 @@ pub use playback::{Jump, Patch, Playback, Transition};
 pub use pose::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 pub use sprites::{Matte, Sprites};
 
+use crate::geometry::Rect;
 use crate::raster::{RgbImage, RgbaImage};
 
 /// What one analysis yields.
@@ -40,6 +41,34 @@ pub struct Library {
     pub stats: LibraryStats,
 }
 
+/// Something that moved besides the animal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mover {
+    /// What it seems to be.
+    pub kind: MoverKind,
+    /// When it was first seen, seconds.
+    pub from_s: f64,
+    /// When it was last seen, seconds.
+    pub to_s: f64,
+    /// The box of all its places, in the frame.
+    pub box_px: Rect,
+}
+
+/// What a mover seems to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MoverKind {
+    /// It looks like the animal.
+    Animal,
+    /// The animal's own image in a mirror, a pane or the water's surface.
+    MirrorImage,
+    /// It reaches in across the border of the picture: a hand, a person, a cable.
+    FromBorder,
+    /// It changes where it is: a plant, a clock, a reflection, bedding.
+    InPlace,
+    /// Something else.
+    Other,
+}
+
 /// Counts and shares that say how good a library is.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct LibraryStats {
@@ -52,6 +81,12 @@ pub struct LibraryStats {
     pub never_seen_px: u64,
     /// Several animals move in the footage, and the largest was followed because that was asked for.
     pub several_animals: bool,
+    /// What else moved, by the first time it was seen.
+    pub other_movers: Vec<Mover>,
+    /// Frames that show another scene than the film (black frames, title cards); nothing is measured in them.
+    pub n_foreign_frames: usize,
+    /// When the first of them is shown, seconds.
+    pub first_foreign_s: Option<f64>,
     /// The animal covers too few pixels for sprites: there are poses alone.
     pub animal_too_small: bool,
     /// Pairs of clips that may be joined (whole, far enough apart, the animal pointing the same way, or turning

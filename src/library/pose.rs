@@ -29,6 +29,8 @@ pub struct Poses {
     pub image_size_px: [u32; 2],
     /// From where the animal is seen.
     pub view: View,
+    /// The probability that the view was guessed right, .5..=1; `None` where it was given.
+    pub view_confidence: Option<f64>,
     /// The camera, when it was given.
     pub camera: Option<Camera>,
     /// The animal's size, when it was given.

@@ -71,6 +71,14 @@ impl ColorSpec {
         }
     }
 
+    /// The luma of black, levels of 255.
+    pub fn black(self) -> f32 {
+        match self.range {
+            Range::Limited => 16.0,
+            Range::Full => 0.0,
+        }
+    }
+
     /// The factors that turn a YUV triple into RGB.
     pub fn to_rgb(self) -> ToRgb {
         let (kr, kb) = self.weights();

@@ -130,6 +130,37 @@ impl Mask {
         self.eroded().dilated()
     }
 
+    /// For each pixel how many erosions clear it: the chessboard distance to the nearest clear pixel, the outside counting
+    /// as clear; 0 where it is clear already.
+    pub fn depth_px(&self) -> Vec<u32> {
+        let (w, h) = (self.width(), self.height());
+        let mut depth = vec![0; w * h];
+        let least = |depth: &[u32], x: usize, y: usize, around: [[isize; 2]; 4]| {
+            let of = |[dx, dy]: [isize; 2]| {
+                let (x, y) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
+                (x < w && y < h).then(|| depth[y * w + x])
+            };
+            around
+                .into_iter()
+                .map(|to| of(to).unwrap_or(0))
+                .min()
+                .unwrap_or(0)
+        };
+        for at in 0..w * h {
+            if self.bits[at] == 1 {
+                let around = [[-1, 0], [-1, -1], [0, -1], [1, -1]];
+                depth[at] = 1 + least(&depth, at % w, at / w, around);
+            }
+        }
+        for at in (0..w * h).rev() {
+            if self.bits[at] == 1 {
+                let around = [[1, 0], [1, 1], [0, 1], [-1, 1]];
+                depth[at] = depth[at].min(1 + least(&depth, at % w, at / w, around));
+            }
+        }
+        depth
+    }
+
     /// A mask from the number of set pixels in each 3 x 3 neighborhood and the pixel itself.
     fn counted(&self, keep: impl Fn(u8, u8) -> bool) -> Mask {
         let (w, h) = (self.width(), self.height());
@@ -193,6 +224,19 @@ mod tests {
             ragged.majority(),
             mask(&[".......", "....#..", "...###.", "...###.", "....#.."])
         );
+    }
+
+    #[test]
+    fn depth_is_the_number_of_erosions_that_clear_a_pixel() {
+        let blot = mask(&[
+            "#######.", "#######.", "#######.", "#######.", "####.##.", "........",
+        ]);
+        let depth = blot.depth_px();
+        for n in 0..4 {
+            let eroded = blot.eroded_by(n);
+            let deeper = depth.iter().map(|&depth| u8::from(depth > n));
+            assert!(deeper.eq(eroded.bits.iter().copied()), "{n}");
+        }
     }
 
     #[test]

@@ -137,18 +137,16 @@ impl<'a> Energy<'a> {
                 false,
                 &[(k * N_STATE + 2, 1.0 / PITCH)],
             );
-            if let Some([x, y]) = view.toward {
-                let along = |v: [f64; 3]| (x * v[0] + y * v[1]) / PINNED;
+            let pinned = view.toward.map(|toward| toward.map(|c| c / PINNED));
+            for (toward, weight) in [(pinned, 1.0), (view.ends, evidence)] {
+                let Some([x, y]) = toward else { continue };
+                let along = |v: [f64; 3]| x * v[0] + y * v[1];
                 let residual = along(axes[k].forward);
                 if residual < 0.0 {
                     let slopes = [axes[k].by_yaw(), axes[k].by_pitch()].map(|a| along(a.forward));
                     let at = k * N_STATE;
-                    add(
-                        residual,
-                        1.0,
-                        false,
-                        &[(at + 1, slopes[0]), (at + 2, slopes[1])],
-                    );
+                    let terms = [(at + 1, slopes[0]), (at + 2, slopes[1])];
+                    add(residual, weight, false, &terms);
                 }
             }
             if k + 1 < states.len() {

@@ -38,6 +38,9 @@ pub struct Seen {
     pub cut: bool,
     /// Where the head is known to be, from the centroid in the picture.
     pub toward: Option<[f64; 2]>,
+    /// Where the head seems to be by the look of both ends: a direction in the picture, as long as half the logarithm of the
+    /// odds.
+    pub ends: Option<[f64; 2]>,
 }
 
 /// A camera like most, for films whose camera is not known: it sees 45 degrees across.
@@ -156,6 +159,8 @@ struct View {
     seen: bool,
     /// Unit vector in the picture toward the head, where that is known.
     toward: Option<[f64; 2]>,
+    /// Where the head seems to be by the look of both ends.
+    ends: Option<[f64; 2]>,
     /// Moments and upright extent of a whole silhouette.
     outline: Option<Outline>,
 }
@@ -185,6 +190,7 @@ impl Views {
                         slope: [0, 1].map(|c| from[c] + (to[c] - from[c]) * share),
                         seen: false,
                         toward: None,
+                        ends: None,
                         outline: None,
                     });
                     bridged.push((gap - 1) as f64 <= BRIDGE_S * fps);
@@ -199,6 +205,7 @@ impl Views {
                     let length = libm::hypot(x, y);
                     (length > 0.0).then(|| [x / length, y / length])
                 }),
+                ends: one.ends.filter(|_| whole),
                 outline: whole.then_some(Outline {
                     covariance_px2: one.covariance_px2,
                     upright_px: one.upright_px,

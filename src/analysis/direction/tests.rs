@@ -80,6 +80,7 @@ fn look(axes: &body::Axes, place: [f64; 3], bend: f64, camera: &Camera, frame: u
         upright_px: tall * camera.focal_px() / apparent * (1.0 + 0.02 * noise(2)),
         cut: false,
         toward: None,
+        ends: None,
     }
 }
 

@@ -53,6 +53,7 @@ fn poses(view: View, headings_rad: impl IntoIterator<Item = Option<f64>>) -> Pos
         fps: 30.0,
         image_size_px: [640, 480],
         view,
+        view_confidence: None,
         camera: None,
         animal: None,
         frames: frames.collect(),

@@ -3,7 +3,7 @@
 
 use super::smooth;
 use super::solid::Coat;
-use crate::analysis::background::Plate;
+use crate::analysis::scene::plate::Plate;
 use crate::geometry::Rect;
 use crate::order::percentile;
 use crate::raster::Mask;

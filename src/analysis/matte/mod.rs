@@ -12,8 +12,8 @@ mod solid;
 
 use self::cast::Ground;
 use self::solid::Coat;
-use super::background::Plate;
-use super::light::Gain;
+use super::scene::light::Light;
+use super::scene::plate::Plate;
 use super::silhouette::{self, Difference};
 use crate::geometry::Rect;
 use crate::raster::{Frame, Mask, RgbaImage};
@@ -31,12 +31,18 @@ pub struct Matte {
 
 /// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
 /// pixels wide, or 2 % of it.
-pub fn pull(frame: &Frame, plate: &Plate, gain: &Gain, silhouette: &Mask, length_px: f64) -> Matte {
+pub fn pull(
+    frame: &Frame,
+    plate: &Plate,
+    light: &Light,
+    silhouette: &Mask,
+    length_px: f64,
+) -> Matte {
     let band_px = ((0.02 * length_px).round() as u32).clamp(2, 8);
     let rect = silhouette
         .rect
         .inflated(band_px + 1, frame.width, frame.height);
-    let difference = silhouette::difference(frame, plate, gain, rect);
+    let difference = silhouette::difference(frame, plate, light, rect);
     let mask = moved(silhouette, rect);
     let on_ground = Ground::of(&mask, plate).on(&mask);
     let coat_of = |mask: &Mask| Coat::of(mask, &difference, plate);

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use crate::analysis::background::Plate;
+use crate::analysis::scene::plate::Plate;
 use crate::analysis::silhouette::{Difference, shadow};
 use crate::order::{median, percentile};
 use crate::raster::Mask;

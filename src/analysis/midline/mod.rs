@@ -13,8 +13,8 @@ mod walk;
 
 use rayon::prelude::*;
 
-use super::sighting::Sighting;
-use super::tracking::Track;
+use super::track::Track;
+use super::track::sighting::Sighting;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
 use crate::raster::RgbaImage;

@@ -340,6 +340,7 @@ mod tests {
             fps: 30.0,
             image_size_px: [64, 64],
             view: View::Top,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames: frames.collect(),

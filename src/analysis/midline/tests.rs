@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::analysis::moments::moments;
-use crate::analysis::tracking::Tracked;
+use crate::analysis::track::Tracked;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
 use crate::scratch::{InMemory, Scratch};
@@ -65,6 +65,9 @@ impl Sausage {
             at: 0,
             reach_px: [0.0; 3],
             contrast: 100.0,
+            asymmetry: None,
+            body_rad: None,
+            body_extent_px: [LENGTH, 16.0],
             extent_px: [LENGTH, 16.0],
             upright_px: f64::from(rect.h),
             box_px: rect,
@@ -132,6 +135,7 @@ fn poses(view: View, pose: Pose) -> Poses {
         fps: 30.0,
         image_size_px: [240, 220],
         view,
+        view_confidence: None,
         camera: None,
         animal: None,
         frames: vec![pose],
@@ -145,9 +149,14 @@ fn track(sausage: &Sausage) -> Track {
     let sighting = Some(sighting);
     let frames = vec![Tracked {
         time_s: 0.0,
+        plate_idx: Some(0),
         sighting,
     }];
-    Track { frames, scratch }
+    Track {
+        frames,
+        movers: Vec::new(),
+        scratch,
+    }
 }
 
 const BENT: Sausage = Sausage {

@@ -4,8 +4,8 @@ use rayon::prelude::*;
 
 use super::ring::OUTER_PX;
 use crate::analysis::Error;
-use crate::analysis::sighting::Sighting;
-use crate::analysis::tracking::Track;
+use crate::analysis::track::Track;
+use crate::analysis::track::sighting::Sighting;
 use crate::progress::Progress;
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};

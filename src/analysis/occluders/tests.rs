@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::analysis::background::{self, Plate};
-use crate::analysis::tracking::{self, Track};
-use crate::analysis::{Params, occluders, read_ahead};
+use crate::analysis::scene::plate::Plate;
+use crate::analysis::track::{self, Track};
+use crate::analysis::{Params, occluders, read_ahead, scene};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use crate::geometry::Rect;
 use crate::progress::Silent;
@@ -80,12 +80,13 @@ impl Film {
     fn looked_at(&self) -> (Track, Plate, Option<RgbaImage>) {
         let params = Params::default();
         let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
-        let (plate, mut track) = read_ahead::while_reading(self, |batches| {
-            let plate = background::estimate(self, None, &params, &Silent)?;
-            let track = tracking::follow(batches, N_FRAMES, &plate, &params, &scratch, &Silent)?;
-            Ok::<_, crate::analysis::Error>((plate, track))
+        let (mut scene, mut track) = read_ahead::while_reading(self, |batches| {
+            let scene = scene::estimate(self, None, &params, &Silent)?;
+            let track = track::follow(batches, N_FRAMES, &scene, &params, &scratch, &Silent)?;
+            Ok::<_, crate::analysis::Error>((scene, track))
         })
         .expect("a disc that moves");
+        let plate = scene.plates.swap_remove(0);
         let found = occluders::take_out(&mut track, &plate, &Silent).expect("not cancelled");
         (track, plate, found)
     }

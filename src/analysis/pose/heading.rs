@@ -2,7 +2,7 @@
 //! one early error lasts for ever).
 //!
 //! Two states a frame, the head at either end of the length axis. A state is likely when the animal
-//! moves that way and when the heavier side lies as it does while the animal moves; a change of state
+//! moves that way and when the ends look as they do in the other frames (`ends`); a change of state
 //! that turns the head by more than a quarter circle costs much while the animal is seen at length.
 //! The cheapest sequence is found by Viterbi, its certainty by the forward-backward algorithm.
 
@@ -10,6 +10,10 @@ use super::Axes;
 
 /// Speed at which the direction of motion decides, lengths a second.
 const DECISIVE_SPEED: f64 = 0.45;
+/// Motion counts at most this much.
+const MOST_MOTION: f64 = 3.0;
+/// Where the head is known, nothing else counts.
+const PINNED: f64 = 1e6;
 
 /// The decision for one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,15 +24,16 @@ pub struct Head {
     pub confidence: f64,
 }
 
-/// Decides for every frame with an axis. `velocity_px` is in pixels a second; `pin` is a frame whose
-/// head is known to lie toward +axis (true) or -axis.
+/// Decides for every frame with an axis. `speed_along` is the speed toward +axis, lengths a second; `ends` what the look of
+/// both ends says for that way, half the logarithm of the odds; `pin` is a frame whose head is known to lie toward +axis
+/// (true) or -axis.
 pub fn decode(
     axes: &[Option<Axes>],
-    velocity_px: &[Option<[f64; 2]>],
-    length_px: f64,
+    speed_along: &[Option<f64>],
+    ends: &[Option<f64>],
     pin: Option<(usize, bool)>,
 ) -> Vec<Option<Head>> {
-    let evidence = evidence(axes, velocity_px, length_px, pin);
+    let evidence = evidence(axes, speed_along, ends, pin);
     let seen: Vec<usize> = (0..axes.len()).filter(|&k| evidence[k].is_some()).collect();
     let emissions: Vec<f64> = seen.iter().filter_map(|&k| evidence[k]).collect();
     let switches: Vec<(f64, f64)> = seen
@@ -71,49 +76,40 @@ pub fn keep(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
 /// What speaks for the head toward +axis in each frame: minus the emission cost of that state.
 fn evidence(
     axes: &[Option<Axes>],
-    velocity_px: &[Option<[f64; 2]>],
-    length_px: f64,
+    speed_along: &[Option<f64>],
+    ends: &[Option<f64>],
     pin: Option<(usize, bool)>,
 ) -> Vec<Option<f64>> {
-    let speed_along: Vec<Option<f64>> = axes
-        .iter()
-        .zip(velocity_px)
-        .map(|(axes, velocity)| {
-            let (u, v) = (axes.as_ref()?.direction()?, (*velocity)?);
-            Some((v[0] * u[0] + v[1] * u[1]) / (DECISIVE_SPEED * length_px))
-        })
-        .collect();
-    let heavier_side: f64 = axes
-        .iter()
-        .zip(&speed_along)
-        .filter_map(|(axes, speed)| {
-            let (axes, speed) = (axes.as_ref()?, (*speed)?);
-            (speed.abs() > 1.0).then(|| speed.signum() * axes.skew)
-        })
-        .sum();
-    let heavier_side = if heavier_side == 0.0 {
-        0.0
-    } else {
-        heavier_side.signum()
-    };
     let one = |k: usize| {
-        let axes = axes[k].as_ref()?;
-        axes.axis_rad?;
-        let motion = speed_along[k].unwrap_or(0.0).clamp(-3.0, 3.0);
-        let shape = 0.5 * (heavier_side * axes.skew / 0.3).clamp(-2.0, 2.0);
+        axes[k].as_ref()?.axis_rad?;
+        let speed = speed_along[k].unwrap_or(0.0);
+        let motion = (speed / DECISIVE_SPEED).clamp(-MOST_MOTION, MOST_MOTION);
         let pinned = match pin {
             Some((frame, forward)) if frame == k => {
                 if forward {
-                    1e6
+                    PINNED
                 } else {
-                    -1e6
+                    -PINNED
                 }
             }
             _ => 0.0,
         };
-        Some(motion + shape + pinned)
+        Some(motion + ends[k].unwrap_or(0.0) + pinned)
     };
     (0..axes.len()).map(one).collect()
+}
+
+/// The speed along +axis of each frame, lengths a second.
+pub fn speed_along(
+    axes: &[Option<Axes>],
+    velocity_px: &[Option<[f64; 2]>],
+    length_px: f64,
+) -> Vec<Option<f64>> {
+    let of = |(axes, velocity): (&Option<Axes>, &Option<[f64; 2]>)| {
+        let (u, v) = (axes.as_ref()?.direction()?, (*velocity)?);
+        Some((v[0] * u[0] + v[1] * u[1]) / length_px)
+    };
+    axes.iter().zip(velocity_px).map(of).collect()
 }
 
 /// The costs of (keeping, changing) the state from one axis to the next.
@@ -231,6 +227,16 @@ mod tests {
         (headings, axes, velocity)
     }
 
+    /// By motion alone.
+    fn decoded(
+        axes: &[Option<Axes>],
+        velocity: &[Option<[f64; 2]>],
+        pin: Option<(usize, bool)>,
+    ) -> Vec<Option<Head>> {
+        let ends = vec![None; axes.len()];
+        decode(axes, &speed_along(axes, velocity, 60.0), &ends, pin)
+    }
+
     fn errors(headings: &[f64], axes: &[Option<Axes>], heads: &[Option<Head>]) -> usize {
         let wrong = |k: &usize| {
             let axis = axes[*k]
@@ -246,7 +252,7 @@ mod tests {
     #[test]
     fn the_head_is_right_all_round_a_circle() {
         let (headings, axes, velocity) = circling(400, |_| 60.0);
-        let heads = decode(&axes, &velocity, 60.0, None);
+        let heads = decoded(&axes, &velocity, None);
         assert_eq!(errors(&headings, &axes, &heads), 0);
         assert!(heads.iter().flatten().all(|head| head.confidence > 0.99));
     }
@@ -255,7 +261,7 @@ mod tests {
     fn drifting_backward_slowly_does_not_turn_the_head() {
         let (headings, axes, velocity) =
             circling(400, |k| if (150..200).contains(&k) { -6.0 } else { 50.0 });
-        let heads = decode(&axes, &velocity, 60.0, None);
+        let heads = decoded(&axes, &velocity, None);
         assert_eq!(errors(&headings, &axes, &heads), 0);
     }
 
@@ -272,7 +278,7 @@ mod tests {
         ];
         let velocity = vec![Some([0.0; 2]); 30];
         for forward in [true, false] {
-            let heads = decode(&axes, &velocity, 60.0, Some((7, forward)));
+            let heads = decoded(&axes, &velocity, Some((7, forward)));
             assert!(heads.iter().flatten().all(|head| head.forward == forward));
         }
     }

@@ -4,6 +4,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 pub mod depth;
+mod ends;
 pub mod heading;
 pub mod smooth;
 mod view;
@@ -11,11 +12,12 @@ mod view;
 use super::Params;
 use super::direction::{self, Seen};
 use super::params::AxisAndHead;
-use super::sighting::Sighting;
-use super::tracking::Tracked;
+use super::track::Tracked;
+use super::track::sighting::Sighting;
 use crate::footage::FootageFormat;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
+use ends::Ends;
 use smooth::{Smoothed, smooth};
 
 /// The side view keeps its length axis unless the other one is nearer the horizontal by this much.
@@ -42,9 +44,15 @@ impl Axes {
     }
 }
 
-/// From where the animal is seen: as asked for, or guessed.
-pub fn view(track: &[Tracked], params: &Params) -> View {
-    params.view().unwrap_or_else(|| view::guess(track))
+/// From where the animal is seen: as asked for, or guessed, with the probability that the guess is right, .5..=1.
+pub fn view(track: &[Tracked], params: &Params) -> (View, Option<f64>) {
+    match params.view() {
+        Some(view) => (view, None),
+        None => {
+            let (view, probability) = view::guess(track);
+            (view, Some(probability))
+        }
+    }
 }
 
 /// The poses of a track.
@@ -60,8 +68,10 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
             + (head.point[1] - centroid[1]) * direction[1];
         Some((frame, toward >= 0.0))
     });
+    let speed = heading::speed_along(&axes, &motion.velocity_px(), reference_px);
+    let ends = Ends::tell(track, &axes, &speed, format.fps);
     let heads = match params.axis_and_head {
-        AxisAndHead::Corrected => heading::decode(&axes, &motion.velocity_px(), reference_px, pin),
+        AxisAndHead::Corrected => heading::decode(&axes, &speed, &ends.evidence, pin),
         AxisAndHead::Printed => heading::keep(&axes),
     };
     let mut poses = Poses {
@@ -69,6 +79,7 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
         fps: format.fps,
         image_size_px: [format.width, format.height],
         view,
+        view_confidence: None,
         camera: params.camera(format.width, format.height),
         animal: params.animal(),
         frames: track.iter().map(|tracked| seen(tracked, params)).collect(),
@@ -90,9 +101,18 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
     }
     depth::measure_alone(&mut poses, params);
     if view == View::Side && params.smooth {
-        best_estimate(&mut poses, track, params);
+        best_estimate(&mut poses, track, &axes, &ends, params);
     } else {
         poses.frames.iter_mut().for_each(take_raw);
+    }
+    if pin.is_none() && params.axis_and_head == AxisAndHead::Corrected {
+        for confidence in poses
+            .frames
+            .iter_mut()
+            .filter_map(|pose| pose.head_confidence.as_mut())
+        {
+            *confidence = ends.tempered(*confidence);
+        }
     }
     poses
 }
@@ -108,7 +128,13 @@ fn take_raw(pose: &mut Pose) {
 
 /// Replaces what single frames say of place and direction by what all frames together say. Without a
 /// camera or the animal's size the heading alone is given, by a usual camera.
-fn best_estimate(poses: &mut Poses, track: &[Tracked], params: &Params) {
+fn best_estimate(
+    poses: &mut Poses,
+    track: &[Tracked],
+    axes: &[Option<Axes>],
+    ends: &Ends,
+    params: &Params,
+) {
     let seen: Vec<Option<Seen>> = track
         .iter()
         .enumerate()
@@ -122,6 +148,11 @@ fn best_estimate(poses: &mut Poses, track: &[Tracked], params: &Params) {
                 upright_px: sighting.upright_px,
                 cut: sighting.cut,
                 toward: pin.map(|head| [0, 1].map(|c| head.point[c] - centroid_px[c])),
+                ends: axes[k]
+                    .as_ref()
+                    .and_then(Axes::direction)
+                    .zip(ends.evidence[k])
+                    .map(|(u, evidence)| u.map(|c| c * evidence)),
             })
         })
         .collect();
@@ -224,7 +255,7 @@ fn seen(tracked: &Tracked, params: &Params) -> Pose {
 
 /// The length axis of every sighting.
 ///
-/// From above it is the major axis. From the side it is the one farther from the vertical (N 5.3),
+/// From above it is the axis of the body without its tail, which is carried to one side for seconds. From the side it is the one farther from the vertical (N 5.3),
 /// with memory: the axis nearest to the last frame's, unless the other one is nearer the
 /// horizontal by 10 degrees. A fish seen head-on is taller than long, one that pitches steeply has
 /// its major axis upright.
@@ -234,28 +265,40 @@ fn length_axes(track: &[Tracked], view: View, rule: AxisAndHead) -> Vec<Option<A
         .iter()
         .map(|tracked| {
             let sighting = tracked.sighting.as_ref()?;
+            if view == View::Top && rule == AxisAndHead::Corrected {
+                return Some(along_body(sighting));
+            }
             let Some(major) = sighting.moments.major_rad else {
                 return Some(along(sighting, true));
             };
             let minor = half_circle(major + FRAC_PI_2);
-            let major_is_length = match (view, rule) {
-                (View::Top, AxisAndHead::Corrected) => true,
-                _ => {
-                    let upright = |axis: f64| FRAC_PI_2 - axis.abs();
-                    let lead = upright(major) - upright(minor);
-                    let near = |last: f64| half_circle(major - last).abs() <= FRAC_PI_4;
-                    match last.map(near) {
-                        Some(true) => lead > -MEMORY_RAD,
-                        Some(false) => lead > MEMORY_RAD,
-                        None => lead >= 0.0,
-                    }
-                }
+            let upright = |axis: f64| FRAC_PI_2 - axis.abs();
+            let lead = upright(major) - upright(minor);
+            let near = |last: f64| half_circle(major - last).abs() <= FRAC_PI_4;
+            let major_is_length = match last.map(near) {
+                Some(true) => lead > -MEMORY_RAD,
+                Some(false) => lead > MEMORY_RAD,
+                None => lead >= 0.0,
             };
             let axes = along(sighting, major_is_length);
             last = axes.axis_rad.filter(|_| rule == AxisAndHead::Corrected);
             Some(axes)
         })
         .collect()
+}
+
+fn along_body(sighting: &Sighting) -> Axes {
+    let (moments, extent) = (&sighting.moments, sighting.body_extent_px);
+    let turned = sighting
+        .body_rad
+        .zip(moments.major_rad)
+        .map_or(0.0, |(body, major)| body - major);
+    Axes {
+        axis_rad: sighting.body_rad,
+        length_px: extent[0],
+        height_px: extent[1],
+        skew: moments.skew[0] * libm::cos(turned).signum(),
+    }
 }
 
 fn along(sighting: &Sighting, major_is_length: bool) -> Axes {

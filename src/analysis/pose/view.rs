@@ -1,65 +1,64 @@
 //! From where the animal is seen, when nobody says (ALGORITHMS.md 4).
 
-use std::f64::consts::{FRAC_PI_4, PI};
+use std::f64::consts::FRAC_PI_3;
 
-use crate::analysis::sighting::Sighting;
-use crate::analysis::tracking::Tracked;
+use crate::analysis::track::Tracked;
+use crate::analysis::track::sighting::Sighting;
 use crate::library::View;
 use crate::order::{median, percentile};
 
-/// From the side an animal has a back and a belly (the skew across its length keeps its sign), and stays
-/// as tall when it turns. From above it has a left and a right, bends, and lies at any angle.
-pub(super) fn guess(track: &[Tracked]) -> View {
-    const LEVEL: f64 = PI / 3.0;
-    let sightings: Vec<&Sighting> = track.iter().filter_map(|t| t.sighting.as_ref()).collect();
-    let mut lengths: Vec<f64> = sightings.iter().map(|s| s.extent_px[0]).collect();
-    let Some(longest) = percentile(&mut lengths, 0.9) else {
-        return View::Side;
+/// A silhouette of this share of the 90th percentile of the lengths is seen at length.
+const AT_LENGTH: f64 = 0.7;
+/// Standard deviations along and across the axis are in this ratio at least.
+const LONG: f64 = 1.3;
+/// Fewer frames than these say nothing.
+const LEAST_FRAMES: usize = 8;
+/// The asymmetry at which both views are as likely, in standard deviations, squared. The labelled clips from above have .07
+/// to .7, those from the side 4 and more.
+const EVEN: f64 = 1.7;
+/// Surer than this nobody can be from a silhouette.
+const MOST: f64 = 0.99;
+
+/// The guessed view and the probability that it is right, .5..=1.
+///
+/// From the side an animal has a back and a belly: its mass and its brightness differ from the upper to the lower side, the same
+/// way in all frames. From above it has a left and a right, which lie up and down by turns. So what counts is the mean of that
+/// difference over its spread. Frames that the border cuts, or that show the animal steeply or end-on, are left out.
+pub(super) fn guess(track: &[Tracked]) -> (View, f64) {
+    let whole = || {
+        let sightings = track.iter().filter_map(|t| t.sighting.as_ref());
+        sightings.filter(|sighting| !sighting.cut)
     };
-    let long = 0.7 * longest;
-    let at_length = sightings.iter().filter(|s| s.extent_px[0] >= long);
-    let seen: Vec<(f64, f64)> = at_length
-        .filter_map(|s| Some((s.moments.major_rad?, s.moments.skew[1])))
+    let mut lengths: Vec<f64> = whole().map(|s| s.extent_px[0]).collect();
+    let longest = percentile(&mut lengths, 0.9).unwrap_or(0.0);
+    let level: Vec<&Sighting> = whole()
+        .filter(|s| s.extent_px[0] >= AT_LENGTH * longest)
+        .filter(|s| s.moments.eigenvalue_ratio >= LONG * LONG)
+        .filter(|s| {
+            s.moments
+                .major_rad
+                .is_some_and(|axis| axis.abs() < FRAC_PI_3)
+        })
         .collect();
-    let steep = seen
+    if level.len() < LEAST_FRAMES {
+        return (View::Side, 0.5);
+    }
+    let mass = level.iter().map(|s| s.moments.skew[1]);
+    let shade = level
         .iter()
-        .filter(|(axis, _)| axis.abs() > FRAC_PI_4)
-        .count();
-    let steep_share = steep as f64 / seen.len().max(1) as f64;
-    let across: Vec<f64> = seen
-        .iter()
-        .filter(|(axis, _)| axis.abs() < LEVEL)
-        .map(|(_, skew)| *skew)
-        .collect();
-    // Medians: silhouettes that went wrong in a tenth of the frames must not show a back.
-    let usual = median(across.iter().copied()).unwrap_or(0.0);
-    let spread = 1.4826 * median(across.iter().map(|skew| (skew - usual).abs())).unwrap_or(0.0);
-    let has_back_and_belly = usual.abs() >= (0.5 * spread).max(0.2);
-    // Turning toward the camera shortens it and leaves it as tall.
-    let sizes = |c: usize| {
-        sightings
-            .iter()
-            .map(move |s| s.moments.covariance_px2[c].sqrt())
-    };
-    let stands_upright = variation(sizes(2).collect()) < 0.5 * variation(sizes(0).collect());
-    let square = across
-        .iter()
-        .map(|skew| (skew - usual).powi(2))
-        .sum::<f64>();
-    let deviation = (square / across.len().max(1) as f64).sqrt();
-    let bends_or_turns = deviation > 0.12 || steep_share > 0.15;
-    if !has_back_and_belly && !stands_upright && bends_or_turns {
-        View::Top
-    } else {
-        View::Side
+        .filter_map(|s| Some(s.asymmetry.as_ref()?.shade));
+    let asymmetry = constancy(mass.collect()).powi(2) + constancy(shade.collect()).powi(2);
+    let odds = (asymmetry / EVEN).powi(2);
+    let side = odds / (1.0 + odds);
+    match side >= 0.5 {
+        true => (View::Side, side.min(MOST)),
+        false => (View::Top, (1.0 - side).min(MOST)),
     }
 }
 
-/// How far the middle two thirds of values spread about their median, as a share of it.
-fn variation(mut values: Vec<f64>) -> f64 {
-    let at = [1.0, 3.0, 5.0].map(|sixth| percentile(&mut values, sixth / 6.0));
-    match at {
-        [Some(low), Some(middle), Some(high)] => (high - low) / (2.0 * middle.max(1e-9)),
-        _ => 0.0,
-    }
+/// The median of values over their spread; both ignore silhouettes that went wrong.
+fn constancy(values: Vec<f64>) -> f64 {
+    let usual = median(values.iter().copied()).unwrap_or(0.0);
+    let spread = median(values.iter().map(|value| (value - usual).abs())).unwrap_or(0.0);
+    usual / (1.4826 * spread).max(0.01)
 }

@@ -4,38 +4,40 @@
 //! compared pixel by pixel. A pixel differs for certain above the core threshold; pixels above half
 //! of it count when they hang together with a certain one.
 
-mod blocks;
-pub mod parting;
+pub mod blocks;
 pub mod shadow;
+pub mod tether;
 
 pub use blocks::Blocks;
 
-use super::background::Plate;
-use super::light::Gain;
+use super::scene::light::Light;
+use super::scene::plate::Plate;
 use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{Frame, Mask, RgbImage};
 
 /// How far a proposed box is widened before it is looked at.
-const MARGIN_PX: u32 = 6;
+pub const MARGIN_PX: u32 = 6;
 /// How far a box grows when a component runs into its edge.
 const GROWTH_PX: u32 = 16;
 
-/// The components of foreground pixels in the boxes that `region` proposes, from the top left; raw: neither
-/// holes nor ragged edges mended (`shaped` does). They do not depend on `seen`, the part of the frame
-/// that is looked at first.
-pub fn components(
+/// The components of foreground pixels of a frame, from the top left; raw: neither holes nor ragged edges mended
+/// (`shaped` does).
+pub fn components(frame: &Frame, plate: &Plate, light: &Light) -> Vec<Component> {
+    let (boxes, _) = plate.blocks.proposals(frame, light, MARGIN_PX);
+    components_of(frame, plate, light, boxes)
+}
+
+/// The same in boxes already proposed.
+pub fn components_of(
     frame: &Frame,
     plate: &Plate,
-    gain: &Gain,
-    [region, seen]: [Rect; 2],
+    light: &Light,
+    boxes: Vec<Rect>,
 ) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
-    let boxes = plate
-        .blocks
-        .proposals(frame, gain, [region, seen], MARGIN_PX);
     for rect in boxes {
-        for component in components_in(frame, plate, gain, rect) {
+        for component in components_in(frame, plate, light, rect) {
             if !found.contains(&component) {
                 found.push(component);
             }
@@ -65,13 +67,22 @@ pub struct Difference {
 }
 
 /// Compares a box of a frame with the plate.
-pub fn difference(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Difference {
+pub fn difference(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Difference {
     let mut rgb = frame.rgb(rect);
-    let factors = gain.to_plate();
+    let factors = light.to_plate();
     if factors != [4096; 3] {
         for pixel in rgb.pixels.chunks_exact_mut(3) {
             for (value, factor) in pixel.iter_mut().zip(factors) {
                 *value = ((i32::from(*value) * factor + 2048) >> 12).min(255) as u8;
+            }
+        }
+    }
+    if light.is_uneven() {
+        for (k, pixel) in rgb.pixels.chunks_exact_mut(3).enumerate() {
+            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
+            let factor = light.factor(rect.x as usize + x, rect.y as usize + y);
+            for value in pixel {
+                *value = (f32::from(*value) / factor + 0.5) as u8;
             }
         }
     }
@@ -120,11 +131,11 @@ fn beside(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
 
 /// The components of one box, which grows to the sides where any of them runs into its edge, twice
 /// as far each time.
-fn components_in(frame: &Frame, plate: &Plate, gain: &Gain, rect: Rect) -> Vec<Component> {
+fn components_in(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Vec<Component> {
     let mut rect = rect;
     let mut growth = i64::from(GROWTH_PX);
     loop {
-        let difference = difference(frame, plate, gain, rect);
+        let difference = difference(frame, plate, light, rect);
         let found = hysteresis(&difference, plate);
         let grow = |runs_out: bool| if runs_out { growth } else { 0 };
         let grown = Rect::clipped(

@@ -6,11 +6,10 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Difference, difference};
-use crate::analysis::background::Plate;
-use crate::analysis::light::Gain;
+use super::Difference;
+use crate::analysis::scene::plate::Plate;
+use crate::raster::Mask;
 use crate::raster::runs::Component;
-use crate::raster::{Frame, Mask};
 
 /// Brightness ratios that a shadow may have.
 const RATIO: RangeInclusive<f32> = 0.45..=0.95;
@@ -37,13 +36,12 @@ pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Pla
     }
 }
 
-/// Whether nearly all of a component looks like the plate, only darker.
-pub fn is_shadow_alone(frame: &Frame, plate: &Plate, component: &Component) -> bool {
-    let difference = difference(frame, plate, &Gain::ONE, component.rect);
+/// Whether nearly all of a component looks like the plate, only darker. `difference` is that of its box.
+pub fn is_shadow_alone(difference: &Difference, plate: &Plate, component: &Component) -> bool {
     let mask = component.mask(component.rect);
     let width = mask.width();
     let like = (0..mask.bits.len()).filter(|&k| {
-        mask.bits[k] == 1 && has_shadow_color(&difference, plate, k % width, k / width)
+        mask.bits[k] == 1 && has_shadow_color(difference, plate, k % width, k / width)
     });
     10 * like.count() as u64 >= 7 * component.area
 }

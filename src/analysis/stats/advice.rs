@@ -8,8 +8,8 @@
 use std::fmt;
 
 use crate::analysis::Params;
-use crate::geometry::wrap_rad;
-use crate::library::{Library, Poses, View};
+use crate::geometry::{Rect, wrap_rad};
+use crate::library::{Library, Mover, MoverKind, Poses, View};
 
 /// Less than this of one motion is hardly any.
 const LEAST_MOTION_S: f64 = 0.5;
@@ -19,6 +19,8 @@ const LEVEL_BINS: usize = 3;
 /// is no jitter of the heading.
 const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
+/// A guess of the view that is less probable than this is worth a word.
+const SURE: f64 = 0.9;
 /// Of more frames it is said that their transitions can be found approximately.
 const MANY_FRAMES: usize = 50_000;
 /// Slower than this is rest, lengths a second; measured over so long either way.
@@ -32,6 +34,12 @@ pub enum Advice {
     AnimalTooSmall,
     /// Several animals move and the largest was followed.
     SeveralAnimals,
+    /// So many things moved besides the animal; this one for the longest.
+    OtherMovers(usize, Mover),
+    /// So many frames show another scene; the first of them is at this time, seconds.
+    ForeignFrames(usize, f64),
+    /// The view was guessed, and is right with this probability, below .9.
+    ViewUnsure(View, f64),
     /// The animal was found in this share of the frames, below 0.8.
     SeldomFound(f64),
     /// The animal touches the border in this share of the frames in which it was found, above 0.2.
@@ -84,6 +92,9 @@ impl Advice {
         match self {
             Advice::AnimalTooSmall => "animal_too_small",
             Advice::SeveralAnimals => "several_animals",
+            Advice::OtherMovers(..) => "other_movers",
+            Advice::ForeignFrames(..) => "foreign_frames",
+            Advice::ViewUnsure(..) => "view_unsure",
             Advice::SeldomFound(_) => "seldom_found",
             Advice::OftenAtBorder(_) => "often_at_border",
             Advice::NoTransitions => "no_transitions",
@@ -94,6 +105,32 @@ impl Advice {
             Advice::SomeMissed(_) => "some_missed",
             Advice::ManyFrames(_) => "many_frames",
             Advice::Lacks(motion, ..) => motion.names().0,
+        }
+    }
+}
+
+impl Advice {
+    /// What is to be said of what else the film shows and of how it was taken.
+    fn write_scene(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Advice::OtherMovers(n, mover) => write_movers(f, *n, mover),
+            Advice::ForeignFrames(n, from_s) => write!(
+                f,
+                "{n} frames show another scene, the first at {from_s:.1} s, and nothing is measured in them: cut them off \
+                 before you send the film"
+            ),
+            Advice::ViewUnsure(view, probability) => {
+                let (seen, other) = match view {
+                    View::Side => ("from the side", "top"),
+                    View::Top => ("from above", "side"),
+                };
+                write!(
+                    f,
+                    "the animal seems to be filmed {seen} ({}): if it is not, set view to {other}",
+                    percent(probability)
+                )
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -137,7 +174,6 @@ impl Motion {
 
 impl fmt::Display for Advice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |share: &f64| format!("{:.0} %", 100.0 * share);
         match self {
             Advice::AnimalTooSmall => write!(
                 f,
@@ -147,6 +183,9 @@ impl fmt::Display for Advice {
                 f,
                 "several animals move in this footage, and the largest was followed: film one alone"
             ),
+            Advice::OtherMovers(..) | Advice::ForeignFrames(..) | Advice::ViewUnsure(..) => {
+                self.write_scene(f)
+            }
             Advice::SeldomFound(share) => write!(
                 f,
                 "the animal was found in only {} of the frames: keep it in view, before a background that it \
@@ -198,6 +237,35 @@ impl fmt::Display for Advice {
     }
 }
 
+fn percent(share: &f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
+/// What moved besides the animal, where and when.
+fn write_movers(f: &mut fmt::Formatter<'_>, n: usize, mover: &Mover) -> fmt::Result {
+    let what = match mover.kind {
+        MoverKind::Animal => "something that looks like the animal",
+        MoverKind::MirrorImage => "the animal's mirror image",
+        MoverKind::FromBorder => "something that reaches in across the border (a hand, a cable)",
+        MoverKind::InPlace => "something that stays at its place (a plant, a clock, a reflection)",
+        MoverKind::Other => "something else",
+    };
+    let Rect { x, y, w, h } = mover.box_px;
+    write!(
+        f,
+        "besides the animal {what} moved, from {:.1} to {:.1} s, within the box {x},{y},{w},{h}",
+        mover.from_s, mover.to_s
+    )?;
+    match n {
+        1 => write!(f, ": see whether the right one was measured"),
+        n => write!(
+            f,
+            ", and {} more: see whether the right one was measured",
+            n - 1
+        ),
+    }
+}
+
 /// What a library lacks, the gravest first; nothing of a good one.
 pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     let stats = &library.stats;
@@ -209,6 +277,7 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     if stats.several_animals {
         all.push(Advice::SeveralAnimals);
     }
+    of_scene(library, &mut all);
     let found = stats.n_detected as f64 / stats.n_frames.max(1) as f64;
     if found < 0.8 {
         all.push(Advice::SeldomFound(found));
@@ -226,6 +295,27 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
         false => of_playback(library, params, &mut all),
     }
     all
+}
+
+/// What else the film shows, and how it was taken.
+fn of_scene(library: &Library, all: &mut Vec<Advice>) {
+    let (stats, poses) = (&library.stats, &library.poses);
+    let longest = stats
+        .other_movers
+        .iter()
+        .max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
+    if let Some(mover) = longest {
+        all.push(Advice::OtherMovers(stats.other_movers.len(), *mover));
+    }
+    if let Some(from_s) = stats.first_foreign_s {
+        all.push(Advice::ForeignFrames(stats.n_foreign_frames, from_s));
+    }
+    match poses.view_confidence {
+        Some(probability) if probability < SURE => {
+            all.push(Advice::ViewUnsure(poses.view, probability));
+        }
+        _ => {}
+    }
 }
 
 /// How the search for transitions went, and how else it could.

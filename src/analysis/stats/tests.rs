@@ -22,6 +22,7 @@ fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
         fps: FPS,
         image_size_px: [400, 100],
         view,
+        view_confidence: None,
         camera: None,
         animal: None,
         frames: (0..300).map(pose).collect(),

@@ -141,6 +141,7 @@ mod tests {
             fps: 10.0,
             image_size_px: [100, 100],
             view,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames: frames.collect(),

@@ -45,6 +45,7 @@ fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
         fps: FPS,
         image_size_px: [320, 240],
         view: View::Side,
+        view_confidence: None,
         camera: None,
         animal: None,
         frames: moments.iter().map(pose).collect(),

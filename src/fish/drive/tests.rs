@@ -39,6 +39,7 @@ fn uncalibrated(view: View) -> Poses {
         fps: 30.0,
         image_size_px: [160, 100],
         view,
+        view_confidence: None,
         camera: None,
         animal: None,
         frames: frames.collect(),

@@ -123,6 +123,7 @@ impl SampleFilm {
             fps: self.params.fps,
             image_size_px: [self.params.width, self.params.height],
             view: View::Side,
+            view_confidence: None,
             camera: Some(self.motion().camera),
             animal: Some(self.animal()),
             frames: frames.map(|k| self.true_pose(k)).collect(),

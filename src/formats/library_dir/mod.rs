@@ -246,6 +246,7 @@ mod tests {
                 fps: 25.0,
                 image_size_px: [16, 12],
                 view: View::Side,
+                view_confidence: None,
                 camera: None,
                 animal: None,
                 frames: vec![Pose::default(); 3],

@@ -159,6 +159,7 @@ mod tests {
             fps: 30.0,
             image_size_px: [8, 8],
             view: View::Side,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames,

@@ -154,6 +154,7 @@ mod tests {
             fps: 1.0,
             image_size_px: [8, 8],
             view: View::Side,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames,

@@ -197,6 +197,7 @@ mod tests {
             fps: 1.0,
             image_size_px: [200, 100],
             view: View::Top,
+            view_confidence: None,
             camera: None,
             animal: None,
             frames: seen.iter().enumerate().map(pose).collect(),

@@ -4,8 +4,7 @@
 
 use std::sync::Arc;
 
-use flockreel::analysis::params::Search;
-use flockreel::analysis::{self, analyze};
+use flockreel::analysis::analyze;
 use flockreel::cpu::Level;
 use flockreel::flock::{self, plan_flock};
 use flockreel::formats::poses_json;
@@ -68,22 +67,18 @@ fn depth_is_within_a_tenth_of_the_tank() {
 }
 
 #[test]
-fn searching_everywhere_finds_what_the_window_found_on_any_number_of_threads() {
+fn the_analysis_is_the_same_for_any_number_of_threads() {
     let (film, library, params) = filmed();
-    let params = analysis::Params {
-        search: Search::Full,
-        ..params.clone()
-    };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()
         .unwrap();
     let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
-    let analyze = || analyze(film, None, &params, Level::detect(), &scratch, &Silent).unwrap();
-    let full = pool.install(analyze);
+    let analyze = || analyze(film, None, params, Level::detect(), &scratch, &Silent).unwrap();
+    let on_one = pool.install(analyze);
     let bytes = |library: &Library| poses_json::write(&library.poses, None);
-    assert!(bytes(&full) == bytes(library), "poses.json differs");
-    assert!(full.sprites == library.sprites, "the sprites differ");
+    assert!(bytes(&on_one) == bytes(library), "poses.json differs");
+    assert!(on_one.sprites == library.sprites, "the sprites differ");
 }
 
 #[test]

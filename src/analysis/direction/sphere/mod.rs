@@ -48,12 +48,15 @@ pub(super) fn decode(views: &Views, shape: &Shape) -> Course {
         if let Some(outline) = &views.frames[k].outline {
             cells.add_moment_costs(outline, &mut cost);
         }
-        let toward = views.frames[k].toward;
+        let (toward, ends) = (views.frames[k].toward, views.frames[k].ends);
         for (cost, axes) in cost.iter_mut().zip(&cells.axes) {
             let points_away = toward.is_some_and(|[x, y]| {
                 let forward = axes.forward;
                 x * forward[0] + y * forward[1] < 0.0
             });
+            if let Some([x, y]) = ends {
+                *cost -= x * axes.forward[0] + y * axes.forward[1];
+            }
             *cost = *cost * tempered + if points_away { PINNED } else { 0.0 };
         }
         cost

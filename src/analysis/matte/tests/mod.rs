@@ -4,7 +4,7 @@ mod cast;
 
 use super::*;
 use crate::analysis::Params;
-use crate::analysis::background::plate_of;
+use crate::analysis::scene::plate::Plate;
 use crate::raster::{ColorSpec, RgbImage};
 
 const SIZE: [u32; 2] = [120, 90];
@@ -37,14 +37,14 @@ fn drawn(shade: fn(u32, u32) -> u8) -> Drawn {
 fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
     let [width, height] = SIZE;
     let sigma = vec![1.5; (width * height) as usize];
-    let plate = plate_of(picture(ground), sigma, &Params::default());
+    let plate = Plate::of(picture(ground), sigma, Params::default().threshold);
     let mut silhouette = Mask::new(Rect::of_size(width, height));
     for k in 0..width * height {
         silhouette.bits[k as usize] =
             u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > 9);
     }
     silhouette.fill_holes();
-    let matte = pull(&picture(shade), &plate, &Gain::ONE, &silhouette, 60.0);
+    let matte = pull(&picture(shade), &plate, &Light::SAME, &silhouette, 60.0);
     Drawn { matte, shade }
 }
 

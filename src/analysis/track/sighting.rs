@@ -1,9 +1,12 @@
 //! What is seen of the animal in one frame: cut out, put aside and measured (N 4; ALGORITHMS.md 2.7, 4).
 
-use super::background::Plate;
-use super::light::Gain;
-use super::matte;
-use super::moments::{self, Moments};
+use super::asymmetry::Asymmetry;
+use super::body;
+use crate::analysis::matte;
+use crate::analysis::moments::{self, Moments};
+use crate::analysis::scene::light::Light;
+use crate::analysis::scene::plate::Plate;
+use crate::analysis::subject;
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask, RgbaImage};
@@ -22,6 +25,12 @@ pub struct Sighting {
     pub contrast: f64,
     /// Its moments, weighed by alpha.
     pub moments: Moments,
+    /// How its ends and its sides differ; `None` where it has no axis.
+    pub asymmetry: Option<Asymmetry>,
+    /// The axis of the body without its tail and other thin parts, in (-pi/2, pi/2]; `None` where that is round.
+    pub body_rad: Option<f64>,
+    /// Extents along the body's axis and across it, tail and all.
+    pub body_extent_px: [f64; 2],
     /// Extents along the major axis and across it, of the pixels that are more animal than background.
     pub extent_px: [f64; 2],
     /// Extent of the same pixels from the topmost to the lowest.
@@ -35,7 +44,7 @@ pub struct Sighting {
 impl Sighting {
     /// What a matte that lies at `rect` tells by itself: neither where it is put aside, nor its contrast, its
     /// silhouette's box and whether that is cut. `None` when nothing of it is opaque.
-    pub(super) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
+    pub(in crate::analysis) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
         let pixels = matte.pixels.as_chunks::<4>().0;
         let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
         let moments = moments::moments(rect, &weights)?;
@@ -43,7 +52,14 @@ impl Sighting {
         let solid = solid(rect, matte);
         let extent_px = |along_rad| moments::extent_px(&solid, along_rad);
         let quarter = std::f64::consts::FRAC_PI_2;
+        let body = body::of(&solid);
+        let opaque: Vec<u8> = body.bits.iter().map(|bit| 255 * bit).collect();
+        let body_rad = moments::moments(body.rect, &opaque).and_then(|body| body.major_rad);
+        let along_body = body_rad.unwrap_or(axis);
         Some(Sighting {
+            asymmetry: Asymmetry::of(rect, matte, &moments),
+            body_rad,
+            body_extent_px: [extent_px(along_body), extent_px(along_body + quarter)],
             rect,
             at: 0,
             reach_px: reach_px(rect, matte, moments.centroid_px),
@@ -66,22 +82,22 @@ pub struct Choice {
 }
 
 /// A frame before its plate.
-pub struct Scene<'a> {
+pub struct View<'a> {
     /// The picture.
     pub frame: &'a Frame,
     /// The scene without the animal.
     pub plate: &'a Plate,
     /// How much brighter than the plate the frame is.
-    pub gain: &'a Gain,
+    pub light: &'a Light,
 }
 
-impl Scene<'_> {
+impl View<'_> {
     /// Cuts the animal out, puts it aside and measures it; `None` when nothing of it is opaque.
     pub fn look(&self, choice: &Choice, scratch: &dyn Scratch) -> Result<Option<Sighting>, Full> {
         let rect = choice.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let silhouette = &choice.silhouette;
-        let matte = matte::pull(self.frame, self.plate, self.gain, silhouette, length_px);
+        let matte = matte::pull(self.frame, self.plate, self.light, silhouette, length_px);
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
@@ -89,14 +105,9 @@ impl Scene<'_> {
             at: scratch.put(&matte.image.pixels)?,
             contrast: matte.contrast,
             box_px: rect,
-            cut: self.touches_border(rect),
+            cut: subject::touches_border(rect, [self.frame.width, self.frame.height]),
             ..measured
         }))
-    }
-
-    fn touches_border(&self, rect: Rect) -> bool {
-        let (right, bottom) = (self.frame.width, self.frame.height);
-        rect.x == 0 || rect.y == 0 || rect.right() == right || rect.bottom() == bottom
     }
 }
 

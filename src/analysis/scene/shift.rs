@@ -23,9 +23,7 @@ const LEAST_DEVIATION: f64 = 3.0;
 const LEAST_PEAK: f64 = 0.3;
 /// Fewer tiles than these do not speak for the picture.
 const LEAST_TILES: usize = 4;
-/// A shift above this is the camera's ...
-const MOST_SHIFT_PX: f64 = 1.0;
-/// ... when this share of the tiles agrees with it ...
+/// A shift is the camera's when this share of the tiles agrees with it ...
 const AGREEMENT: f64 = 0.6;
 /// ... to within this, or to within this share of the shift: a tile fades to its edges, which holds a large
 /// shift back.
@@ -37,30 +35,15 @@ const BANDWIDTH: f64 = 0.2;
 /// brought to equal strength.
 const NOISE: f64 = 8.0;
 
-/// Whether a share of more than `often` of the frames is shifted against the plate by over a pixel.
-pub(super) fn camera_moves(frames: &[Frame], plate: &Frame, often: f64) -> bool {
-    const N_JUDGED: usize = 21;
-    let correlator = Correlator::of(plate);
-    let judged: Vec<&Frame> = frames
-        .iter()
-        .step_by(frames.len().div_ceil(N_JUDGED).max(1))
-        .collect();
-    let has_moved = |frame: &&&Frame| {
-        let shift = correlator.shift_px(frame);
-        shift.is_some_and(|shift| libm::hypot(shift[0], shift[1]) > MOST_SHIFT_PX)
-    };
-    let n_moved = judged.par_iter().filter(has_moved).count();
-    n_moved as f64 > often * judged.len() as f64
-}
-
 /// The plate's tiles that have structure, with their spectra.
-struct Correlator {
+pub(super) struct Correlator {
     tiles: Vec<(Rect, Vec<Complex>)>,
     fourier: Fourier,
 }
 
 impl Correlator {
-    fn of(plate: &Frame) -> Correlator {
+    /// A correlator against a reference frame.
+    pub(super) fn of(plate: &Frame) -> Correlator {
         let fourier = Fourier::new();
         let tiles = tiles(plate.width, plate.height)
             .into_iter()
@@ -71,6 +54,12 @@ impl Correlator {
             })
             .collect();
         Correlator { tiles, fourier }
+    }
+
+    /// The shift of each chosen frame against the reference, pixels; `None` where the tiles do not agree.
+    pub(super) fn shifts_px(&self, frames: &[Frame], chosen: &[usize]) -> Vec<Option<[f64; 2]>> {
+        let of = |&k: &usize| self.shift_px(&frames[k]);
+        chosen.par_iter().map(of).collect()
     }
 
     /// The shift that most tiles agree upon; `None` when they do not.

@@ -9,7 +9,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::Difference;
+use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;
 use crate::raster::runs::{self, Component};
 
@@ -22,66 +22,33 @@ const PASS: f64 = 0.7;
 const CONTACT: f64 = 1.2;
 /// How many heights are tried for the pass.
 const N_HEIGHTS: usize = 24;
-/// How much the last area counts beside the usual one.
-const LAST_WEIGHT: f64 = 0.5;
 
-/// What is known of the animal before a frame.
-pub struct Known {
-    /// The median of its last areas, pixels.
-    pub usual_area: f64,
-    /// Its last area, pixels.
-    pub last_area: f64,
-    /// Where its centroid should be.
-    pub place_px: [f64; 2],
-}
-
-impl Known {
-    /// How far an area is off what it should be: both the usual one, and the last, for what was one thing a moment ago is so
-    /// still.
-    fn off(&self, area: u64) -> f64 {
-        let from = |other: f64| libm::log(area as f64 / other).abs();
-        from(self.usual_area) + LAST_WEIGHT * from(self.last_area)
-    }
-}
-
-/// The part of a component that is the animal, where two summits show and its area is nearer to what it should be than
-/// the whole's; `None` where the component is one thing. `difference` is that of the component's box.
-pub fn part_of(component: &Component, difference: &Difference, known: &Known) -> Option<Component> {
-    let part = part_at(component, difference, known.usual_area, known.place_px)?;
-    (known.off(part.area) < known.off(component.area)).then_some(part)
-}
-
-/// The part that holds what is nearest `place_px`, whatever its area.
-fn part_at(
+/// The parts of a component that shows several summits of difference, each touching the rest along a short line only;
+/// none where the component is one thing. `difference` is that of the component's box.
+pub(super) fn parts_of(
     component: &Component,
     difference: &Difference,
     usual_area: f64,
-    place_px: [f64; 2],
-) -> Option<Component> {
+) -> Vec<Component> {
     let mask = component.mask(difference.rect);
     let heights = blurred(&mask, difference, (0.02 * usual_area.sqrt()) as usize);
-    let summits = summits(&mask, &heights, LEAST_SHARE * usual_area)?;
-    let off = |summit: &Component| {
-        let rect = summit.rect;
-        let x = f64::from(rect.x) + f64::from(rect.w) / 2.0;
-        let y = f64::from(rect.y) + f64::from(rect.h) / 2.0;
-        libm::hypot(x - place_px[0], y - place_px[1])
+    let Some(summits) = summits(&mask, &heights, LEAST_SHARE * usual_area) else {
+        return Vec::new();
     };
-    let mine = (0..summits.len()).min_by(|&a, &b| off(&summits[a]).total_cmp(&off(&summits[b])))?;
     let labels = flooded(&mask, &heights, &summits);
-    let part = Mask {
-        rect: mask.rect,
-        bits: labels
-            .into_iter()
-            .map(|label| u8::from(label == Some(mine)))
-            .collect(),
+    let part = |label: usize| {
+        let bits = labels.iter().map(|&l| u8::from(l == Some(label)));
+        let part = Mask {
+            rect: mask.rect,
+            bits: bits.collect(),
+        };
+        let is_apart = contact(&part, &mask) <= CONTACT;
+        let pieces = runs::components(&part).into_iter();
+        pieces
+            .reduce(|all, piece| all.joined(piece))
+            .filter(|_| is_apart)
     };
-    if contact(&part, &mask) > CONTACT {
-        return None;
-    }
-    runs::components(&part)
-        .into_iter()
-        .reduce(|all, part| all.joined(part))
+    (0..summits.len()).filter_map(part).collect()
 }
 
 /// Along how many sides of a square as large as the smaller a part of a mask touches the rest.
@@ -215,6 +182,15 @@ mod tests {
         ellipse(x, y, [45.0, 60.0], [25.0, 12.0])
     }
 
+    /// The part that holds the middle of the animal.
+    fn animals_part(both: &Component, difference: &Difference, usual_area: f64) -> Component {
+        let parts = parts_of(both, difference, usual_area);
+        let mut holding = parts
+            .into_iter()
+            .filter(|part| part.mask(part.rect).is_set(45, 58));
+        holding.next().expect("two things")
+    }
+
     #[test]
     fn a_fainter_mirror_image_that_touches_is_left_out() {
         let (both, difference) = scene(|x, y| {
@@ -230,7 +206,7 @@ mod tests {
         });
         let usual_area = std::f64::consts::PI * 25.0 * 12.0;
         assert!(both.area as f64 > 1.9 * usual_area);
-        let part = part_at(&both, &difference, usual_area, [45.0, 58.0]).expect("two things");
+        let part = animals_part(&both, &difference, usual_area);
         let share = part.area as f64 / usual_area;
         assert!((0.95..1.15).contains(&share) && part.rect.y > 38, "{share}");
     }
@@ -249,32 +225,8 @@ mod tests {
             }
         });
         let usual_area = std::f64::consts::PI * 25.0 * 12.0;
-        let part = part_at(&both, &difference, usual_area, [45.0, 58.0]).expect("two things");
+        let part = animals_part(&both, &difference, usual_area);
         assert!(part.rect.y > 8, "{:?}", part.rect);
-    }
-
-    #[test]
-    fn what_was_one_thing_a_moment_ago_is_so_still() {
-        let (both, difference) = scene(|x, y| {
-            let other = ellipse(x, y, [45.0, 38.0], [15.0, 6.0]);
-            let bridge = (42.0..48.0).contains(&x) && (42.0..50.0).contains(&y);
-            match animal(x, y) || other {
-                true => 180.0,
-                false => f64::from(u8::from(bridge)) * 40.0,
-            }
-        });
-        let alone = std::f64::consts::PI * 25.0 * 12.0;
-        let part = |last_area| {
-            let known = Known {
-                usual_area: 1.1 * alone,
-                last_area,
-                place_px: [45.0, 60.0],
-            };
-            part_of(&both, &difference, &known)
-        };
-        assert!(part(both.area as f64).is_none());
-        let share = part(alone).expect("something came near").area as f64 / alone;
-        assert!((0.95..1.1).contains(&share), "{share}");
     }
 
     #[test]
@@ -284,7 +236,7 @@ mod tests {
             true => 180.0,
             false => 0.0,
         });
-        assert!(part_at(&whole, &difference, 500.0, [30.0, 60.0]).is_none());
+        assert!(parts_of(&whole, &difference, 500.0).is_empty());
     }
 
     #[test]
@@ -300,6 +252,6 @@ mod tests {
                 f64::from(u8::from(fin)) * 60.0
             }
         });
-        assert!(part_at(&whole, &difference, 900.0, [45.0, 60.0]).is_none());
+        assert!(parts_of(&whole, &difference, 900.0).is_empty());
     }
 }

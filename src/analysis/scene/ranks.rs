@@ -33,16 +33,21 @@ impl Wanted {
 }
 
 /// For each pixel of a row the wanted value of the samples; 255 where none is free. `samples` are the same
-/// row of each sample, at most [`MOST`]; with `base` the values are their distances from it.
-pub(super) fn ranked(samples: &[&[u8]], base: Option<&[u8]>, wanted: &[Wanted], row: &mut [u8]) {
+/// row of each sample, at most [`MOST`]; with `bases`, one row a sample, the values are their distances from those.
+pub(super) fn ranked(
+    samples: &[&[u8]],
+    bases: Option<&[&[u8]]>,
+    wanted: &[Wanted],
+    row: &mut [u8],
+) {
     let mut values = [[0; LANES]; MOST];
     for start in (0..row.len()).step_by(LANES) {
         let n = LANES.min(row.len() - start);
         let values = &mut values[..samples.len()];
-        for (lanes, sample) in values.iter_mut().zip(samples) {
+        for (k, (lanes, sample)) in values.iter_mut().zip(samples).enumerate() {
             lanes[..n].copy_from_slice(&sample[start..start + n]);
-            if let Some(base) = base {
-                for (value, base) in lanes.iter_mut().zip(&base[start..start + n]) {
+            if let Some(bases) = bases {
+                for (value, base) in lanes.iter_mut().zip(&bases[k][start..start + n]) {
                     *value = value.abs_diff(*base);
                 }
             }
@@ -112,7 +117,8 @@ mod tests {
             }).collect();
             let mut row = vec![0; width];
             for base in [None, Some(base.as_slice())] {
-                ranked(&rows, base, &wanted, &mut row);
+                let bases: Option<Vec<&[u8]>> = base.map(|base| vec![base; n]);
+                ranked(&rows, bases.as_deref(), &wanted, &mut row);
                 for x in 0..width {
                     let mut free: Vec<u8> = (0..n)
                         .filter(|k| wanted[x].free >> k & 1 == 1)

@@ -7,20 +7,25 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::occupancy::Occupancy;
+use super::plate::SIGMA_FLOOR;
 use super::ranks::{self, MOST, Wanted};
-use super::{Occupancy, Plate, SIGMA_FLOOR};
-use crate::analysis::{Error, LEAST_FRAMES, light, silhouette};
-use crate::footage::FrameSource;
-use crate::geometry::Rect;
+use super::states;
+use super::thumbnail::Thumbnail;
+use crate::analysis::{Error, LEAST_FRAMES};
+use crate::footage::{FrameSource, spread_idx};
 use crate::progress::Progress;
 use crate::raster::Frame;
-use crate::raster::runs::Component;
 
 const LEAST: usize = 16;
 const BUDGET_BYTES: usize = 128 << 20;
 
 pub(super) struct Samples {
+    /// The frames.
     pub(super) frames: Vec<Frame>,
+    /// Which frames of the footage they are.
+    pub(super) frame_idx: Vec<usize>,
+    fps: f64,
 }
 
 impl Samples {
@@ -50,7 +55,31 @@ impl Samples {
                 least: LEAST_FRAMES,
             });
         }
-        Ok(Samples { frames })
+        let mut frame_idx = spread_idx(format.n_frames_hint, n_kept);
+        frame_idx.truncate(frames.len());
+        Ok(Samples {
+            frames,
+            frame_idx,
+            fps: format.fps,
+        })
+    }
+
+    /// The time of a sample, seconds from the first frame.
+    pub(super) fn time_s(&self, k: usize) -> f64 {
+        self.frame_idx[k] as f64 / self.fps
+    }
+
+    /// Changes the samples of `part`.
+    pub(super) fn change(&mut self, part: u64, change: impl Fn(&mut Frame) + Sync) {
+        let members = self.frames.par_iter_mut().enumerate();
+        members
+            .filter(|(k, _)| part >> k & 1 == 1)
+            .for_each(|(_, frame)| change(frame));
+    }
+
+    /// A thumbnail of every sample.
+    pub(super) fn thumbnails(&self) -> Vec<Thumbnail> {
+        self.frames.par_iter().map(Thumbnail::of).collect()
     }
 
     /// Pixels of a frame.
@@ -58,76 +87,64 @@ impl Samples {
         self.frames[0].width as usize * self.frames[0].height as usize
     }
 
-    /// A word with a bit for every sample.
-    pub(super) fn all_bits(&self) -> u64 {
-        u64::MAX >> (64 - self.frames.len())
+    /// The median of the samples of `part`, of every plane.
+    pub(super) fn median_frame(&self, part: u64) -> Frame {
+        self.each_row(part, None, |wanted, _, _| wanted.fill(Wanted::median(part)))
     }
 
-    /// Divides every sample's light by its gain over the plate, so that flicker is not noise.
-    pub(super) fn even_out_light(&mut self, plate: &Plate) {
-        self.frames.par_iter_mut().for_each(|frame| {
-            let gain = light::gain(frame, plate);
-            gain.undo(frame);
-        });
-    }
-
-    /// The components of every sample, whose light is even already.
-    pub(super) fn components(&self, plate: &Plate) -> Vec<Vec<Component>> {
-        let whole = Rect::of_size(plate.frame.width, plate.frame.height);
-        let of =
-            |frame: &Frame| silhouette::components(frame, plate, &light::Gain::ONE, [whole; 2]);
-        self.frames.par_iter().map(of).collect()
-    }
-
-    /// The median of every sample of every plane.
-    pub(super) fn median_frame(&self) -> Frame {
-        let all = self.all_bits();
-        self.each_row(None, |wanted, _, _| wanted.fill(Wanted::median(all)))
-    }
-
-    /// The median over the samples in which the pixel is free; where it is free in none, as before.
-    pub(super) fn median_where_free(&self, before: &Frame, seen: &Occupancy) -> Frame {
-        let all = self.all_bits();
-        let mut result = self.each_row(None, |wanted, plane, row| {
+    /// The median over the samples of `part` in which the pixel is free; where it is free in fewer than `least`, as
+    /// before.
+    pub(super) fn median_where_free(
+        &self,
+        part: u64,
+        before: &Frame,
+        seen: &Occupancy,
+        least: u32,
+    ) -> Frame {
+        let mut result = self.each_row(part, None, |wanted, plane, row| {
             for (x, wanted) in wanted.iter_mut().enumerate() {
-                *wanted = Wanted::median(self.free_at(plane, x, row, seen, all));
+                let free = self.free_at(plane, x, row, seen, part);
+                let enough = free.count_ones() >= least;
+                *wanted = Wanted::median(if enough { free } else { 0 });
             }
         });
-        for at in self.never_free(&result, seen) {
-            result.planes[at] = before.planes[at];
-        }
+        // Where nothing is wanted the row holds 255.
+        self.each_place(|at, plane, x, y| {
+            if result.planes[at] == 255
+                && self.free_at(plane, x, y, seen, part).count_ones() < least
+            {
+                result.planes[at] = before.planes[at];
+            }
+        });
         result
     }
 
-    /// The noise of each pixel over its free samples: 1.4826 times the median absolute deviation,
-    /// luma and chroma added as they add in RGB, at least the floor (ALGORITHMS.md 2.4). Where scenery
-    /// sways the values gather at two places and the median says nothing: there it is what a normal
-    /// distribution with the same 90th percentile would have.
-    pub(super) fn noise(&self, plate: &Frame, seen: &Occupancy) -> Vec<f32> {
-        let all = self.all_bits();
+    /// The noise of each pixel over its free samples in `part`, against each sample's own background: 1.4826 times the
+    /// median absolute deviation, luma and chroma added as they add in RGB, at least the floor (ALGORITHMS.md 2.4). Where
+    /// scenery sways the values gather at two places and the median says nothing: there it is what a normal distribution with
+    /// the same 90th percentile would have.
+    pub(super) fn noise(&self, part: u64, backgrounds: &[&Frame], seen: &Occupancy) -> Vec<f32> {
         let sways_anywhere = seen.scenery.contains(&true);
-        let mut deviation = self.each_row(Some(plate), |wanted, plane, row| {
+        let mut deviation = self.each_row(part, Some(backgrounds), |wanted, plane, row| {
             for (x, wanted) in wanted.iter_mut().enumerate() {
-                let free = self.free_at(plane, x, row, seen, all);
+                let free = self.free_at(plane, x, row, seen, part);
                 *wanted = Wanted::median(free);
                 if sways_anywhere && free != 0 && self.sways(plane, x, row, seen) {
                     wanted.rank = (free.count_ones() * 9 / 10) as u8;
                 }
             }
         });
-        for at in self.never_free(&deviation, seen) {
-            deviation.planes[at] = 0;
-        }
-        if sways_anywhere {
-            self.each_place(|at, plane, x, row| {
-                if self.sways(plane, x, row, seen) {
-                    let value = &mut deviation.planes[at];
-                    *value = (f32::from(*value) * 0.41).ceil() as u8;
-                }
-            });
-        }
+        self.each_place(|at, plane, x, y| {
+            let value = &mut deviation.planes[at];
+            if *value == 255 && self.free_at(plane, x, y, seen, part) == 0 {
+                *value = 0;
+            }
+            if sways_anywhere && self.sways(plane, x, y, seen) {
+                *value = (f32::from(*value) * 0.41).ceil() as u8;
+            }
+        });
         let (u, v) = deviation.chroma();
-        let (width, chroma_width) = (plate.width as usize, plate.chroma_width() as usize);
+        let (width, chroma_width) = (deviation.width as usize, deviation.chroma_width() as usize);
         let mut sigma = vec![0.0; self.n_px()];
         let rows = sigma
             .par_chunks_mut(width)
@@ -189,18 +206,6 @@ impl Samples {
         }
     }
 
-    /// The indices of the values that are free in no sample, where `ranked` holds 255.
-    fn never_free(&self, ranked: &Frame, seen: &Occupancy) -> Vec<usize> {
-        let all = self.all_bits();
-        let mut never = Vec::new();
-        self.each_place(|at, plane, x, y| {
-            if ranked.planes[at] == 255 && self.free_at(plane, x, y, seen, all) == 0 {
-                never.push(at);
-            }
-        });
-        never
-    }
-
     /// Kind, width and number of rows of each plane, in the order of the frame's bytes.
     fn planes(&self) -> [(Plane, usize, usize); 3] {
         let frame = &self.frames[0];
@@ -209,11 +214,12 @@ impl Samples {
         [(Plane::Luma, w, h), chroma, chroma]
     }
 
-    /// A frame each of whose values is of the wanted rank among the samples' values at the same place, or
-    /// among their distances from `base`. `want` fills in what is wanted of a row.
+    /// A frame each of whose values is of the wanted rank among the values of the samples of `part` at the same place, or
+    /// among their distances from `bases`, one for each sample. `want` fills in what is wanted of a row.
     fn each_row(
         &self,
-        base: Option<&Frame>,
+        part: u64,
+        bases: Option<&[&Frame]>,
         want: impl Fn(&mut [Wanted], Plane, usize) + Sync,
     ) -> Frame {
         let mut result = self.frames[0].clone();
@@ -228,19 +234,36 @@ impl Samples {
                     let mut wanted = vec![Wanted::default(); width];
                     want(&mut wanted, plane, y);
                     let bytes = first + y * width..first + (y + 1) * width;
-                    let samples: Vec<&[u8]> = self
-                        .frames
-                        .iter()
-                        .map(|f| &f.planes[bytes.clone()])
+                    for wanted in &mut wanted {
+                        wanted.free = packed(wanted.free, part);
+                    }
+                    let members = states::bits(part);
+                    let samples: Vec<&[u8]> = members
+                        .clone()
+                        .map(|k| &self.frames[k].planes[bytes.clone()])
                         .collect();
-                    let base = base.map(|base| &base.planes[bytes]);
-                    ranks::ranked(&samples, base, &wanted, row);
+                    let bases = bases.map(|bases| -> Vec<&[u8]> {
+                        members.map(|k| &bases[k].planes[bytes.clone()]).collect()
+                    });
+                    ranks::ranked(&samples, bases.as_deref(), &wanted, row);
                 });
             first += width * n_rows;
             rest = others;
         }
         result
     }
+}
+
+/// The bits of `free` at the set bits of `part`, packed together.
+fn packed(free: u64, part: u64) -> u64 {
+    if free == part {
+        return u64::MAX >> (64 - part.count_ones());
+    }
+    let at = |(to, from): (usize, usize)| (free >> from & 1) << to;
+    states::bits(part)
+        .enumerate()
+        .map(at)
+        .fold(0, |all, bit| all | bit)
 }
 
 /// Whether a value belongs to one pixel or to four.

@@ -1,0 +1,158 @@
+//! Which end is the head, as both ends look in all frames of a film.
+//!
+//! What tells the ends apart (`track::asymmetry`) is one direction in the space of its numbers, the same in every frame but
+//! for the sign: the first principal axis of all frames, not centered. It needs neither motion nor a first guess. Which of
+//! its two ways is the head's is told once for the film, by the way the animal moves.
+
+use super::Axes;
+use crate::analysis::track::Tracked;
+use crate::analysis::track::asymmetry::{Asymmetry, N_NUMBERS};
+
+/// The standard deviations of a silhouette along and across its axis must be in this ratio at least.
+const LONG: f64 = 1.25;
+/// Fewer frames do not tell what the ends look like.
+const LEAST_FRAMES: usize = 8;
+/// Rounds of power iteration.
+const N_ROUNDS: usize = 64;
+/// What a single frame may say, half the logarithm of the odds.
+const MOST: f64 = 4.0;
+/// Scores spread by at least this share of their mean: no film is without light that plays on the animal.
+const LEAST_SPREAD: f64 = 0.25;
+/// Speeds count up to this one, lengths a second.
+const MOST_SPEED: f64 = 1.0;
+/// The sum over spans of this many seconds says how sure the direction of motion is.
+const SPAN_S: f64 = 1.0;
+
+/// The length axis follows the axis of the moments; where it does not, the ends are not its own.
+const SAME_AXIS: f64 = 0.7;
+
+/// What the ends of the animal say of its head.
+pub(super) struct Ends {
+    /// For each frame half the logarithm of the odds that the head lies toward +axis.
+    pub(super) evidence: Vec<Option<f64>>,
+    /// The probability that the animal moves head first on the whole, .5..=1: that all of `evidence` has the right sign.
+    /// `None` where the ends tell nothing.
+    certainty: Option<f64>,
+}
+
+impl Ends {
+    /// Tells heads from tails. `speed` is the speed along +axis in each frame, lengths a second.
+    pub(super) fn tell(
+        track: &[Tracked],
+        axes: &[Option<Axes>],
+        speed: &[Option<f64>],
+        fps: f64,
+    ) -> Ends {
+        let seen: Vec<Option<&Asymmetry>> = track.iter().map(usable).collect();
+        let whole: Vec<&Asymmetry> = seen
+            .iter()
+            .zip(track)
+            .filter(|(_, tracked)| tracked.sighting.as_ref().is_some_and(|s| !s.cut))
+            .filter_map(|(seen, _)| *seen)
+            .collect();
+        if whole.len() < LEAST_FRAMES {
+            return Ends {
+                evidence: vec![None; track.len()],
+                certainty: None,
+            };
+        }
+        let principal = principal_axis(&whole);
+        let n = whole.len() as f64;
+        let mean = whole
+            .iter()
+            .map(|a| score(a, &principal).abs())
+            .sum::<f64>()
+            / n;
+        let square = whole
+            .iter()
+            .map(|a| score(a, &principal).powi(2))
+            .sum::<f64>()
+            / n;
+        let variance = (square - mean * mean)
+            .max((LEAST_SPREAD * mean).powi(2))
+            .max(1e-12);
+        let one = |k: usize| {
+            let major_rad = track[k].sighting.as_ref()?.moments.major_rad?;
+            let same = libm::cos(axes[k].as_ref()?.axis_rad? - major_rad);
+            let evidence = (mean * score(seen[k]?, &principal) / variance).clamp(-MOST, MOST);
+            (same.abs() > SAME_AXIS).then_some(same.signum() * evidence)
+        };
+        let mut evidence: Vec<Option<f64>> = (0..track.len()).map(one).collect();
+        let forward = forward(&evidence, speed, fps);
+        if forward < 0.0 {
+            evidence
+                .iter_mut()
+                .flatten()
+                .for_each(|evidence| *evidence = -*evidence);
+        }
+        Ends {
+            evidence,
+            // The logistic function of 1.7 t is the normal distribution's within .01.
+            certainty: Some(1.0 / (1.0 + libm::exp(-1.7 * forward.abs()))),
+        }
+    }
+
+    /// A probability that assumes the right sign of the evidence, without that assumption.
+    pub(super) fn tempered(&self, probability: f64) -> f64 {
+        let certainty = self.certainty.unwrap_or(1.0);
+        certainty * probability + (1.0 - certainty) * (1.0 - probability)
+    }
+}
+
+fn usable(tracked: &Tracked) -> Option<&Asymmetry> {
+    let sighting = tracked.sighting.as_ref()?;
+    let is_long = sighting.moments.eigenvalue_ratio >= LONG * LONG;
+    sighting.asymmetry.as_ref().filter(|_| is_long)
+}
+
+/// The unit vector along which the numbers of all frames are largest, whatever their signs.
+fn principal_axis(all: &[&Asymmetry]) -> [f64; N_NUMBERS] {
+    let largest = all.iter().max_by(|a, b| {
+        let square = |a: &Asymmetry| a.ends.iter().map(|v| v * v).sum::<f32>();
+        square(a).total_cmp(&square(b))
+    });
+    let mut axis = largest.map_or([0.0; N_NUMBERS], |a| a.ends.map(f64::from));
+    for _ in 0..N_ROUNDS {
+        let mut next = [0.0; N_NUMBERS];
+        for asymmetry in all {
+            let score = score(asymmetry, &axis);
+            for (sum, &number) in next.iter_mut().zip(&asymmetry.ends) {
+                *sum += score * f64::from(number);
+            }
+        }
+        let length = next.iter().map(|v| v * v).sum::<f64>().sqrt().max(1e-300);
+        axis = next.map(|v| v / length);
+    }
+    axis
+}
+
+fn score(asymmetry: &Asymmetry, axis: &[f64; N_NUMBERS]) -> f64 {
+    asymmetry
+        .ends
+        .iter()
+        .zip(axis)
+        .map(|(a, b)| f64::from(*a) * b)
+        .sum()
+}
+
+/// How surely the animal moves toward the end that the evidence names: the sum over spans of the mean speed that way, over
+/// its standard deviation if both ways were as likely.
+fn forward(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f64 {
+    let span = ((SPAN_S * fps).round() as usize).max(1);
+    let spans = evidence
+        .chunks(span)
+        .zip(speed_bl_s.chunks(span))
+        .map(|(evidence, speeds)| {
+            let along = |(evidence, speed): (&Option<f64>, &Option<f64>)| {
+                let sign = (evidence.as_ref()? / MOST).clamp(-1.0, 1.0);
+                Some(sign * speed.as_ref()?.clamp(-MOST_SPEED, MOST_SPEED))
+            };
+            evidence.iter().zip(speeds).filter_map(along).sum::<f64>() / span as f64
+        });
+    let (mut sum, mut square) = (0.0, 0.0);
+    for value in spans {
+        sum += value;
+        square += value * value;
+    }
+    sum / f64::sqrt(square).max(1e-9)
+}

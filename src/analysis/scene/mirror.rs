@@ -1,0 +1,113 @@
+//! The animal's own image in the water's surface, in a pane, or in a mirror: a second thing that moves just as the animal does,
+//! mirrored about a line. Two animals do not.
+
+use crate::analysis::subject::Look;
+use crate::order::median;
+
+/// Place and mirrored place agree to within this share of the animal's diagonal ...
+const AGREEMENT: f64 = 0.15;
+/// ... in this share of the samples that show both.
+const OFTEN: f64 = 0.8;
+/// Fewer samples do not tell.
+const LEAST_PAIRS: usize = 6;
+/// The animal moves by more than this share of its diagonal meanwhile: what rests agrees with anything.
+const MOVES: f64 = 0.5;
+
+/// A line along an axis of the picture, and on which side of it images lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mirror {
+    /// The coordinate that is mirrored: 0 for x, 1 for y.
+    axis: usize,
+    /// Where the line is, pixels.
+    line_px: f64,
+    /// Images have the smaller coordinate.
+    is_before: bool,
+}
+
+impl Mirror {
+    /// Whether a thing that lies here is an image.
+    pub fn is_image(&self, centroid_px: [f64; 2]) -> bool {
+        (centroid_px[self.axis] < self.line_px) == self.is_before
+    }
+
+    /// The mirror that explains pairs of things which samples show together; `None` where none does.
+    pub(super) fn of(pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
+        [1, 0]
+            .into_iter()
+            .find_map(|axis| Mirror::along(axis, pairs, diagonal_px))
+    }
+
+    fn along(axis: usize, pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
+        let tolerance_px = AGREEMENT * diagonal_px;
+        let sum = |[a, b]: &[&Look; 2]| a.centroid_px[axis] + b.centroid_px[axis];
+        let apart = |[a, b]: &[&Look; 2]| a.centroid_px[1 - axis] - b.centroid_px[1 - axis];
+        let usual = median(pairs.iter().map(sum))?;
+        let agrees = |pair: &&[&Look; 2]| {
+            (sum(pair) - usual).abs() < tolerance_px && apart(pair).abs() < tolerance_px
+        };
+        let agreeing: Vec<&[&Look; 2]> = pairs.iter().filter(agrees).collect();
+        let moved = |c: usize| {
+            let at = || agreeing.iter().map(|[a, _]| a.centroid_px[c]);
+            at().fold(f64::MIN, f64::max) - at().fold(f64::MAX, f64::min)
+        };
+        let enough = agreeing.len() >= LEAST_PAIRS
+            && agreeing.len() as f64 >= OFTEN * pairs.len() as f64
+            && moved(0).max(moved(1)) > MOVES * diagonal_px;
+        let line_px = usual / 2.0;
+        // An image is fainter than what it is the image of.
+        let fainter_before = |[a, b]: &&&[&Look; 2]| {
+            let a_is_before = a.centroid_px[axis] < b.centroid_px[axis];
+            (a.contrast < b.contrast) == a_is_before
+        };
+        let n_before = agreeing.iter().filter(fainter_before).count();
+        enough.then_some(Mirror {
+            axis,
+            line_px,
+            is_before: 2 * n_before > agreeing.len(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::subject::Color;
+    use crate::geometry::Rect;
+
+    fn look(centroid_px: [f64; 2], contrast: f64) -> Look {
+        Look {
+            area_px: 400.0,
+            color: Color::of(std::iter::empty()),
+            contrast,
+            box_px: Rect::of_size(40, 20),
+            centroid_px,
+            on_border: false,
+            is_shadow: false,
+            is_ghost: false,
+        }
+    }
+
+    fn found(other: impl Fn(f64, [f64; 2]) -> [f64; 2]) -> Option<Mirror> {
+        let animal = |k: f64| {
+            [
+                200.0 + 90.0 * libm::sin(k),
+                160.0 + 40.0 * libm::cos(1.7 * k),
+            ]
+        };
+        let looks: Vec<[Look; 2]> = (0..20)
+            .map(|k| {
+                let here = animal(f64::from(k));
+                [look(here, 40.0), look(other(f64::from(k), here), 28.0)]
+            })
+            .collect();
+        let pairs: Vec<[&Look; 2]> = looks.iter().map(|[a, b]| [a, b]).collect();
+        Mirror::of(&pairs, 45.0)
+    }
+
+    #[test]
+    fn an_image_in_the_surface_is_told_from_a_second_animal() {
+        let mirror = found(|_, [x, y]| [x + 1.0, 222.0 - y]).expect("it is an image");
+        assert!(mirror.is_image([100.0, 40.0]) && !mirror.is_image([100.0, 140.0]));
+        assert_eq!(found(|k, _| [200.0 + 90.0 * libm::cos(k), 60.0]), None);
+    }
+}

@@ -1,0 +1,98 @@
+//! Films that cannot become a library, told from the samples before any tracking (ALGORITHMS.md 2.9).
+
+use super::mirror::Mirror;
+use super::samples::Samples;
+use super::survey::Survey;
+use crate::analysis::params::Follow;
+use crate::analysis::subject::{FITS, LEAST_AREA_PX, Look, Subject};
+use crate::analysis::{Error, Params};
+use crate::geometry::Rect;
+
+/// Something must move in this share of the samples.
+const MOVING_SHARE: f64 = 0.05;
+/// Where more than this share of the picture differs ...
+const BUSY_AREA: f64 = 0.15;
+/// ... in more than this share of the samples, the scene moves. A second animal must be seen as often.
+const OFTEN: f64 = 0.3;
+/// An animal that covers more than this share of the picture leaves too little of the scene.
+const LARGE: f64 = 0.35;
+/// A second component of this share of the animal's area may be a second animal.
+const COMPARABLE: f64 = 0.5;
+
+/// What moves besides the animal and looks like it.
+pub(super) enum Company {
+    /// Nothing, or too seldom to matter.
+    None,
+    /// Its mirror image.
+    Image(Mirror),
+    /// Other animals.
+    Animals,
+}
+
+/// Judges a film by the survey of its samples. Returns the animal's company, where that is no reason to refuse.
+pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Result<Company, Error> {
+    let n_samples = survey.looks.len() as f64;
+    let n_px = samples.n_px() as f64;
+    let Some(subject) = &survey.subject else {
+        return Err(Error::NothingMoves);
+    };
+    let of_animal = |k: usize| survey.animal[k].map_or(0.0, |at| survey.looks[k][at].area_px);
+    let rest = |k: usize| survey.looks[k].iter().map(|l| l.area_px).sum::<f64>() - of_animal(k);
+    let busy: Vec<usize> = (0..survey.looks.len())
+        .filter(|&k| rest(k) > BUSY_AREA * n_px)
+        .collect();
+    if busy.len() as f64 > OFTEN * n_samples {
+        return Err(Error::BackgroundNotStatic {
+            at_s: samples.time_s(busy[0]),
+        });
+    }
+    let n_found = survey.animal.iter().flatten().count() as f64;
+    if n_found < MOVING_SHARE * n_samples {
+        return Err(Error::NothingMoves);
+    }
+    if subject.area_px() > LARGE * n_px {
+        return Err(Error::AnimalTooLarge {
+            share: subject.area_px() / n_px,
+        });
+    }
+    let pairs: Vec<[&Look; 2]> = (0..survey.looks.len())
+        .filter_map(|k| {
+            let (looks, at) = (&survey.looks[k], survey.animal[k]?);
+            Some([&looks[at], &looks[second(looks, at, subject)?]])
+        })
+        .collect();
+    if (pairs.len() as f64) <= OFTEN * n_samples {
+        return Ok(Company::None);
+    }
+    match Mirror::of(&pairs, subject.diagonal_px) {
+        Some(mirror) => Ok(Company::Image(mirror)),
+        None if params.follow == Follow::One => Err(Error::SeveralAnimals),
+        None => Ok(Company::Animals),
+    }
+}
+
+/// Another component that looks like the subject, of comparable area, farther from the animal than either is long.
+pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option<usize> {
+    let first = &looks[animal];
+    (0..looks.len()).find(|&at| {
+        let look = &looks[at];
+        at != animal
+            && !look.is_ghost
+            && look.area_px >= (COMPARABLE * first.area_px).max(LEAST_AREA_PX as f64)
+            && subject.cost(look) < FITS
+            && look.is_shadow == first.is_shadow
+            && gap_px(&look.box_px, &first.box_px)
+                > longest(&first.box_px).min(longest(&look.box_px))
+    })
+}
+
+fn longest(rect: &Rect) -> u32 {
+    rect.w.max(rect.h)
+}
+
+/// The distance between two boxes, the longer way of x and y; 0 where they meet.
+fn gap_px(a: &Rect, b: &Rect) -> u32 {
+    let apart =
+        |a0: u32, a1: u32, b0: u32, b1: u32| b0.saturating_sub(a1).max(a0.saturating_sub(b1));
+    apart(a.x, a.right(), b.x, b.right()).max(apart(a.y, a.bottom(), b.y, b.bottom()))
+}

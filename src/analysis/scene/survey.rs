@@ -1,0 +1,208 @@
+//! What differs from the plates in the samples: the components, their looks, and which of them is the animal.
+
+use rayon::prelude::*;
+
+use super::plate::Plate;
+use super::samples::Samples;
+use super::scenery;
+use crate::analysis::silhouette::{self, shadow, tether};
+use crate::analysis::subject::{Color, LEAST_AREA_PX, Look, Subject, touches_border};
+use crate::geometry::Rect;
+use crate::order;
+use crate::raster::runs::{Component, Run};
+use crate::raster::{Frame, RgbImage};
+
+use super::light::Light;
+
+/// Components looked at in a sample, the largest ones. More are noise.
+const MOST_COMPONENTS: usize = 24;
+
+/// A ghost does not move: it is seen just where it is in at least this many samples. A ghost that hangs together with the
+/// animal moves, and is neither.
+pub(super) const GHOST_SAMPLES: usize = 3;
+
+/// An animal is tethered that is led so in more than this share of the samples in which it is seen.
+const TETHERED: f64 = 0.5;
+
+/// The components of every sample; samples that belong to no plate have none.
+pub(super) struct Survey {
+    /// Components, the largest first.
+    pub(super) found: Vec<Vec<Component>>,
+    /// What they look like.
+    pub(super) looks: Vec<Vec<Look>>,
+    /// The animal as the samples show it.
+    pub(super) subject: Option<Subject>,
+    /// How well the subject explains the samples; 0 without one.
+    pub(super) worth: f64,
+    /// Something thin leads from the animal to the border and is a component of its own: half the width up to which
+    /// things are thin, pixels (`silhouette::tether`).
+    pub(super) tether_px: Option<u32>,
+    /// Which component of each sample is the animal.
+    pub(super) animal: Vec<Option<usize>>,
+}
+
+impl Survey {
+    /// Compares every sample with its plate. The light of the samples is even already.
+    pub(super) fn of(samples: &Samples, plates: &[Plate], plate_of: &[Option<usize>]) -> Survey {
+        let of_sample = |k: usize| {
+            let plate = plate_of[k].map(|at| &plates[at]);
+            plate.map_or(Vec::new(), |plate| {
+                silhouette::components(&samples.frames[k], plate, &Light::SAME)
+            })
+        };
+        let found: Vec<Vec<Component>> = (0..samples.frames.len())
+            .into_par_iter()
+            .map(of_sample)
+            .collect();
+        let whole = Survey::of_components(found.clone(), samples, plates, plate_of);
+        let Some(thin_px) = whole.thin_px(samples) else {
+            return whole;
+        };
+        let first = &samples.frames[0];
+        let cut = |components: Vec<Component>| {
+            let picture = [first.width, first.height];
+            let cut = |component| tether::cut_all(component, thin_px, picture);
+            components.into_iter().flat_map(cut).collect()
+        };
+        Survey {
+            tether_px: Some(thin_px),
+            ..Survey::of_components(
+                found.into_iter().map(cut).collect(),
+                samples,
+                plates,
+                plate_of,
+            )
+        }
+    }
+
+    fn of_components(
+        mut found: Vec<Vec<Component>>,
+        samples: &Samples,
+        plates: &[Plate],
+        plate_of: &[Option<usize>],
+    ) -> Survey {
+        for components in &mut found {
+            components.retain(|c| c.area >= LEAST_AREA_PX);
+            components.sort_by_key(|c| std::cmp::Reverse(c.area));
+            components.truncate(MOST_COMPONENTS);
+        }
+        let looks_of = |(k, components): (usize, &Vec<Component>)| {
+            let plate = plate_of[k].map(|at| &plates[at]);
+            let looks = components
+                .iter()
+                .filter_map(|c| Some(look(&samples.frames[k], plate?, c)));
+            looks.collect()
+        };
+        let mut looks: Vec<Vec<Look>> = found.par_iter().enumerate().map(looks_of).collect();
+        let subject = Subject::learn(&looks, None);
+        for (k, (looks, components)) in looks.iter_mut().zip(&found).enumerate() {
+            for (look, component) in looks.iter_mut().zip(components) {
+                look.is_ghost = look.is_ghost
+                    && scenery::recurs(&found, component, GHOST_SAMPLES)
+                    && plate_of[k]
+                        .zip(subject.as_ref())
+                        .is_some_and(|(at, subject)| {
+                            subject.prefers(&color_in(&plates[at].rgb, component), &look.color)
+                        });
+            }
+        }
+        let animal = match &subject {
+            Some(subject) => subject.choices(&looks),
+            None => vec![None; looks.len()],
+        };
+        Survey {
+            worth: subject
+                .as_ref()
+                .map_or(0.0, |subject| subject.worth(&looks)),
+            tether_px: None,
+            found,
+            looks,
+            subject,
+            animal,
+        }
+    }
+
+    /// Where something thin leads from the animal to the border in most samples, half the width up to which things are thin.
+    fn thin_px(&self, samples: &Samples) -> Option<u32> {
+        let first = &samples.frames[0];
+        let animals = self.animal.iter().enumerate();
+        let animals: Vec<&Component> = animals
+            .filter_map(|(k, at)| Some(&self.found[k][(*at)?]))
+            .collect();
+        let on_border = animals
+            .iter()
+            .filter(|animal| touches_border(animal.rect, [first.width, first.height]));
+        let thin_px =
+            order::median(on_border.map(|animal| f64::from(tether::thin_px(animal))))? as u32;
+        let picture = [first.width, first.height];
+        let leads = |animal: &&&Component| {
+            let parts = tether::cut(animal, thin_px, picture);
+            parts.is_some_and(|[_, tether]| touches_border(tether.rect, picture))
+        };
+        let n_led = animals.iter().filter(leads).count();
+        (n_led as f64 > TETHERED * animals.len() as f64).then_some(thin_px)
+    }
+
+    /// How much differs in half of the samples, pixels.
+    pub(super) fn differing_px(&self) -> f64 {
+        let of = |looks: &Vec<Look>| looks.iter().map(|look| look.area_px).sum::<f64>();
+        order::median(self.looks.iter().map(of)).unwrap_or(0.0)
+    }
+
+    /// Whether a component is scenery that sways.
+    pub(super) fn is_scenery(&self, k: usize, at: usize) -> bool {
+        scenery::is_scenery(&self.found, &self.animal, &self.found[k][at])
+    }
+
+    /// Area from which a component counts as something that moves, pixels.
+    pub(super) fn least_area_px(&self) -> u64 {
+        let of = |subject: &Subject| (0.3 * subject.area_px()) as u64;
+        self.subject.as_ref().map_or(0, of).max(LEAST_AREA_PX)
+    }
+}
+
+fn look(frame: &Frame, plate: &Plate, component: &Component) -> Look {
+    let difference = silhouette::difference(frame, plate, &Light::SAME, component.rect);
+    let picture = [frame.width, frame.height];
+    let look = Look::of(component, &difference.rgb, &difference.levels, picture);
+    Look {
+        is_shadow: shadow::is_shadow_alone(&difference, plate, component),
+        is_ghost: is_ghost(frame, plate, component),
+        ..look
+    }
+}
+
+/// The color of a picture inside a component.
+pub(super) fn color_in(picture: &RgbImage, component: &Component) -> Color {
+    let row = |run: &Run| {
+        let first = run.y as usize * picture.width as usize;
+        picture.pixels[3 * (first + run.x0 as usize)..3 * (first + run.x1 as usize)].chunks(3)
+    };
+    Color::of(component.runs.iter().flat_map(row))
+}
+
+/// Whether a component's outline lives in the plate rather than in the frame: the sum over the
+/// outline of |grad I| - |grad B| is negative (ALGORITHMS.md 2.2).
+fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
+    let (w, h) = (frame.width as usize, frame.height as usize);
+    let rect: Rect = component.rect.inflated(1, frame.width, frame.height);
+    let mask = component.mask(rect);
+    let inner = mask.eroded();
+    let gradient = |luma: &[u8], x: usize, y: usize| {
+        let at = |x: usize, y: usize| i32::from(luma[y * w + x]);
+        let dx = at((x + 1).min(w - 1), y) - at(x.saturating_sub(1), y);
+        let dy = at(x, (y + 1).min(h - 1)) - at(x, y.saturating_sub(1));
+        (dx.abs() + dy.abs()) as f32
+    };
+    let mut sum = 0.0;
+    for (k, (&set, &inside)) in mask.bits.iter().zip(&inner.bits).enumerate() {
+        if set == 1 && inside == 0 {
+            let (x, y) = (
+                rect.x as usize + k % mask.width(),
+                rect.y as usize + k / mask.width(),
+            );
+            sum += gradient(frame.luma(), x, y) - gradient(plate.frame.luma(), x, y);
+        }
+    }
+    sum < 0.0
+}

@@ -1,0 +1,182 @@
+//! A sample made small: cell means of luma and chroma, and how much of the picture differs between two of them
+//! beyond light.
+
+use crate::order;
+use crate::raster::Frame;
+
+/// Cells along the longer side of the picture, about.
+const ALONG: usize = 96;
+/// A cell differs when its luma is off by this many levels of 255 ...
+const LEVELS: f32 = 6.0;
+/// ... and this share of its luma besides, or a chroma channel by this many levels.
+const SHARE: f32 = 0.1;
+const CHROMA_LEVELS: f32 = 8.0;
+/// Darker cells say nothing about light, levels of 255.
+const DARK: f32 = 12.0;
+/// A picture whose cells all lie within this many levels of each other is blank.
+const FLAT: f32 = 6.0;
+/// Light that a camera still follows, as a factor either way.
+const MOST_GAIN: f32 = 4.0;
+
+/// Means of Y (less black), U and V (less 128) of square cells.
+#[derive(Clone, Debug)]
+pub(super) struct Thumbnail {
+    columns: usize,
+    cells: Vec<[f32; 3]>,
+}
+
+impl Thumbnail {
+    /// Side of a cell in a picture of this size, pixels; even.
+    pub(super) fn cell_px(width: u32, height: u32) -> usize {
+        let side = (width.max(height) as usize).div_ceil(ALONG);
+        (side + side % 2).max(4)
+    }
+
+    /// The thumbnail of a frame.
+    pub(super) fn of(frame: &Frame) -> Thumbnail {
+        let side = Thumbnail::cell_px(frame.width, frame.height);
+        let (w, h) = (frame.width as usize, frame.height as usize);
+        let (columns, rows) = (w.div_ceil(side), h.div_ceil(side));
+        let black = frame.color.black();
+        let (u, v) = frame.chroma();
+        let y = cell_means(frame.luma(), [w, h], side);
+        let chroma_size = [frame.chroma_width() as usize, h.div_ceil(2)];
+        let [u, v] = [u, v].map(|plane| cell_means(plane, chroma_size, side / 2));
+        let cell = |k: usize| [y[k] - black, u[k] - 128.0, v[k] - 128.0];
+        Thumbnail {
+            columns,
+            cells: (0..columns * rows).map(cell).collect(),
+        }
+    }
+
+    /// The cell-wise median of thumbnails of one size; at least one must be given.
+    pub(super) fn median<'a>(all: impl Iterator<Item = &'a Thumbnail>) -> Thumbnail {
+        let all: Vec<&Thumbnail> = all.collect();
+        let cell = |k: usize| {
+            [0, 1, 2].map(|c| {
+                let values = all.iter().map(|t| f64::from(t.cells[k][c]));
+                order::median(values).unwrap_or(0.0) as f32
+            })
+        };
+        Thumbnail {
+            columns: all[0].columns,
+            cells: (0..all[0].cells.len()).map(cell).collect(),
+        }
+    }
+
+    /// Number of cells.
+    pub(super) fn len(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// Whether nothing is to be seen: black, or without structure.
+    pub(super) fn is_blank(&self) -> bool {
+        let luma = || self.cells.iter().map(|cell| cell[0]);
+        let most = luma().fold(f32::MIN, f32::max);
+        let least = luma().fold(f32::MAX, f32::min);
+        most - least < FLAT
+    }
+
+    /// The share of cells that differ from another thumbnail's, once its light is fitted: 0..=1.
+    pub(super) fn mismatch(&self, other: &Thumbnail) -> f64 {
+        let fitted = self.in_light_of(other);
+        let differs = |(a, b): &(&[f32; 3], &[f32; 3])| cells_differ(a, b);
+        let n = fitted
+            .cells
+            .iter()
+            .zip(&other.cells)
+            .filter(differs)
+            .count();
+        n as f64 / self.cells.len() as f64
+    }
+
+    /// Whether cell `k` differs from the other thumbnail's, without any fit.
+    pub(super) fn differs_at(&self, other: &Thumbnail, k: usize) -> bool {
+        cells_differ(&self.cells[k], &other.cells[k])
+    }
+
+    /// Correlation of the luma of two thumbnails, -1..=1; 0 where one is flat.
+    pub(super) fn correlation(&self, other: &Thumbnail) -> f64 {
+        let n = self.cells.len() as f64;
+        let mean = |t: &Thumbnail| t.cells.iter().map(|c| f64::from(c[0])).sum::<f64>() / n;
+        let (a, b) = (mean(self), mean(other));
+        let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+        for (p, q) in self.cells.iter().zip(&other.cells) {
+            let (p, q) = (f64::from(p[0]) - a, f64::from(q[0]) - b);
+            ab += p * q;
+            aa += p * p;
+            bb += q * q;
+        }
+        match aa * bb > 0.0 {
+            true => ab / (aa * bb).sqrt(),
+            false => 0.0,
+        }
+    }
+
+    /// The cells in the light of another thumbnail: divided by a gain, then by factors of rows and of columns, and with
+    /// chroma shifted by its median offset.
+    fn in_light_of(&self, other: &Thumbnail) -> Thumbnail {
+        let mut result = self.clone();
+        let n_rows = self.cells.len() / self.columns;
+        result.divide(0..self.cells.len(), other);
+        for row in 0..n_rows {
+            result.divide(row * self.columns..(row + 1) * self.columns, other);
+        }
+        for column in 0..self.columns {
+            let along = (0..n_rows).map(|row| row * self.columns + column);
+            result.divide(along, other);
+        }
+        for c in 1..3 {
+            let off = |(a, b): (&[f32; 3], &[f32; 3])| f64::from(a[c] - b[c]);
+            let off = order::median(result.cells.iter().zip(&other.cells).map(off));
+            for cell in &mut result.cells {
+                cell[c] -= off.unwrap_or(0.0) as f32;
+            }
+        }
+        result
+    }
+
+    /// Divides the luma of some cells by its median ratio to the other's; the animal is less than half of them.
+    fn divide(&mut self, cells: impl Iterator<Item = usize> + Clone, other: &Thumbnail) {
+        let ratio = |k: usize| {
+            let (a, b) = (self.cells[k][0], other.cells[k][0]);
+            (a > DARK && b > DARK).then(|| f64::from(a / b))
+        };
+        let n_cells = cells.clone().count();
+        let mut ratios: Vec<f64> = cells.clone().filter_map(ratio).collect();
+        // A few bright cells on black are the animal.
+        if 3 * ratios.len() < n_cells {
+            return;
+        }
+        let gain = order::percentile(&mut ratios, 0.5).unwrap_or(1.0) as f32;
+        let gain = gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
+        for k in cells {
+            self.cells[k][0] /= gain;
+        }
+    }
+}
+
+fn cells_differ(a: &[f32; 3], b: &[f32; 3]) -> bool {
+    let luma = (a[0] - b[0]).abs() > LEVELS + SHARE * b[0].max(0.0);
+    luma || (1..3).any(|c| (a[c] - b[c]).abs() > CHROMA_LEVELS)
+}
+
+/// The means of square cells of a plane; the last ones of a row or column may be smaller.
+fn cell_means(plane: &[u8], [w, h]: [usize; 2], side: usize) -> Vec<f32> {
+    let (columns, rows) = (w.div_ceil(side), h.div_ceil(side));
+    let mut means = Vec::with_capacity(columns * rows);
+    for row in 0..rows {
+        let lines = row * side..((row + 1) * side).min(h);
+        let mut sums = vec![0u32; columns];
+        for line in lines.clone() {
+            let line = &plane[line * w..(line + 1) * w];
+            for (sum, cell) in sums.iter_mut().zip(line.chunks(side)) {
+                *sum += cell.iter().map(|&v| u32::from(v)).sum::<u32>();
+            }
+        }
+        let n_in = |column: usize| (side.min(w - column * side) * lines.len()) as f32;
+        let of = |(column, sum): (usize, u32)| sum as f32 / n_in(column);
+        means.extend(sums.into_iter().enumerate().map(of));
+    }
+    means
+}

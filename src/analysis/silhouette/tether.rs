@@ -1,0 +1,121 @@
+//! A cable, a leash, a thread: something thin that leads from the animal to the border of the picture.
+
+use crate::analysis::subject::touches_border;
+use crate::raster::Mask;
+use crate::raster::runs::{self, Component};
+
+/// What is thinner than this share of the animal's greatest width is thin.
+const THIN: f64 = 0.45;
+/// A tail is not longer than this many times half the width that is thin.
+const LONG: f64 = 6.0;
+/// The blurred rim of a thing that is not thin, pixels.
+const RIM_PX: u32 = 2;
+
+/// Half the width below which a part of a component is thin, pixels: a share of the component's own greatest.
+pub fn thin_px(component: &Component) -> u32 {
+    let mut mask = component.mask(component.rect);
+    mask.fill_holes();
+    let half_width = mask.depth_px().into_iter().max().unwrap_or(0);
+    (THIN * f64::from(half_width)) as u32
+}
+
+/// A component without what is thin and leads to the border of a picture of the given size, or far enough that it would do
+/// so if the background did not show the rest of it; and that. `None` where nothing does.
+pub fn cut(component: &Component, thin_px: u32, picture: [u32; 2]) -> Option<[Component; 2]> {
+    if thin_px == 0 {
+        return None;
+    }
+    let mask = component.mask(component.rect);
+    let mut filled = mask.clone();
+    filled.fill_holes();
+    let depth = filled.depth_px();
+    let part = |bits: Vec<u8>| Mask {
+        rect: mask.rect,
+        bits,
+    };
+    let thick = part(
+        depth
+            .iter()
+            .map(|&depth| u8::from(depth > thin_px))
+            .collect(),
+    );
+    let thick = thick.dilated_by(thin_px + RIM_PX);
+    let rest = part(
+        mask.bits
+            .iter()
+            .zip(&thick.bits)
+            .map(|(set, thick)| set & (1 - thick))
+            .collect(),
+    );
+    let tether = runs::components(&rest)
+        .into_iter()
+        .filter(|part| touches_border(part.rect, picture) || is_long(part, thin_px))
+        .max_by_key(|component| component.area)?;
+    let led_away = tether.mask(mask.rect);
+    let left = part(
+        mask.bits
+            .iter()
+            .zip(&led_away.bits)
+            .map(|(set, led)| set & (1 - led))
+            .collect(),
+    );
+    let animal = runs::components(&left)
+        .into_iter()
+        .max_by_key(|component| component.area)?;
+    Some([animal, tether])
+}
+
+fn is_long(part: &Component, thin_px: u32) -> bool {
+    let diagonal_px = libm::hypot(f64::from(part.rect.w), f64::from(part.rect.h));
+    diagonal_px > LONG * f64::from(thin_px)
+}
+
+/// The same as components: the animal and its tether, or the whole.
+pub fn cut_all(component: Component, thin_px: u32, picture: [u32; 2]) -> Vec<Component> {
+    match cut(&component, thin_px, picture) {
+        Some(parts) => parts.into(),
+        None => vec![component],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rect;
+
+    fn component(set: impl Fn(f64, f64) -> bool) -> Component {
+        let rect = Rect::of_size(120, 90);
+        let at = |k: u32| u8::from(set(f64::from(k % 120) + 0.5, f64::from(k / 120) + 0.5));
+        let mask = Mask {
+            rect,
+            bits: (0..120 * 90).map(at).collect(),
+        };
+        runs::components(&mask).remove(0)
+    }
+
+    fn animal(x: f64, y: f64) -> bool {
+        let tail = (84.0..96.0).contains(&x) && (y - 60.0).abs() < 2.0;
+        ((x - 60.0) / 26.0).powi(2) + ((y - 60.0) / 13.0).powi(2) < 1.0 || tail
+    }
+
+    #[test]
+    fn a_cable_to_the_border_is_cut_off_and_a_tail_is_not() {
+        let cable = |x: f64, y: f64| y < 60.0 && (x - 40.0 - y / 3.0).abs() < 1.7;
+        let both = component(|x, y| animal(x, y) || cable(x, y));
+        let [cut_off, tether] = cut(&both, thin_px(&both), [120, 90]).expect("there is a cable");
+        let alone = component(animal).area as f64;
+        assert!(
+            (cut_off.area as f64 / alone - 1.0).abs() < 0.05,
+            "{}",
+            cut_off.area
+        );
+        assert_eq!(tether.rect.y, 0);
+        assert_eq!(cut(&component(animal), 5, [120, 90]), None);
+    }
+
+    #[test]
+    fn an_animal_at_the_border_is_left_whole() {
+        let low = component(|x, y| animal(x, y - 25.0));
+        assert_eq!(cut(&low, thin_px(&low), [120, 90]), None);
+    }
+}

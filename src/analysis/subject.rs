@@ -1,0 +1,291 @@
+//! Which thing is the animal: its size and color, learned from frames of the whole film.
+//!
+//! Every component of every sample is described by its [`Look`]. The [`Subject`] is the look that explains the most
+//! samples as one body, seen once in each, that moves about, stands out and does not come in across the border. A hand
+//! that lets the animal go, an arm, a plant, a shadow or a mirror image explains fewer samples, or stays at its
+//! place. Afterwards the subject scores every candidate of every frame.
+
+use crate::geometry::Rect;
+use crate::order;
+use crate::raster::RgbImage;
+use crate::raster::runs::Component;
+
+/// Bins of a color channel.
+const N_BINS: usize = 16;
+/// Pixels of a component that are looked at, at most.
+const MOST_PX: u64 = 2048;
+/// Spread of the color of one animal from frame to frame, levels of 255: its sides, its shade.
+const COLOR_SPREAD: f64 = 14.0;
+/// Spread of the logarithm of its area: turned toward the camera a fish covers a third.
+const AREA_SPREAD: f64 = 0.45;
+/// How much a small area counts against what the border of the picture cuts.
+const CUT_WEIGHT: f64 = 0.15;
+/// A look within this cost of the subject's is taken for it (two standard deviations).
+pub const FITS: f64 = 4.0;
+/// Components of each sample that are tried as the subject.
+const SEEDS_EACH: usize = 3;
+/// Components smaller than this are noise, pixels.
+pub const LEAST_AREA_PX: u64 = 12;
+
+/// Cumulative histograms of R, G and B, each from 0 to 1.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Color([[f32; N_BINS]; 3]);
+
+impl Color {
+    /// The color of the pixels that `pixels` gives.
+    pub fn of<'a>(pixels: impl Iterator<Item = &'a [u8]>) -> Color {
+        let mut counts = [[0.0f32; N_BINS]; 3];
+        let mut n = 0.0;
+        for rgb in pixels {
+            n += 1.0;
+            for (counts, &value) in counts.iter_mut().zip(rgb) {
+                // A value counts for the two bins around it, so that a level more moves little.
+                let at = f32::from(value) * (N_BINS - 1) as f32 / 255.0;
+                let low = at as usize;
+                counts[low] += 1.0 - (at - low as f32);
+                counts[(low + 1).min(N_BINS - 1)] += at - low as f32;
+            }
+        }
+        for counts in &mut counts {
+            let mut below = 0.0;
+            for count in counts {
+                below += *count / f32::max(n, 1.0);
+                *count = below;
+            }
+        }
+        Color(counts)
+    }
+
+    /// How far one color is from another, levels of 255: the earth mover's distance, the mean over the channels.
+    pub fn distance(&self, other: &Color) -> f64 {
+        let of = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| f64::from((a - b).abs()))
+                .sum::<f64>()
+        };
+        let sum: f64 = self.0.iter().zip(&other.0).map(of).sum();
+        sum * 255.0 / (N_BINS - 1) as f64 / 3.0
+    }
+
+    fn mean<'a>(all: impl Iterator<Item = &'a Color>) -> Color {
+        let mut sum = [[0.0; N_BINS]; 3];
+        let mut n = 0.0;
+        for color in all {
+            n += 1.0;
+            for (sum, values) in sum.iter_mut().flatten().zip(color.0.iter().flatten()) {
+                *sum += values;
+            }
+        }
+        Color(sum.map(|bins| bins.map(|value| value / f32::max(n, 1.0))))
+    }
+}
+
+/// What a component looks like.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// Pixels.
+    pub area_px: f64,
+    /// Its colors, in the light of the plate.
+    pub color: Color,
+    /// Mean difference from the plate, levels of 255.
+    pub contrast: f64,
+    /// Bounding box.
+    pub box_px: Rect,
+    /// Middle of its pixels.
+    pub centroid_px: [f64; 2],
+    /// Touches the border of the picture.
+    pub on_border: bool,
+    /// Looks like the plate, only darker.
+    pub is_shadow: bool,
+    /// The plate shows the thing, the frame does not.
+    pub is_ghost: bool,
+}
+
+impl Look {
+    /// The look of a component. `rgb` and `levels` (differences from the plate) are of the component's own box.
+    pub fn of(component: &Component, rgb: &RgbImage, levels: &[u8], picture: [u32; 2]) -> Look {
+        let rect = component.rect;
+        let step = component.area.div_ceil(MOST_PX).max(1) as usize;
+        let indices = || {
+            let of = move |run: &crate::raster::runs::Run| {
+                let row = (run.y - rect.y) as usize * rect.w as usize;
+                (run.x0 - rect.x) as usize + row..(run.x1 - rect.x) as usize + row
+            };
+            component.runs.iter().flat_map(of).step_by(step)
+        };
+        let n = indices().count().max(1) as f64;
+        Look {
+            area_px: component.area as f64,
+            color: Color::of(indices().map(|k| &rgb.pixels[3 * k..3 * k + 3])),
+            contrast: indices().map(|k| f64::from(levels[k])).sum::<f64>() / n,
+            box_px: rect,
+            centroid_px: component.centroid_px(),
+            on_border: touches_border(rect, picture),
+            is_shadow: false,
+            is_ghost: false,
+        }
+    }
+
+    fn may_be_animal(&self) -> bool {
+        !self.is_ghost && self.area_px >= LEAST_AREA_PX as f64
+    }
+
+    fn diagonal_px(&self) -> f64 {
+        libm::hypot(f64::from(self.box_px.w), f64::from(self.box_px.h))
+    }
+}
+
+/// Whether a box touches the border of a picture of the given size.
+pub fn touches_border(rect: Rect, [width, height]: [u32; 2]) -> bool {
+    rect.x == 0 || rect.y == 0 || rect.right() == width || rect.bottom() == height
+}
+
+/// The animal as the whole film shows it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Subject {
+    /// Its usual color.
+    color: Color,
+    /// 5th percentile, median and 95th percentile of its area, pixels.
+    areas_px: [f64; 3],
+    /// Median diagonal of its box, pixels.
+    pub diagonal_px: f64,
+    /// Median contrast, levels of 255.
+    pub contrast: f64,
+}
+
+impl Subject {
+    /// Learns the subject from the looks of samples; `None` when there are none. `at` is a sample and the component of it that
+    /// is known to be the animal.
+    pub fn learn(samples: &[Vec<Look>], at: Option<(usize, usize)>) -> Option<Subject> {
+        let seed = match at {
+            Some((sample, component)) => Subject::like(&samples[sample][component]),
+            None => best_seed(samples)?,
+        };
+        let mut subject = seed;
+        for _ in 0..2 {
+            subject = subject.refined(samples);
+        }
+        Some(subject)
+    }
+
+    /// The subject of a single look.
+    fn like(look: &Look) -> Subject {
+        Subject {
+            color: look.color.clone(),
+            areas_px: [look.area_px; 3],
+            diagonal_px: look.diagonal_px(),
+            contrast: look.contrast,
+        }
+    }
+
+    /// Median area, pixels.
+    pub fn area_px(&self) -> f64 {
+        self.areas_px[1]
+    }
+
+    /// Whether one color is more like the subject's than another.
+    pub fn prefers(&self, color: &Color, other: &Color) -> bool {
+        self.color.distance(color) < self.color.distance(other)
+    }
+
+    /// How unlike the subject a look is: 0 for just as usual, 1 for one standard deviation of area or color.
+    pub fn cost(&self, look: &Look) -> f64 {
+        let color = self.color.distance(&look.color) / COLOR_SPREAD;
+        let area = self.area_cost(look.area_px);
+        // What the border cuts may be any part of the animal.
+        let is_part = look.on_border && look.area_px < self.area_px();
+        (if is_part { CUT_WEIGHT * area } else { area }) + color * color
+    }
+
+    /// The share of the cost that is for the area alone.
+    pub fn area_cost(&self, area_px: f64) -> f64 {
+        let [low, _, high] = self.areas_px;
+        let off = libm::log(area_px / area_px.clamp(low, high)) / AREA_SPREAD;
+        off * off
+    }
+
+    /// For each sample the component that is most like the subject and fits.
+    pub fn choices(&self, samples: &[Vec<Look>]) -> Vec<Option<usize>> {
+        samples.iter().map(|looks| self.choice(looks)).collect()
+    }
+
+    fn choice(&self, looks: &[Look]) -> Option<usize> {
+        let real = (0..looks.len()).filter(|&k| looks[k].may_be_animal());
+        let best = real
+            .map(|k| (k, self.cost(&looks[k])))
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        best.filter(|(_, cost)| *cost < FITS).map(|(k, _)| k)
+    }
+
+    /// The subject as its choices among the samples show it.
+    fn refined(&self, samples: &[Vec<Look>]) -> Subject {
+        let members = self.members(samples);
+        if members.is_empty() {
+            return self.clone();
+        }
+        let mut areas: Vec<f64> = members.iter().map(|look| look.area_px).collect();
+        let at = [0.05, 0.5, 0.95].map(|share| order::percentile(&mut areas, share).unwrap_or(0.0));
+        let median =
+            |of: &dyn Fn(&Look) -> f64| order::median(members.iter().map(|l| of(l))).unwrap_or(0.0);
+        Subject {
+            color: Color::mean(members.iter().map(|look| &look.color)),
+            areas_px: at,
+            diagonal_px: median(&|look| look.diagonal_px()),
+            contrast: median(&|look| look.contrast),
+        }
+    }
+
+    fn members<'a>(&self, samples: &'a [Vec<Look>]) -> Vec<&'a Look> {
+        let chosen = samples.iter().zip(self.choices(samples));
+        chosen.filter_map(|(looks, k)| Some(&looks[k?])).collect()
+    }
+
+    /// How well the subject explains the samples: more for each sample that shows it, for size, contrast and going places; less
+    /// for what comes in across the border or is a shadow.
+    pub fn worth(&self, samples: &[Vec<Look>]) -> f64 {
+        let members = self.members(samples);
+        let n = members.len() as f64;
+        if members.is_empty() {
+            return 0.0;
+        }
+        let support: f64 = members
+            .iter()
+            .map(|look| libm::exp(-0.5 * self.cost(look)))
+            .sum();
+        let side = self.diagonal_px.max(4.0);
+        let mut places: Vec<[i64; 2]> = members
+            .iter()
+            .map(|look| look.centroid_px.map(|c| (c / side).floor() as i64))
+            .collect();
+        places.sort_unstable();
+        places.dedup();
+        let roams = (places.len() as f64 / n.clamp(1.0, 4.0)).min(1.0);
+        let share = |holds: &dyn Fn(&Look) -> bool| {
+            members.iter().filter(|look| holds(look)).count() as f64 / n
+        };
+        let inside = 1.0 - 0.7 * share(&|look| look.on_border);
+        let solid = 1.0 - 0.8 * share(&|look| look.is_shadow);
+        support * roams * inside * solid * self.area_px().sqrt() * self.contrast.max(1.0)
+    }
+}
+
+/// The look that explains the samples best as the subject's. The largest of each sample are tried.
+fn best_seed(samples: &[Vec<Look>]) -> Option<Subject> {
+    let largest = |looks: &'_ Vec<Look>| {
+        let mut real: Vec<usize> = (0..looks.len())
+            .filter(|&k| looks[k].may_be_animal())
+            .collect();
+        real.sort_by(|&a, &b| looks[b].area_px.total_cmp(&looks[a].area_px));
+        real.truncate(SEEDS_EACH);
+        real
+    };
+    let seeds = samples
+        .iter()
+        .flat_map(|looks| largest(looks).into_iter().map(|k| &looks[k]));
+    let with_worth = seeds
+        .map(Subject::like)
+        .map(|subject| (subject.worth(samples), subject));
+    let best = with_worth.max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, subject)| subject)
+}

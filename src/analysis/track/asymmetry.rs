@@ -1,0 +1,87 @@
+//! How the two ends of an animal differ, and its upper from its lower side.
+//!
+//! The length of the animal is cut into bins. What each holds (mass, and how its color differs from the mean of the animal), less
+//! what the bin at the same distance from the other end holds, changes its sign with the direction of the head and
+//! nothing else; so all frames of a film together tell heads from tails (`pose::ends`), whichever way the animal moved.
+
+use super::super::moments::Moments;
+use crate::geometry::Rect;
+use crate::raster::RgbaImage;
+
+/// Bins from the middle to one end.
+const N_BINS: usize = 6;
+/// Standard deviations from the middle to the end of the last bin.
+const REACH: f64 = 2.5;
+/// Levels of color that count as much as all of the mass.
+const COLOR_LEVELS: f64 = 60.0;
+/// Numbers that tell the ends apart: mass, R, G and B of each bin.
+pub const N_NUMBERS: usize = 4 * N_BINS;
+
+/// What tells the ends and the sides of an animal apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Asymmetry {
+    /// Each bin toward +axis less the bin toward -axis, from the middle outward; the axis of the moments.
+    pub ends: [f32; N_NUMBERS],
+    /// Correlation of brightness with the place across the axis, positive where what lies lower in the picture is
+    /// brighter, -1..=1.
+    pub shade: f64,
+}
+
+impl Asymmetry {
+    /// The asymmetry of a matte that lies at `rect`; `None` where it has no axis.
+    pub fn of(rect: Rect, matte: &RgbaImage, moments: &Moments) -> Option<Asymmetry> {
+        let axis = moments.major_rad?;
+        let (c, s) = (libm::cos(axis), libm::sin(axis));
+        let [xx, xy, yy] = moments.covariance_px2;
+        let along_px = (c * c * xx + 2.0 * c * s * xy + s * s * yy).sqrt();
+        let pixels = || {
+            let seen = matte.pixels.as_chunks::<4>().0.iter().enumerate();
+            seen.filter(|(_, rgba)| rgba[3] > 0).map(|(k, rgba)| {
+                let dx = f64::from(rect.x + k as u32 % rect.w) + 0.5 - moments.centroid_px[0];
+                let dy = f64::from(rect.y + k as u32 / rect.w) + 0.5 - moments.centroid_px[1];
+                let color = [0, 1, 2].map(|channel| f64::from(rgba[channel]));
+                (
+                    f64::from(rgba[3]) / 255.0,
+                    dx * c + dy * s,
+                    dy * c - dx * s,
+                    color,
+                )
+            })
+        };
+        let mut mean = [0.0; 3];
+        for (weight, _, _, color) in pixels() {
+            (0..3).for_each(|channel| mean[channel] += weight * color[channel] / moments.area_px);
+        }
+        let mut ends = [0.0; N_NUMBERS];
+        let [mut square, mut across, mut both] = [0.0; 3];
+        for (weight, u, v, color) in pixels() {
+            let off = [0, 1, 2].map(|channel| color[channel] - mean[channel]);
+            let luma = 0.3 * off[0] + 0.59 * off[1] + 0.11 * off[2];
+            square += weight * luma * luma;
+            across += weight * v * v;
+            both += weight * luma * v;
+            let numbers = [1.0, off[0], off[1], off[2]];
+            add(&mut ends, weight * u.signum(), u.abs() / along_px, numbers);
+        }
+        let share = N_BINS as f64 / moments.area_px;
+        Some(Asymmetry {
+            ends: ends.map(|number| (share * number) as f32),
+            shade: both / (square * across).sqrt().max(1e-9),
+        })
+    }
+}
+
+/// Adds a pixel to the two bins around its place, `at` standard deviations from the middle.
+fn add(ends: &mut [f64; N_NUMBERS], weight: f64, at: f64, numbers: [f64; 4]) {
+    let at = (at / REACH * N_BINS as f64).min(N_BINS as f64 - 0.5) - 0.5;
+    let low = at.floor();
+    for (bin, share) in [(low, 1.0 - (at - low)), (low + 1.0, at - low)] {
+        if bin < 0.0 || bin >= N_BINS as f64 {
+            continue;
+        }
+        for (channel, number) in numbers.into_iter().enumerate() {
+            let unit = if channel == 0 { 1.0 } else { COLOR_LEVELS };
+            ends[4 * bin as usize + channel] += weight * share * number / unit;
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The body of an animal without what is thin: tail, legs, antennae, fins.
+//!
+//! The silhouette is opened by a share of its own greatest half width. A tail that is carried to one side turns the axis of
+//! all moments with it, always to that side; the axis of the body stays.
+
+use crate::raster::Mask;
+use crate::raster::runs;
+
+/// What is thinner than this share of the greatest width is no body. Labelled mice and flies are nearest to their body axis
+/// between .3 and .6; above .3 a slender fish loses its own tail.
+const THIN: f64 = 0.3;
+
+/// The largest part of a silhouette that is left when what is thin has gone; empty for an empty one.
+pub(super) fn of(silhouette: &Mask) -> Mask {
+    let depth = silhouette.depth_px();
+    let half_width = depth.iter().copied().max().unwrap_or(0);
+    let thin = (THIN * f64::from(half_width)) as u32;
+    let deep = Mask {
+        rect: silhouette.rect,
+        bits: depth.iter().map(|&depth| u8::from(depth > thin)).collect(),
+    };
+    let largest = runs::components(&deep)
+        .into_iter()
+        .max_by_key(|component| component.area);
+    let Some(core) = largest else {
+        return silhouette.clone();
+    };
+    let near = core.mask(silhouette.rect).dilated_by(thin);
+    let bits = near
+        .bits
+        .iter()
+        .zip(&silhouette.bits)
+        .map(|(near, set)| near & set)
+        .collect();
+    Mask {
+        rect: silhouette.rect,
+        bits,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rect;
+
+    #[test]
+    fn a_tail_is_no_body() {
+        let rect = Rect::of_size(80, 40);
+        let body = |x: f64, y: f64| ((x - 25.0) / 18.0).powi(2) + ((y - 20.0) / 9.0).powi(2) < 1.0;
+        let tail = |x: f64, y: f64| (40.0..76.0).contains(&x) && (y - 22.0).abs() < 1.6;
+        let bits = |set: &dyn Fn(f64, f64) -> bool| {
+            let at = |k: u32| set(f64::from(k % 80) + 0.5, f64::from(k / 80) + 0.5);
+            (0..80 * 40).map(|k| u8::from(at(k))).collect()
+        };
+        let whole = Mask {
+            rect,
+            bits: bits(&|x, y| body(x, y) || tail(x, y)),
+        };
+        let alone = Mask {
+            rect,
+            bits: bits(&body),
+        };
+        let found = of(&whole);
+        assert!(found.area() as f64 > 0.95 * alone.area() as f64);
+        assert!(found.area() as f64 <= 1.02 * alone.area() as f64);
+    }
+}
