@@ -6,8 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
-use crate::geometry::Rect;
-use crate::library::{Jump, Library, LibraryStats, Mover, MoverKind, Patch, Playback, Transition};
+use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Transition};
+
+mod mover;
+
+use mover::MoverFile;
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/library@1";
@@ -261,62 +264,6 @@ struct StatsFile {
 #[derive(Serialize, Deserialize)]
 struct BackgroundStats {
     never_seen_px: u64,
-}
-
-#[derive(Serialize, Deserialize)]
-struct MoverFile {
-    kind: MoverName,
-    from_s: f64,
-    to_s: f64,
-    box_px: [u32; 4],
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum MoverName {
-    Animal,
-    MirrorImage,
-    FromBorder,
-    InPlace,
-    Other,
-}
-
-impl MoverFile {
-    fn of(mover: &Mover) -> MoverFile {
-        MoverFile {
-            kind: match mover.kind {
-                MoverKind::Animal => MoverName::Animal,
-                MoverKind::MirrorImage => MoverName::MirrorImage,
-                MoverKind::FromBorder => MoverName::FromBorder,
-                MoverKind::InPlace => MoverName::InPlace,
-                MoverKind::Other => MoverName::Other,
-            },
-            from_s: super::poses_json::round(mover.from_s, 3),
-            to_s: super::poses_json::round(mover.to_s, 3),
-            box_px: [
-                mover.box_px.x,
-                mover.box_px.y,
-                mover.box_px.w,
-                mover.box_px.h,
-            ],
-        }
-    }
-
-    fn into_mover(self) -> Mover {
-        let [x, y, w, h] = self.box_px;
-        Mover {
-            kind: match self.kind {
-                MoverName::Animal => MoverKind::Animal,
-                MoverName::MirrorImage => MoverKind::MirrorImage,
-                MoverName::FromBorder => MoverKind::FromBorder,
-                MoverName::InPlace => MoverKind::InPlace,
-                MoverName::Other => MoverKind::Other,
-            },
-            from_s: self.from_s,
-            to_s: self.to_s,
-            box_px: Rect { x, y, w, h },
-        }
-    }
 }
 
 #[derive(Serialize)]
