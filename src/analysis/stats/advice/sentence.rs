@@ -1,4 +1,4 @@
-//! The sentences of advice.
+//! The sentences of advice: what each one says, with its figures.
 
 use std::fmt;
 
