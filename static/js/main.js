@@ -17,8 +17,11 @@ const current = { library: null, flock: null };
 const made = { libraries: [], flocks: [] };
 /** Results shown since the page was opened. They are shown again only when they are chosen. */
 const shown = new Set();
-const makeFlocksOf = flockForm(async (id) => { await refresh(); await watch(id); byId("stage").focus(); });
-filmForm(async (id) => { await refresh(); await chooseLibrary(id); byId("library").scrollIntoView(); byId("library-title").focus(); });
+/** Whether the person made or chose something here. From then on, results of other tabs and programs wait in the lists. */
+let isOwn = false;
+const own = (show) => async (/** @type {string} */ id) => { isOwn = true; await show(id); };
+const makeFlocksOf = flockForm(own(async (id) => { await refresh(); await watch(id); byId("stage").focus(); }));
+filmForm(own(async (id) => { await refresh(); await chooseLibrary(id); byId("library").scrollIntoView(); byId("library-title").focus(); }));
 
 async function refresh() {
   const [libraries, flocks] = await Promise.all([listLibraries(), listFlocks()]);
@@ -28,7 +31,7 @@ async function refresh() {
 }
 
 const isReady = (thing) => (thing.state ?? "done") === "done";
-const redrawLists = () => showEarlier(made.libraries, made.flocks, current, { onLibrary: chooseLibrary, onFlock: watch });
+const redrawLists = () => showEarlier(made.libraries, made.flocks, current, { onLibrary: own(chooseLibrary), onFlock: own(watch) });
 
 /** Shows a library and its newest flock; without a flock, the stage says what is next. */
 async function chooseLibrary(id, next = "Press “Make the flock”, and its flock will play here.") {
@@ -50,7 +53,9 @@ async function chooseFilm(id) {
 }
 
 async function chooseFlock(id) {
+  const mine = isOwn;
   const flock = await getFlock(id);
+  if (mine !== isOwn) return; // the person chose meanwhile
   current.flock = id;
   shown.add(id);
   showFlock(flock, made.libraries.find((library) => library.id === flock.library_id)?.name ?? "");
@@ -68,6 +73,7 @@ const hasResult = (job) => isUnderWay(job) || (job.state === "done" && job.kind 
 
 /** @param {any} job the newest one that has a result or is under way */
 async function showNewest(job) {
+  if (isOwn) return;
   if (job && isUnderWay(job)) {
     if (!current.library) await announce(job);
   } else if (job) {

@@ -164,6 +164,9 @@ def test_all_tabs_follow_their_jobs_by_one_stream(browser, filled_service):
         tab.get_by_role("button", name="Make the flock").click()
     for number, tab in enumerate(tabs):
         expect(tab.locator("#stage-title")).to_have_text(f"A flock of {3 + number}", timeout=LONG_MS)
+        expect(tab.locator("#earlier-flocks li").filter(has_text=re.compile(r"\b40 frames"))).to_have_count(2, timeout=LONG_MS)
+    # Neither tab is shown what the other one made.
+    assert [tab.locator("#stage-title").text_content() for tab in tabs] == ["A flock of 3", "A flock of 4"]
     context.close()
     metrics = fetch(filled_service + "/metrics").decode()
     streams = re.findall(r'requests_total\{route="([^"]*/events)",method="GET",status="200"\} (\d+)', metrics)
