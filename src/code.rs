@@ -78,19 +78,27 @@ codes! {
         "Delete what is no longer needed, or ask whoever runs the service for room; then try again."
     // The analysis (ALGORITHMS.md 2.9).
     NothingMoves "nothing_moves" "Nothing moves before the background."
-        "Film an animal that moves about, before a background that it stands out from."
+        "Film an animal that moves about, before a background that it stands out from; or give a picture of the scene \
+         without it, for example with `--background empty.png`."
+    NothingAtPoint "nothing_at_point" "Nothing that moves is where the animal was said to be."
+        "Point at the animal in a frame in which it has moved; frames are counted from 0, as in poses.json."
     BackgroundNotStatic "background_not_static" "Much of the picture changes throughout the film."
-        "Put the camera on a tripod, keep zoom and focus fixed, and film before a scene that stays still."
+        "Put the camera on a tripod, keep zoom and focus fixed, and film before a scene that stays still. Where only a \
+         part of the picture moves, leave it out, for example with `--ignore 0,0,200,100`; where only a part of the film \
+         is so, measure another, for example with `--from 2 --to 20`."
     CameraMoved "camera_moved" "The camera was moved and did not stand still for long enough."
-        "Cut the film to a part in which the camera stands still, for example with `ffmpeg -i film -ss 2 -to 20 -c:v libx264 film.mp4`, or film again with the camera fixed."
+        "Measure a part in which the camera stands still, for example with `--from 2 --to 20`, or film again with the \
+         camera fixed."
     LightChanges "light_changes" "The light changes too often or too much to be followed."
-        "Cut the film to a part with steady light, for example with `ffmpeg -i film -ss 2 -to 20 -c:v libx264 film.mp4`, or film in steady light; set the camera to 50 or 60 Hz as the lamps need."
+        "Measure a part with steady light, for example with `--from 2 --to 20`, or film in steady light; set the camera \
+         to 50 or 60 Hz as the lamps need."
     SceneChanges "scene_changes" "The film shows several scenes, none of them for long enough."
-        "Cut the film to the scene with the animal, for example with `ffmpeg -i film -ss 2 -to 20 -c:v libx264 film.mp4`."
+        "Measure the scene with the animal alone, for example with `--from 2 --to 20`."
     AnimalTooLarge "animal_too_large" "The animal fills too much of the picture."
         "Step back, or zoom out, until the animal covers less than a third of the picture."
     SeveralAnimals "several_animals" "More than one animal moves in the footage."
-        "Film one animal alone, without its mirror image."
+        "Film one alone, without its mirror image; or say which one is the animal, for example with \
+         `--animal-at 60:320,240` (frame, x, y), or follow the largest with `--follow-largest`."
     AnimalTooSmall "animal_too_small" "The animal is too small in the picture."
         "Film from nearer by, or with more pixels."
     BackgroundSizeDiffers "background_size_differs" "The background image has another size than the footage."

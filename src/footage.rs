@@ -1,7 +1,7 @@
 //! What the algorithms ask of a video. Implemented by `media` (an ffmpeg child), by the virtual
 //! camera of `fish`, and by small pictures in tests.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use crate::code::Code;
 use crate::raster::{ColorSpec, Frame};
@@ -71,6 +71,83 @@ pub fn spread_by_reading<S: FrameSource + ?Sized>(
 pub fn spread_idx(n_frames: usize, n: usize) -> Vec<usize> {
     let n = n.min(n_frames);
     (0..n).map(|k| (2 * k + 1) * n_frames / (2 * n)).collect()
+}
+
+/// A part of a video, as a video of its own: its frames and times are counted from where it begins.
+pub struct Part<'a> {
+    source: &'a dyn FrameSource,
+    /// The frames of the source that it holds.
+    frames: Range<usize>,
+}
+
+impl<'a> Part<'a> {
+    /// The frames from `from_s` up to `to_s`, seconds from the first frame of `source`; all where neither is set.
+    pub fn of(source: &'a dyn FrameSource, from_s: Option<f64>, to_s: Option<f64>) -> Part<'a> {
+        let format = source.format();
+        // Saturates: an end beyond every film is the film's end.
+        let idx = |time_s: f64| (time_s * format.fps).round() as usize;
+        let first = from_s.map_or(0, idx);
+        // Without an end the stream decides, which may be longer than it seemed.
+        let end = to_s.map_or(usize::MAX, idx);
+        Part {
+            source,
+            frames: first..end.max(first),
+        }
+    }
+}
+
+impl FrameSource for Part<'_> {
+    fn format(&self) -> FootageFormat {
+        let format = self.source.format();
+        let end = self.frames.end.min(format.n_frames_hint);
+        FootageFormat {
+            n_frames_hint: end.saturating_sub(self.frames.start),
+            ..format
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(PartStream {
+            stream: self.source.open()?,
+            frames: self.frames.clone(),
+            n_read: 0,
+            start_s: 0.0,
+        }))
+    }
+
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        match self.frames == (0..usize::MAX) {
+            true => self.source.spread(n, visit),
+            false => spread_by_reading(self, n, visit),
+        }
+    }
+}
+
+/// One reading of a part.
+struct PartStream<'a> {
+    stream: Box<dyn FrameStream + 'a>,
+    frames: Range<usize>,
+    n_read: usize,
+    /// Time of its first frame in the source.
+    start_s: f64,
+}
+
+impl FrameStream for PartStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        while self.n_read < self.frames.end {
+            let Some(time_s) = self.stream.next_frame(frame)? else {
+                return Ok(None);
+            };
+            self.n_read += 1;
+            if self.n_read == self.frames.start + 1 {
+                self.start_s = time_s;
+            }
+            if self.n_read > self.frames.start {
+                return Ok(Some(time_s - self.start_s));
+            }
+        }
+        Ok(None)
+    }
 }
 
 /// The frames of a video, in order, at a constant rate.

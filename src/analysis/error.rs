@@ -1,5 +1,6 @@
 //! Why an analysis ends without a library.
 
+use super::params::AnimalAtParam;
 use crate::code::Code;
 use crate::footage::SourceError;
 use crate::scratch::Full;
@@ -11,7 +12,7 @@ pub enum Error {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// Fewer frames than a library needs.
-    #[error("the footage has {n_frames} frames, at least {least} are needed")]
+    #[error("there are {n_frames} frames to measure, at least {least} are needed")]
     TooFewFrames {
         /// Frames found.
         n_frames: usize,
@@ -26,6 +27,12 @@ pub enum Error {
         /// Size of the footage.
         wanted: [u32; 2],
     },
+    /// Nothing that moves is where the animal was said to be.
+    #[error(
+        "nothing that moves is at {},{} in frame {}",
+        .0.point[0], .0.point[1], .0.frame
+    )]
+    NothingAtPoint(AnimalAtParam),
     /// No component large enough in enough frames.
     #[error("nothing moves before the background")]
     NothingMoves,
@@ -60,9 +67,7 @@ pub enum Error {
         share: f64,
     },
     /// Two components of comparable area, each persistent.
-    #[error(
-        "more than one animal moves in the footage: film one alone, or set follow to largest (--follow-largest)"
-    )]
+    #[error("more than one animal moves in the footage")]
     SeveralAnimals,
     /// The animal's pictures found no room.
     #[error(transparent)]
@@ -79,6 +84,7 @@ impl Error {
             Error::Source(error) => error.code,
             Error::TooFewFrames { .. } => Code::TooFewFrames,
             Error::BackgroundSizeDiffers { .. } => Code::BackgroundSizeDiffers,
+            Error::NothingAtPoint(_) => Code::NothingAtPoint,
             Error::NothingMoves => Code::NothingMoves,
             Error::BackgroundNotStatic { .. } => Code::BackgroundNotStatic,
             Error::CameraMoves { .. } => Code::CameraMoved,

@@ -70,6 +70,7 @@ pub fn analyze(
         let track = track::follow(batches, n_frames, &scene, params, scratch, progress)?;
         Ok::<_, Error>((scene, track))
     })?;
+    let lights: Vec<usize> = scene.plates.iter().map(|plate| plate.light).collect();
     let plate = scene.plates.swap_remove(0);
     let occluders = occluders::take_out(&mut track, &plate, progress)?;
     let (view, view_confidence) = pose::view(&track.frames, params);
@@ -83,7 +84,9 @@ pub fn analyze(
         true => sprite::none(track.frames.len()),
         false => {
             let by_depth = params.scale_mode == ScaleMode::Depth && view == View::Side;
-            sprite::align(&track, view, by_depth.then(|| sprite::scales(&poses)))
+            let scales = by_depth.then(|| sprite::scales(&poses));
+            let is_in_light = |plate_idx: usize| lights[plate_idx] == lights[0];
+            sprite::align(&track, view, scales, is_in_light)
         }
     };
     let foreign = || track.frames.iter().filter(|t| t.plate_idx.is_none());

@@ -50,12 +50,23 @@ pub fn scales(poses: &Poses) -> Vec<f64> {
 
 /// The sprites of a track, of the size filmed or of `scales`: its mattes, each with its centroid. The box holds the
 /// largest extent from the centroid over the frames in which the animal is not cut off; from above it is a square
-/// that holds the animal at any turn.
-pub fn align(track: &Track, view: View, scales: Option<Vec<f64>>) -> Sprites {
+/// that holds the animal at any turn. `is_in_light` says which plates were filmed in the light of the background; in any
+/// other the animal has other colors, and no sprites.
+pub fn align(
+    track: &Track,
+    view: View,
+    scales: Option<Vec<f64>>,
+    is_in_light: impl Fn(usize) -> bool,
+) -> Sprites {
     let scale = |frame_idx: usize| scales.as_ref().map_or(1.0, |scales| scales[frame_idx]);
     let size = common_size(&track.frames, view, &scale);
-    let sightings = track.frames.iter().map(|t| t.sighting.as_ref());
-    let mattes = sightings.map(|sighting| sighting.map(matte)).collect();
+    let of = |t: &Tracked| {
+        let sighting = t.sighting.as_ref()?;
+        t.plate_idx
+            .is_some_and(&is_in_light)
+            .then(|| matte(sighting))
+    };
+    let mattes = track.frames.iter().map(of).collect();
     Sprites::of(size, mattes, scales, Arc::clone(&track.scratch))
 }
 

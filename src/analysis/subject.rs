@@ -100,11 +100,19 @@ pub struct Look {
     pub is_shadow: bool,
     /// The plate shows the thing, the frame does not.
     pub is_ghost: bool,
+    /// The light that the plate was filmed in.
+    pub light: usize,
 }
 
 impl Look {
     /// The look of a component. `rgb` and `levels` (differences from the plate) are of the component's own box.
-    pub fn of(component: &Component, rgb: &RgbImage, levels: &[u8], picture: [u32; 2]) -> Look {
+    pub fn of(
+        component: &Component,
+        rgb: &RgbImage,
+        levels: &[u8],
+        picture: [u32; 2],
+        light: usize,
+    ) -> Look {
         let rect = component.rect;
         let step = component.area.div_ceil(MOST_PX).max(1) as usize;
         let indices = || {
@@ -124,6 +132,7 @@ impl Look {
             on_border: touches_border(rect, picture),
             is_shadow: false,
             is_ghost: false,
+            light,
         }
     }
 
@@ -144,8 +153,8 @@ pub fn touches_border(rect: Rect, [width, height]: [u32; 2]) -> bool {
 /// The animal as the whole film shows it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subject {
-    /// Its usual color.
-    color: Color,
+    /// Its usual color in each light, where it was seen in it.
+    colors: Vec<Option<Color>>,
     /// 5th percentile, median and 95th percentile of its area, pixels.
     areas_px: [f64; 3],
     /// Median diagonal of its box, pixels.
@@ -172,7 +181,9 @@ impl Subject {
     /// The subject of a single look.
     fn like(look: &Look) -> Subject {
         Subject {
-            color: look.color.clone(),
+            colors: (0..=look.light)
+                .map(|light| (light == look.light).then(|| look.color.clone()))
+                .collect(),
             areas_px: [look.area_px; 3],
             diagonal_px: look.diagonal_px(),
             contrast: look.contrast,
@@ -184,14 +195,24 @@ impl Subject {
         self.areas_px[1]
     }
 
-    /// Whether one color is more like the subject's than another.
-    pub fn prefers(&self, color: &Color, other: &Color) -> bool {
-        self.color.distance(color) < self.color.distance(other)
+    /// Whether a color is like the subject's in a look's light, and more so than the look's own.
+    pub fn prefers(&self, color: &Color, look: &Look) -> bool {
+        let usual = self.color_in(look.light);
+        usual.is_some_and(|usual| {
+            let off = usual.distance(color);
+            off < usual.distance(&look.color) && off / COLOR_SPREAD < FITS.sqrt()
+        })
     }
 
-    /// How unlike the subject a look is: 0 for just as usual, 1 for one standard deviation of area or color.
+    fn color_in(&self, light: usize) -> Option<&Color> {
+        self.colors.get(light)?.as_ref()
+    }
+
+    /// How unlike the subject a look is: 0 for just as usual, 1 for one standard deviation of area or color. In a light in which the
+    /// subject was never seen, its area alone tells.
     pub fn cost(&self, look: &Look) -> f64 {
-        let color = self.color.distance(&look.color) / COLOR_SPREAD;
+        let usual = self.color_in(look.light);
+        let color = usual.map_or(0.0, |usual| usual.distance(&look.color)) / COLOR_SPREAD;
         let area = self.area_cost(look.area_px);
         // What the border cuts may be any part of the animal.
         let is_part = look.on_border && look.area_px < self.area_px();
@@ -225,11 +246,19 @@ impl Subject {
             return self.clone();
         }
         let mut areas: Vec<f64> = members.iter().map(|look| look.area_px).collect();
+        let n_lights = members.iter().map(|look| look.light + 1).max().unwrap_or(0);
+        let color_in = |light| {
+            let mut of_light = members.iter().filter(|look| look.light == light).peekable();
+            of_light
+                .peek()
+                .is_some()
+                .then(|| Color::mean(of_light.map(|look| &look.color)))
+        };
         let at = [0.05, 0.5, 0.95].map(|share| order::percentile(&mut areas, share).unwrap_or(0.0));
         let median =
             |of: &dyn Fn(&Look) -> f64| order::median(members.iter().map(|l| of(l))).unwrap_or(0.0);
         Subject {
-            color: Color::mean(members.iter().map(|look| &look.color)),
+            colors: (0..n_lights).map(color_in).collect(),
             areas_px: at,
             diagonal_px: median(&|look| look.diagonal_px()),
             contrast: median(&|look| look.contrast),
@@ -288,4 +317,63 @@ fn best_seed(samples: &[Vec<Look>]) -> Option<Subject> {
         .map(|subject| (subject.worth(samples), subject));
     let best = with_worth.max_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, subject)| subject)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ORANGE: [u8; 3] = [230, 120, 30];
+    const SKIN: [u8; 3] = [224, 172, 140];
+    const GRAY: [u8; 3] = [110, 110, 110];
+
+    fn look(rgb: [u8; 3], side: u32, x: u32, light: usize) -> Look {
+        let box_px = Rect {
+            x,
+            y: 80,
+            w: side,
+            h: side,
+        };
+        Look {
+            area_px: f64::from(side * side),
+            color: Color::of(std::iter::once(rgb.as_slice())),
+            contrast: 60.0,
+            box_px,
+            centroid_px: [f64::from(x), 80.0],
+            on_border: false,
+            is_shadow: false,
+            is_ghost: false,
+            light,
+        }
+    }
+
+    #[test]
+    fn whoever_is_there_for_most_of_the_film_and_goes_places_is_the_subject() {
+        let samples: Vec<Vec<Look>> = (0..40)
+            .map(|k| match k {
+                0..8 => vec![look(SKIN, 90, 200, 0)],
+                8..12 => vec![look(SKIN, 90, 200, 0), look(ORANGE, 30, 20 + 10 * k, 0)],
+                // A plant that sways at its place.
+                _ => vec![look(ORANGE, 30, 20 + 10 * k, 0), look(GRAY, 40, 500, 0)],
+            })
+            .collect();
+        let subject = Subject::learn(&samples, None).expect("something moves");
+        let choices = subject.choices(&samples);
+        let wanted = |k: usize| (k >= 8).then_some(usize::from(k < 12));
+        assert_eq!(choices, (0..40).map(wanted).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn in_another_light_the_subject_has_another_color() {
+        let samples: Vec<Vec<Look>> = (0..40)
+            .map(|k| match k {
+                0..20 => vec![look(ORANGE, 30, 20 + 10 * k, 0)],
+                _ => vec![look(GRAY, 30, 20 + 10 * k, 1)],
+            })
+            .collect();
+        let subject = Subject::learn(&samples, None).expect("something moves");
+        assert!(subject.choices(&samples).iter().all(Option::is_some));
+        assert!(subject.cost(&look(GRAY, 30, 0, 0)) > FITS);
+        assert!(subject.cost(&look(GRAY, 30, 0, 1)) < 1.0);
+    }
 }

@@ -175,6 +175,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::MemoryLimit
         | Code::DecoderCrashed
         | Code::NothingMoves
+        | Code::NothingAtPoint
         | Code::BackgroundNotStatic
         | Code::CameraMoved
         | Code::LightChanges

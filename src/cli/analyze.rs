@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use super::{Error, Listener, Summary};
 use crate::analysis::{self, Params};
 use crate::cpu;
+use crate::footage::Part;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::analysis::{Advice, hints};
@@ -46,6 +47,18 @@ pub struct Args {
     /// Frames a second, whatever the file says: 0.01 to 1000. Every picture is then used once.
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
+    /// Measure from this second of the film on; frames and times are counted from there.
+    #[arg(long, value_name = "SECONDS")]
+    from: Option<f64>,
+    /// Measure up to this second of the film.
+    #[arg(long, value_name = "SECONDS")]
+    to: Option<f64>,
+    /// The animal is the thing at this point of this frame.
+    #[arg(long, value_name = "FRAME:X,Y")]
+    animal_at: Option<String>,
+    /// Take nothing in this box for the animal, pixels; or only from one second to another. May be given again.
+    #[arg(long, value_name = "X,Y,W,H[@FROM-TO]")]
+    ignore: Vec<String>,
     /// Width of a pixel over its height, whatever the file says.
     #[arg(long, value_name = "R")]
     pixel_aspect: Option<f64>,
@@ -97,14 +110,15 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let level = cpu::Level::detect();
     let scratch = super::scratch_beside(&args.output);
     let background = background.as_ref();
-    let library = analysis::analyze(&video, background, &params, level, &scratch, &progress)
+    let part = Part::of(&video, params.from_s, params.to_s);
+    let library = analysis::analyze(&part, background, &params, level, &scratch, &progress)
         .map_err(|error| Error::work(error.code(), &error))?;
     let footage = footage_summary(video.files())?;
     library_dir::write(&args.output, &library, &params, &footage)
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
     write_views(&args.output, &library)?;
     if let Some(path) = &args.overlay {
-        overlay::film(&video, &library.poses, path, &progress)
+        overlay::film(&part, &library.poses, path, &progress)
             .map_err(|error| Error::work(error.code(), &error))?;
     }
     super::say(&view_sentence(&library.poses));
@@ -140,6 +154,15 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     put("fps", args.fps.map(|fps| json!(fps)));
     let pixel_aspect = args.pixel_aspect;
     put("pixel_aspect", pixel_aspect.map(|aspect| json!(aspect)));
+    put("from_s", args.from.map(|from_s| json!(from_s)));
+    put("to_s", args.to.map(|to_s| json!(to_s)));
+    let animal_at = args.animal_at.as_deref();
+    put("animal_at", animal_at.map(read_animal_at).transpose()?);
+    if !args.ignore.is_empty() {
+        let boxes = args.ignore.iter().map(|text| read_ignore(text));
+        let boxes = boxes.collect::<Result<Vec<Value>, Error>>()?;
+        put("ignore", Some(json!(boxes)));
+    }
     put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
     let weights = args.clip_weights.as_ref();
     put("clip_weights", weights.map(|weights| json!(weights)));
@@ -165,6 +188,52 @@ fn params_of(args: &Args) -> Result<Params, Error> {
         );
     }
     params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
+}
+
+/// Reads FRAME:X,Y.
+fn read_animal_at(text: &str) -> Result<Value, Error> {
+    let parts = text.split_once(':').and_then(|(frame, point)| {
+        let (x, y) = point.split_once(',')?;
+        let frame: u32 = frame.trim().parse().ok()?;
+        Some((frame, [number(x)?, number(y)?]))
+    });
+    let (frame, point) = parts.ok_or_else(|| {
+        Error::Usage(format!(
+            "--animal-at takes FRAME:X,Y, such as 120:310,95: {text}"
+        ))
+    })?;
+    Ok(json!({"frame": frame, "point": point}))
+}
+
+/// Reads X,Y,W,H or X,Y,W,H@FROM-TO.
+fn read_ignore(text: &str) -> Result<Value, Error> {
+    let wanted = || {
+        let example = "10,20,200,40 or 10,20,200,40@0-2.5";
+        Error::Usage(format!(
+            "--ignore takes X,Y,W,H or X,Y,W,H@FROM-TO, such as {example}: {text}"
+        ))
+    };
+    let (sides, span) = match text.split_once('@') {
+        Some((sides, span)) => (sides, Some(span)),
+        None => (text, None),
+    };
+    let sides: Option<Vec<u32>> = sides
+        .split(',')
+        .map(|side| side.trim().parse().ok())
+        .collect();
+    let box_px: Option<[u32; 4]> = sides.and_then(|sides| sides.try_into().ok());
+    let box_px = box_px.ok_or_else(wanted)?;
+    let Some(span) = span else {
+        return Ok(json!({"box_px": box_px}));
+    };
+    let (from_s, to_s) = span.split_once('-').ok_or_else(wanted)?;
+    let from_s = number(from_s).ok_or_else(wanted)?;
+    let to_s = number(to_s).ok_or_else(wanted)?;
+    Ok(json!({"box_px": box_px, "from_s": from_s, "to_s": to_s}))
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.trim().parse().ok()
 }
 
 fn read_json(path: &Path) -> Result<Value, Error> {

@@ -8,6 +8,7 @@ use super::decoding::Counted;
 use super::{Attempt, Context, Error, Product, Stages, overlay};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
+use crate::footage::Part;
 use crate::formats::distance_map::DistanceMap;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, svg};
@@ -115,11 +116,12 @@ impl Input {
         let level = cpu::Level::detect();
         let progress = attempt.listener;
         let (background, scratch) = (background.as_ref(), attempt.scratch());
-        let film = Counted::new(&video, progress);
+        let part = Part::of(&video, self.params.from_s, self.params.to_s);
+        let film = Counted::new(&part, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
-            &video,
+            &part,
             &library.poses,
             &attempt.folder().join("overlay.mp4"),
             progress,

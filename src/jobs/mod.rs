@@ -153,7 +153,7 @@ pub enum Job {
     /// Nothing to footage.
     Sample(sample::Input),
     /// Footage to library.
-    Analysis(analysis::Input),
+    Analysis(Box<analysis::Input>),
     /// Library to flock.
     Flock(Box<flock::Input>),
     /// Library to virtual fish.

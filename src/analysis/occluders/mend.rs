@@ -21,7 +21,7 @@ pub(super) fn mend(
 ) -> Result<(), Error> {
     let scratch = track.scratch.clone();
     track.frames.par_iter_mut().try_for_each(|tracked| {
-        let Some(seen) = &tracked.sighting else {
+        let Some(seen) = tracked.before_main_plate() else {
             return Ok(());
         };
         if progress.cancelled() {

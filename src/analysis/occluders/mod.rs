@@ -22,8 +22,8 @@ use self::evidence::{Evidence, Proof, Question};
 use self::ring::SummedArea;
 use super::Error;
 use super::scene::plate::Plate;
-use super::track::Track;
 use super::track::sighting::Sighting;
+use super::track::{Track, Tracked};
 use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::runs::{Component, components};
@@ -58,7 +58,7 @@ const MOST_AT_PLACE: u32 = 3;
 /// More frames than these tell nothing new.
 const MOST_FRAMES: usize = 1024;
 
-/// Finds what stands before the animal and takes it out of the track's mattes, which are measured anew.
+/// Finds what stands before the animal and the main plate, and takes it out of the track's mattes, which are measured anew.
 /// The picture is of the footage's size: straight color F and alpha w; `None` when nothing was found.
 pub fn take_out(
     track: &mut Track,
@@ -100,7 +100,7 @@ pub fn take_out(
 fn spaced(track: &Track) -> Vec<Sighting> {
     let (mut spaced, mut last) = (Vec::new(), None);
     let mut n_at: HashMap<[i64; 2], u32> = HashMap::new();
-    for seen in track.frames.iter().filter_map(|t| t.sighting.as_ref()) {
+    for seen in track.frames.iter().filter_map(Tracked::before_main_plate) {
         let [x, y] = seen.moments.centroid_px;
         let is_apart = |[u, v]: [f64; 2]| libm::hypot(x - u, y - v) >= APART_PX;
         if !last.is_none_or(is_apart) {

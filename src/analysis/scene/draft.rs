@@ -28,6 +28,9 @@ const BUSY: f64 = 0.03;
 const STARK: f64 = 2.0;
 /// ... and they explain the samples better by this factor.
 const MUCH_BETTER: f64 = 1.5;
+/// Medians of short windows are taken that explain the samples better than the commonest values by this factor.
+const FAR_BETTER: f64 = 3.0;
+
 /// The plates while they are made.
 pub(super) struct Draft {
     /// The samples of each plate.
@@ -54,6 +57,7 @@ impl Draft {
             even_out_light(samples, part.samples, &mut plate);
             plates.push(Plate {
                 uneven_light: plate.uneven_light,
+                light: part.light,
                 ..Plate::without_noise(samples.median_frame(part.samples), params.threshold)
             });
         }
@@ -137,17 +141,36 @@ impl Draft {
 
     /// The same parts in short windows of time, each with the median of its samples as its plate: in them an animal that
     /// moves is seen, whatever changes over the film.
-    pub(super) fn in_short_windows(&self, samples: &Samples) -> Draft {
+    pub(super) fn in_short_windows(&self, samples: &Samples) -> (Draft, Survey) {
+        // A mouse that rests for a while among bedding that it kicks about is commoner than any one color of the bedding; a large
+        // animal that hovers is in the median.
+        let surveyed = |typical: fn(&Samples, u64) -> Frame| {
+            let mut draft =
+                self.in_short_windows_of(|part| typical(samples, part), samples.frames.len());
+            let survey = draft.survey(samples);
+            (draft, survey)
+        };
+        let of_medians = surveyed(Samples::median_frame);
+        let of_commonest = surveyed(Samples::commonest_frame);
+        match of_medians.1.worth < FAR_BETTER * of_commonest.1.worth {
+            true => of_commonest,
+            false => of_medians,
+        }
+    }
+
+    fn in_short_windows_of(&self, typical: impl Fn(u64) -> Frame, n_samples: usize) -> Draft {
         let parts: Vec<Part> = self
             .parts
             .iter()
             .flat_map(|&part| windows::short(part))
             .collect();
-        let plate =
-            |part: &Part| Plate::without_noise(samples.median_frame(part.samples), self.threshold);
+        let plate = |part: &Part| Plate {
+            light: part.light,
+            ..Plate::without_noise(typical(part.samples), self.threshold)
+        };
         Draft {
             plates: parts.iter().map(plate).collect(),
-            plate_of: plate_of(&parts, samples.frames.len()),
+            plate_of: plate_of(&parts, n_samples),
             wider: parts.iter().map(|part| part.samples).collect(),
             threshold: self.threshold,
             parts,
@@ -173,6 +196,7 @@ impl Draft {
                     .map(|(window, plate)| (*window, plate))
                     .collect();
                 resting::mark(&mut seen, whole, &windows, subject);
+                resting::mark_settled(&mut seen, whole, part.samples, survey, subject);
             }
         }
         seen
@@ -192,6 +216,7 @@ impl Draft {
                 wider.push(samples);
                 plates.push(Plate {
                     uneven_light: plate.uneven_light,
+                    light: plate.light,
                     ..Plate::without_noise(plate.frame.clone(), self.threshold)
                 });
             }
@@ -230,6 +255,7 @@ impl Draft {
         for (plate, sigma) in self.plates.iter_mut().zip(sigmas) {
             *plate = Plate {
                 uneven_light: plate.uneven_light,
+                light: plate.light,
                 ..Plate::of(plate.frame.clone(), sigma, self.threshold)
             };
         }
@@ -295,6 +321,7 @@ impl Draft {
             *plate = Plate {
                 never_seen_px: places().count() as u64,
                 uneven_light: plate.uneven_light,
+                light: plate.light,
                 core_threshold: std::mem::take(&mut plate.core_threshold),
                 weak_share: plate.weak_share,
                 ..Plate::of(frame, std::mem::take(&mut plate.sigma), threshold)

@@ -21,10 +21,15 @@ const DARKEST: u32 = 16;
 /// Where fewer of the pixels compared are bright enough (5 %), the animal may cover most of them: the light counts as
 /// that of the plate.
 const LEAST_PROBES: u32 = N_SAMPLES as u32 / 20;
+/// Gains that a light can have.
+const DARKEST_GAIN: f32 = 0.2;
+const BRIGHTEST_GAIN: f32 = 3.9;
 /// Pixels compared in a row or column, at most.
 const ALONG: usize = 160;
 /// Fewer bright pixels than this in a row or column say nothing about its light.
 const LEAST_ALONG: usize = 24;
+/// Light is colored where a channel's gain deviates from that of luma by this share.
+const COLORED: f32 = 0.02;
 /// Rows and columns whose factors are averaged, to either side. A 100 Hz lamp gives at most about ten bands a
 /// picture, far broader than this.
 const SMOOTH: usize = 2;
@@ -77,9 +82,25 @@ impl Light {
         self.field.as_ref().map_or(1.0, of)
     }
 
-    /// Divides a frame by its light: luma pixel by pixel, chroma by the gain of luma.
+    /// Divides a frame by its light: luma pixel by pixel, chroma by the gain of luma; all channels one by one where the light is
+    /// colored.
     pub fn undo(&self, frame: &mut Frame) {
         let gain = self.luma();
+        self.undo_gain(frame, gain);
+        let tint = self.rgb.map(|of_channel| of_channel / gain);
+        if tint.iter().all(|t| (t - 1.0).abs() < COLORED) {
+            return;
+        }
+        let mut image = frame.to_rgb();
+        for pixel in image.pixels.chunks_exact_mut(3) {
+            for (value, tint) in pixel.iter_mut().zip(tint) {
+                *value = (f32::from(*value) / tint).round().min(255.0) as u8;
+            }
+        }
+        frame.draw_all_rgb(&image);
+    }
+
+    fn undo_gain(&self, frame: &mut Frame, gain: f32) {
         if (gain - 1.0).abs() < 0.002 && !self.is_uneven() {
             return;
         }
@@ -204,18 +225,27 @@ fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
         counts[channel][0] -= n_dark(channel);
         median_ratio(&counts[channel])
     };
-    [0, 1, 2].map(median)
+    let gains = [0, 1, 2].map(median);
+    // A channel too dark to tell has the gain of the others.
+    let known: Vec<f32> = gains.iter().flatten().copied().collect();
+    let usual = match known.len() {
+        0 => 1.0,
+        n => known.iter().sum::<f32>() / n as f32,
+    };
+    gains.map(|gain| gain.unwrap_or(usual))
 }
 
-/// The median of the counted ratios near their median; 1 when too few pixels are bright enough.
-fn median_ratio(counts: &[u16; 4 * STEPS]) -> f32 {
+/// The median of the counted ratios near their median; `None` when too few pixels are bright enough, or when they do
+/// not agree: then it is not light in which they differ.
+fn median_ratio(counts: &[u16; 4 * STEPS]) -> Option<f32> {
     let n: u32 = counts.iter().map(|&count| u32::from(count)).sum();
-    if n < LEAST_PROBES {
-        return 1.0;
-    }
     let middle = median_step(counts, 0..4 * STEPS);
     let near = middle - middle / 4..(middle + middle / 4 + 1).min(4 * STEPS);
-    (median_step(counts, near) as f32 / STEPS as f32).clamp(0.25, 3.9)
+    let n_near: u32 = counts[near.clone()].iter().map(|&c| u32::from(c)).sum();
+    let gain = median_step(counts, near) as f32 / STEPS as f32;
+    let agree =
+        n >= LEAST_PROBES && 2 * n_near > n && (DARKEST_GAIN..BRIGHTEST_GAIN).contains(&gain);
+    agree.then_some(gain)
 }
 
 /// The step at which half of the count within `steps` is reached.
@@ -303,7 +333,7 @@ mod tests {
         for k in 0..301 {
             counts[1126 - 150 + k] = 10;
         }
-        assert_eq!(median_ratio(&counts), 1126.0 / 1024.0);
+        assert_eq!(median_ratio(&counts), Some(1126.0 / 1024.0));
     }
 
     #[test]

@@ -2,7 +2,9 @@
 //! mirrored about a line. Two animals do not.
 
 use crate::analysis::subject::Look;
+use crate::geometry::Rect;
 use crate::order::median;
+use crate::raster::runs::{self, Component};
 
 /// Place and mirrored place agree to within this share of the animal's diagonal ...
 const AGREEMENT: f64 = 0.15;
@@ -28,6 +30,41 @@ impl Mirror {
     /// Whether a thing that lies here is an image.
     pub fn is_image(&self, centroid_px: [f64; 2]) -> bool {
         (centroid_px[self.axis] < self.line_px) == self.is_before
+    }
+
+    /// A component in parts that lie on one side of the line each: the animal touches its image where it touches the mirror.
+    pub fn parted(&self, component: Component) -> Vec<Component> {
+        let rect = component.rect;
+        let line = self.line_px.round().max(0.0) as u32;
+        let halves = match self.axis {
+            0 if rect.x < line && line < rect.right() => [
+                Rect {
+                    w: line - rect.x,
+                    ..rect
+                },
+                Rect {
+                    x: line,
+                    w: rect.right() - line,
+                    ..rect
+                },
+            ],
+            1 if rect.y < line && line < rect.bottom() => [
+                Rect {
+                    h: line - rect.y,
+                    ..rect
+                },
+                Rect {
+                    y: line,
+                    h: rect.bottom() - line,
+                    ..rect
+                },
+            ],
+            _ => return vec![component],
+        };
+        halves
+            .into_iter()
+            .flat_map(|half| runs::components(&component.mask(half)))
+            .collect()
     }
 
     /// The mirror that explains pairs of things which samples show together; `None` where none does.
@@ -72,7 +109,7 @@ impl Mirror {
 mod tests {
     use super::*;
     use crate::analysis::subject::Color;
-    use crate::geometry::Rect;
+    use crate::raster::Mask;
 
     fn look(centroid_px: [f64; 2], contrast: f64) -> Look {
         Look {
@@ -82,6 +119,7 @@ mod tests {
             box_px: Rect::of_size(40, 20),
             centroid_px,
             on_border: false,
+            light: 0,
             is_shadow: false,
             is_ghost: false,
         }
@@ -109,5 +147,33 @@ mod tests {
         let mirror = found(|_, [x, y]| [x + 1.0, 222.0 - y]).expect("it is an image");
         assert!(mirror.is_image([100.0, 40.0]) && !mirror.is_image([100.0, 140.0]));
         assert_eq!(found(|k, _| [200.0 + 90.0 * libm::cos(k), 60.0]), None);
+    }
+
+    #[test]
+    fn an_animal_at_the_surface_is_parted_from_its_image() {
+        let mirror = found(|_, [x, y]| [x, 40.0 - y]).expect("it is an image");
+        let touching = Mask {
+            rect: Rect {
+                x: 10,
+                y: 14,
+                w: 8,
+                h: 12,
+            },
+            bits: vec![1; 96],
+        };
+        let parts = mirror.parted(runs::components(&touching).remove(0));
+        let boxes: Vec<[u32; 2]> = parts
+            .iter()
+            .map(|part| [part.rect.y, part.rect.h])
+            .collect();
+        assert_eq!(boxes, [[14, 6], [20, 6]]);
+        let below = Mask {
+            rect: Rect {
+                y: 20,
+                ..touching.rect
+            },
+            ..touching
+        };
+        assert_eq!(mirror.parted(runs::components(&below).remove(0)).len(), 1);
     }
 }

@@ -43,6 +43,7 @@ use occupancy::Occupancy;
 use plate::Plate;
 use refusal::Company;
 use samples::Samples;
+use survey::Survey;
 
 /// A frame in which more than this share of the blocks differs does not show the plate's scene.
 const FOREIGN: f64 = 0.5;
@@ -51,8 +52,6 @@ const FOREIGN: f64 = 0.5;
 pub struct Scene {
     /// Its plates, the one of the most samples first.
     pub plates: Vec<Plate>,
-    /// Which light each plate was filmed in; sprites of one light are comparable.
-    pub lights: Vec<usize>,
     /// The samples' frames and plates, by frame: which plate is likely in between.
     likely: Vec<(usize, Option<usize>)>,
     /// The animal, as the samples show it.
@@ -128,13 +127,12 @@ pub fn estimate(
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<Scene, Error> {
-    let mut samples = Samples::spread(source, progress)?;
+    let mut samples = Samples::spread(source, params, progress)?;
     let mut draft = match given {
         Some(image) => Draft::given(image, &mut samples, params)?,
         None => Draft::of_states(&mut samples, params)?,
     };
-    let mut short = draft.in_short_windows(&samples);
-    let mut survey = short.survey(&samples);
+    let (short, mut survey) = draft.in_short_windows(&samples);
     let mut seen = draft.occupancy_over_time(&short, &samples, &survey);
     if given.is_none() {
         draft.split_in_time(&samples, &seen);
@@ -152,11 +150,12 @@ pub fn estimate(
     let company = refusal::judge(&survey, &samples, params)?;
     let seen = Occupancy::of(&samples, &draft.plates, &draft.plate_of, &survey);
     draft.finish(&samples, &seen, &survey, given.is_some());
+    // As the finished plates show it, and the track will.
+    let survey = Survey::of(&samples, &draft.plates, &draft.plate_of);
     let tether_px = survey.tether_px;
     let subject = survey.subject.ok_or(Error::NothingMoves)?;
     Ok(Scene {
         plates: draft.plates,
-        lights: draft.parts.iter().map(|part| part.light).collect(),
         likely: samples
             .frame_idx
             .iter()

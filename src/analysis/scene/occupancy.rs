@@ -40,7 +40,8 @@ impl Occupancy {
                 continue;
             };
             for (at, component) in components.iter().enumerate() {
-                if component.area < least_area {
+                // What is left of a ghost may be small.
+                if component.area < least_area && !survey.looks[k][at].is_ghost {
                     continue;
                 }
                 let rect = component

@@ -28,6 +28,8 @@ pub struct Plate {
     pub blocks: Blocks,
     /// The light of frames differs over the picture.
     pub uneven_light: bool,
+    /// Which light it was filmed in; colors of one light are comparable.
+    pub light: usize,
     /// Pixels that the animal never left free. They continue the texture around them (Efros & Leung 1999).
     pub never_seen_px: u64,
 }
@@ -73,6 +75,7 @@ impl Plate {
             sigma,
             weak_share: Threshold::usual(threshold).weak_share,
             uneven_light: false,
+            light: 0,
             never_seen_px: 0,
         }
     }

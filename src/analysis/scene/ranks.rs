@@ -7,6 +7,8 @@
 
 /// Most samples: they fit the bits of a word.
 pub(super) const MOST: usize = 64;
+/// Values of a scene that does not change lie this near to each other, levels of 255: noise, and what is left of flicker.
+const NEAR: u8 = 10;
 /// Pixels searched in step.
 const LANES: usize = 64;
 
@@ -62,6 +64,43 @@ pub(super) fn ranked(
     }
 }
 
+/// Of the free samples of each pixel keeps those that lie within `NEAR` levels of the value around which the most of them lie, and
+/// wants their median. A scene stays as it is while what passes before it varies, so this is the scene even where something
+/// stands before it more than half of the time.
+pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
+    for (start, wanted) in (0..).step_by(LANES).zip(wanted.chunks_mut(LANES)) {
+        let mut values = [[0; LANES]; MOST];
+        let mut free = [[0u8; LANES]; MOST];
+        for (k, sample) in samples.iter().enumerate() {
+            values[k][..wanted.len()].copy_from_slice(&sample[start..start + wanted.len()]);
+            for (free, wanted) in free[k].iter_mut().zip(&*wanted) {
+                *free = (wanted.free >> k & 1) as u8;
+            }
+        }
+        let (mut most, mut commonest) = ([0u8; LANES], [0u8; LANES]);
+        for (own, own_free) in values.iter().zip(&free).take(samples.len()) {
+            let mut count = [0u8; LANES];
+            for (other, free) in values.iter().zip(&free).take(samples.len()) {
+                for (((count, own), other), free) in count.iter_mut().zip(own).zip(other).zip(free)
+                {
+                    *count += u8::from(own.abs_diff(*other) <= NEAR) & free;
+                }
+            }
+            for lane in 0..LANES {
+                let count = count[lane] * own_free[lane];
+                if count > most[lane] {
+                    (most[lane], commonest[lane]) = (count, own[lane]);
+                }
+            }
+        }
+        for (lane, wanted) in wanted.iter_mut().enumerate() {
+            let near = |k: &usize| values[*k][lane].abs_diff(commonest[lane]) <= NEAR;
+            let near: u64 = (0..samples.len()).filter(near).map(|k| 1 << k).sum();
+            *wanted = Wanted::median(wanted.free & near);
+        }
+    }
+}
+
 /// Makes 255 of what is not free.
 fn leave_out(values: &mut [Lanes], wanted: &[Wanted]) {
     let all = u64::MAX >> (MOST - values.len());
@@ -100,6 +139,28 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn what_stays_as_it_is_is_the_commonest_though_something_passes_more_often() {
+        // Twenty free samples of the scene, forty of which no ten are alike, and four that are not free.
+        let value = |k: usize| {
+            if k.is_multiple_of(3) {
+                120 + (k % 4) as u8
+            } else {
+                (4 * k) as u8
+            }
+        };
+        let samples: Vec<Vec<u8>> = (0..64).map(|k| vec![value(k); 70]).collect();
+        let rows: Vec<&[u8]> = samples.iter().map(Vec::as_slice).collect();
+        let mut wanted = vec![Wanted::median(u64::MAX << 4); 70];
+        want_commonest(&rows, &mut wanted);
+        let mut row = vec![0; 70];
+        ranked(&rows, None, &wanted, &mut row);
+        assert!(
+            row.iter().all(|value| (120..=123).contains(value)),
+            "{row:?}"
+        );
+    }
 
     proptest! {
         #[test]

@@ -7,6 +7,7 @@ use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, LEAST_AREA_PX, Look, Subject};
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
+use crate::order;
 
 /// Something must move in this share of the samples.
 const MOVING_SHARE: f64 = 0.05;
@@ -18,6 +19,8 @@ const OFTEN: f64 = 0.3;
 const LARGE: f64 = 0.35;
 /// A second component of this share of the animal's area may be a second animal.
 const COMPARABLE: f64 = 0.5;
+/// It is an animal if it goes farther than this share of the animal's diagonal: a plant sways at its place.
+const ROAMS: f64 = 0.5;
 
 /// What moves besides the animal and looks like it.
 pub(super) enum Company {
@@ -33,6 +36,11 @@ pub(super) enum Company {
 pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Result<Company, Error> {
     let n_samples = survey.looks.len() as f64;
     let n_px = samples.n_px() as f64;
+    if let Some(at) = params.animal_at
+        && !survey.is_pinned
+    {
+        return Err(Error::NothingAtPoint(at));
+    }
     let Some(subject) = &survey.subject else {
         return Err(Error::NothingMoves);
     };
@@ -61,12 +69,16 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
             Some([&looks[at], &looks[second(looks, at, subject)?]])
         })
         .collect();
-    if (pairs.len() as f64) <= OFTEN * n_samples {
+    let seconds: Vec<&Look> = pairs.iter().map(|[_, second]| *second).collect();
+    if (pairs.len() as f64) <= OFTEN * n_samples || range_px(&seconds) < ROAMS * subject.diagonal_px
+    {
         return Ok(Company::None);
     }
     match Mirror::of(&pairs, subject.diagonal_px) {
         Some(mirror) => Ok(Company::Image(mirror)),
-        None if params.follow == Follow::One => Err(Error::SeveralAnimals),
+        None if params.follow == Follow::One && params.animal_at.is_none() => {
+            Err(Error::SeveralAnimals)
+        }
         None => Ok(Company::Animals),
     }
 }
@@ -86,7 +98,17 @@ pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option
     })
 }
 
-fn longest(rect: &Rect) -> u32 {
+/// How far things lie apart along x or y, without the outermost tenth, pixels.
+fn range_px(looks: &[&Look]) -> f64 {
+    let along = |axis: usize| {
+        let mut values: Vec<f64> = looks.iter().map(|look| look.centroid_px[axis]).collect();
+        let mut at = |share| order::percentile(&mut values, share).unwrap_or(0.0);
+        at(0.95) - at(0.05)
+    };
+    along(0).max(along(1))
+}
+
+pub(super) fn longest(rect: &Rect) -> u32 {
     rect.w.max(rect.h)
 }
 

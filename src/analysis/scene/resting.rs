@@ -4,17 +4,22 @@
 //! looks like the subject, and the other does not, is the animal at rest: in that window, or in the windows that
 //! look like the whole. There its pixels do not show the scene.
 
+use super::fill;
 use super::light::Light;
 use super::occupancy::Occupancy;
 use super::plate::Plate;
-use super::states::Part;
-use super::survey::color_in;
+use super::refusal::longest;
+use super::states::{Part, bits};
+use super::survey::{Survey, color_in};
 use crate::analysis::silhouette;
 use crate::analysis::subject::{FITS, Look, Subject};
+use crate::geometry::Rect;
 use crate::raster::runs::Component;
 
 /// A component below this share of the subject's area is none of it.
 const LEAST_SHARE: f64 = 0.3;
+/// Fewer samples than these without the animal tell nothing of where it is.
+const LEAST_GAP: usize = 3;
 /// Two plates that differ by fewer levels than this on average show the same.
 const SAME_LEVELS: f64 = 10.0;
 
@@ -26,7 +31,7 @@ pub(super) fn mark(
     subject: &Subject,
 ) {
     for (part, plate) in windows {
-        let found = silhouette::components(&plate.frame, whole, &Light::SAME);
+        let found = silhouette::components(&plate.frame, whole, &Light::SAME, &[]);
         for component in found {
             if (component.area as f64) < LEAST_SHARE * subject.area_px() {
                 continue;
@@ -50,11 +55,77 @@ pub(super) fn mark(
     }
 }
 
+/// Marks the pixels of an animal that was lost where it moved last, and rests there. What is behind it was never seen, so it is told
+/// from the scene continued across its place. An animal that went into a hole was seen elsewhere before, and that place without it.
+pub(super) fn mark_settled(
+    seen: &mut Occupancy,
+    whole: &Plate,
+    part: u64,
+    survey: &Survey,
+    subject: &Subject,
+) {
+    let picture = [whole.frame.width, whole.frame.height];
+    let members: Vec<usize> = bits(part).collect();
+    let sighting = |k: usize| Some(&survey.looks[k][survey.animal[k]?]);
+    for gap in members.chunk_by(|&a, &b| sighting(a).is_none() == sighting(b).is_none()) {
+        if gap.len() < LEAST_GAP || sighting(gap[0]).is_some() {
+            continue;
+        }
+        let before = gap[0].checked_sub(1).and_then(sighting);
+        let after = gap
+            .last()
+            .map(|k| k + 1)
+            .filter(|k| *k < survey.looks.len());
+        for look in before.into_iter().chain(after.and_then(sighting)) {
+            let rect = look
+                .box_px
+                .inflated(longest(&look.box_px) / 3, picture[0], picture[1]);
+            let is_elsewhere = |k: &&usize| {
+                sighting(**k).is_some_and(|other| other.box_px.intersection(&rect).is_empty())
+            };
+            if members.iter().filter(is_elsewhere).count() >= LEAST_GAP {
+                continue;
+            }
+            let empty = without(whole, rect);
+            let found = silhouette::components(&whole.frame, &empty, &Light::SAME, &[]);
+            let with_cost = found.iter().map(|c| (cost(subject, whole, &empty, c), c));
+            let best = with_cost.min_by(|a, b| a.0.total_cmp(&b.0));
+            if let Some((_, component)) = best.filter(|(cost, _)| *cost < FITS) {
+                let samples = gap.iter().fold(0, |all, k| all | 1 << k);
+                seen.take(component, picture, samples);
+            }
+        }
+    }
+}
+
+/// A plate with the scene around a box continued across it.
+fn without(plate: &Plate, rect: Rect) -> Plate {
+    let mut rgb = plate.rgb.clone();
+    let is_inside = |k: usize| {
+        let (x, y) = (k as u32 % rgb.width, k as u32 / rgb.width);
+        (rect.x..rect.right()).contains(&x) && (rect.y..rect.bottom()).contains(&y)
+    };
+    let unknown: Vec<bool> = (0..plate.frame.luma().len()).map(is_inside).collect();
+    fill::smooth(&mut rgb, &unknown);
+    let mut frame = plate.frame.clone();
+    frame.draw_rgb(&rgb, rect);
+    Plate {
+        core_threshold: plate.core_threshold.clone(),
+        ..Plate::of(frame, plate.sigma.clone(), 0)
+    }
+}
+
 /// How unlike the subject a component of one plate looks before another.
 fn cost(subject: &Subject, plate: &Plate, behind: &Plate, component: &Component) -> f64 {
     let difference = silhouette::difference(&plate.frame, behind, &Light::SAME, component.rect);
     let picture = [plate.frame.width, plate.frame.height];
-    let look = Look::of(component, &difference.rgb, &difference.levels, picture);
+    let look = Look::of(
+        component,
+        &difference.rgb,
+        &difference.levels,
+        picture,
+        behind.light,
+    );
     subject.cost(&Look {
         color: color_in(&plate.rgb, component),
         ..look

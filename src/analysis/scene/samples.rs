@@ -12,8 +12,10 @@ use super::plate::SIGMA_FLOOR;
 use super::ranks::{self, MOST, Wanted};
 use super::states;
 use super::thumbnail::Thumbnail;
-use crate::analysis::{Error, LEAST_FRAMES};
+use crate::analysis::params::AnimalAtParam;
+use crate::analysis::{Error, LEAST_FRAMES, Params};
 use crate::footage::{FrameSource, spread_idx};
+use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::Frame;
 
@@ -25,13 +27,19 @@ pub(super) struct Samples {
     pub(super) frames: Vec<Frame>,
     /// Which frames of the footage they are.
     pub(super) frame_idx: Vec<usize>,
+    /// The boxes of each in which nothing is the animal.
+    pub(super) ignored: Vec<Vec<Rect>>,
+    /// A sample and a point in it at which the animal was said to be.
+    pub(super) pinned: Option<(usize, [f64; 2])>,
     fps: f64,
 }
 
 impl Samples {
-    /// Reads the footage once and keeps frames spread evenly over it.
+    /// Reads the footage once and keeps frames spread evenly over it. The frame in which the animal was pointed at is one of
+    /// them.
     pub(super) fn spread(
         source: &dyn FrameSource,
+        params: &Params,
         progress: &dyn Progress,
     ) -> Result<Samples, Error> {
         let format = source.format();
@@ -57,9 +65,17 @@ impl Samples {
         }
         let mut frame_idx = spread_idx(format.n_frames_hint, n_kept);
         frame_idx.truncate(frames.len());
+        let pinned = match params.animal_at {
+            Some(at) => Some((pin(source, at, &mut frames, &mut frame_idx)?, at.point)),
+            None => None,
+        };
+        let size = [format.width, format.height];
+        let ignored = |&idx: &usize| params.ignored_at(idx as f64 / format.fps, size);
         Ok(Samples {
+            ignored: frame_idx.iter().map(ignored).collect(),
             frames,
             frame_idx,
+            pinned,
             fps: format.fps,
         })
     }
@@ -89,7 +105,16 @@ impl Samples {
 
     /// The median of the samples of `part`, of every plane.
     pub(super) fn median_frame(&self, part: u64) -> Frame {
-        self.each_row(part, None, |wanted, _, _| wanted.fill(Wanted::median(part)))
+        self.each_row(part, None, false, |wanted, _, _| {
+            wanted.fill(Wanted::median(part))
+        })
+    }
+
+    /// The commonest values of the samples of `part`.
+    pub(super) fn commonest_frame(&self, part: u64) -> Frame {
+        self.each_row(part, None, true, |wanted, _, _| {
+            wanted.fill(Wanted::median(part))
+        })
     }
 
     /// The median over the samples of `part` in which the pixel is free; where it is free in fewer than `least`, as
@@ -101,7 +126,7 @@ impl Samples {
         seen: &Occupancy,
         least: u32,
     ) -> Frame {
-        let mut result = self.each_row(part, None, |wanted, plane, row| {
+        let mut result = self.each_row(part, None, true, |wanted, plane, row| {
             for (x, wanted) in wanted.iter_mut().enumerate() {
                 let free = self.free_at(plane, x, row, seen, part);
                 let enough = free.count_ones() >= least;
@@ -125,7 +150,7 @@ impl Samples {
     /// the same 90th percentile would have.
     pub(super) fn noise(&self, part: u64, backgrounds: &[&Frame], seen: &Occupancy) -> Vec<f32> {
         let sways_anywhere = seen.scenery.contains(&true);
-        let mut deviation = self.each_row(part, Some(backgrounds), |wanted, plane, row| {
+        let mut deviation = self.each_row(part, Some(backgrounds), false, |wanted, plane, row| {
             for (x, wanted) in wanted.iter_mut().enumerate() {
                 let free = self.free_at(plane, x, row, seen, part);
                 *wanted = Wanted::median(free);
@@ -220,6 +245,7 @@ impl Samples {
         &self,
         part: u64,
         bases: Option<&[&Frame]>,
+        commonest: bool,
         want: impl Fn(&mut [Wanted], Plane, usize) + Sync,
     ) -> Frame {
         let mut result = self.frames[0].clone();
@@ -245,6 +271,9 @@ impl Samples {
                     let bases = bases.map(|bases| -> Vec<&[u8]> {
                         members.map(|k| &bases[k].planes[bytes.clone()]).collect()
                     });
+                    if commonest {
+                        ranks::want_commonest(&samples, &mut wanted);
+                    }
                     ranks::ranked(&samples, bases.as_deref(), &wanted, row);
                 });
             first += width * n_rows;
@@ -252,6 +281,26 @@ impl Samples {
         }
         result
     }
+}
+
+/// Puts the frame in which the animal was pointed at in place of the sample nearest to it; returns which one.
+fn pin(
+    source: &dyn FrameSource,
+    at: AnimalAtParam,
+    frames: &mut [Frame],
+    frame_idx: &mut [usize],
+) -> Result<usize, Error> {
+    let wanted = at.frame as usize;
+    let nearest = (0..frames.len()).min_by_key(|&k| frame_idx[k].abs_diff(wanted));
+    let k = nearest.unwrap_or(0);
+    let mut stream = source.open()?;
+    for _ in 0..=wanted {
+        if stream.next_frame(&mut frames[k])?.is_none() {
+            return Err(Error::NothingAtPoint(at));
+        }
+    }
+    frame_idx[k] = wanted;
+    Ok(k)
 }
 
 /// The bits of `free` at the set bits of `part`, packed together.

@@ -23,6 +23,9 @@ pub(super) const GHOST_SAMPLES: usize = 3;
 
 /// An animal is tethered that is led so in more than this share of the samples in which it is seen.
 const TETHERED: f64 = 0.5;
+/// A tether that the background hides in part seems to end inside the picture: always at the same place, which moves by less than
+/// this share of what the animal moves.
+const ANCHORED: f64 = 0.4;
 
 /// The components of every sample; samples that belong to no plate have none.
 pub(super) struct Survey {
@@ -37,6 +40,8 @@ pub(super) struct Survey {
     /// Something thin leads from the animal to the border and is a component of its own: half the width up to which
     /// things are thin, pixels (`silhouette::tether`).
     pub(super) tether_px: Option<u32>,
+    /// Something is where the animal was said to be.
+    pub(super) is_pinned: bool,
     /// Which component of each sample is the animal.
     pub(super) animal: Vec<Option<usize>>,
 }
@@ -47,7 +52,7 @@ impl Survey {
         let of_sample = |k: usize| {
             let plate = plate_of[k].map(|at| &plates[at]);
             plate.map_or(Vec::new(), |plate| {
-                silhouette::components(&samples.frames[k], plate, &Light::SAME)
+                silhouette::components(&samples.frames[k], plate, &Light::SAME, &samples.ignored[k])
             })
         };
         let found: Vec<Vec<Component>> = (0..samples.frames.len())
@@ -94,7 +99,11 @@ impl Survey {
             looks.collect()
         };
         let mut looks: Vec<Vec<Look>> = found.par_iter().enumerate().map(looks_of).collect();
-        let subject = Subject::learn(&looks, None);
+        let pinned = samples.pinned.and_then(|(k, point_px)| {
+            let at = nearest_to(&found[k], point_px)?;
+            Some((k, at))
+        });
+        let subject = Subject::learn(&looks, pinned);
         for (k, (looks, components)) in looks.iter_mut().zip(&found).enumerate() {
             for (look, component) in looks.iter_mut().zip(components) {
                 look.is_ghost = look.is_ghost
@@ -102,19 +111,23 @@ impl Survey {
                     && plate_of[k]
                         .zip(subject.as_ref())
                         .is_some_and(|(at, subject)| {
-                            subject.prefers(&color_in(&plates[at].rgb, component), &look.color)
+                            subject.prefers(&color_in(&plates[at].rgb, component), look)
                         });
             }
         }
-        let animal = match &subject {
+        let mut animal = match &subject {
             Some(subject) => subject.choices(&looks),
             None => vec![None; looks.len()],
         };
+        if let Some((k, at)) = pinned {
+            animal[k] = Some(at);
+        }
         Survey {
             worth: subject
                 .as_ref()
                 .map_or(0.0, |subject| subject.worth(&looks)),
             tether_px: None,
+            is_pinned: pinned.is_some(),
             found,
             looks,
             subject,
@@ -122,25 +135,30 @@ impl Survey {
         }
     }
 
-    /// Where something thin leads from the animal to the border in most samples, half the width up to which things are thin.
+    /// Where something thin leads from the animal to the border, or to one and the same place, in most samples: half the width
+    /// up to which things are thin. The end of a tail goes where the animal goes.
     fn thin_px(&self, samples: &Samples) -> Option<u32> {
         let first = &samples.frames[0];
+        let picture = [first.width, first.height];
         let animals = self.animal.iter().enumerate();
         let animals: Vec<&Component> = animals
             .filter_map(|(k, at)| Some(&self.found[k][(*at)?]))
             .collect();
-        let on_border = animals
+        let thin_px = order::median(animals.iter().map(|c| f64::from(tether::thin_px(c))))? as u32;
+        let cut = |whole: &&Component| tether::cut(whole, thin_px, picture);
+        let parts: Vec<[Component; 2]> = animals.iter().filter_map(cut).collect();
+        let n_led = parts
             .iter()
-            .filter(|animal| touches_border(animal.rect, [first.width, first.height]));
-        let thin_px =
-            order::median(on_border.map(|animal| f64::from(tether::thin_px(animal))))? as u32;
-        let picture = [first.width, first.height];
-        let leads = |animal: &&&Component| {
-            let parts = tether::cut(animal, thin_px, picture);
-            parts.is_some_and(|[_, tether]| touches_border(tether.rect, picture))
-        };
-        let n_led = animals.iter().filter(leads).count();
-        (n_led as f64 > TETHERED * animals.len() as f64).then_some(thin_px)
+            .filter(|[_, tether]| touches_border(tether.rect, picture))
+            .count();
+        let ends: Vec<[f64; 2]> = parts.iter().map(tether::end_px).collect();
+        let places: Vec<[f64; 2]> = parts
+            .iter()
+            .map(|[animal, _]| animal.centroid_px())
+            .collect();
+        let is_anchored = spread_px(&ends) < ANCHORED * spread_px(&places);
+        let n_tethered = if is_anchored { parts.len() } else { n_led };
+        (n_tethered as f64 > TETHERED * animals.len() as f64).then_some(thin_px)
     }
 
     /// How much differs in half of the samples, pixels.
@@ -161,15 +179,56 @@ impl Survey {
     }
 }
 
+/// The median distance of points from their median.
+fn spread_px(points: &[[f64; 2]]) -> f64 {
+    let middle = [0, 1].map(|axis| order::median(points.iter().map(|p| p[axis])).unwrap_or(0.0));
+    let off = points
+        .iter()
+        .map(|p| libm::hypot(p[0] - middle[0], p[1] - middle[1]));
+    order::median(off).unwrap_or(0.0)
+}
+
 fn look(frame: &Frame, plate: &Plate, component: &Component) -> Look {
     let difference = silhouette::difference(frame, plate, &Light::SAME, component.rect);
     let picture = [frame.width, frame.height];
-    let look = Look::of(component, &difference.rgb, &difference.levels, picture);
+    let look = Look::of(
+        component,
+        &difference.rgb,
+        &difference.levels,
+        picture,
+        plate.light,
+    );
     Look {
         is_shadow: shadow::is_shadow_alone(&difference, plate, component),
         is_ghost: is_ghost(frame, plate, component),
         ..look
     }
+}
+
+/// The component that a point lies in, or the nearest one whose box, widened by its size, holds the point.
+fn nearest_to(components: &[Component], point_px: [f64; 2]) -> Option<usize> {
+    let gap_px = |component: &Component| {
+        let rect = component.rect;
+        let beyond = |v: f64, from: u32, to: u32| (f64::from(from) - v).max(v - f64::from(to));
+        let x = beyond(point_px[0], rect.x, rect.right()).max(0.0);
+        let y = beyond(point_px[1], rect.y, rect.bottom()).max(0.0);
+        libm::hypot(x, y)
+    };
+    let holds = |component: &Component| {
+        let [x, y] = point_px.map(|v| v.floor());
+        let inside =
+            |run: &Run| y == f64::from(run.y) && f64::from(run.x0) <= x && x < f64::from(run.x1);
+        component.runs.iter().any(inside)
+    };
+    let near = (0..components.len()).filter(|&at| {
+        let rect = components[at].rect;
+        gap_px(&components[at]) <= f64::from(rect.w.max(rect.h))
+    });
+    near.min_by(|&a, &b| {
+        let rank = |at: usize| (!holds(&components[at]), gap_px(&components[at]));
+        let ((out_a, gap_a), (out_b, gap_b)) = (rank(a), rank(b));
+        out_a.cmp(&out_b).then(gap_a.total_cmp(&gap_b))
+    })
 }
 
 /// The color of a picture inside a component.

@@ -187,7 +187,7 @@ fn two_animals_are_refused_unless_the_largest_is_to_be_followed() {
     let two = |k: usize| Picture::of(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
     let (code, sentence) = refusal(60, two);
     assert_eq!(code, Code::SeveralAnimals, "{sentence}");
-    assert!(sentence.contains("set follow to largest"));
+    assert!(code.advice().contains("--follow-largest"));
     let params = Params {
         follow: Follow::Largest,
         ..Params::default()
@@ -237,6 +237,6 @@ fn a_film_of_a_few_frames_is_refused() {
     assert_eq!(code, Code::TooFewFrames);
     assert_eq!(
         sentence,
-        "the footage has 12 frames, at least 16 are needed"
+        "there are 12 frames to measure, at least 16 are needed"
     );
 }

@@ -129,8 +129,10 @@ impl Thumbnail {
         for c in 1..3 {
             let off = |(a, b): (&[f32; 3], &[f32; 3])| f64::from(a[c] - b[c]);
             let off = order::median(result.cells.iter().zip(&other.cells).map(off));
+            // Light of another color is another state.
+            let off = (off.unwrap_or(0.0) as f32).clamp(-CHROMA_LEVELS, CHROMA_LEVELS);
             for cell in &mut result.cells {
-                cell[c] -= off.unwrap_or(0.0) as f32;
+                cell[c] -= off;
             }
         }
         result

@@ -10,6 +10,9 @@ const GOOD: f64 = 0.004;
 /// A split is worth it when the two halves together differ in at most this share of what the whole differs in.
 const BETTER: f64 = 0.65;
 
+/// What is there for a smaller share of the samples is a visitor before the scene.
+const FOR_GOOD: f64 = 0.33;
+
 /// Samples of a short window.
 const SHORT: usize = 8;
 
@@ -21,7 +24,7 @@ pub(super) fn split(
     is_free: &impl Fn(usize, usize) -> bool,
 ) -> Vec<Part> {
     let members: Vec<usize> = bits(part.samples).collect();
-    let least = LEAST_SAMPLES as usize;
+    let least = (LEAST_SAMPLES as usize).max((FOR_GOOD * members.len() as f64).ceil() as usize);
     let whole = unexplained(&members, thumbnails, is_free);
     let n_cells = thumbnails[members[0]].len();
     if members.len() < 2 * least || (whole as f64) < GOOD * (n_cells * members.len()) as f64 {

@@ -22,10 +22,10 @@ pub const MARGIN_PX: u32 = 6;
 const GROWTH_PX: u32 = 16;
 
 /// The components of foreground pixels of a frame, from the top left; raw: neither holes nor ragged edges mended
-/// (`shaped` does).
-pub fn components(frame: &Frame, plate: &Plate, light: &Light) -> Vec<Component> {
+/// (`shaped` does). Nothing inside the `ignored` boxes counts.
+pub fn components(frame: &Frame, plate: &Plate, light: &Light, ignored: &[Rect]) -> Vec<Component> {
     let (boxes, _) = plate.blocks.proposals(frame, light, MARGIN_PX);
-    components_of(frame, plate, light, boxes)
+    components_of(frame, plate, light, boxes, ignored)
 }
 
 /// The same in boxes already proposed.
@@ -34,10 +34,11 @@ pub fn components_of(
     plate: &Plate,
     light: &Light,
     boxes: Vec<Rect>,
+    ignored: &[Rect],
 ) -> Vec<Component> {
     let mut found: Vec<Component> = Vec::new();
     for rect in boxes {
-        for component in components_in(frame, plate, light, rect) {
+        for component in components_in(frame, plate, light, rect, ignored) {
             if !found.contains(&component) {
                 found.push(component);
             }
@@ -64,6 +65,25 @@ pub struct Difference {
     pub rgb: RgbImage,
     /// Largest channel difference of each pixel.
     pub levels: Vec<u8>,
+}
+
+impl Difference {
+    /// Takes a box for no different, as far as it lies inside.
+    fn clear(&mut self, ignored: Rect) {
+        let common = self.rect.intersection(&ignored);
+        if common.is_empty() {
+            return;
+        }
+        let row_length = self.rect.w as usize;
+        let rows = self.levels.chunks_exact_mut(row_length);
+        let first = (common.x - self.rect.x) as usize;
+        for row in rows
+            .skip((common.y - self.rect.y) as usize)
+            .take(common.h as usize)
+        {
+            row[first..first + common.w as usize].fill(0);
+        }
+    }
 }
 
 /// Compares a box of a frame with the plate.
@@ -131,11 +151,20 @@ fn beside(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
 
 /// The components of one box, which grows to the sides where any of them runs into its edge, twice
 /// as far each time.
-fn components_in(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Vec<Component> {
+fn components_in(
+    frame: &Frame,
+    plate: &Plate,
+    light: &Light,
+    rect: Rect,
+    ignored: &[Rect],
+) -> Vec<Component> {
     let mut rect = rect;
     let mut growth = i64::from(GROWTH_PX);
     loop {
-        let difference = difference(frame, plate, light, rect);
+        let mut difference = difference(frame, plate, light, rect);
+        ignored
+            .iter()
+            .for_each(|ignored| difference.clear(*ignored));
         let found = hysteresis(&difference, plate);
         let grow = |runs_out: bool| if runs_out { growth } else { 0 };
         let grown = Rect::clipped(

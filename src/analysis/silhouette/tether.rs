@@ -65,6 +65,18 @@ pub fn cut(component: &Component, thin_px: u32, picture: [u32; 2]) -> Option<[Co
     Some([animal, tether])
 }
 
+/// The end of a tether that is farthest from the animal.
+pub fn end_px([animal, tether]: &[Component; 2]) -> [f64; 2] {
+    let from = animal.centroid_px();
+    let ends = tether
+        .runs
+        .iter()
+        .flat_map(|run| [run.x0, run.x1].map(|x| [f64::from(x), f64::from(run.y)]));
+    let far = |p: &[f64; 2]| libm::hypot(p[0] - from[0], p[1] - from[1]);
+    ends.max_by(|a, b| far(a).total_cmp(&far(b)))
+        .unwrap_or(from)
+}
+
 fn is_long(part: &Component, thin_px: u32) -> bool {
     let diagonal_px = libm::hypot(f64::from(part.rect.w), f64::from(part.rect.h));
     diagonal_px > LONG * f64::from(thin_px)

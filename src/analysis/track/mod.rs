@@ -19,11 +19,13 @@ pub mod sighting;
 use self::movers::Other;
 use self::path::Candidate;
 use self::sighting::{Choice, Sighting, View};
+use super::params::Follow;
 use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};
 use super::silhouette::{self, tether};
 use super::subject::{LEAST_AREA_PX, Look};
 use super::{Error, LEAST_FRAMES, Params};
+use crate::geometry::Rect;
 use crate::library::Mover;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
@@ -48,6 +50,14 @@ pub struct Tracked {
     pub plate_idx: Option<usize>,
     /// The animal, where it was found.
     pub sighting: Option<Sighting>,
+}
+
+impl Tracked {
+    /// The animal, where it was found before the main plate.
+    pub fn before_main_plate(&self) -> Option<&Sighting> {
+        let sighting = self.sighting.as_ref();
+        sighting.filter(|_| self.plate_idx == Some(0))
+    }
 }
 
 /// All frames of a footage, and where the pixels of the animal are kept.
@@ -94,7 +104,7 @@ pub fn follow(
     while let Some(batch) = batches.next_batch()? {
         let first = seen.len();
         let of = |(k, (time_s, frame)): (usize, &(f64, Frame))| {
-            look(first + k, *time_s, frame, scene, &**scratch)
+            look(first + k, *time_s, frame, scene, params, &**scratch)
         };
         let of_batch: Result<Vec<Seen>, Full> = batch.par_iter().enumerate().map(of).collect();
         seen.extend(of_batch?);
@@ -112,7 +122,17 @@ pub fn follow(
         });
     }
     let candidates: Vec<&[Candidate]> = seen.iter().map(|s| s.candidates.as_slice()).collect();
-    let chosen = path::choose(&candidates, &scene.subject, params.follow);
+    let pin = params.animal_at.and_then(|at| {
+        let candidates = candidates.get(at.frame as usize)?;
+        Some((at.frame as usize, nearest_to(candidates, at.point)?))
+    });
+    // Who points at the animal follows that one.
+    let follow = if pin.is_some() {
+        Follow::One
+    } else {
+        params.follow
+    };
+    let chosen = path::choose(&candidates, &scene.subject, follow, pin);
     let others = seen.iter().zip(&chosen).map(|(seen, &chosen)| {
         let box_px = chosen.map(|at| seen.candidates[at].look.box_px);
         movers::beside(&seen.others, box_px)
@@ -142,6 +162,7 @@ fn look(
     time_s: f64,
     frame: &Frame,
     scene: &Scene,
+    params: &Params,
     scratch: &dyn Scratch,
 ) -> Result<Seen, Full> {
     let Some(placed) = scene.place(frame_idx, frame) else {
@@ -152,11 +173,13 @@ fn look(
             others: Vec::new(),
         });
     };
-    let (described, others) = described(frame, &placed, scene);
+    let ignored = params.ignored_at(time_s, [frame.width, frame.height]);
+    let (described, others) = described(frame, &placed, scene, &ignored);
     let view = View {
         frame,
         plate: placed.plate,
         light: &placed.light,
+        ignored: &ignored,
     };
     let mut candidates = Vec::with_capacity(described.len());
     for (component, look, cost) in described {
@@ -190,6 +213,7 @@ fn described(
     frame: &Frame,
     placed: &Placed<'_>,
     scene: &Scene,
+    ignored: &[Rect],
 ) -> (Vec<(Component, Look, f64)>, Vec<Other>) {
     let subject = &scene.subject;
     let is_image = |look: &Look| {
@@ -198,11 +222,16 @@ fn described(
             .is_some_and(|mirror| mirror.is_image(look.centroid_px))
     };
     let boxes = placed.boxes.clone();
-    let mut components = silhouette::components_of(frame, placed.plate, &placed.light, boxes);
+    let mut components =
+        silhouette::components_of(frame, placed.plate, &placed.light, boxes, ignored);
     if let Some(thin_px) = scene.tether_px {
         let picture = [frame.width, frame.height];
         let cut = |component| tether::cut_all(component, thin_px, picture);
         components = components.into_iter().flat_map(cut).collect();
+    }
+    if let Some(mirror) = &scene.mirror {
+        let parted = |component| mirror.parted(component);
+        components = components.into_iter().flat_map(parted).collect();
     }
     let mut found: Vec<(Component, Look, f64)> = Vec::new();
     let mut others = Vec::new();
@@ -232,8 +261,23 @@ fn described(
     (found, others)
 }
 
+/// The candidate whose middle is nearest to a point.
+fn nearest_to(candidates: &[Candidate], point_px: [f64; 2]) -> Option<usize> {
+    let off = |at: &usize| {
+        let [x, y] = candidates[*at].look.centroid_px;
+        libm::hypot(x - point_px[0], y - point_px[1])
+    };
+    (0..candidates.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
 fn describe(component: &Component, frame: &Frame, placed: &Placed<'_>) -> Look {
     let difference = silhouette::difference(frame, placed.plate, &placed.light, component.rect);
     let picture = [frame.width, frame.height];
-    Look::of(component, &difference.rgb, &difference.levels, picture)
+    Look::of(
+        component,
+        &difference.rgb,
+        &difference.levels,
+        picture,
+        placed.plate.light,
+    )
 }

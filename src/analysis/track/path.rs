@@ -16,12 +16,20 @@ pub(super) const MOST_COST: f64 = 24.0;
 const ABSENT: f64 = 10.0;
 /// Cost of the farthest step, in any time.
 const FARTHEST: f64 = 80.0;
+/// A step of more spreads than this is a leap ...
+const LEAP: f64 = 2.0;
+/// ... and leads to something else, where that was so many times nearer.
+const NEARER: f64 = 3.0;
+/// Cost of a leap to something that was seen elsewhere before.
+const TAKEN: f64 = 400.0;
 /// Weight of the cost of looks that fit.
 const FITTING: f64 = 0.05;
 /// Cost of the largest change of area.
 const LARGEST_CHANGE: f64 = 3.0;
 /// Spread of the change of the logarithm of the area from one frame to the next.
 const CHANGE_SPREAD: f64 = 0.3;
+/// What the path gains where a person has pointed at the animal: more than all else can cost.
+const PINNED: f64 = 1e9;
 /// Frames without the animal that a step may lead across; after more the animal may be anywhere.
 const MOST_MISSED: usize = 30;
 
@@ -37,75 +45,154 @@ pub(super) struct Candidate {
 }
 
 /// Chooses a candidate, or none, for each frame. Where the largest of several animals is followed, a smaller one costs the
-/// logarithm of how many times smaller it is.
+/// logarithm of how many times smaller it is. `pin` is a frame and the candidate in it that is the animal.
 pub(super) fn choose(
     frames: &[&[Candidate]],
     subject: &Subject,
     follow: Follow,
+    pin: Option<(usize, usize)>,
 ) -> Vec<Option<usize>> {
-    let steps = Steps::of(frames, subject);
-    // A node is a candidate; its best predecessor is a node of an earlier frame, or none.
-    let mut costs: Vec<Vec<f64>> = Vec::with_capacity(frames.len());
-    let mut from: Vec<Vec<Option<(usize, usize)>>> = Vec::with_capacity(frames.len());
-    // The cheapest end so far of a path whose last node lies too far back for a step.
-    let mut forgotten: (f64, Option<(usize, usize)>) = (0.0, None);
+    let mut paths = Paths {
+        frames,
+        steps: Steps::of(frames, subject),
+        best: Vec::with_capacity(frames.len()),
+        forgotten: Path {
+            cost: 0.0,
+            from: None,
+        },
+    };
     for (t, candidates) in frames.iter().enumerate() {
-        let (mut of_frame, mut from_frame) = (Vec::new(), Vec::new());
-        if let Some(old) = t.checked_sub(MOST_MISSED + 1) {
-            for (at, cost) in costs[old].iter().enumerate() {
-                // Compared as if both had missed all frames up to now.
-                let since_start = cost - ABSENT * (old + 1) as f64;
-                if since_start < forgotten.0 {
-                    forgotten = (since_start, Some((old, at)));
-                }
-            }
-        }
+        paths.forget(t);
         let fitting = candidates.iter().filter(|c| c.cost < FITS);
         let largest_px = fitting.map(|c| c.look.area_px).fold(0.0, f64::max);
         let smaller = |candidate: &Candidate| match follow {
             Follow::One => 0.0,
             Follow::Largest => libm::log(largest_px / candidate.look.area_px).max(0.0),
         };
-        for candidate in *candidates {
-            let mut best = (
-                forgotten.0
-                    + ABSENT * t as f64
-                    + if forgotten.1.is_some() { FARTHEST } else { 0.0 },
-                forgotten.1,
-            );
-            for before in t.saturating_sub(MOST_MISSED)..t {
-                let n_missed = t - before - 1;
-                for (at, previous) in frames[before].iter().enumerate() {
-                    let cost = costs[before][at]
-                        + ABSENT * n_missed as f64
-                        + steps.cost(&previous.look, &candidate.look, n_missed + 1);
-                    if cost < best.0 {
-                        best = (cost, Some((before, at)));
-                    }
-                }
+        let path = |(at, candidate): (usize, &Candidate)| {
+            let mut path = paths.to(t, candidate);
+            path.cost += of_look(candidate.cost) + smaller(candidate);
+            if pin == Some((t, at)) {
+                path.cost -= PINNED;
             }
-            of_frame.push(best.0 + of_look(candidate.cost) + smaller(candidate));
-            from_frame.push(best.1);
-        }
-        costs.push(of_frame);
-        from.push(from_frame);
+            path
+        };
+        let best = candidates.iter().enumerate().map(path).collect();
+        paths.best.push(best);
     }
-    let n = frames.len();
-    let ends = costs.iter().enumerate().flat_map(|(t, costs)| {
-        let with_rest =
-            move |(at, cost): (usize, &f64)| (cost + ABSENT * (n - 1 - t) as f64, (t, at));
-        costs.iter().enumerate().map(with_rest)
-    });
-    let mut node = ends
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(cost, _)| *cost < ABSENT * n as f64)
-        .map(|(_, node)| node);
-    let mut chosen = vec![None; n];
-    while let Some((t, at)) = node {
-        chosen[t] = Some(at);
-        node = from[t][at];
+    let mut chosen = paths.cheapest();
+    if pin.is_none() {
+        drop_misfits(&mut chosen, frames, &paths.steps);
     }
     chosen
+}
+
+/// A candidate, by its frame and its number in it.
+type Node = (usize, usize);
+
+/// The cheapest path that ends at a candidate.
+#[derive(Clone, Copy)]
+struct Path {
+    cost: f64,
+    /// The candidate before the last one.
+    from: Option<Node>,
+}
+
+/// The cheapest paths to all candidates of the frames so far.
+struct Paths<'a> {
+    frames: &'a [&'a [Candidate]],
+    steps: Steps,
+    best: Vec<Vec<Path>>,
+    /// The cheapest of the paths whose ends lie too far back for a step, and of none; without the frames after it.
+    forgotten: Path,
+}
+
+impl Paths<'_> {
+    /// Puts aside the paths from whose ends no step leads to frame `t` any more.
+    fn forget(&mut self, t: usize) {
+        let Some(old) = t.checked_sub(MOST_MISSED + 1) else {
+            return;
+        };
+        for (at, path) in self.best[old].iter().enumerate() {
+            // Compared as if both had missed all frames up to now.
+            let cost = path.cost - ABSENT * (old + 1) as f64;
+            if cost < self.forgotten.cost {
+                let from = Some((old, at));
+                self.forgotten = Path { cost, from };
+            }
+        }
+    }
+
+    /// The cheapest path that leads to a candidate of frame `t`, without what the candidate itself costs.
+    fn to(&self, t: usize, candidate: &Candidate) -> Path {
+        let afar = self.forgotten.from.map_or(0.0, |_| FARTHEST);
+        let mut best = Path {
+            cost: self.forgotten.cost + ABSENT * t as f64 + afar,
+            ..self.forgotten
+        };
+        for before in t.saturating_sub(MOST_MISSED)..t {
+            let n_missed = t - before - 1;
+            for (at, previous) in self.frames[before].iter().enumerate() {
+                let beside = self.frames[before].iter().enumerate();
+                let others = beside.filter(|(k, _)| *k != at).map(|(_, o)| &o.look);
+                let cost = self.best[before][at].cost
+                    + ABSENT * n_missed as f64
+                    + self
+                        .steps
+                        .cost(&previous.look, &candidate.look, n_missed + 1)
+                    + self.steps.taken(&previous.look, &candidate.look, others);
+                if cost < best.cost {
+                    let from = Some((before, at));
+                    best = Path { cost, from };
+                }
+            }
+        }
+        best
+    }
+
+    /// The candidates of the cheapest path of all.
+    fn cheapest(&self) -> Vec<Option<usize>> {
+        let n = self.frames.len();
+        let ends = self.best.iter().enumerate().flat_map(|(t, paths)| {
+            let with_rest = move |(at, path): (usize, &Path)| {
+                (path.cost + ABSENT * (n - 1 - t) as f64, (t, at))
+            };
+            paths.iter().enumerate().map(with_rest)
+        });
+        let mut node = ends
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|(cost, _)| *cost < ABSENT * n as f64)
+            .map(|(_, node)| node);
+        let mut chosen = vec![None; n];
+        while let Some((t, at)) = node {
+            chosen[t] = Some(at);
+            node = self.best[t][at].from;
+        }
+        chosen
+    }
+}
+
+/// Takes away the stretches of the path that mostly do not fit: nothing that fits leads to them. Stretches end where the
+/// animal is not seen and at leaps.
+fn drop_misfits(chosen: &mut [Option<usize>], frames: &[&[Candidate]], steps: &Steps) {
+    let candidate = |t: usize, chosen: &[Option<usize>]| chosen[t].map(|at| &frames[t][at]);
+    let mut ends = Vec::new();
+    for t in 0..frames.len() {
+        let before = t.checked_sub(1).and_then(|t| candidate(t, chosen));
+        let goes_on = before.zip(candidate(t, chosen));
+        if goes_on.is_none_or(|(a, b)| steps.is_leap(&a.look, &b.look)) {
+            ends.push(t);
+        }
+    }
+    ends.push(frames.len());
+    for stretch in ends.windows(2).map(|ends| ends[0]..ends[1]) {
+        let costs = stretch
+            .clone()
+            .filter_map(|t| Some(candidate(t, chosen)?.cost));
+        if order::median(costs).is_some_and(|cost| cost > FITS) {
+            chosen[stretch].fill(None);
+        }
+    }
 }
 
 /// What a look costs in a path: nearly nothing while it fits, however well another may fit. Looks of neighboring frames are
@@ -124,14 +211,19 @@ struct Steps {
 
 impl Steps {
     fn of(frames: &[&[Candidate]], subject: &Subject) -> Steps {
-        let best = |candidates: &&[Candidate]| {
-            let fitting = candidates.iter().filter(|c| c.cost < FITS);
-            fitting
-                .min_by(|a, b| a.cost.total_cmp(&b.cost))
-                .map(|c| c.look.centroid_px)
+        // From the best candidate of a frame to the nearest one of the next: of several animals any may be the best.
+        let fitting = |candidates: &&[Candidate]| -> Vec<[f64; 2]> {
+            let mut fitting: Vec<&Candidate> =
+                candidates.iter().filter(|c| c.cost < FITS).collect();
+            fitting.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            fitting.iter().map(|c| c.look.centroid_px).collect()
         };
-        let places: Vec<Option<[f64; 2]>> = frames.iter().map(best).collect();
-        let step = |pair: &[Option<[f64; 2]>]| Some(distance(pair[0]?, pair[1]?));
+        let places: Vec<Vec<[f64; 2]>> = frames.iter().map(fitting).collect();
+        let step = |pair: &[Vec<[f64; 2]>]| {
+            let from = *pair[0].first()?;
+            let steps = pair[1].iter().map(|&to| distance(from, to));
+            steps.min_by(f64::total_cmp)
+        };
         let mut steps: Vec<f64> = places.windows(2).filter_map(step).collect();
         Steps {
             usual_px: order::percentile(&mut steps, 0.9).unwrap_or(0.0),
@@ -141,13 +233,119 @@ impl Steps {
 
     fn cost(&self, a: &Look, b: &Look, n_frames: usize) -> f64 {
         let n = n_frames as f64;
+        let change = libm::log(b.area_px / a.area_px) / (CHANGE_SPREAD * n.sqrt());
+        self.far(a, b, n) + (0.5 * change * change).min(LARGEST_CHANGE)
+    }
+
+    /// The share of the cost that is for the distance alone.
+    fn far(&self, a: &Look, b: &Look, n: f64) -> f64 {
         let beyond = (distance(a.centroid_px, b.centroid_px) - self.usual_px * n).max(0.0);
         let far = beyond / (self.spread_px * n.sqrt());
-        let change = libm::log(b.area_px / a.area_px) / (CHANGE_SPREAD * n.sqrt());
-        (0.5 * far * far).min(FARTHEST) + (0.5 * change * change).min(LARGEST_CHANGE)
+        (0.5 * far * far).min(FARTHEST)
+    }
+
+    fn is_leap(&self, a: &Look, b: &Look) -> bool {
+        distance(a.centroid_px, b.centroid_px) > LEAP * self.spread_px + self.usual_px
+    }
+
+    /// What a leap from `a` to `b` costs besides, where one of the `others` seen together with `a` was far nearer to `b`: two
+    /// things seen at once are not the same.
+    fn taken<'a>(&self, a: &Look, b: &Look, mut others: impl Iterator<Item = &'a Look>) -> f64 {
+        let leap_px = distance(a.centroid_px, b.centroid_px);
+        let nearer = |other: &Look| NEARER * distance(other.centroid_px, b.centroid_px) < leap_px;
+        match self.is_leap(a, b) && others.any(nearer) {
+            true => TAKEN,
+            false => 0.0,
+        }
     }
 }
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     libm::hypot(a[0] - b[0], a[1] - b[1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::subject::Color;
+    use crate::geometry::Rect;
+    use crate::raster::RgbaImage;
+
+    /// Something of 20 x 10 pixels at a place, as unlike the subject as said.
+    fn candidate(x: f64, cost: f64) -> Candidate {
+        let rect = Rect::of_size(20, 10);
+        let mut image = RgbaImage::new(20, 10);
+        image.pixels.fill(255);
+        let look = Look {
+            area_px: 200.0,
+            color: Color::of(std::iter::empty()),
+            contrast: 60.0,
+            box_px: rect,
+            centroid_px: [x, 50.0],
+            on_border: false,
+            is_shadow: false,
+            is_ghost: false,
+            light: 0,
+        };
+        Candidate {
+            sighting: Sighting::measured(rect, &image).expect("it is opaque"),
+            look,
+            cost,
+        }
+    }
+
+    fn chosen(frames: &[Vec<Candidate>], pin: Option<(usize, usize)>) -> Vec<Option<usize>> {
+        let looks = vec![vec![candidate(0.0, 0.0).look]];
+        let subject = Subject::learn(&looks, Some((0, 0))).expect("there is a look");
+        let frames: Vec<&[Candidate]> = frames.iter().map(Vec::as_slice).collect();
+        choose(&frames, &subject, Follow::One, pin)
+    }
+
+    #[test]
+    fn what_was_there_first_and_fits_less_is_not_the_animal() {
+        let frames: Vec<Vec<Candidate>> = (0..60)
+            .map(|t| {
+                let hand = candidate(400.0, 12.0);
+                let animal = candidate(100.0 + f64::from(t), 0.5);
+                match t {
+                    0..10 => vec![hand],
+                    10..20 => vec![hand, animal],
+                    _ => vec![animal],
+                }
+            })
+            .collect();
+        let wanted = |t| (t >= 10).then_some(usize::from(t < 20));
+        let wanted: Vec<Option<usize>> = (0..60).map(wanted).collect();
+        assert_eq!(chosen(&frames, None), wanted);
+    }
+
+    #[test]
+    fn an_animal_that_is_hidden_for_a_while_is_not_made_up() {
+        let frames: Vec<Vec<Candidate>> = (0..60)
+            .map(|t| match t {
+                20..30 => vec![candidate(300.0, 23.0)],
+                _ => vec![candidate(100.0 + f64::from(t), 0.5)],
+            })
+            .collect();
+        let n_found = chosen(&frames, None).iter().flatten().count();
+        assert_eq!(n_found, 50);
+    }
+
+    #[test]
+    fn of_two_that_are_alike_the_one_that_was_pointed_at_is_followed() {
+        let frames: Vec<Vec<Candidate>> = (0..40)
+            .map(|t| {
+                vec![
+                    candidate(100.0 + f64::from(t), 0.1),
+                    candidate(300.0 - f64::from(t), 0.6),
+                ]
+            })
+            .collect();
+        assert!(chosen(&frames, None).iter().all(|&at| at == Some(0)));
+        assert!(
+            chosen(&frames, Some((30, 1)))
+                .iter()
+                .all(|&at| at == Some(1))
+        );
+    }
 }

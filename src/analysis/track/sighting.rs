@@ -37,7 +37,7 @@ pub struct Sighting {
     pub upright_px: f64,
     /// Bounding box of the silhouette.
     pub box_px: Rect,
-    /// The silhouette touches the border of the frame.
+    /// The silhouette touches the border of the frame or of a box that is not looked at.
     pub cut: bool,
 }
 
@@ -89,6 +89,8 @@ pub struct View<'a> {
     pub plate: &'a Plate,
     /// How much brighter than the plate the frame is.
     pub light: &'a Light,
+    /// Boxes that are not looked at.
+    pub ignored: &'a [Rect],
 }
 
 impl View<'_> {
@@ -105,9 +107,17 @@ impl View<'_> {
             at: scratch.put(&matte.image.pixels)?,
             contrast: matte.contrast,
             box_px: rect,
-            cut: subject::touches_border(rect, [self.frame.width, self.frame.height]),
+            cut: self.cuts(rect),
             ..measured
         }))
+    }
+
+    /// Whether a box reaches the border of what is looked at.
+    fn cuts(&self, rect: Rect) -> bool {
+        let (width, height) = (self.frame.width, self.frame.height);
+        let around = rect.inflated(1, width, height);
+        let meets = |ignored: &Rect| !ignored.intersection(&around).is_empty();
+        subject::touches_border(rect, [width, height]) || self.ignored.iter().any(meets)
     }
 }
 

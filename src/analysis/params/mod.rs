@@ -1,7 +1,11 @@
 //! What a person may set about an analysis. Every default is the value of ALGORITHMS.md.
 
+mod hints;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
+
+pub use hints::{AnimalAtParam, IgnoreParam};
 
 use super::distance::Clip;
 use crate::geometry::Camera;
@@ -16,6 +20,15 @@ pub struct Params {
     pub fps: Option<f64>,
     /// Width of a pixel over its height, 0.1..=10; null = as the file says.
     pub pixel_aspect: Option<f64>,
+    /// Where the part that is measured begins, seconds from the file's first frame; null = there. All frames and times
+    /// are counted from this.
+    pub from_s: Option<f64>,
+    /// Where the part that is measured ends, seconds from the file's first frame; null = at the last one.
+    pub to_s: Option<f64>,
+    /// Where the animal is in one frame: that thing is followed, whatever else moves.
+    pub animal_at: Option<AnimalAtParam>,
+    /// Boxes in which nothing is taken for the animal, at most 64.
+    pub ignore: Vec<IgnoreParam>,
     /// From where the animal is seen; guessed when absent.
     pub view: Option<ViewParam>,
     /// The calibrated camera; without it nothing is given in metres.
@@ -182,6 +195,10 @@ impl Default for Params {
         Params {
             fps: None,
             pixel_aspect: None,
+            from_s: None,
+            to_s: None,
+            animal_at: None,
+            ignore: Vec::new(),
             view: None,
             camera: None,
             animal: None,
@@ -280,6 +297,7 @@ impl Params {
         positive("kappa", self.kappa)?;
         within("fps", self.fps, 0.01..=1000.0)?;
         within("pixel_aspect", self.pixel_aspect, 0.1..=10.0)?;
+        self.check_hints()?;
         if !(0.0..=180.0).contains(&self.heading_gate_deg) {
             return Err(format!(
                 "heading_gate_deg must lie in 0..=180: {}",

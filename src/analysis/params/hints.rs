@@ -1,0 +1,82 @@
+//! What a person says of a film that it does not say itself: which part is measured, which thing is the animal, what is none.
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::Params;
+use crate::geometry::Rect;
+
+/// Boxes to ignore, at most.
+const MOST_IGNORED: usize = 64;
+
+/// Where the animal is in one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AnimalAtParam {
+    /// The frame, counted from 0.
+    pub frame: u32,
+    /// A point of the animal, pixels.
+    pub point: [f64; 2],
+}
+
+/// A box in which nothing is taken for the animal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IgnoreParam {
+    /// Left, top, width and height, pixels.
+    pub box_px: [u32; 4],
+    /// From when on, seconds; null = from the start.
+    #[serde(default)]
+    pub from_s: Option<f64>,
+    /// Until when, seconds; null = to the end.
+    #[serde(default)]
+    pub to_s: Option<f64>,
+}
+
+impl Params {
+    /// The boxes in which nothing is the animal at a time, as far as they lie in a picture of the given size.
+    pub fn ignored_at(&self, time_s: f64, [width, height]: [u32; 2]) -> Vec<Rect> {
+        let holds = |ignore: &&IgnoreParam| {
+            ignore.from_s.is_none_or(|from_s| from_s <= time_s)
+                && ignore.to_s.is_none_or(|to_s| time_s <= to_s)
+        };
+        let clipped = |ignore: &IgnoreParam| {
+            let [x, y, w, h] = ignore.box_px.map(i64::from);
+            Rect::clipped(x, y, x + w, y + h, width, height)
+        };
+        self.ignore.iter().filter(holds).map(clipped).collect()
+    }
+
+    /// Checks what says which part of the film is measured, and what in it.
+    pub(super) fn check_hints(&self) -> Result<(), String> {
+        check_span("", self.from_s, self.to_s)?;
+        if let Some(at) = self.animal_at
+            && at.point.iter().any(|v| !v.is_finite())
+        {
+            return Err("animal_at.point must be two finite numbers".into());
+        }
+        if self.ignore.len() > MOST_IGNORED {
+            let n = self.ignore.len();
+            return Err(format!("ignore takes {MOST_IGNORED} boxes at most: {n}"));
+        }
+        for ignore in &self.ignore {
+            check_span("ignore.", ignore.from_s, ignore.to_s)?;
+            let [x, y, w, h] = ignore.box_px;
+            if w == 0 || h == 0 {
+                return Err(format!("ignore.box_px must hold a pixel: {x},{y},{w},{h}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Checks that a span of time, where both ends are set, is one.
+fn check_span(name: &str, from_s: Option<f64>, to_s: Option<f64>) -> Result<(), String> {
+    let (from_s, to_s) = (from_s.unwrap_or(0.0), to_s.unwrap_or(f64::MAX));
+    match 0.0 <= from_s && from_s < to_s && to_s.is_finite() {
+        true => Ok(()),
+        false => Err(format!(
+            "{name}from_s must be at least 0 and before {name}to_s: {from_s}"
+        )),
+    }
+}
