@@ -52,6 +52,45 @@ fn a_film_that_is_refused_gets_a_sentence_with_advice_and_leaves_nothing_behind(
 }
 
 #[test]
+fn every_option_that_an_advice_names_is_one() {
+    let films = Films::new();
+    let quoted = |code: &Code| code.advice().split('`').skip(1).step_by(2).collect();
+    let all: Vec<&str> = Code::ALL
+        .iter()
+        .flat_map(|code| -> Vec<&str> { quoted(code) })
+        .collect();
+    let options = all
+        .iter()
+        .filter(|text| text.starts_with("--") && !text.contains("upload"));
+    assert!(options.clone().count() > 6);
+    for option in options {
+        let done = flockreel(&films, &format!("analyze nowhere.mp4 -o library {option}"));
+        let sentence = String::from_utf8(done.stderr).expect("it is text");
+        // It was understood: what is missing is the film.
+        assert!(
+            sentence.contains("cannot be read") && sentence.contains("nowhere.mp4"),
+            "{option}: {sentence}"
+        );
+    }
+}
+
+#[test]
+fn a_hint_that_is_not_understood_is_shown_with_an_example() {
+    let films = Films::new();
+    for (option, example) in [
+        ("--animal-at 120", "such as 120:310,95: 120"),
+        ("--animal-at 1:2", "such as 120:310,95: 1:2"),
+        ("--ignore 1,2,3", "10,20,200,40@0-2.5: 1,2,3"),
+        ("--ignore 1,2,3,4@5", "10,20,200,40@0-2.5: 1,2,3,4@5"),
+    ] {
+        let done = flockreel(&films, &format!("analyze nowhere.mp4 -o library {option}"));
+        let sentence = String::from_utf8(done.stderr).expect("it is text");
+        assert_eq!(done.status.code(), Some(2), "{sentence}");
+        assert!(sentence.contains(example), "{option}: {sentence}");
+    }
+}
+
+#[test]
 fn a_film_that_is_not_there_is_named() {
     let films = Films::new();
     let done = flockreel(&films, "analyze nowhere.mp4 -o library");

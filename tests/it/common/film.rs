@@ -76,3 +76,13 @@ impl Films {
         std::fs::read(raw).expect("the reference")
     }
 }
+
+/// The folder of real recordings that FLOCKREEL_FOOTAGE names, if there is one.
+pub(crate) fn footage() -> Option<PathBuf> {
+    let folder = std::env::var_os("FLOCKREEL_FOOTAGE").map(PathBuf::from);
+    let folder = folder.filter(|folder| folder.is_dir());
+    if folder.is_none() {
+        println!("skipped: FLOCKREEL_FOOTAGE names no folder of real footage");
+    }
+    folder
+}

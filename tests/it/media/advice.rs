@@ -25,7 +25,7 @@ fn rates(code: Code) -> Vec<f64> {
 /// Films that are refused, one for each code whose advice names a command, more where kinds differ: size, frames, and
 /// how ffmpeg makes them.
 #[rustfmt::skip]
-const REFUSED: [(Code, &str, usize, &str); 15] = [
+const REFUSED: [(Code, &str, usize, &str); 12] = [
     (Code::ContainerNotAllowed, "64x48", 40, "-c:v libvpx -f ivf film.ivf"),
     (Code::ContainerNotAllowed, "64x48", 40, "-pix_fmt yuv444p film.y4m"),
     (Code::ContainerNotAllowed, "64x48", 40, "-c:v mpeg2video bare.m2v"),
@@ -38,9 +38,6 @@ const REFUSED: [(Code, &str, usize, &str); 15] = [
     (Code::TooFast, "64x48", 2100, "-vf settb=1/2000,setpts=N -r 2000 -c:v mpeg4 fast.mkv"),
     (Code::TooLong, "64x48", 80, "-vf setpts=N*50/TB -fps_mode vfr -c:v mpeg4 long.mkv"),
     (Code::DecoderCrashed, "64x48", 40, "-c:v mpeg4 any.avi"),
-    (Code::CameraMoved, "64x48", 100, "-c:v mpeg4 moved.avi"),
-    (Code::LightChanges, "64x48", 100, "-c:v mpeg4 light.avi"),
-    (Code::SceneChanges, "64x48", 100, "-c:v mpeg4 scenes.avi"),
 ];
 
 /// The refused films, with their codes.
@@ -70,24 +67,15 @@ fn codec_of(name: &str) -> &'static str {
     }
 }
 
-/// Refused for what the film shows, or by chance: the advice is tried on a film that can be read.
-const READABLE: [Code; 4] = [
-    Code::DecoderCrashed,
-    Code::CameraMoved,
-    Code::LightChanges,
-    Code::SceneChanges,
-];
-
 #[test]
 fn each_command_of_an_advice_makes_a_film_that_is_taken() {
     let films = Films::new();
     let mut tried = Vec::new();
     for (code, film) in refused(&films) {
         let refusal = read_whole(&film, &Limits::default()).err();
-        assert!(
-            refusal == Some(code) || READABLE.contains(&code),
-            "{film:?}: {refusal:?}"
-        );
+        // A decoder that crashes does so by chance: its advice is tried on a film that can be read.
+        let is_right = refusal == Some(code) || code == Code::DecoderCrashed;
+        assert!(is_right, "{film:?}: {refusal:?}");
         let name = film
             .file_name()
             .and_then(|name| name.to_str())

@@ -1,24 +1,15 @@
 //! Real recordings decode whole, with the counts and sizes of their table. They are not part of
 //! the repository: FLOCKREEL_FOOTAGE names their folder.
 
-use std::path::PathBuf;
-
 use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Video};
 use flockreel::raster::{Frame, Range};
 
-fn folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("FLOCKREEL_FOOTAGE").map(PathBuf::from);
-    let folder = folder.filter(|folder| folder.is_dir());
-    if folder.is_none() {
-        println!("skipped: FLOCKREEL_FOOTAGE names no folder of real footage");
-    }
-    folder
-}
+use crate::common::film::footage;
 
 #[test]
 fn every_real_clip_decodes_whole_at_its_own_size_and_rate() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = footage() else { return };
     for (name, width, height, fps, n_frames) in [
         ("mouse_openfield.mp4", 640, 480, 1e6 / 33333.0, 1200),
         ("mouse_round_arena.webm", 640, 480, 30.0, 1200),

@@ -1,0 +1,151 @@
+//! What goes wrong when people film: each is measured all the same, or refused for its own reason.
+
+use flockreel::analysis::{Error, Params};
+use flockreel::library::MoverKind;
+
+use super::staged::{FPS, HEIGHT, N_FRAMES, Staged, WIDTH, put};
+
+/// An animal from the side, as most films of this fish are; the view is guessed in tests of its own.
+fn measured(name: &str, film: &Staged) -> flockreel::library::Library {
+    let library = film.analyzed(&Params::default());
+    let library = library.unwrap_or_else(|error| panic!("{name}: {error}"));
+    film.check(name, &library);
+    library
+}
+
+#[test]
+fn light_that_is_dimmed_switched_or_flickers_changes_nothing() {
+    let dimmed = |k: usize, _| 1.0 - 0.5 * (k as f64 / 75.0 - 0.5).clamp(0.0, 1.0);
+    measured("dimmed", &Staged::plain().with_light(dimmed));
+    let switched = |k: usize, _| if (50..110).contains(&k) { 0.4 } else { 1.0 };
+    measured("switched", &Staged::plain().with_light(switched));
+    let banded = |k: usize, y: usize| 1.0 + 0.08 * (y as f64 / 25.0 + k as f64 * 1.3).sin();
+    measured("mains", &Staged::plain().with_light(banded));
+}
+
+#[test]
+fn a_camera_that_is_bumped_is_followed() {
+    measured(
+        "bumped",
+        &Staged::plain().shifted(|k| if k < 70 { [0, 0] } else { [4, 2] }),
+    );
+}
+
+#[test]
+fn an_animal_that_rests_for_most_of_the_film_is_found_where_it_rests() {
+    let rests = (0..N_FRAMES).map(|k| k.max(90)).collect();
+    measured("rests first", &Staged::in_order(rests));
+    let rests = (0..N_FRAMES).map(|k| (k + 90).min(N_FRAMES - 1)).collect();
+    measured("rests last", &Staged::in_order(rests));
+}
+
+#[test]
+fn frames_of_no_scene_are_left_out_and_told() {
+    let film = Staged::plain().after(15, [0; 3]);
+    let library = measured("black lead", &film);
+    assert_eq!(library.stats.n_foreign_frames, 15);
+    assert_eq!(library.stats.first_foreign_s, Some(0.0));
+}
+
+#[test]
+fn a_cable_is_not_the_animal() {
+    let film = Staged::plain();
+    let scene = film.scene().clone();
+    let film = film.with_drawing(|_, picture, [x, y]| {
+        for row in 0..y as u32 {
+            let middle = 160.0 + (x - 160.0) * f64::from(row) / y;
+            for column in middle as u32 - 1..middle as u32 + 1 {
+                // It is fixed to the far side of the fish.
+                let (shown, empty) = (picture.pixel(column, row), scene.pixel(column, row));
+                let is_fish = (0..3).any(|c| shown[c].abs_diff(empty[c]) > 24);
+                if !is_fish {
+                    put(picture, [column, row], [35; 3]);
+                }
+            }
+        }
+    });
+    let library = measured("cable", &film);
+    let n_cut = library.poses.frames.iter().filter(|p| p.cut).count();
+    assert!(n_cut < N_FRAMES / 10, "cut in {n_cut}");
+}
+
+#[test]
+fn a_hand_that_was_there_first_is_not_the_animal_but_told() {
+    let film = Staged::plain().with_drawing(|k, picture, _| {
+        let down = 150 - (k as i64 - 20).max(0) * 6;
+        for y in 0..down.clamp(0, i64::from(HEIGHT)) as u32 {
+            for x in 40..90 + y / 10 {
+                put(picture, [x, y], [224, 172, 140]);
+            }
+        }
+    });
+    let library = film.analyzed(&Params::default()).expect("a library");
+    // Where the hand hides the fish or touches it, nobody can tell.
+    let poses = &library.poses.frames;
+    let far = (0..N_FRAMES).filter(|&k| {
+        let truth = film.centroid_px(k).expect("it is shown");
+        let off = |found: [f64; 2]| (found[0] - truth[0]).hypot(found[1] - truth[1]);
+        poses[k].centroid_px.is_some_and(|found| off(found) > 12.0)
+    });
+    let far: Vec<usize> = far.collect();
+    assert!(far.len() <= 3, "far off in {far:?}");
+    let others = &library.stats.other_movers;
+    let hand = others.iter().find(|m| m.kind == MoverKind::FromBorder);
+    let hand = hand.unwrap_or_else(|| panic!("nobody told of the hand: {others:?}"));
+    // Until it moves it may be taken for scenery.
+    assert!(hand.from_s < 1.0 && hand.to_s < 2.0, "{hand:?}");
+}
+
+#[test]
+fn the_mirror_image_in_the_surface_is_not_a_second_animal() {
+    let surface = HEIGHT / 3;
+    let film = Staged::plain().with_drawing(|_, picture, _| {
+        for y in 0..surface {
+            for x in 0..WIDTH {
+                let below = picture.pixel(x, 2 * surface - 1 - y);
+                put(picture, [x, y], below.map(|v| (f64::from(v) * 0.8) as u8));
+            }
+        }
+    });
+    let library = film.analyzed(&Params::default()).expect("a library");
+    let off = |k: usize| {
+        let (found, truth) = (library.poses.frames[k].centroid_px?, film.centroid_px(k)?);
+        Some((found[0] - truth[0]).hypot(found[1] - truth[1]))
+    };
+    // Only while the fish is below the surface its truth is that of the film.
+    let below = (0..N_FRAMES).filter(|&k| {
+        let y = film.centroid_px(k).map_or(0.0, |c| c[1]);
+        y > f64::from(surface) + 25.0
+    });
+    let (n, n_far) = below.fold((0, 0), |(n, far), k| {
+        (
+            n + 1,
+            far + usize::from(off(k).is_some_and(|off| off > 12.0)),
+        )
+    });
+    assert!(n > N_FRAMES / 2 && n_far <= n / 50, "{n_far} of {n}");
+}
+
+/// The first frame at which a refusal says that the trouble begins.
+fn refused(name: &str, film: &Staged) -> (&'static str, f64) {
+    match film.analyzed(&Params::default()) {
+        Err(Error::BackgroundNotStatic { at_s }) => ("background_not_static", at_s),
+        Err(Error::CameraMoves { at_s }) => ("camera_moved", at_s),
+        Err(Error::LightChanges { at_s }) => ("light_changes", at_s),
+        Err(Error::SceneChanges { at_s }) => ("scene_changes", at_s),
+        Err(error) => panic!("{name}: {error}"),
+        Ok(_) => panic!("{name}: measured"),
+    }
+}
+
+#[test]
+fn a_hand_held_camera_is_refused_for_its_own_reason() {
+    let sway = |k: usize, rate: f64| (14.0 * (k as f64 * rate).sin()) as i64;
+    let film = Staged::plain().shifted(|k| [sway(k, 0.14), sway(k, 0.22)]);
+    let (code, at_s) = refused("hand-held", &film);
+    assert!(
+        ["camera_moved", "background_not_static"].contains(&code),
+        "{code}"
+    );
+    assert!(at_s < N_FRAMES as f64 / FPS / 2.0, "{at_s}");
+}

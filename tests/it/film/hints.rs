@@ -1,0 +1,147 @@
+//! What a person may say of a film: which part is measured, which thing is the animal, and what is none.
+
+use flockreel::analysis::params::{AnimalAtParam, IgnoreParam};
+use flockreel::analysis::{Error, Params};
+use flockreel::footage::{FrameSource, Part};
+use flockreel::raster::Frame;
+
+use super::staged::{HEIGHT, N_FRAMES, Staged, WIDTH, put};
+
+/// How much lower the second fish swims, pixels.
+const LOWER_PX: u32 = 70;
+
+/// The fish, and one that swims below as if it were the first one in a picture turned about its middle.
+fn two_fish() -> Staged {
+    let film = Staged::plain();
+    let scene = film.scene().clone();
+    film.with_drawing(|_, picture, _| {
+        let shown = picture.clone();
+        for y in LOWER_PX..HEIGHT {
+            for x in 0..WIDTH {
+                let (there_x, there_y) = (WIDTH - 1 - x, HEIGHT - 1 + LOWER_PX - y);
+                if there_y >= HEIGHT {
+                    continue;
+                }
+                let (fish, empty) = (shown.pixel(there_x, there_y), scene.pixel(there_x, there_y));
+                if (0..3).any(|c| fish[c].abs_diff(empty[c]) > 24) {
+                    put(picture, [x, y], fish);
+                }
+            }
+        }
+    })
+}
+
+#[test]
+fn of_two_animals_the_one_that_is_pointed_at_is_followed() {
+    let film = two_fish();
+    assert!(matches!(
+        film.analyzed(&Params::default()),
+        Err(Error::SeveralAnimals)
+    ));
+    let point = film.centroid_px(60).expect("it is shown");
+    let turned = |[x, y]: [f64; 2]| [f64::from(WIDTH) - x, f64::from(HEIGHT + LOWER_PX) - y];
+    let other = turned(point);
+    let pointing_at = |point| {
+        let animal_at = Some(AnimalAtParam { frame: 60, point });
+        let params = Params {
+            animal_at,
+            ..Params::default()
+        };
+        film.analyzed(&params).expect("a library")
+    };
+    film.check("the fish", &pointing_at(point));
+    let library = pointing_at(other);
+    let far = |k: usize| {
+        let truth = film.centroid_px(k).expect("it is shown");
+        let found = library.poses.frames[k].centroid_px?;
+        let truth = turned(truth);
+        Some((found[0] - truth[0]).hypot(found[1] - truth[1]) > 6.0)
+    };
+    let n_far = (0..N_FRAMES).filter(|&k| far(k) == Some(true)).count();
+    assert!(n_far < N_FRAMES / 20, "the other: {n_far}");
+}
+
+#[test]
+fn pointing_at_nothing_is_told() {
+    let film = Staged::plain();
+    let [x, y] = film.centroid_px(60).expect("it is shown");
+    let (width, height) = (f64::from(WIDTH), f64::from(HEIGHT));
+    let point = [
+        if x > width / 2.0 { 5.0 } else { width - 5.0 },
+        if y > height / 2.0 { 5.0 } else { height - 5.0 },
+    ];
+    for (frame, point) in [(60, point), (N_FRAMES as u32, [x, y])] {
+        let animal_at = Some(AnimalAtParam { frame, point });
+        let params = Params {
+            animal_at,
+            ..Params::default()
+        };
+        let error = film.analyzed(&params).expect_err("nothing is there");
+        assert!(matches!(error, Error::NothingAtPoint(_)), "{error}");
+    }
+}
+
+#[test]
+fn what_blinks_in_an_ignored_box_is_not_told_of() {
+    let film = Staged::plain().with_drawing(|k, picture, _| {
+        for y in 5..35 {
+            for x in 5..65 {
+                put(
+                    picture,
+                    [x, y],
+                    if k / 5 % 2 == 0 { [250; 3] } else { [5; 3] },
+                );
+            }
+        }
+    });
+    let without = film.analyzed(&Params::default()).expect("a library");
+    assert!(!without.stats.other_movers.is_empty());
+    let ignoring = |from_s, to_s| Params {
+        ignore: vec![IgnoreParam {
+            box_px: [0, 0, 70, 40],
+            from_s,
+            to_s,
+        }],
+        ..Params::default()
+    };
+    let library = film.analyzed(&ignoring(None, None)).expect("a library");
+    assert_eq!(library.stats.other_movers, []);
+    film.check("ignored", &library);
+    let half = film
+        .analyzed(&ignoring(None, Some(2.5)))
+        .expect("a library");
+    let told = &half.stats.other_movers;
+    assert!(
+        !told.is_empty() && told.iter().all(|m| m.from_s > 2.4),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn a_part_of_a_film_is_a_film_of_its_own() {
+    let film = Staged::plain();
+    let part = Part::of(&film, Some(1.0), Some(3.0));
+    assert_eq!(part.format().n_frames_hint, 60);
+    let (mut whole, mut of_part) = (film.open().unwrap(), part.open().unwrap());
+    let (mut expected, mut found) = (Frame::default(), Frame::default());
+    for _ in 0..30 {
+        whole.next_frame(&mut expected).unwrap();
+    }
+    for k in 0..60 {
+        whole.next_frame(&mut expected).unwrap();
+        let time_s = of_part.next_frame(&mut found).unwrap().expect("a frame");
+        assert!((time_s - f64::from(k) / 30.0).abs() < 1e-9, "{time_s}");
+        assert_eq!(found, expected, "frame {k}");
+    }
+    assert_eq!(of_part.next_frame(&mut found).unwrap(), None);
+    let mut n_spread = 0;
+    let mut visit = |_: &Frame| {
+        n_spread += 1;
+        std::ops::ControlFlow::Continue(())
+    };
+    part.spread(16, &mut visit).unwrap();
+    assert_eq!(n_spread, 16);
+    let beyond = Part::of(&film, Some(100.0), None);
+    assert_eq!(beyond.format().n_frames_hint, 0);
+    assert_eq!(beyond.open().unwrap().next_frame(&mut found).unwrap(), None);
+}

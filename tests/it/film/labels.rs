@@ -1,0 +1,121 @@
+//! Real recordings, which are not part of the repository, against labels made by eye (`bench/labels`). FLOCKREEL_FOOTAGE names
+//! their folder. What is measured of them whole is in docs/ACCURACY.md (`make accuracy`).
+
+use std::path::Path;
+use std::sync::Arc;
+
+use flockreel::analysis::{Error, Params, analyze};
+use flockreel::cpu::Level;
+use flockreel::footage::Part;
+use flockreel::library::Library;
+use flockreel::media::{Limits, Video};
+use flockreel::progress::Silent;
+use flockreel::scratch::{InMemory, Scratch};
+use serde_json::Value;
+
+use crate::common::film::footage;
+
+/// How much of a clip is measured here, seconds.
+const SECONDS: f64 = 10.0;
+
+/// The labels of a clip.
+fn labels(name: &str) -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("bench/labels/{name}.json"));
+    let text = std::fs::read(path).expect("labels");
+    serde_json::from_slice(&text).expect("JSON")
+}
+
+/// The first seconds measured; `None` where there is no footage.
+fn measured(labels: &Value) -> Option<Result<Library, Error>> {
+    let clip = footage()?.join(labels["clip"].as_str().expect("a name"));
+    let video = Video::open(&clip, &Limits::default()).expect("a film");
+    let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+    let part = Part::of(&video, None, Some(SECONDS));
+    let params = Params::default();
+    Some(analyze(
+        &part,
+        None,
+        &params,
+        Level::detect(),
+        &scratch,
+        &Silent,
+    ))
+}
+
+fn point(value: &Value) -> Option<[f64; 2]> {
+    Some([value[0].as_f64()?, value[1].as_f64()?])
+}
+
+fn distance([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
+    (ax - bx).hypot(ay - by)
+}
+
+/// Checks the centroids: found where the labeller saw the animal, within a quarter of its length.
+fn check(name: &str) {
+    let labels = labels(name);
+    let Some(library) = measured(&labels) else {
+        return;
+    };
+    let library = library.unwrap_or_else(|error| panic!("{name}: {error}"));
+    let rows = labels["frames"].as_array().expect("rows");
+    let length = |row: &Value| {
+        Some(distance(
+            point(&row["nose_px"])?,
+            point(&row["tail_base_px"])?,
+        ))
+    };
+    let length_px = rows.iter().filter_map(length).fold(0.0, f64::max);
+    let (mut n, mut n_found) = (0, 0);
+    for row in rows.iter().filter(|row| row["visible"] == true) {
+        let frame = row["frame"].as_u64().expect("a number") as usize;
+        let Some(pose) = library.poses.frames.get(frame) else {
+            continue;
+        };
+        n += 1;
+        n_found += usize::from(pose.detected());
+        if let Some((found, truth)) = pose.centroid_px.zip(point(&row["centroid_px"])) {
+            let off = distance(found, truth) / length_px;
+            assert!(off < 0.25, "{name}, frame {frame}: {off:.2} lengths off");
+        }
+    }
+    assert!(n >= 6 && 20 * n_found >= 19 * n, "{name}: {n_found} of {n}");
+    assert_eq!(
+        format!("{:?}", library.poses.view).to_lowercase(),
+        labels["view"],
+        "{name}"
+    );
+}
+
+#[test]
+fn a_goldfish_from_the_side() {
+    check("goldfish_black_water");
+}
+
+#[test]
+fn mice_from_above() {
+    check("mouse_openfield");
+    check("mouse_round_arena");
+}
+
+#[test]
+fn a_finch_behind_wires() {
+    check("zebra_finch_cage");
+}
+
+#[test]
+fn fish_from_above() {
+    check("zebrafish_larva_single");
+    check("zebrafish_juvenile_single");
+}
+
+#[test]
+fn a_dog_beside_an_arm() {
+    check("dog_side_with_hand");
+}
+
+#[test]
+fn two_flies_are_refused() {
+    if let Some(library) = measured(&labels("flies_pair")) {
+        assert!(matches!(library, Err(Error::SeveralAnimals)));
+    }
+}

@@ -1,0 +1,209 @@
+//! Films of the virtual fish to which something happens, with their truth: the frames are changed in memory, so that a test
+//! of a whole analysis takes a second.
+
+use std::sync::Arc;
+
+use flockreel::analysis::{Error, Params, analyze};
+use flockreel::cpu::Level;
+use flockreel::fish::sample::{SampleFilm, SampleParams};
+use flockreel::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use flockreel::geometry::wrap_rad;
+use flockreel::library::Library;
+use flockreel::progress::Silent;
+use flockreel::raster::{Frame, RgbImage};
+use flockreel::scratch::{InMemory, Scratch};
+
+/// Frames of the film that is changed.
+pub(super) const N_FRAMES: usize = 150;
+pub(super) const FPS: f64 = 30.0;
+pub(super) const WIDTH: u32 = 320;
+pub(super) const HEIGHT: u32 = 240;
+
+/// A film whose frames were changed.
+pub(super) struct Staged {
+    film: SampleFilm,
+    frames: Vec<Frame>,
+    /// The frame of the film that each shows; `None` where the fish is not seen.
+    shown: Vec<Option<usize>>,
+    /// How far the picture is shifted in each, pixels.
+    shift_px: Vec<[f64; 2]>,
+}
+
+impl Staged {
+    /// The film as it is.
+    pub(super) fn plain() -> Staged {
+        Staged::in_order((0..N_FRAMES).collect())
+    }
+
+    /// The frames of the film in another order, or again and again.
+    pub(super) fn in_order(order: Vec<usize>) -> Staged {
+        let film = SampleFilm::new(SampleParams {
+            n_frames: N_FRAMES,
+            width: WIDTH,
+            height: HEIGHT,
+            ..SampleParams::default()
+        })
+        .expect("in range");
+        let render = |&idx: &usize| {
+            let mut frame = Frame::default();
+            film.render(idx, &mut frame);
+            frame
+        };
+        Staged {
+            frames: order.iter().map(render).collect(),
+            shift_px: vec![[0.0; 2]; order.len()],
+            shown: order.into_iter().map(Some).collect(),
+            film,
+        }
+    }
+
+    /// Multiplies the light of every frame: number of the frame, row.
+    pub(super) fn with_light(mut self, light: impl Fn(usize, usize) -> f64) -> Staged {
+        for (k, frame) in self.frames.iter_mut().enumerate() {
+            let mut picture = frame.to_rgb();
+            for (at, value) in picture.pixels.iter_mut().enumerate() {
+                let by_light = f64::from(*value) * light(k, at / (3 * WIDTH as usize));
+                *value = by_light.round().min(255.0) as u8;
+            }
+            frame.draw_all_rgb(&picture);
+        }
+        self
+    }
+
+    /// Draws into every frame: number of the frame, picture, and the true centroid of the fish.
+    pub(super) fn with_drawing(mut self, draw: impl Fn(usize, &mut RgbImage, [f64; 2])) -> Staged {
+        for k in 0..self.frames.len() {
+            let centroid_px = self.centroid_px(k).unwrap_or([f64::NAN; 2]);
+            let mut picture = self.frames[k].to_rgb();
+            draw(k, &mut picture, centroid_px);
+            self.frames[k].draw_all_rgb(&picture);
+        }
+        self
+    }
+
+    /// Shifts the picture of each frame by whole pixels, right and down; the border is repeated.
+    pub(super) fn shifted(mut self, by: impl Fn(usize) -> [i64; 2]) -> Staged {
+        for (k, frame) in self.frames.iter_mut().enumerate() {
+            let [right, down] = by(k);
+            let picture = frame.to_rgb();
+            let mut moved = picture.clone();
+            for y in 0..HEIGHT {
+                for x in 0..WIDTH {
+                    let from_x = (i64::from(x) - right).clamp(0, i64::from(WIDTH) - 1) as u32;
+                    let from_y = (i64::from(y) - down).clamp(0, i64::from(HEIGHT) - 1) as u32;
+                    put(&mut moved, [x, y], picture.pixel(from_x, from_y));
+                }
+            }
+            frame.draw_all_rgb(&moved);
+            self.shift_px[k] = [right as f64, down as f64];
+        }
+        self
+    }
+
+    /// Puts frames of one color before the film.
+    pub(super) fn after(mut self, n_frames: usize, rgb: [u8; 3]) -> Staged {
+        let mut frame = self.frames[0].clone();
+        let mut picture = frame.to_rgb();
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                put(&mut picture, [x, y], rgb);
+            }
+        }
+        frame.draw_all_rgb(&picture);
+        self.frames.splice(0..0, vec![frame; n_frames]);
+        self.shown.splice(0..0, vec![None; n_frames]);
+        self.shift_px.splice(0..0, vec![[0.0; 2]; n_frames]);
+        self
+    }
+
+    /// The scene without the fish.
+    pub(super) fn scene(&self) -> &RgbImage {
+        self.film.background()
+    }
+
+    /// Where the fish is in a frame.
+    pub(super) fn centroid_px(&self, k: usize) -> Option<[f64; 2]> {
+        let centroid = self.film.true_pose(self.shown[k]?).centroid_px?;
+        Some([0, 1].map(|c| centroid[c] + self.shift_px[k][c]))
+    }
+
+    /// The whole analysis.
+    pub(super) fn analyzed(&self, params: &Params) -> Result<Library, Error> {
+        let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+        analyze(self, None, params, Level::detect(), &scratch, &Silent)
+    }
+
+    /// Checks that the fish is measured in nearly every frame, and nothing else: within two pixels, with the head at its end.
+    pub(super) fn check(&self, name: &str, library: &Library) {
+        let poses = &library.poses.frames;
+        assert_eq!(poses.len(), self.frames.len(), "{name}");
+        let (mut off_px, mut n_turned, mut n_missed) = (Vec::new(), 0, 0);
+        for (k, pose) in poses.iter().enumerate() {
+            let Some(truth) = self.centroid_px(k) else {
+                assert!(!pose.detected(), "{name}: frame {k} shows nothing");
+                continue;
+            };
+            let Some(found) = pose.centroid_px else {
+                n_missed += 1;
+                continue;
+            };
+            off_px.push((found[0] - truth[0]).hypot(found[1] - truth[1]));
+            let true_pose = self.film.true_pose(self.shown[k].unwrap_or(0));
+            let is_level = true_pose.gamma_rad.is_some_and(|gamma| gamma.cos() > 0.5);
+            let turn = true_pose.heading_rad.zip(pose.heading_rad);
+            let is_turned =
+                |(a, b): (f64, f64)| wrap_rad(a - b).abs() > std::f64::consts::FRAC_PI_2;
+            n_turned += usize::from(is_level && turn.is_some_and(is_turned));
+        }
+        off_px.sort_by(f64::total_cmp);
+        let p95 = off_px.get(off_px.len() * 95 / 100).copied();
+        let most_missed = self.frames.len() / 20;
+        assert!(n_missed <= most_missed, "{name}: not found in {n_missed}");
+        assert!(p95.is_some_and(|p95| p95 < 2.0), "{name}: {p95:?} px off");
+        assert!(
+            20 * n_turned <= self.frames.len(),
+            "{name}: turned in {n_turned}"
+        );
+    }
+}
+
+/// Sets a pixel.
+pub(super) fn put(picture: &mut RgbImage, [x, y]: [u32; 2], rgb: [u8; 3]) {
+    let at = 3 * (y * picture.width + x) as usize;
+    picture.pixels[at..at + 3].copy_from_slice(&rgb);
+}
+
+impl FrameSource for Staged {
+    fn format(&self) -> FootageFormat {
+        FootageFormat {
+            width: WIDTH,
+            height: HEIGHT,
+            fps: FPS,
+            n_frames_hint: self.frames.len(),
+            color: self.frames[0].color,
+        }
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(StagedStream {
+            frames: &self.frames,
+            n_given: 0,
+        }))
+    }
+}
+
+struct StagedStream<'a> {
+    frames: &'a [Frame],
+    n_given: usize,
+}
+
+impl FrameStream for StagedStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        let Some(next) = self.frames.get(self.n_given) else {
+            return Ok(None);
+        };
+        frame.clone_from(next);
+        self.n_given += 1;
+        Ok(Some((self.n_given - 1) as f64 / FPS))
+    }
+}
