@@ -25,8 +25,6 @@ pub struct Matte {
     pub rect: Rect,
     /// Straight alpha, in the plate's light.
     pub image: RgbaImage,
-    /// Mean difference of the silhouette from the plate, levels of 255.
-    pub contrast: f64,
 }
 
 /// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
@@ -80,11 +78,7 @@ pub fn pull(
         };
         pixel.copy_from_slice(&rgba);
     }
-    Matte {
-        rect,
-        contrast: contrast(&difference, &mask),
-        image,
-    }
+    Matte { rect, image }
 }
 
 /// The mask over another box; what lies outside the old one is clear.
@@ -140,16 +134,6 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
     }
     let rows = nearest[padded..].chunks_exact(padded).take(h);
     rows.flat_map(|row| row[1..=w].iter().copied()).collect()
-}
-
-fn contrast(difference: &Difference, mask: &Mask) -> f64 {
-    let sum: u64 = difference
-        .levels
-        .iter()
-        .zip(&mask.bits)
-        .map(|(&level, &bit)| u64::from(level) * u64::from(bit))
-        .sum();
-    sum as f64 / mask.area().max(1) as f64
 }
 
 /// Less alpha is noise, not animal.

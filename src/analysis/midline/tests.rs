@@ -64,7 +64,7 @@ impl Sausage {
             rect,
             at: 0,
             reach_px: [0.0; 3],
-            contrast: 100.0,
+            confidence: 1.0,
             asymmetry: None,
             body_rad: None,
             body_extent_px: [LENGTH, 16.0],

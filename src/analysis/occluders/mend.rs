@@ -47,7 +47,7 @@ fn remeasured(
         return Ok(None);
     };
     mended.at = scratch.put(&image.pixels)?;
-    mended.contrast = seen.contrast;
+    mended.confidence = seen.confidence;
     mended.box_px = seen.box_px;
     mended.cut = seen.cut;
     Ok(Some(mended))

@@ -82,7 +82,7 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
         view_confidence: None,
         camera: params.camera(format.width, format.height),
         animal: params.animal(),
-        frames: track.iter().map(|tracked| seen(tracked, params)).collect(),
+        frames: track.iter().map(seen).collect(),
     };
     for ((pose, axes), head) in poses.frames.iter_mut().zip(&axes).zip(&heads) {
         let Some(axes) = axes else { continue };
@@ -236,16 +236,14 @@ pub fn reference_length_px(axes: &[Option<Axes>]) -> f64 {
         .max(1.0)
 }
 
-fn seen(tracked: &Tracked, params: &Params) -> Pose {
+fn seen(tracked: &Tracked) -> Pose {
     let mut pose = Pose {
         time_s: tracked.time_s,
         ..Pose::default()
     };
     if let Some(sighting) = &tracked.sighting {
         pose.cut = sighting.cut;
-        // Certain when the silhouette differs, on average, by three thresholds or more.
-        let contrast = sighting.contrast / f64::from(params.threshold);
-        pose.confidence = Some((contrast / 3.0).clamp(0.0, 1.0));
+        pose.confidence = Some(sighting.confidence);
         pose.centroid_px = Some(sighting.moments.centroid_px);
         pose.box_px = Some(sighting.box_px);
         pose.area_px = Some(sighting.moments.area_px);

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 pub mod asymmetry;
 mod body;
+mod confidence;
 mod movers;
 mod parting;
 mod path;
@@ -139,10 +140,18 @@ pub fn follow(
     });
     let times_s: Vec<f64> = seen.iter().map(|s| s.time_s).collect();
     let movers = movers::gathered(&others.collect::<Vec<_>>(), &times_s);
-    let tracked = seen.into_iter().zip(chosen).map(|(seen, chosen)| Tracked {
-        time_s: seen.time_s,
-        plate_idx: seen.plate_idx,
-        sighting: chosen.and_then(|at| seen.candidates.into_iter().nth(at).map(|c| c.sighting)),
+    let tracked = seen.into_iter().zip(chosen).map(|(seen, chosen)| {
+        let candidate = chosen.and_then(|at| seen.candidates.into_iter().nth(at));
+        let sighting = candidate.map(|candidate| Sighting {
+            confidence: confidence::of(candidate.cost),
+            ..candidate.sighting
+        });
+        Tracked {
+            time_s: seen.time_s,
+            plate_idx: seen.plate_idx,
+            // What is probably wrong was not found.
+            sighting: sighting.filter(|sighting| sighting.confidence >= confidence::FOUND),
+        }
     });
     let frames: Vec<Tracked> = tracked.collect();
     if frames.iter().all(|t| t.sighting.is_none()) {

@@ -21,8 +21,8 @@ pub struct Sighting {
     pub at: u64,
     /// How far they reach from the centroid: horizontally, vertically, in any direction.
     pub reach_px: [f64; 3],
-    /// Mean difference of the silhouette from the plate, levels of 255.
-    pub contrast: f64,
+    /// Probability that the centroid lies within a tenth of the body length of the true one (`confidence`).
+    pub confidence: f64,
     /// Its moments, weighed by alpha.
     pub moments: Moments,
     /// How its ends and its sides differ; `None` where it has no axis.
@@ -42,7 +42,7 @@ pub struct Sighting {
 }
 
 impl Sighting {
-    /// What a matte that lies at `rect` tells by itself: neither where it is put aside, nor its contrast, its
+    /// What a matte that lies at `rect` tells by itself: neither where it is put aside, nor how sure it is, its
     /// silhouette's box and whether that is cut. `None` when nothing of it is opaque.
     pub(in crate::analysis) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
         let pixels = matte.pixels.as_chunks::<4>().0;
@@ -63,7 +63,7 @@ impl Sighting {
             rect,
             at: 0,
             reach_px: reach_px(rect, matte, moments.centroid_px),
-            contrast: 0.0,
+            confidence: 0.0,
             moments,
             extent_px: [extent_px(axis), extent_px(axis + quarter)],
             upright_px: extent_px(quarter),
@@ -105,7 +105,6 @@ impl View<'_> {
         };
         Ok(Some(Sighting {
             at: scratch.put(&matte.image.pixels)?,
-            contrast: matte.contrast,
             box_px: rect,
             cut: self.cuts(rect),
             ..measured
