@@ -78,6 +78,7 @@ fn still(image_size_px: [u32; 2], n_frames: usize) -> Poses {
         image_size_px,
         view: View::Side,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: None,
         animal: None,
         frames: vec![Pose::default(); n_frames],

@@ -128,6 +128,7 @@ fn made_library(n_frames: u32) -> Library {
             image_size_px: [640, 480],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames,

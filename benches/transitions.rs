@@ -203,6 +203,7 @@ impl Swim {
             image_size_px: [640, 480],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames: self.moments.iter().map(pose).collect(),

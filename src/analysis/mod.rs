@@ -78,6 +78,7 @@ pub fn analyze(
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
     let mut poses = pose::measure(&track.frames, view, &source.format(), params);
     poses.view_confidence = view_confidence;
+    poses.other_movers = std::mem::take(&mut track.movers);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
     let sprites = match animal_too_small {
@@ -92,13 +93,11 @@ pub fn analyze(
     let foreign = || track.frames.iter().filter(|t| t.plate_idx.is_none());
     let n_foreign_frames = foreign().count();
     let first_foreign_s = foreign().next().map(|t| t.time_s);
-    let other_movers = std::mem::take(&mut track.movers);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
         never_seen_px: plate.never_seen_px,
         several_animals: scene.several_animals,
-        other_movers,
         n_foreign_frames,
         first_foreign_s,
         animal_too_small,

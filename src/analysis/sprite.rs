@@ -141,6 +141,7 @@ mod tests {
             image_size_px: [640, 480],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames,

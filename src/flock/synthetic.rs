@@ -43,6 +43,7 @@ pub(crate) fn library(view: View) -> Library {
             image_size_px: SIZE_PX,
             view,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames,

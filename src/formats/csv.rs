@@ -85,6 +85,7 @@ mod tests {
             image_size_px: [8, 8],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames: vec![

@@ -9,6 +9,7 @@ pub mod glb;
 pub mod ground_truth;
 pub mod library_dir;
 pub mod library_json;
+mod mover;
 pub mod npy;
 pub mod overlay;
 pub mod params;

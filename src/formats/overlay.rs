@@ -160,6 +160,7 @@ mod tests {
             image_size_px: [640, 120],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames: vec![pose, Pose::default()],

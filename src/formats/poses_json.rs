@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::mover::MoverFile;
 use crate::analysis::Params;
 use crate::geometry::{Camera, Rect};
 use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
@@ -25,6 +26,7 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
             View::Top => ViewName::Top,
         },
         view_confidence: poses.view_confidence.map(|value| round(value, 3)),
+        other_movers: poses.other_movers.iter().map(MoverFile::of).collect(),
         camera: poses.camera.map(|c| CameraFile {
             z_min_m: c.z_min_m,
             pane_px_per_m: c.pane_px_per_m,
@@ -69,6 +71,11 @@ pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
             ViewName::Top => View::Top,
         },
         view_confidence: file.view_confidence,
+        other_movers: file
+            .other_movers
+            .into_iter()
+            .map(MoverFile::into_mover)
+            .collect(),
         camera: file.camera.map(|c| Camera {
             z_min_m: c.z_min_m,
             pane_px_per_m: c.pane_px_per_m,
@@ -101,6 +108,8 @@ struct PosesFile<Frames> {
     view: ViewName,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     view_confidence: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    other_movers: Vec<MoverFile>,
     camera: Option<CameraFile>,
     animal: Option<AnimalFile>,
     #[serde(default)]
@@ -325,6 +334,7 @@ mod tests {
             image_size_px: [64, 48],
             view: View::Top,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: Some(Animal {
                 length_m: 0.1,

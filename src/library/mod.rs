@@ -81,8 +81,6 @@ pub struct LibraryStats {
     pub never_seen_px: u64,
     /// Several animals move in the footage, and the largest was followed because that was asked for.
     pub several_animals: bool,
-    /// What else moved, by the first time it was seen.
-    pub other_movers: Vec<Mover>,
     /// Frames that show another scene than the film (black frames, title cards); nothing is measured in them.
     pub n_foreign_frames: usize,
     /// When the first of them is shown, seconds.

@@ -1,5 +1,6 @@
 //! Poses: what is measured in each frame. What could not be measured is `None`, never invented.
 
+use super::Mover;
 use crate::geometry::{Camera, Rect};
 
 /// From where the animal is seen.
@@ -31,6 +32,8 @@ pub struct Poses {
     pub view: View,
     /// The probability that the view was guessed right, .5..=1; `None` where it was given.
     pub view_confidence: Option<f64>,
+    /// What moved besides the animal, by the first time it was seen.
+    pub other_movers: Vec<Mover>,
     /// The camera, when it was given.
     pub camera: Option<Camera>,
     /// The animal's size, when it was given.
@@ -92,7 +95,7 @@ pub struct Pose {
     pub time_s: f64,
     /// The silhouette touches the border of the image.
     pub cut: bool,
-    /// How far the silhouette stands out from the background and fits the track, 0..=1.
+    /// Probability that the centroid lies within a tenth of the body length of the true one, 0.5..=1.
     pub confidence: Option<f64>,
     /// Posterior probability of the head being where `heading_rad` says, 0.5..=1.
     pub head_confidence: Option<f64>,
@@ -146,7 +149,7 @@ pub struct Raw {
 }
 
 impl Pose {
-    /// True when the animal was found in the frame.
+    /// True when the animal was found in the frame: its confidence is 0.5 at least.
     pub fn detected(&self) -> bool {
         self.centroid_px.is_some()
     }

@@ -54,6 +54,7 @@ fn poses(view: View, headings_rad: impl IntoIterator<Item = Option<f64>>) -> Pos
         image_size_px: [640, 480],
         view,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: None,
         animal: None,
         frames: frames.collect(),

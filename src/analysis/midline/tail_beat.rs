@@ -341,6 +341,7 @@ mod tests {
             image_size_px: [64, 64],
             view: View::Top,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames: frames.collect(),

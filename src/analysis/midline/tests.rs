@@ -136,6 +136,7 @@ fn poses(view: View, pose: Pose) -> Poses {
         image_size_px: [240, 220],
         view,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: None,
         animal: None,
         frames: vec![pose],

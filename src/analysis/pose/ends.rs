@@ -21,7 +21,7 @@ const LEAST_SPREAD: f64 = 0.25;
 /// Speeds count up to this one, lengths a second.
 const MOST_SPEED: f64 = 1.0;
 /// The sum over spans of this many seconds says how sure the direction of motion is.
-const SPAN_S: f64 = 1.0;
+const SPAN_S: f64 = 0.5;
 
 /// The length axis follows the axis of the moments; where it does not, the ends are not its own.
 const SAME_AXIS: f64 = 0.7;

@@ -80,6 +80,7 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
         image_size_px: [format.width, format.height],
         view,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: params.camera(format.width, format.height),
         animal: params.animal(),
         frames: track.iter().map(seen).collect(),

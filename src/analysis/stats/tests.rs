@@ -23,6 +23,7 @@ fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
         image_size_px: [400, 100],
         view,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: None,
         animal: None,
         frames: (0..300).map(pose).collect(),

@@ -135,23 +135,21 @@ pub fn follow(
     };
     let chosen = path::choose(&candidates, &scene.subject, follow, pin);
     let others = seen.iter().zip(&chosen).map(|(seen, &chosen)| {
-        let box_px = chosen.map(|at| seen.candidates[at].look.box_px);
+        let box_px = chosen.map(|(at, _)| seen.candidates[at].look.box_px);
         movers::beside(&seen.others, box_px)
     });
     let times_s: Vec<f64> = seen.iter().map(|s| s.time_s).collect();
     let movers = movers::gathered(&others.collect::<Vec<_>>(), &times_s);
-    let tracked = seen.into_iter().zip(chosen).map(|(seen, chosen)| {
-        let candidate = chosen.and_then(|at| seen.candidates.into_iter().nth(at));
-        let sighting = candidate.map(|candidate| Sighting {
-            confidence: confidence::of(candidate.cost),
-            ..candidate.sighting
-        });
-        Tracked {
-            time_s: seen.time_s,
-            plate_idx: seen.plate_idx,
-            // What is probably wrong was not found.
-            sighting: sighting.filter(|sighting| sighting.confidence >= confidence::FOUND),
-        }
+    let tracked = seen.into_iter().zip(chosen).map(|(seen, chosen)| Tracked {
+        time_s: seen.time_s,
+        plate_idx: seen.plate_idx,
+        sighting: chosen.and_then(|(at, confidence)| {
+            let candidate = seen.candidates.into_iter().nth(at)?;
+            Some(Sighting {
+                confidence,
+                ..candidate.sighting
+            })
+        }),
     });
     let frames: Vec<Tracked> = tracked.collect();
     if frames.iter().all(|t| t.sighting.is_none()) {

@@ -5,6 +5,7 @@
 //! the animal has a fixed cost. So a hand that is seen first, a speck where the animal is gone, or the half of a
 //! silhouette are taken only where nothing fits better.
 
+use super::confidence;
 use super::sighting::Sighting;
 use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, Look, Subject};
@@ -51,7 +52,7 @@ pub(super) fn choose(
     subject: &Subject,
     follow: Follow,
     pin: Option<(usize, usize)>,
-) -> Vec<Option<usize>> {
+) -> Vec<Option<(usize, f64)>> {
     let mut paths = Paths {
         frames,
         steps: Steps::of(frames, subject),
@@ -80,11 +81,7 @@ pub(super) fn choose(
         let best = candidates.iter().enumerate().map(path).collect();
         paths.best.push(best);
     }
-    let mut chosen = paths.cheapest();
-    if pin.is_none() {
-        drop_misfits(&mut chosen, frames, &paths.steps);
-    }
-    chosen
+    judged(&paths.cheapest(), frames, &paths.steps)
 }
 
 /// A candidate, by its frame and its number in it.
@@ -172,27 +169,37 @@ impl Paths<'_> {
     }
 }
 
-/// Takes away the stretches of the path that mostly do not fit: nothing that fits leads to them. Stretches end where the
-/// animal is not seen and at leaps.
-fn drop_misfits(chosen: &mut [Option<usize>], frames: &[&[Candidate]], steps: &Steps) {
-    let candidate = |t: usize, chosen: &[Option<usize>]| chosen[t].map(|at| &frames[t][at]);
-    let mut ends = Vec::new();
-    for t in 0..frames.len() {
-        let before = t.checked_sub(1).and_then(|t| candidate(t, chosen));
-        let goes_on = before.zip(candidate(t, chosen));
-        if goes_on.is_none_or(|(a, b)| steps.is_leap(&a.look, &b.look)) {
-            ends.push(t);
-        }
-    }
-    ends.push(frames.len());
+/// How sure each frame of the path is: its candidate, and the probability that it is the animal.
+///
+/// A stretch of the path that ends where the animal is not seen, at leaps and where the area changes at once, shows one
+/// thing, and is as sure as it is like the subject in most of its frames: near the lens, in the dark or cut by the border an
+/// animal is unlike itself for a while. What is probably wrong was not found.
+fn judged(
+    chosen: &[Option<usize>],
+    frames: &[&[Candidate]],
+    steps: &Steps,
+) -> Vec<Option<(usize, f64)>> {
+    let candidate = |t: usize| chosen[t].map(|at| &frames[t][at]);
+    let is_end = |&t: &usize| {
+        let before = t.checked_sub(1).and_then(candidate);
+        let pair = before.zip(candidate(t));
+        pair.is_none_or(|(a, b)| steps.is_break(&a.look, &b.look))
+    };
+    let ends: Vec<usize> = (0..frames.len())
+        .filter(is_end)
+        .chain([frames.len()])
+        .collect();
+    let mut judged = vec![None; frames.len()];
     for stretch in ends.windows(2).map(|ends| ends[0]..ends[1]) {
-        let costs = stretch
-            .clone()
-            .filter_map(|t| Some(candidate(t, chosen)?.cost));
-        if order::median(costs).is_some_and(|cost| cost > FITS) {
-            chosen[stretch].fill(None);
+        let misfits = stretch.clone().filter_map(|t| Some(candidate(t)?.cost));
+        let confidence = order::median(misfits).map_or(0.0, confidence::of);
+        if confidence >= confidence::FOUND {
+            for t in stretch {
+                judged[t] = chosen[t].map(|at| (at, confidence));
+            }
         }
     }
+    judged
 }
 
 /// What a look costs in a path: nearly nothing while it fits, however well another may fit. Looks of neighboring frames are
@@ -248,6 +255,12 @@ impl Steps {
         distance(a.centroid_px, b.centroid_px) > LEAP * self.spread_px + self.usual_px
     }
 
+    /// Whether two looks in a row may be of two things: a leap lies between them, or one is far larger.
+    fn is_break(&self, a: &Look, b: &Look) -> bool {
+        let change = libm::log(b.area_px / a.area_px).abs();
+        self.is_leap(a, b) || change > LEAP * CHANGE_SPREAD
+    }
+
     /// What a leap from `a` to `b` costs besides, where one of the `others` seen together with `a` was far nearer to `b`: two
     /// things seen at once are not the same.
     fn taken<'a>(&self, a: &Look, b: &Look, mut others: impl Iterator<Item = &'a Look>) -> f64 {
@@ -294,11 +307,16 @@ mod tests {
         }
     }
 
-    fn chosen(frames: &[Vec<Candidate>], pin: Option<(usize, usize)>) -> Vec<Option<usize>> {
+    fn judged(frames: &[Vec<Candidate>], pin: Option<(usize, usize)>) -> Vec<Option<(usize, f64)>> {
         let looks = vec![vec![candidate(0.0, 0.0).look]];
         let subject = Subject::learn(&looks, Some((0, 0))).expect("there is a look");
         let frames: Vec<&[Candidate]> = frames.iter().map(Vec::as_slice).collect();
         choose(&frames, &subject, Follow::One, pin)
+    }
+
+    fn chosen(frames: &[Vec<Candidate>], pin: Option<(usize, usize)>) -> Vec<Option<usize>> {
+        let found = judged(frames, pin).into_iter();
+        found.map(|found| Some(found?.0)).collect()
     }
 
     #[test]
@@ -346,6 +364,30 @@ mod tests {
             chosen(&frames, Some((30, 1)))
                 .iter()
                 .all(|&at| at == Some(1))
+        );
+    }
+
+    #[test]
+    fn a_thing_is_as_sure_as_it_is_like_the_subject_in_most_of_its_frames() {
+        // Two things, a leap apart; the second is unlike itself for a while.
+        let frames: Vec<Vec<Candidate>> = (0..60)
+            .map(|t| match t {
+                0..20 => vec![candidate(900.0, 2.0)],
+                30..40 => vec![candidate(100.0 + f64::from(t), 9.0)],
+                _ => vec![candidate(100.0 + f64::from(t), 0.0)],
+            })
+            .collect();
+        let sure = |t: usize| judged(&frames, None)[t].map_or(0.0, |(_, confidence)| confidence);
+        assert!(
+            (0..20).all(|t| (0.6..0.95).contains(&sure(t))),
+            "{}",
+            sure(0)
+        );
+        assert!(
+            (20..60).all(|t| sure(t) > 0.99),
+            "{} {}",
+            sure(20),
+            sure(35)
         );
     }
 }

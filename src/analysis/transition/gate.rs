@@ -142,6 +142,7 @@ mod tests {
             image_size_px: [100, 100],
             view,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames: frames.collect(),

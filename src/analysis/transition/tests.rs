@@ -46,6 +46,7 @@ fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
         image_size_px: [320, 240],
         view: View::Side,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: None,
         animal: None,
         frames: moments.iter().map(pose).collect(),

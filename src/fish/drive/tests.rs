@@ -40,6 +40,7 @@ fn uncalibrated(view: View) -> Poses {
         image_size_px: [160, 100],
         view,
         view_confidence: None,
+        other_movers: Vec::new(),
         camera: None,
         animal: None,
         frames: frames.collect(),

@@ -124,6 +124,7 @@ impl SampleFilm {
             image_size_px: [self.params.width, self.params.height],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: Some(self.motion().camera),
             animal: Some(self.animal()),
             frames: frames.map(|k| self.true_pose(k)).collect(),

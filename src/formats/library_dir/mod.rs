@@ -247,6 +247,7 @@ mod tests {
                 image_size_px: [16, 12],
                 view: View::Side,
                 view_confidence: None,
+                other_movers: Vec::new(),
                 camera: None,
                 animal: None,
                 frames: vec![Pose::default(); 3],

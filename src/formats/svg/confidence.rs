@@ -41,7 +41,7 @@ pub fn confidence(poses: &Poses) -> String {
     };
     rows.spans("found", "water", Pose::detected);
     rows.spans("at border", "accent", |pose| pose.cut);
-    rows.curve("contrast", [0.0, 1.0], |pose| pose.confidence);
+    rows.curve("animal", [0.5, 1.0], |pose| pose.confidence);
     rows.curve("head", [0.5, 1.0], |pose| pose.head_confidence);
     if with_depth {
         rows.curve("depth sign", [0.5, 1.0], |pose| pose.depth_sign_confidence);
@@ -151,7 +151,7 @@ mod tests {
             };
             9000
         ];
-        frames[4500].confidence = Some(0.0);
+        frames[4500].confidence = Some(0.5);
         for (k, pose) in frames.iter_mut().enumerate() {
             pose.time_s = k as f64 / 30.0;
         }
@@ -160,6 +160,7 @@ mod tests {
             image_size_px: [8, 8],
             view: View::Side,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames,

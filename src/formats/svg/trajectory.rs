@@ -198,6 +198,7 @@ mod tests {
             image_size_px: [200, 100],
             view: View::Top,
             view_confidence: None,
+            other_movers: Vec::new(),
             camera: None,
             animal: None,
             frames: seen.iter().enumerate().map(pose).collect(),

@@ -89,7 +89,7 @@ fn a_hand_that_was_there_first_is_not_the_animal_but_told() {
     });
     let far: Vec<usize> = far.collect();
     assert!(far.len() <= 3, "far off in {far:?}");
-    let others = &library.stats.other_movers;
+    let others = &library.poses.other_movers;
     let hand = others.iter().find(|m| m.kind == MoverKind::FromBorder);
     let hand = hand.unwrap_or_else(|| panic!("nobody told of the hand: {others:?}"));
     // Until it moves it may be taken for scenery.

@@ -95,7 +95,7 @@ fn what_blinks_in_an_ignored_box_is_not_told_of() {
         }
     });
     let without = film.analyzed(&Params::default()).expect("a library");
-    assert!(!without.stats.other_movers.is_empty());
+    assert!(!without.poses.other_movers.is_empty());
     let ignoring = |from_s, to_s| Params {
         ignore: vec![IgnoreParam {
             box_px: [0, 0, 70, 40],
@@ -105,12 +105,12 @@ fn what_blinks_in_an_ignored_box_is_not_told_of() {
         ..Params::default()
     };
     let library = film.analyzed(&ignoring(None, None)).expect("a library");
-    assert_eq!(library.stats.other_movers, []);
+    assert_eq!(library.poses.other_movers, []);
     film.check("ignored", &library);
     let half = film
         .analyzed(&ignoring(None, Some(2.5)))
         .expect("a library");
-    let told = &half.stats.other_movers;
+    let told = &half.poses.other_movers;
     assert!(
         !told.is_empty() && told.iter().all(|m| m.from_s > 2.4),
         "{told:?}"

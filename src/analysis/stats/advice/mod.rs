@@ -143,12 +143,12 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
 /// What else the film shows, and how it was taken.
 fn of_scene(library: &Library, all: &mut Vec<Advice>) {
     let (stats, poses) = (&library.stats, &library.poses);
-    let longest = stats
+    let longest = poses
         .other_movers
         .iter()
         .max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
     if let Some(mover) = longest {
-        all.push(Advice::OtherMovers(stats.other_movers.len(), *mover));
+        all.push(Advice::OtherMovers(poses.other_movers.len(), *mover));
     }
     if let Some(from_s) = stats.first_foreign_s {
         all.push(Advice::ForeignFrames(stats.n_foreign_frames, from_s));

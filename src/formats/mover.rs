@@ -1,8 +1,8 @@
-//! What moved besides the animal, in library.json.
+//! What moved besides the animal, in poses.json.
 
 use serde::{Deserialize, Serialize};
 
-use crate::formats::poses_json::round;
+use super::poses_json::round;
 use crate::geometry::Rect;
 use crate::library::{Mover, MoverKind};
 

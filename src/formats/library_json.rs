@@ -8,10 +8,6 @@ use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
 use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Transition};
 
-mod mover;
-
-use mover::MoverFile;
-
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/library@1";
 
@@ -239,8 +235,6 @@ struct StatsFile {
     #[serde(default)]
     several_animals: bool,
     #[serde(default)]
-    other_movers: Vec<MoverFile>,
-    #[serde(default)]
     n_foreign_frames: usize,
     #[serde(default)]
     first_foreign_s: Option<f64>,
@@ -291,7 +285,6 @@ impl StatsFile {
                 never_seen_px: stats.never_seen_px,
             },
             several_animals: stats.several_animals,
-            other_movers: stats.other_movers.iter().map(MoverFile::of).collect(),
             n_foreign_frames: stats.n_foreign_frames,
             first_foreign_s: stats.first_foreign_s.map(digits(3)),
             animal_too_small: stats.animal_too_small,
@@ -314,11 +307,6 @@ impl StatsFile {
             n_detected: self.n_detected,
             never_seen_px: self.background.never_seen_px,
             several_animals: self.several_animals,
-            other_movers: self
-                .other_movers
-                .into_iter()
-                .map(MoverFile::into_mover)
-                .collect(),
             n_foreign_frames: self.n_foreign_frames,
             first_foreign_s: self.first_foreign_s,
             animal_too_small: self.animal_too_small,
