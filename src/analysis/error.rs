@@ -3,6 +3,7 @@
 use super::params::AnimalAtParam;
 use crate::code::Code;
 use crate::footage::SourceError;
+use crate::geometry::Rect;
 use crate::scratch::Full;
 
 /// The reasons, one variant each (ALGORITHMS.md 2.9).
@@ -41,6 +42,8 @@ pub enum Error {
     BackgroundNotStatic {
         /// When it begins, seconds.
         at_s: f64,
+        /// What moved then besides the animal, where it is known, pixels.
+        box_px: Option<Rect>,
     },
     /// The camera stands at no place long enough.
     #[error("the camera moves from {at_s:.1} s on")]
@@ -65,10 +68,22 @@ pub enum Error {
     AnimalTooLarge {
         /// Share of the picture, 0..=1.
         share: f64,
+        /// A frame in which it is as large.
+        frame: usize,
+        /// Where it is in that frame, pixels.
+        box_px: Rect,
     },
     /// Two components of comparable area, each persistent.
-    #[error("more than one animal moves in the footage")]
-    SeveralAnimals,
+    #[error(
+        "more than one animal moves in the footage: in frame {frame} one is at {} and another at {}",
+        center(&boxes_px[0]), center(&boxes_px[1])
+    )]
+    SeveralAnimals {
+        /// A frame that shows two.
+        frame: usize,
+        /// Where they are in that frame, pixels.
+        boxes_px: [Rect; 2],
+    },
     /// The animal's pictures found no room.
     #[error(transparent)]
     Full(#[from] Full),
@@ -77,7 +92,39 @@ pub enum Error {
     Cancelled,
 }
 
+/// Where a film shows why it was refused.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evidence {
+    /// The frame that shows it; or one before a change and one after it. They rise.
+    pub frames: Vec<usize>,
+    /// What to look at in the last of them, pixels.
+    pub boxes_px: Vec<Rect>,
+}
+
 impl Error {
+    /// Where a film of `fps` frames a second shows the reason; `None` where no frame does.
+    pub fn evidence(&self, fps: f64) -> Option<Evidence> {
+        let at = |at_s: f64| (at_s * fps).round() as usize;
+        let (frames, boxes_px) = match *self {
+            Error::BackgroundNotStatic {
+                at_s,
+                box_px: Some(box_px),
+            } => (vec![at(at_s)], vec![box_px]),
+            Error::BackgroundNotStatic { at_s, box_px: None }
+            | Error::CameraMoves { at_s }
+            | Error::LightChanges { at_s }
+            | Error::SceneChanges { at_s } => {
+                let mut frames = vec![at(at_s / 2.0), at(at_s)];
+                frames.dedup();
+                (frames, Vec::new())
+            }
+            Error::AnimalTooLarge { frame, box_px, .. } => (vec![frame], vec![box_px]),
+            Error::SeveralAnimals { frame, boxes_px } => (vec![frame], boxes_px.to_vec()),
+            _ => return None,
+        };
+        Some(Evidence { frames, boxes_px })
+    }
+
     /// The stable code.
     pub fn code(&self) -> Code {
         match self {
@@ -91,9 +138,14 @@ impl Error {
             Error::LightChanges { .. } => Code::LightChanges,
             Error::SceneChanges { .. } => Code::SceneChanges,
             Error::AnimalTooLarge { .. } => Code::AnimalTooLarge,
-            Error::SeveralAnimals => Code::SeveralAnimals,
+            Error::SeveralAnimals { .. } => Code::SeveralAnimals,
             Error::Full(error) => error.code(),
             Error::Cancelled => Code::Cancelled,
         }
     }
+}
+
+/// The middle of a box as X,Y, the way `--animal-at` takes it.
+fn center(rect: &Rect) -> String {
+    format!("{},{}", rect.x + rect.w / 2, rect.y + rect.h / 2)
 }

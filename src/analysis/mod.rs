@@ -31,7 +31,7 @@ pub mod playback;
 pub mod stats;
 pub mod transition;
 
-pub use error::Error;
+pub use error::{Error, Evidence};
 pub use params::Params;
 use params::{CutSprites, ScaleMode};
 

@@ -176,6 +176,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
+        .routes(routes!(jobs::get_refused_jpeg))
         .routes(routes!(jobs::events::get_job_events))
         .routes(routes!(jobs::events::get_events))
         .routes(routes!(session::begin_session, session::end_session))

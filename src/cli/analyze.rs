@@ -10,11 +10,11 @@ use sha2::{Digest, Sha256};
 use super::{Error, Listener, Summary};
 use crate::analysis::{self, Params};
 use crate::cpu;
-use crate::footage::Part;
+use crate::footage::{FrameSource, Part};
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::analysis::{Advice, hints};
-use crate::jobs::overlay;
+use crate::jobs::{overlay, refusal};
 use crate::library::{Library, Poses, View};
 use crate::media::{self, Limits, Tool, Video, read_image};
 
@@ -112,7 +112,10 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let background = background.as_ref();
     let part = Part::of(&video, params.from_s, params.to_s);
     let library = analysis::analyze(&part, background, &params, level, &scratch, &progress)
-        .map_err(|error| Error::work(error.code(), &error))?;
+        .map_err(|error| {
+            show_refusal(&part, &error, &args.output);
+            Error::work(error.code(), &error)
+        })?;
     let footage = footage_summary(video.files())?;
     library_dir::write(&args.output, &library, &params, &footage)
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
@@ -127,6 +130,21 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         super::say(&format!("{sentence} ({code})"));
     }
     Ok(Some(summary(&library, &args.output, &advice)))
+}
+
+/// Writes the frames that show why a film was refused beside where its library would be, and says where.
+fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) {
+    let Some(picture) = refusal::picture(film, error) else {
+        return;
+    };
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    let path = output.with_file_name(format!("{name}.{}", refusal::NAME));
+    let folder = output.parent().unwrap_or(Path::new(""));
+    let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, picture));
+    match written {
+        Ok(()) => super::say(&format!("what was seen: {}", path.display())),
+        Err(cause) => super::say(&format!("cannot write {}: {cause}", path.display())),
+    }
 }
 
 /// What people look at: the table and the pictures.

@@ -3,6 +3,7 @@
 
 pub mod csv;
 pub mod distance_map;
+pub mod evidence;
 pub mod flock_json;
 pub mod flock_overlay;
 pub mod glb;

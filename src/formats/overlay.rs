@@ -3,6 +3,7 @@
 //!
 //! Every stroke lies on a dark rim, so that it can be seen on light and dark.
 
+use crate::geometry::Rect;
 use crate::library::{Pose, Poses};
 use crate::raster::{Frame, Pen};
 
@@ -11,7 +12,7 @@ const TRACE_S: f64 = 2.0;
 const RIM: [u8; 3] = [16, 24, 28];
 const BOX: [u8; 3] = [236, 240, 238];
 const TRACE: [u8; 3] = [84, 214, 230];
-const HEADING: [u8; 3] = [255, 132, 60];
+pub(super) const HEADING: [u8; 3] = [255, 132, 60];
 const MIDLINE: [u8; 3] = [255, 226, 92];
 
 /// Draws poses over frames of one footage.
@@ -28,7 +29,7 @@ impl<'a> Overlay<'a> {
     /// What draws the poses of a footage.
     pub fn new(poses: &'a Poses) -> Overlay<'a> {
         let [width, height] = poses.image_size_px;
-        let unit_px = (f64::from(width.max(height)) / 640.0).clamp(0.5, 4.0);
+        let unit_px = unit_px(width, height);
         let mut lengths: Vec<f64> = poses.frames.iter().filter_map(|p| p.length_px).collect();
         lengths.sort_by(f64::total_cmp);
         let length_px = lengths.get(lengths.len() / 2).copied().unwrap_or(0.0);
@@ -49,10 +50,7 @@ impl<'a> Overlay<'a> {
         let (poses, unit) = (self.poses, self.unit_px);
         self.trace(frame_idx, frame);
         if let Some(rect) = pose.box_px {
-            let [x, y] = [f64::from(rect.x), f64::from(rect.y)];
-            let [right, bottom] = [f64::from(rect.right()), f64::from(rect.bottom())];
-            let corners = [[x, y], [right, y], [right, bottom], [x, bottom], [x, y]];
-            self.stroke(frame, &corners, 0.5 * unit, BOX);
+            self.stroke(frame, &outline(&rect), 0.5 * unit, BOX);
         }
         if let Some(midline) = &pose.midline_px {
             self.stroke(frame, midline, 0.9 * unit, MIDLINE);
@@ -125,20 +123,40 @@ impl<'a> Overlay<'a> {
         self.pen.ink(frame, BOX);
     }
 
-    /// A line in one color on its rim.
     fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
-        self.pen
-            .polyline(points, radius_px + 0.9 * self.unit_px, 0.55);
-        self.pen.ink(frame, RIM);
-        self.pen.polyline(points, radius_px, 1.0);
-        self.pen.ink(frame, rgb);
+        stroke(&mut self.pen, frame, points, [radius_px, self.unit_px], rgb);
     }
+}
+
+/// A line in one color on its rim: its radius, and how wide a stroke is on a picture of this size, pixels.
+pub(super) fn stroke(
+    pen: &mut Pen,
+    frame: &mut Frame,
+    points: &[[f64; 2]],
+    [radius_px, unit_px]: [f64; 2],
+    rgb: [u8; 3],
+) {
+    pen.polyline(points, radius_px + 0.9 * unit_px, 0.55);
+    pen.ink(frame, RIM);
+    pen.polyline(points, radius_px, 1.0);
+    pen.ink(frame, rgb);
+}
+
+/// How much wider strokes are on a larger picture.
+pub(super) fn unit_px(width: u32, height: u32) -> f64 {
+    (f64::from(width.max(height)) / 640.0).clamp(0.5, 4.0)
+}
+
+/// The way around a box, pixels.
+pub(super) fn outline(rect: &Rect) -> [[f64; 2]; 5] {
+    let [x, y] = [f64::from(rect.x), f64::from(rect.y)];
+    let [right, bottom] = [f64::from(rect.right()), f64::from(rect.bottom())];
+    [[x, y], [right, y], [right, bottom], [x, bottom], [x, y]]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Rect;
     use crate::library::View;
     use crate::raster::ColorSpec;
 

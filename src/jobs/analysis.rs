@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::decoding::Counted;
-use super::{Attempt, Context, Error, Product, Stages, overlay};
+use super::{Attempt, Context, Error, Product, Stages, overlay, refusal};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
 use crate::footage::Part;
@@ -118,7 +118,8 @@ impl Input {
         let (background, scratch) = (background.as_ref(), attempt.scratch());
         let part = Part::of(&video, self.params.from_s, self.params.to_s);
         let film = Counted::new(&part, progress);
-        let library = analyze(&film, background, &self.params, level, &scratch, progress)?;
+        let library = analyze(&film, background, &self.params, level, &scratch, progress)
+            .map_err(|cause| refusal::illustrated(&part, cause))?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
             &part,

@@ -22,6 +22,15 @@ pub enum Error {
     /// The analysis ended without a library.
     #[error(transparent)]
     Analysis(#[from] analysis::Error),
+    /// The same, where the film itself shows why.
+    #[error("{cause}")]
+    Refused {
+        /// The reason.
+        #[source]
+        cause: analysis::Error,
+        /// The frames that show it, JPEG.
+        picture: Vec<u8>,
+    },
     /// The flock could not be made.
     #[error(transparent)]
     Flock(#[from] flock::Error),
@@ -65,7 +74,7 @@ impl Error {
             Error::InputAbsent(_) => Code::InputFailed,
             Error::Media(error) => error.code(),
             Error::Source(error) => error.code,
-            Error::Analysis(error) => error.code(),
+            Error::Analysis(error) | Error::Refused { cause: error, .. } => error.code(),
             Error::Flock(error) => error.code(),
             Error::Fish(error) => error.code(),
             Error::LibraryDir(error) => of_library_dir(error),
@@ -77,6 +86,14 @@ impl Error {
             Error::NoRoom => Code::StorageFull,
             Error::Busy => Code::Busy,
             Error::Cancelled => Code::Cancelled,
+        }
+    }
+
+    /// The picture of the reason, JPEG, where there is one.
+    pub fn picture(&self) -> Option<&[u8]> {
+        match self {
+            Error::Refused { picture, .. } => Some(picture),
+            _ => None,
         }
     }
 

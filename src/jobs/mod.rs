@@ -31,6 +31,8 @@ pub mod flock; // library -> flock
 pub mod fish; // library -> virtual fish
 pub mod overlay; // footage -> the same with its poses drawn over it
 
+pub mod refusal; // footage that could not be measured -> a picture of why
+
 pub mod at_once; // library -> what somebody waits for
 
 pub mod places; // how much of that at once

@@ -215,7 +215,8 @@ impl Worker {
             }
             Err(error) => {
                 let code = error.code();
-                let change = store.fail(lease, code, &said(&error), now_ms()).await?;
+                let (said, picture) = (said(&error), error.picture());
+                let change = store.fail(lease, code, &said, picture, now_ms()).await?;
                 (change, Step::Failed(job, code))
             }
         };

@@ -3,13 +3,14 @@
 
 /** What went wrong, in the words of the service (RFC 9457). */
 export class Problem extends Error {
-  /** @param {{title?: string, detail?: string, code?: string, advice?: string, status?: number}} body */
+  /** @param {{title?: string, detail?: string, code?: string, advice?: string, picture?: string | null, status?: number}} body */
   constructor(body) {
     super(body.title ?? "Something went wrong");
     this.title = this.message;
     this.detail = body.detail ?? "";
     this.code = body.code ?? "";
     this.advice = body.advice ?? "";
+    this.picture = body.picture ?? null;
     this.status = body.status ?? 0;
   }
 }

@@ -156,3 +156,64 @@ fn forward(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f6
     }
     sum / f64::sqrt(square).max(1e-9)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::pose::painted::{Look, fish};
+
+    const FPS: f64 = 30.0;
+    const N_FRAMES: usize = 240;
+
+    /// Whether its head is at the left end: it turns every second.
+    fn is_left(k: usize) -> bool {
+        k / 30 % 2 == 1
+    }
+
+    /// The ends of an animal that moves head first at `forward(k)` lengths a second.
+    fn told(forward: impl Fn(usize) -> f64) -> Ends {
+        let look = |k| Look {
+            is_left: is_left(k),
+            is_upper_dark: true,
+        };
+        let track: Vec<Tracked> = (0..N_FRAMES).map(|k| fish(k, look(k))).collect();
+        let axes = |tracked: &Tracked| {
+            let sighting = tracked.sighting.as_ref()?;
+            Some(Axes {
+                axis_rad: sighting.moments.major_rad,
+                length_px: sighting.extent_px[0],
+                height_px: sighting.extent_px[1],
+                skew: sighting.moments.skew[0],
+            })
+        };
+        let axes: Vec<Option<Axes>> = track.iter().map(axes).collect();
+        let along = |k| if is_left(k) { -forward(k) } else { forward(k) };
+        let speed: Vec<Option<f64>> = (0..N_FRAMES).map(|k| Some(along(k))).collect();
+        Ends::tell(&track, &axes, &speed, FPS)
+    }
+
+    /// How many frames have the head at the wrong end.
+    fn n_wrong(ends: &Ends) -> usize {
+        let is_wrong = |k: &usize| ends.evidence[*k].is_none_or(|e| (e < 0.0) != is_left(*k));
+        (0..N_FRAMES).filter(is_wrong).count()
+    }
+
+    #[test]
+    fn heads_are_told_in_every_frame_by_the_way_the_animal_usually_moves() {
+        let ends = told(|_| 0.5);
+        assert_eq!(n_wrong(&ends), 0);
+        assert!(ends.tempered(0.99) > 0.9);
+        let backs_off_at_times = told(|k| if k % 60 < 15 { -0.4 } else { 0.5 });
+        assert_eq!(n_wrong(&backs_off_at_times), 0);
+    }
+
+    #[test]
+    fn who_moves_to_and_fro_leaves_it_uncertain() {
+        let ends = told(|k| if k / 15 % 2 == 0 { 0.5 } else { -0.5 });
+        assert!(
+            (ends.tempered(0.99) - 0.5).abs() < 0.1,
+            "{}",
+            ends.tempered(0.99)
+        );
+    }
+}

@@ -6,6 +6,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 pub mod depth;
 mod ends;
 pub mod heading;
+#[cfg(test)]
+mod painted;
 pub mod smooth;
 mod view;
 

@@ -62,3 +62,44 @@ fn constancy(values: Vec<f64>) -> f64 {
     let spread = median(values.iter().map(|value| (value - usual).abs())).unwrap_or(0.0);
     usual / (1.4826 * spread).max(0.01)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::pose::painted::{Look, fish};
+
+    fn tracked(look: impl Fn(usize) -> Look) -> Vec<Tracked> {
+        (0..40).map(|k| fish(k, look(k))).collect()
+    }
+
+    #[test]
+    fn a_dark_back_above_a_light_belly_is_seen_from_the_side() {
+        let (view, probability) = guess(&tracked(|k| Look {
+            is_left: k >= 20,
+            is_upper_dark: true,
+        }));
+        assert_eq!(view, View::Side);
+        assert!(probability > 0.9, "{probability}");
+    }
+
+    #[test]
+    fn a_light_flank_that_is_up_when_it_goes_one_way_and_down_when_it_goes_back_is_seen_from_above()
+    {
+        let (view, probability) = guess(&tracked(|k| Look {
+            is_left: k >= 20,
+            is_upper_dark: k >= 20,
+        }));
+        assert_eq!(view, View::Top);
+        assert!(probability > 0.9, "{probability}");
+    }
+
+    #[test]
+    fn of_a_few_frames_nothing_is_known() {
+        let look = Look {
+            is_left: false,
+            is_upper_dark: true,
+        };
+        let few: Vec<Tracked> = (0..LEAST_FRAMES - 1).map(|k| fish(k, look)).collect();
+        assert_eq!(guess(&few), (View::Side, 0.5));
+    }
+}

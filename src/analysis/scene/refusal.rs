@@ -50,8 +50,12 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
         .filter(|&k| rest(k) > BUSY_AREA * n_px)
         .collect();
     if busy.len() as f64 > OFTEN * n_samples {
+        let looks = survey.looks[busy[0]].iter().enumerate();
+        let others = looks.filter(|(at, _)| survey.animal[busy[0]] != Some(*at));
+        let boxes = others.map(|(_, look)| look.box_px);
         return Err(Error::BackgroundNotStatic {
             at_s: samples.time_s(busy[0]),
+            box_px: boxes.reduce(|all, one| all.union(&one)),
         });
     }
     let n_found = survey.animal.iter().flatten().count() as f64;
@@ -59,16 +63,23 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
         return Err(Error::NothingMoves);
     }
     if subject.area_px() > LARGE * n_px {
+        let seen =
+            (0..survey.looks.len()).filter_map(|k| Some((k, &survey.looks[k][survey.animal[k]?])));
+        let off = |look: &Look| (look.area_px - subject.area_px()).abs();
+        let usual = seen.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        let (k, look) = usual.ok_or(Error::NothingMoves)?;
         return Err(Error::AnimalTooLarge {
             share: subject.area_px() / n_px,
+            frame: samples.frame_idx[k],
+            box_px: look.box_px,
         });
     }
-    let pairs: Vec<[&Look; 2]> = (0..survey.looks.len())
+    let (in_samples, pairs): (Vec<usize>, Vec<[&Look; 2]>) = (0..survey.looks.len())
         .filter_map(|k| {
             let (looks, at) = (&survey.looks[k], survey.animal[k]?);
-            Some([&looks[at], &looks[second(looks, at, subject)?]])
+            Some((k, [&looks[at], &looks[second(looks, at, subject)?]]))
         })
-        .collect();
+        .unzip();
     let seconds: Vec<&Look> = pairs.iter().map(|[_, second]| *second).collect();
     if (pairs.len() as f64) <= OFTEN * n_samples || range_px(&seconds) < ROAMS * subject.diagonal_px
     {
@@ -77,7 +88,12 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
     match Mirror::of(&pairs, subject.diagonal_px) {
         Some(mirror) => Ok(Company::Image(mirror)),
         None if params.follow == Follow::One && params.animal_at.is_none() => {
-            Err(Error::SeveralAnimals)
+            // A pair in the middle of those found: neither has only just come in.
+            let at = pairs.len() / 2;
+            Err(Error::SeveralAnimals {
+                frame: samples.frame_idx[in_samples[at]],
+                boxes_px: pairs[at].map(|look| look.box_px),
+            })
         }
         None => Ok(Company::Animals),
     }

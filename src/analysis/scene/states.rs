@@ -176,7 +176,7 @@ fn reason(samples: &Samples, thumbnails: &[Thumbnail], dropped: &[Part]) -> Erro
         .min();
     let at_s = samples.time_s(first_change.unwrap_or(0) as usize);
     if n_lights + MOST_MOVES < dropped.len() {
-        return Error::BackgroundNotStatic { at_s };
+        return Error::BackgroundNotStatic { at_s, box_px: None };
     }
     if n_lights < dropped.len() {
         return Error::CameraMoves { at_s };

@@ -133,3 +133,121 @@ pub(super) fn gathered(frames: &[Vec<Other>], times_s: &[f64]) -> Vec<Mover> {
     movers.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     movers
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FPS: f64 = 30.0;
+
+    fn at(x: u32, y: u32, w: u32, h: u32) -> Other {
+        Other {
+            box_px: Rect { x, y, w, h },
+            on_border: false,
+            is_like_animal: false,
+            is_image: false,
+        }
+    }
+
+    /// The movers of 90 frames that show what `seen` says.
+    fn of(seen: impl Fn(u32) -> Vec<Other>) -> Vec<Mover> {
+        let frames: Vec<Vec<Other>> = (0..90).map(seen).collect();
+        let times_s: Vec<f64> = (0..90).map(|k| f64::from(k) / FPS).collect();
+        gathered(&frames, &times_s)
+    }
+
+    #[test]
+    fn a_hand_that_comes_in_and_goes_is_one_mover_with_its_time_and_place() {
+        let hand = |k: u32| {
+            let reach = 10 + 2 * (k - 30).min(60 - k);
+            let hand = Other {
+                on_border: true,
+                ..at(100, 0, 20, reach)
+            };
+            vec![hand]
+        };
+        let movers = of(|k| {
+            if (30..60).contains(&k) {
+                hand(k)
+            } else {
+                Vec::new()
+            }
+        });
+        let [mover] = &movers[..] else {
+            panic!("{movers:?}")
+        };
+        assert_eq!(mover.kind, MoverKind::FromBorder);
+        assert_eq!((mover.from_s, mover.to_s), (1.0, 59.0 / FPS));
+        assert_eq!(
+            mover.box_px,
+            Rect {
+                x: 100,
+                y: 0,
+                w: 20,
+                h: 40
+            }
+        );
+    }
+
+    #[test]
+    fn what_is_seen_for_a_moment_is_none() {
+        assert_eq!(
+            of(|k| if k < 8 {
+                vec![at(5, 5, 9, 9)]
+            } else {
+                Vec::new()
+            }),
+            []
+        );
+        let twice = |k| {
+            if k == 0 || k == 20 {
+                vec![at(5, 5, 9, 9)]
+            } else {
+                Vec::new()
+            }
+        };
+        assert_eq!(of(twice), [], "two frames are too few");
+    }
+
+    #[test]
+    fn who_comes_again_later_is_told_of_twice_in_order_of_time() {
+        let seen = |k: u32| match k {
+            0..20 => vec![at(50, 50, 10, 10)],
+            10..60 => vec![at(200, 80, 10, 10)],
+            60.. => vec![at(50, 50, 10, 10)],
+        };
+        let times: Vec<f64> = of(seen).iter().map(|mover| mover.from_s).collect();
+        assert_eq!(times, [0.0, 20.0 / FPS, 2.0]);
+    }
+
+    #[test]
+    fn the_kind_is_what_most_sightings_say() {
+        let kind = |seen: &dyn Fn(u32) -> Other| of(|k| vec![seen(k)])[0].kind;
+        let runs = |k: u32| at(10 + 3 * k, 40, 12, 8);
+        let image = |k| Other {
+            is_image: k % 3 > 0,
+            ..runs(k)
+        };
+        let like = |k| Other {
+            is_like_animal: k % 3 > 0,
+            ..runs(k)
+        };
+        assert_eq!(kind(&image), MoverKind::MirrorImage);
+        assert_eq!(kind(&like), MoverKind::Animal);
+        assert_eq!(kind(&|k| at(10 + k % 3, 40, 12, 8)), MoverKind::InPlace);
+        assert_eq!(kind(&runs), MoverKind::Other);
+    }
+
+    #[test]
+    fn what_overlaps_the_animal_is_the_animal() {
+        let animal = Rect {
+            x: 10,
+            y: 10,
+            w: 40,
+            h: 20,
+        };
+        let others = [at(15, 12, 10, 10), at(45, 12, 20, 10), at(200, 5, 10, 10)];
+        assert_eq!(beside(&others, Some(animal)), others[1..]);
+        assert_eq!(beside(&others, None), others);
+    }
+}

@@ -23,6 +23,7 @@ use super::timestamp::rfc3339;
 use crate::code::Code;
 use crate::ids::{JobId, LibraryId};
 use crate::jobs::clock::now_ms;
+use crate::jobs::refusal::NAME;
 use crate::store::jobs::cancel::Cancel;
 use crate::store::jobs::read::JobRow;
 use crate::store::jobs::{JobState, Kind};
@@ -72,6 +73,8 @@ pub(super) struct JobFailure {
     detail: String,
     /// What to do about it.
     advice: &'static str,
+    /// The address of a picture of the frames that show the reason, where they do.
+    picture: Option<String>,
 }
 
 /// Where to look next.
@@ -121,6 +124,29 @@ pub(super) async fn get_job(
     let mut answer = axum::Json(job).into_response();
     wait.applied(answer.headers_mut());
     Ok(answer)
+}
+
+/// The frames that show why a film was refused: with boxes around what moved, or before and after a change.
+#[utoipa::path(get, path = "/v1/jobs/{id}/refused.jpg", params(("id" = Uuid, Path)), responses(
+    (status = 200, content_type = "image/jpeg"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_refused_jpeg(
+    State(state): State<AppState>,
+    caller: Caller,
+    Id(id): Id,
+) -> Result<impl IntoResponse, Problem> {
+    let store = &state.context.store;
+    let jpeg = store.refused_jpeg(JobId(id), &caller.reach).await?;
+    let jpeg = jpeg.ok_or_else(Problem::not_found)?;
+    let headers = [
+        (header::CONTENT_TYPE, "image/jpeg"),
+        (
+            header::CACHE_CONTROL,
+            "private, max-age=31536000, immutable",
+        ),
+    ];
+    Ok((headers, jpeg))
 }
 
 /// Cancel a job: at once where it is queued (200), soon where it runs (202).
@@ -238,6 +264,9 @@ impl JobView {
             attempt: row.attempt,
             cancel_requested: row.cancel_requested,
             error: row.failure.map(|(code, detail)| JobFailure {
+                picture: row
+                    .has_picture
+                    .then(|| format!("/v1/jobs/{}/{NAME}", row.id)),
                 code: code.name(),
                 title: code.meaning(),
                 detail,

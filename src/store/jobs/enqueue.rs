@@ -171,7 +171,7 @@ mod tests {
         assert_eq!(waiting, (JobState::Queued, None));
         let lease = store.claim(Uuid::now_v7(), 1, 10).await.unwrap().unwrap();
         let sentence = "it is no film";
-        let fail = store.fail(&lease, Code::NotAVideo, sentence, 2);
+        let fail = store.fail(&lease, Code::NotAVideo, sentence, None, 2);
         assert_eq!(fail.await.unwrap(), Change::Made);
         let late = state_after(&failed).await;
         assert_eq!(late, (JobState::Failed, Some(Code::InputFailed)));

@@ -6,15 +6,16 @@ use crate::code::Code;
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Ends the job as failed, for a reason that another attempt would meet again.
+    /// Ends the job as failed, for a reason that another attempt would meet again; `picture` shows it, JPEG.
     pub async fn fail(
         &self,
         lease: &Lease,
         code: Code,
         detail: &str,
+        picture: Option<&[u8]>,
         now_ms: i64,
     ) -> Result<Change, Error> {
-        let fail = || self.fail_now(lease, code, detail, now_ms);
+        let fail = || self.fail_now(lease, code, detail, picture, now_ms);
         self.reserve.lend(fail).await
     }
 
@@ -23,18 +24,20 @@ impl Store {
         lease: &Lease,
         code: Code,
         detail: &str,
+        picture: Option<&[u8]>,
         now_ms: i64,
     ) -> Result<Change, Error> {
         let mut transaction = self.writer.begin().await?;
         let n_rows = sql::query(
             "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
-             code = $3, detail = $4, finished_ms = $5 \
+             code = $3, detail = $4, refused_jpeg = $5, finished_ms = $6 \
              where id = $1 and fence = $2 and state = 'running'",
         )
         .bind(lease.job_id.0)
         .bind(lease.fence)
         .bind(code.name())
         .bind(detail)
+        .bind(picture)
         .bind(now_ms)
         .execute(&mut transaction)
         .await?;

@@ -31,6 +31,8 @@ pub struct JobRow {
     pub progress: f64,
     /// Why it failed.
     pub failure: Option<(Code, String)>,
+    /// Whether there is a picture of that.
+    pub has_picture: bool,
     /// When it was queued, first claimed and ended, milliseconds since 1970.
     pub created_ms: i64,
     /// See `created_ms`.
@@ -43,7 +45,7 @@ pub struct JobRow {
 macro_rules! columns {
     () => {
         "id, kind, state, result_id, cancel_requested, attempt, stage, progress, code, detail, \
-         created_ms, started_ms, finished_ms, \
+         created_ms, started_ms, finished_ms, refused_jpeg is not null as has_picture, \
          case kind when 'sample' then null when 'analysis' then json_extract(input, '$.footage_id') \
          else json_extract(input, '$.library_id') end as subject"
     };
@@ -65,6 +67,7 @@ pub(super) struct Row {
     created_ms: i64,
     started_ms: Option<i64>,
     finished_ms: Option<i64>,
+    has_picture: bool,
     subject: Option<String>,
 }
 
@@ -78,6 +81,14 @@ impl Store {
         );
         let row: Option<Row> = self.one_of(sql, id.0, reach).await?;
         row.map(JobRow::try_from).transpose()
+    }
+
+    /// The picture of why a job failed, JPEG, if it has one and is within reach.
+    pub async fn refused_jpeg(&self, id: JobId, reach: &Reach) -> Result<Option<Vec<u8>>, Error> {
+        let sql = "select refused_jpeg from jobs \
+                   where id = $1 and ($2 is null or owner = $2) and refused_jpeg is not null";
+        let row: Option<(Vec<u8>,)> = self.one_of(sql, id.0, reach).await?;
+        Ok(row.map(|(jpeg,)| jpeg))
     }
 
     /// The job that makes, or made, the result of that id, if it is within reach.
@@ -132,6 +143,7 @@ impl TryFrom<Row> for JobRow {
             stage: row.stage,
             progress: row.progress,
             failure,
+            has_picture: row.has_picture,
             created_ms: row.created_ms,
             started_ms: row.started_ms,
             finished_ms: row.finished_ms,

@@ -160,7 +160,7 @@ async fn a_worker_that_was_given_up_changes_nothing() {
     let fresh = queue.claim(LEASE_MS + 1).await.unwrap();
 
     assert_eq!(queue.finish(&stale).await, Change::Lost);
-    let failed = queue.store.fail(&stale, Code::Internal, "", 0).await;
+    let failed = queue.store.fail(&stale, Code::Internal, "", None, 0).await;
     assert_eq!(failed.unwrap(), Change::Lost);
     assert_eq!(queue.store.stop(&stale, 0).await.unwrap(), Change::Lost);
     assert_eq!(queue.store.retry(&stale, 0).await.unwrap(), Change::Lost);
@@ -277,7 +277,9 @@ async fn a_job_that_follows_a_failed_one_fails_with_it() {
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
     let lease = queue.claim(0).await.unwrap();
-    let failed = queue.store.fail(&lease, Code::NothingMoves, "still", 1);
+    let failed = queue
+        .store
+        .fail(&lease, Code::NothingMoves, "still", None, 1);
     assert_eq!(failed.await.unwrap(), Change::Made);
     let row = queue.store.job(second, &Reach::All).await.unwrap().unwrap();
     assert_eq!(row.failure.unwrap().0, Code::InputFailed);

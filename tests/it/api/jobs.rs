@@ -6,11 +6,45 @@ use serde_json::{Value, json};
 use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::TINY;
+use crate::common::film::Films;
+use flockreel::store::tokens::Scope;
 
 async fn queued(app: &TestApp) -> Value {
     let footage_id = app.upload(&TINY).await;
     app.accept("/v1/analyses", json!({"footage_id": footage_id}))
         .await
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_film_that_is_refused_shows_why() {
+    let mut app = TestApp::working().await;
+    let (owner, stranger) = (
+        app.token(Scope::Write, 9).await,
+        app.token(Scope::Write, 9).await,
+    );
+    app.sign_in(&owner);
+    let films = Films::new();
+    let film = films.run("-f lavfi -i mandelbrot=size=640x480:rate=25,scroll=h=0.013:v=0.007,scale=160:120 -frames:v 60 a.mp4");
+    let footage_id = app.upload(&std::fs::read(film).unwrap()).await;
+    let body = json!({"footage_id": footage_id});
+    let accepted = app.accept("/v1/analyses", body).await;
+    let job = app.ended_job(&accepted["job_id"]).await;
+    assert_eq!(job["error"]["code"], "background_not_static", "{job}");
+    let picture = job["error"]["picture"].as_str().expect("a picture");
+    let answer = app.get(picture).send().await.unwrap();
+    assert_eq!(answer.headers()["content-type"], "image/jpeg");
+    let jpeg = answer.bytes().await.unwrap();
+    let shown = image::load_from_memory(&jpeg).expect("a JPEG");
+    assert!(shown.height() == 120 && [160, 328].contains(&shown.width()));
+    app.sign_in(&stranger);
+    let hidden = app.get(picture).send().await.unwrap();
+    assert_eq!(code_of(hidden, 404).await, "not_found");
+    app.sign_in(&owner);
+    let deleted = app.delete(&format!("/v1/footage/{footage_id}"));
+    assert!(deleted.send().await.unwrap().status().is_success());
+    let gone = app.get(picture).send().await.unwrap();
+    assert_eq!(code_of(gone, 404).await, "not_found");
+    app.assert_sound().await;
 }
 
 #[tokio::test]

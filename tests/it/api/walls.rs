@@ -63,6 +63,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("DELETE", "/v1/fish/{id}", Path("fish")),
         ("DELETE", "/v1/libraries/{id}", Path("libraries")),
         ("DELETE", "/v1/footage/{id}", Path("footage")),
+        ("GET", "/v1/jobs/{id}/refused.jpg", Nothing), // of jobs that failed alone: tests/it/api/jobs.rs
         ("GET", "/v1/events", Nothing), // endless, of the caller's own: tests/it/api/events.rs
         ("POST", "/v1/footage", Nothing),
         ("POST", "/v1/uploads", Nothing),

@@ -52,6 +52,21 @@ fn a_film_that_is_refused_gets_a_sentence_with_advice_and_leaves_nothing_behind(
 }
 
 #[test]
+fn a_film_whose_scene_moves_leaves_the_picture_that_it_tells_of() {
+    let films = Films::new();
+    films.run("-f lavfi -i mandelbrot=size=640x480:rate=25,scroll=h=0.013:v=0.007,scale=160:120 -frames:v 60 pan.mp4");
+    let done = flockreel(&films, "analyze pan.mp4 -o deep/library");
+    let said = String::from_utf8(done.stderr).expect("it is text");
+    assert!(
+        said.contains("what was seen: deep/library.refused.jpg"),
+        "{said}"
+    );
+    let picture = std::fs::read(films.path("deep/library.refused.jpg")).expect("it is there");
+    image::load_from_memory(&picture).expect("a JPEG");
+    assert_eq!(names(&films), ["deep", "pan.mp4"]);
+}
+
+#[test]
 fn every_option_that_an_advice_names_is_one() {
     let films = Films::new();
     let quoted = |code: &Code| code.advice().split('`').skip(1).step_by(2).collect();

@@ -129,7 +129,7 @@ fn the_mirror_image_in_the_surface_is_not_a_second_animal() {
 /// The first frame at which a refusal says that the trouble begins.
 fn refused(name: &str, film: &Staged) -> (&'static str, f64) {
     match film.analyzed(&Params::default()) {
-        Err(Error::BackgroundNotStatic { at_s }) => ("background_not_static", at_s),
+        Err(Error::BackgroundNotStatic { at_s, .. }) => ("background_not_static", at_s),
         Err(Error::CameraMoves { at_s }) => ("camera_moved", at_s),
         Err(Error::LightChanges { at_s }) => ("light_changes", at_s),
         Err(Error::SceneChanges { at_s }) => ("scene_changes", at_s),

@@ -34,12 +34,19 @@ fn two_fish() -> Staged {
 #[test]
 fn of_two_animals_the_one_that_is_pointed_at_is_followed() {
     let film = two_fish();
-    assert!(matches!(
-        film.analyzed(&Params::default()),
-        Err(Error::SeveralAnimals)
-    ));
-    let point = film.centroid_px(60).expect("it is shown");
     let turned = |[x, y]: [f64; 2]| [f64::from(WIDTH) - x, f64::from(HEIGHT + LOWER_PX) - y];
+    match film.analyzed(&Params::default()) {
+        Err(Error::SeveralAnimals { frame, boxes_px }) => {
+            let fish = film.centroid_px(frame).expect("it is shown");
+            for point in [fish, turned(fish)] {
+                let [x, y] = point.map(|v| v as u32);
+                let n_there = boxes_px.iter().filter(|b| b.contains(x, y)).count();
+                assert_eq!(n_there, 1, "{point:?} in {boxes_px:?}");
+            }
+        }
+        other => panic!("it was not told that there are two: {:?}", other.err()),
+    }
+    let point = film.centroid_px(60).expect("it is shown");
     let other = turned(point);
     let pointing_at = |point| {
         let animal_at = Some(AnimalAtParam { frame: 60, point });

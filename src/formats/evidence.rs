@@ -1,0 +1,134 @@
+//! refused.jpg: what a film shows that could not be measured. One frame with boxes around what moves, or a frame
+//! from before a change beside one from after it.
+
+use super::overlay::{HEADING, outline, stroke, unit_px};
+use super::picture;
+use crate::geometry::Rect;
+use crate::raster::resize::resized;
+use crate::raster::{Frame, Pen, RgbImage};
+
+/// Each frame is made smaller until neither side is longer, pixels.
+const LONGEST_PX: u32 = 640;
+/// Between two frames, pixels.
+const GAP_PX: u32 = 8;
+/// A pixel has changed when its luma differs by more, levels of 255.
+const CHANGED: u8 = 24;
+/// Where more than this share of the pixels has changed, marking them would only hide the frame.
+const MOST_MARKED: f64 = 0.5;
+
+/// Draws the frames side by side, with boxes over the last one, as JPEG. Where there are two, what changed is
+/// marked in the second. Panics when there is no frame, or when they differ in size.
+pub fn draw(mut frames: Vec<Frame>, boxes_px: &[Rect]) -> Vec<u8> {
+    let before = (frames.len() > 1).then(|| frames[0].clone());
+    if let Some(last) = frames.last_mut() {
+        let unit = unit_px(last.width, last.height);
+        let mut pen = Pen::new(last.width, last.height);
+        for rect in boxes_px {
+            stroke(&mut pen, last, &outline(rect), [1.1 * unit, unit], HEADING);
+        }
+    }
+    let mut pictures: Vec<RgbImage> = frames.iter().map(Frame::to_rgb).collect();
+    if let (Some(before), Some(after), Some(picture)) = (before, frames.last(), pictures.last_mut())
+    {
+        mark_changes(&before, after, picture);
+    }
+    let small: Vec<RgbImage> = pictures.iter().map(shrunk).collect();
+    picture::write_jpeg(&side_by_side(&small))
+}
+
+/// Tints the pixels that differ between two frames.
+fn mark_changes(before: &Frame, after: &Frame, picture: &mut RgbImage) {
+    let pairs = before.luma().iter().zip(after.luma());
+    let changed: Vec<bool> = pairs.map(|(a, b)| a.abs_diff(*b) > CHANGED).collect();
+    let n_changed = changed.iter().filter(|changed| **changed).count();
+    if n_changed as f64 > MOST_MARKED * changed.len() as f64 {
+        return;
+    }
+    let marked = picture.pixels.chunks_exact_mut(3).zip(changed);
+    for (rgb, _) in marked.filter(|(_, changed)| *changed) {
+        for (value, tint) in rgb.iter_mut().zip(HEADING) {
+            *value = value.midpoint(tint);
+        }
+    }
+}
+
+/// The picture, no side longer than [`LONGEST_PX`].
+fn shrunk(picture: &RgbImage) -> RgbImage {
+    let [width, height] = [picture.width, picture.height].map(f64::from);
+    let scale = (f64::from(LONGEST_PX) / width.max(height)).min(1.0);
+    let [width, height] = [width, height].map(|side| ((side * scale).round() as u32).max(1));
+    resized(picture, width, height)
+}
+
+/// Pictures of one size in a row, on white.
+fn side_by_side(pictures: &[RgbImage]) -> RgbImage {
+    let (n, step) = (pictures.len() as u32, pictures[0].width + GAP_PX);
+    let mut row = RgbImage::new(n * step - GAP_PX, pictures[0].height);
+    row.pixels.fill(255);
+    let row_bytes = row.width as usize * 3;
+    for (at, picture) in pictures.iter().enumerate() {
+        let left = at * step as usize * 3;
+        let lines = picture.pixels.chunks_exact(picture.width as usize * 3);
+        for (line, into) in lines.zip(row.pixels.chunks_exact_mut(row_bytes)) {
+            into[left..left + line.len()].copy_from_slice(line);
+        }
+    }
+    row
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::ColorSpec;
+
+    fn gray(width: u32, height: u32) -> Frame {
+        let mut frame = Frame::new(width, height, ColorSpec::default());
+        frame.planes.fill(128);
+        frame
+    }
+
+    fn decoded(jpeg: &[u8]) -> image::RgbImage {
+        image::load_from_memory(jpeg)
+            .expect("our own JPEG")
+            .into_rgb8()
+    }
+
+    fn is_orange([r, _, b]: [u8; 3]) -> bool {
+        r > b.saturating_add(60)
+    }
+
+    #[test]
+    fn one_frame_shows_its_boxes_and_is_made_small() {
+        let rect = Rect {
+            x: 200,
+            y: 100,
+            w: 400,
+            h: 200,
+        };
+        let picture = decoded(&draw(vec![gray(1280, 720)], &[rect]));
+        assert_eq!(picture.dimensions(), (640, 360));
+        assert!(is_orange(picture.get_pixel(100, 100).0));
+        assert!(!is_orange(picture.get_pixel(200, 100).0));
+    }
+
+    #[test]
+    fn two_frames_stand_side_by_side_with_what_changed_marked_in_the_second() {
+        let mut after = gray(64, 48);
+        for y in 8..24 {
+            after.planes[y * 64 + 16..y * 64 + 32].fill(200);
+        }
+        let picture = decoded(&draw(vec![gray(64, 48), after], &[]));
+        assert_eq!(picture.dimensions(), (64 + 8 + 64, 48));
+        assert!(is_orange(picture.get_pixel(72 + 24, 16).0));
+        assert!(!is_orange(picture.get_pixel(24, 16).0));
+        assert!(!is_orange(picture.get_pixel(72 + 50, 16).0));
+    }
+
+    #[test]
+    fn where_all_has_changed_the_second_frame_stays_as_it_is() {
+        let mut after = gray(64, 48);
+        after.planes[..64 * 48].fill(220);
+        let picture = decoded(&draw(vec![gray(64, 48), after], &[]));
+        assert!(!is_orange(picture.get_pixel(72 + 24, 16).0));
+    }
+}
