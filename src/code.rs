@@ -82,6 +82,11 @@ codes! {
          without it, for example with `--background empty.png`."
     NothingAtPoint "nothing_at_point" "Nothing that moves is where the animal was said to be."
         "Point at the animal in a frame in which it has moved; frames are counted from 0, as in poses.json."
+    MasksDiffer "masks_differ" "The masks do not match the footage in size or number."
+        "Send one mask for each frame, of the footage's own width and height. Where the footage has no constant rate, say \
+         one, for example with `--fps 30`: every picture is then used once."
+    MasksEmpty "masks_empty" "The masks show no animal."
+        "Send masks that are white where the animal is and black elsewhere."
     BackgroundNotStatic "background_not_static" "Much of the picture changes throughout the film."
         "Put the camera on a tripod, keep zoom and focus fixed, and film before a scene that stays still. Where only a \
          part of the picture moves, leave it out, for example with `--ignore 0,0,200,100`; where only a part of the film \

@@ -4,7 +4,7 @@
 use std::ops::{ControlFlow, Range};
 
 use crate::code::Code;
-use crate::raster::{ColorSpec, Frame};
+use crate::raster::{ColorSpec, Frame, GivenMask};
 
 /// What is known of a footage before its frames are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -147,6 +147,134 @@ impl FrameStream for PartStream<'_> {
             }
         }
         Ok(None)
+    }
+}
+
+/// A video each frame of which comes with the mask that another video has for it: its luma says how much of each pixel
+/// is the animal.
+pub struct Masked<'a> {
+    video: &'a dyn FrameSource,
+    masks: &'a dyn FrameSource,
+    is_mixed: bool,
+}
+
+/// A video and its masks are of different sizes or lengths.
+#[derive(Debug, thiserror::Error)]
+pub enum MasksDiffer {
+    /// Their pictures are of different sizes.
+    #[error("the masks are of {masks:?} pixels, the footage of {footage:?}")]
+    Size {
+        /// Width and height of the masks.
+        masks: [u32; 2],
+        /// Width and height of the footage.
+        footage: [u32; 2],
+    },
+    /// There are fewer masks than frames.
+    #[error("there are {n_masks} masks for more frames: one for each frame is needed")]
+    TooFew {
+        /// How many masks there are.
+        n_masks: usize,
+    },
+    /// There are more masks than frames.
+    #[error("there are more masks than the {n_frames} frames: one for each frame is needed")]
+    TooMany {
+        /// How many frames there are.
+        n_frames: usize,
+    },
+}
+
+impl From<MasksDiffer> for SourceError {
+    fn from(cause: MasksDiffer) -> SourceError {
+        SourceError {
+            code: Code::MasksDiffer,
+            cause: Box::new(cause),
+        }
+    }
+}
+
+impl<'a> Masked<'a> {
+    /// `is_mixed`: see [`GivenMask`]. Fails where the sizes of the pictures differ.
+    pub fn of(
+        video: &'a dyn FrameSource,
+        masks: &'a dyn FrameSource,
+        is_mixed: bool,
+    ) -> Result<Masked<'a>, SourceError> {
+        let size = |source: &dyn FrameSource| {
+            let format = source.format();
+            [format.width, format.height]
+        };
+        match (size(masks), size(video)) {
+            (masks, footage) if masks != footage => {
+                Err(MasksDiffer::Size { masks, footage }.into())
+            }
+            _ => Ok(Masked {
+                video,
+                masks,
+                is_mixed,
+            }),
+        }
+    }
+}
+
+impl FrameSource for Masked<'_> {
+    fn format(&self) -> FootageFormat {
+        self.video.format()
+    }
+
+    fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
+        Ok(Box::new(MaskedStream {
+            video: self.video.open()?,
+            masks: self.masks.open()?,
+            is_mixed: self.is_mixed,
+            mask: Frame::default(),
+            n_read: 0,
+        }))
+    }
+
+    // A decoder that skips frames may give others of the masks than of the video.
+    fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
+        spread_by_reading(self, n, visit)
+    }
+}
+
+/// One reading of a video with its masks.
+struct MaskedStream<'a> {
+    video: Box<dyn FrameStream + 'a>,
+    masks: Box<dyn FrameStream + 'a>,
+    is_mixed: bool,
+    /// The mask read last.
+    mask: Frame,
+    n_read: usize,
+}
+
+impl FrameStream for MaskedStream<'_> {
+    fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
+        let alpha = frame.mask.take().map(|mask| mask.alpha);
+        let time_s = self.video.next_frame(frame)?;
+        let masked_s = self.masks.next_frame(&mut self.mask)?;
+        let n_read = self.n_read;
+        match (time_s, masked_s) {
+            (Some(_), None) => Err(MasksDiffer::TooFew { n_masks: n_read }.into()),
+            (None, Some(_)) => Err(MasksDiffer::TooMany { n_frames: n_read }.into()),
+            (None, None) => Ok(None),
+            (Some(time_s), Some(_)) => {
+                self.n_read += 1;
+                let levels = self.mask.gray_levels();
+                let mut alpha = alpha.unwrap_or_default();
+                alpha.clear();
+                alpha.extend(
+                    self.mask
+                        .luma()
+                        .iter()
+                        .map(|&luma| levels[usize::from(luma)]),
+                );
+                frame.mask = Some(GivenMask {
+                    alpha,
+                    is_mixed: self.is_mixed,
+                });
+                Ok(Some(time_s))
+            }
+        }
     }
 }
 

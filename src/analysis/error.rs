@@ -34,6 +34,12 @@ pub enum Error {
         .0.point[0], .0.point[1], .0.frame
     )]
     NothingAtPoint(AnimalAtParam),
+    /// The masks that came with the footage show no animal.
+    #[error(
+        "the masks show no animal: none has a white place of {} pixels",
+        super::subject::LEAST_AREA_PX
+    )]
+    MasksEmpty,
     /// No component large enough in enough frames.
     #[error("nothing moves before the background")]
     NothingMoves,
@@ -132,6 +138,7 @@ impl Error {
             Error::TooFewFrames { .. } => Code::TooFewFrames,
             Error::BackgroundSizeDiffers { .. } => Code::BackgroundSizeDiffers,
             Error::NothingAtPoint(_) => Code::NothingAtPoint,
+            Error::MasksEmpty => Code::MasksEmpty,
             Error::NothingMoves => Code::NothingMoves,
             Error::BackgroundNotStatic { .. } => Code::BackgroundNotStatic,
             Error::CameraMoves { .. } => Code::CameraMoved,

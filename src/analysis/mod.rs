@@ -72,7 +72,10 @@ pub fn analyze(
     })?;
     let lights: Vec<usize> = scene.plates.iter().map(|plate| plate.light).collect();
     let plate = scene.plates.swap_remove(0);
-    let occluders = occluders::take_out(&mut track, &plate, progress)?;
+    let occluders = match scene.is_masked {
+        true => None,
+        false => occluders::take_out(&mut track, &plate, progress)?,
+    };
     let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);

@@ -40,6 +40,8 @@ pub(super) struct FootageView {
     n_frames_hint: i64,
     /// Whether a picture of the empty scene came with it.
     has_background: bool,
+    /// Whether masks came with it that say which of it is the animal.
+    has_masks: bool,
     /// Made by the program itself.
     sample: bool,
     created_at: String,
@@ -64,10 +66,14 @@ pub(super) struct FootageForm {
     video: Vec<u8>,
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
+    /// A mask for each frame: a gray video, a zip of pictures or a TIFF, white where the animal is; soft values count in
+    /// part.
+    #[schema(value_type = Option<String>, format = Binary)]
+    masks: Option<Vec<u8>>,
 }
 
 /// Upload a video, a zip of numbered pictures or a TIFF of several pages: as the raw body, or as a form with `video`
-/// and, if there is one, `background`.
+/// and, if there are such, `background` and `masks`. The alpha channel of a footage is taken for its masks.
 #[utoipa::path(post, path = "/v1/footage", params(Naming),
     request_body(content(([u8] = "application/octet-stream"), (FootageForm = "multipart/form-data"))),
     responses(
@@ -189,6 +195,7 @@ impl FootageView {
             fps: footage.fps,
             n_frames_hint: footage.n_frames_hint,
             has_background: !footage.background_sha256.is_empty(),
+            has_masks: !footage.masks_sha256.is_empty(),
             sample: footage.sample,
             created_at: rfc3339(footage.created_ms),
         }

@@ -174,6 +174,8 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::TimeLimit
         | Code::MemoryLimit
         | Code::DecoderCrashed
+        | Code::MasksDiffer
+        | Code::MasksEmpty
         | Code::NothingMoves
         | Code::NothingAtPoint
         | Code::BackgroundNotStatic

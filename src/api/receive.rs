@@ -16,7 +16,7 @@ use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::code::Code;
 use crate::jobs::admit::Arrival;
 use crate::store;
-use crate::store::footage::{BACKGROUND, VIDEO};
+use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
 use crate::store::intake::Intake;
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
@@ -40,7 +40,7 @@ const MAX_BACKGROUND_BYTES: u64 = 64 << 20;
 /// What a form says besides its files: JSON objects by the names of their fields.
 pub(super) type Wishes = BTreeMap<&'static str, Map<String, Value>>;
 
-/// Receives a footage, raw or as a form with `video` and, if given, `background`.
+/// Receives a footage, raw or as a form with `video` and, if given, `background` and `masks`.
 pub(super) async fn receive(
     state: &AppState,
     request: Request,
@@ -74,6 +74,7 @@ pub(super) async fn receive_with(
         draft,
         video,
         background: None,
+        masks: None,
         name: label(name.as_deref().unwrap_or_default()),
         owner,
     };
@@ -93,7 +94,7 @@ async fn receive_form(
     let mut form = Multipart::from_request(request, state)
         .await
         .map_err(|rejection| malformed(&rejection.body_text()))?;
-    let (mut video, mut background, mut file_name) = (None, None, None);
+    let (mut video, mut background, mut masks, mut file_name) = (None, None, None, None);
     let mut wished = Wishes::new();
     while let Some(field) = next_field(&mut form).await? {
         match field.name() {
@@ -106,6 +107,10 @@ async fn receive_form(
             Some("background") if background.is_none() => {
                 let into = (&draft, BACKGROUND, MAX_BACKGROUND_BYTES);
                 background = Some(receive_file(state, field, into).await?);
+            }
+            Some("masks") if masks.is_none() => {
+                let into = (&draft, MASKS, state.config.max_upload_bytes);
+                masks = Some(receive_file(state, field, into).await?);
             }
             name => {
                 let wish = wishes.iter().find(|wish| name == Some(wish));
@@ -120,6 +125,7 @@ async fn receive_form(
         draft,
         video: video.ok_or_else(|| malformed("the form has no field: video"))?,
         background,
+        masks,
         name: label(&name.or(file_name).unwrap_or_default()),
         owner,
     };
@@ -204,8 +210,10 @@ where
 /// What can be refused before the body is read.
 fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
     let most = match is_form(request) {
-        // A background and wishes besides, and what parts them.
-        true => limit_bytes.saturating_add(MAX_BACKGROUND_BYTES + (4 << 20)),
+        // Masks, a background and wishes besides, and what parts them.
+        true => limit_bytes
+            .saturating_mul(2)
+            .saturating_add(MAX_BACKGROUND_BYTES + (4 << 20)),
         false => limit_bytes,
     };
     match body_bytes(request).is_some_and(|bytes| bytes > most) {

@@ -268,6 +268,7 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
         draft,
         video,
         background: None,
+        masks: None,
         name: upload.name.clone(),
         owner: upload.owner.clone(),
     };

@@ -14,7 +14,8 @@ use crate::footage::{FrameSource, Part};
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::analysis::{Advice, hints};
-use crate::jobs::{overlay, refusal};
+use crate::jobs::masks::Masks;
+use crate::jobs::{self, overlay, refusal};
 use crate::library::{Library, Poses, View};
 use crate::media::{self, Limits, Tool, Video, read_image};
 
@@ -29,6 +30,10 @@ pub struct Args {
     /// A picture of the scene without the animal; estimated when absent.
     #[arg(long, value_name = "IMAGE")]
     background: Option<PathBuf>,
+    /// A mask for each frame, white where the animal is, gray where in part: a video, or pictures in a folder, a zip or a
+    /// TIFF. Footage with an alpha channel needs none.
+    #[arg(long, value_name = "DIR|VIDEO")]
+    masks: Option<PathBuf>,
     /// The calibrated camera, as JSON: {"z_min_m": 0.7, "pane_px_per_m": 1000, ...}.
     #[arg(long, value_name = "JSON_FILE")]
     camera: Option<PathBuf>,
@@ -88,9 +93,13 @@ pub struct Args {
 /// Analyses the video and writes the library.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
-    for path in [Some(&args.video), args.background.as_ref()]
-        .into_iter()
-        .flatten()
+    for path in [
+        Some(&args.video),
+        args.background.as_ref(),
+        args.masks.as_ref(),
+    ]
+    .into_iter()
+    .flatten()
     {
         File::open(path).map_err(|cause| {
             Error::Usage(format!("cannot be read: {cause}: {}", path.display()))
@@ -110,7 +119,16 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let level = cpu::Level::detect();
     let scratch = super::scratch_beside(&args.output);
     let background = background.as_ref();
-    let part = Part::of(&video, params.from_s, params.to_s);
+    let refused = |error: jobs::Error| Error::work(error.code(), &error);
+    let given = (&*args.video, args.masks.as_deref());
+    let masks = Masks::open(&video, given, &limits, &hints).map_err(refused)?;
+    let masked = masks.as_ref().map(|masks| masks.over(&video));
+    let masked = masked.transpose().map_err(refused)?;
+    let source: &dyn FrameSource = match &masked {
+        Some(masked) => masked,
+        None => &video,
+    };
+    let part = Part::of(source, params.from_s, params.to_s);
     let library = analysis::analyze(&part, background, &params, level, &scratch, &progress)
         .map_err(|error| {
             show_refusal(&part, &error, &args.output);

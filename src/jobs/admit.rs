@@ -4,10 +4,11 @@
 use uuid::Uuid;
 
 use super::clock::now_ms;
+use super::masks::Masks;
 use super::{Context, Error};
 use crate::footage::{FootageFormat, FrameSource};
-use crate::media::{Limits, Video, read_image};
-use crate::store::footage::{Added, BACKGROUND, Footage, VIDEO};
+use crate::media::{Hints, Limits, Video, read_image};
+use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
@@ -19,6 +20,8 @@ pub struct Arrival {
     pub video: BlobFile,
     /// The given background, if there is one.
     pub background: Option<BlobFile>,
+    /// The given masks, if there are any.
+    pub masks: Option<BlobFile>,
     /// A label for people.
     pub name: String,
     /// Whose it is.
@@ -39,6 +42,7 @@ pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> 
     let footage = row(&arrival, &format);
     let mut files = vec![arrival.video];
     files.extend(arrival.background);
+    files.extend(arrival.masks);
     let store = &context.store;
     Ok(store.add_footage(footage, arrival.draft, &files).await?)
 }
@@ -46,7 +50,16 @@ pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> 
 /// Everything that can be said of the files without decoding the video.
 fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
     let limits = Limits::default();
-    let format = Video::open(&arrival.draft.path().join(VIDEO), &limits)?.format();
+    let path = arrival.draft.path().join(VIDEO);
+    let video = Video::open(&path, &limits)?;
+    let format = video.format();
+    if arrival.masks.is_some() {
+        let given = arrival.draft.path().join(MASKS);
+        let given = (&*path, Some(&*given));
+        if let Some(masks) = Masks::open(&video, given, &limits, &Hints::default())? {
+            masks.over(&video)?;
+        }
+    }
     if arrival.background.is_some() {
         let image = read_image(&arrival.draft.path().join(BACKGROUND), &limits)?;
         let (found, wanted) = ([image.width, image.height], [format.width, format.height]);
@@ -59,15 +72,18 @@ fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
 
 fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
     let background = arrival.background.as_ref();
-    let background_bytes = background.map_or(0, |file| file.size_bytes);
+    let size_bytes = |file: Option<&BlobFile>| file.map_or(0, |file| file.size_bytes);
+    let sha256 = |file: Option<&BlobFile>| file.map_or(Vec::new(), |file| file.sha256.clone());
+    let masks = arrival.masks.as_ref();
     Footage {
         id: Uuid::now_v7(),
         owner: arrival.owner.clone(),
         folder: String::new(),
         sha256: arrival.video.sha256.clone(),
-        background_sha256: background.map_or(Vec::new(), |file| file.sha256.clone()),
+        background_sha256: sha256(background),
+        masks_sha256: sha256(masks),
         name: arrival.name.clone(),
-        size_bytes: arrival.video.size_bytes + background_bytes,
+        size_bytes: arrival.video.size_bytes + size_bytes(background) + size_bytes(masks),
         width: i64::from(format.width),
         height: i64::from(format.height),
         fps: format.fps,
@@ -100,6 +116,7 @@ mod tests {
             draft,
             video,
             background: None,
+            masks: None,
             name: String::new(),
             owner: Owner::local(),
         };

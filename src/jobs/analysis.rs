@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::decoding::Counted;
+use super::masks::Masks;
 use super::{Attempt, Context, Error, Product, Stages, overlay, refusal};
 use crate::analysis::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
-use crate::footage::Part;
+use crate::footage::{FrameSource, Part};
 use crate::formats::distance_map::DistanceMap;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, svg};
@@ -16,7 +17,7 @@ use crate::ids::{FootageId, JobId, LibraryId};
 use crate::library::{Library, View};
 use crate::media::{Hints, Limits, Note, Video, read_image};
 use crate::progress::Progress;
-use crate::store::footage::{BACKGROUND, Footage, VIDEO};
+use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
@@ -82,6 +83,7 @@ pub fn hints(params: &Params) -> Hints {
     Hints {
         fps: params.fps,
         pixel_aspect: params.pixel_aspect,
+        of_alpha: false,
     }
 }
 
@@ -106,9 +108,13 @@ impl Input {
             threads: u32::try_from(attempt.threads).unwrap_or(0),
             ..Limits::default()
         };
-        let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND])?;
+        let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND, MASKS])?;
         let path_of = |name| files.path().join(name);
-        let video = Video::open_with(&path_of(VIDEO), &limits, &hints(&self.params))?;
+        let hints = hints(&self.params);
+        let video = Video::open_with(&path_of(VIDEO), &limits, &hints)?;
+        let given = (!footage.masks_sha256.is_empty()).then(|| path_of(MASKS));
+        let masks = Masks::open(&video, (&path_of(VIDEO), given.as_deref()), &limits, &hints)?;
+        let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
         let background = match footage.background_sha256.is_empty() {
             true => None,
             false => Some(read_image(&path_of(BACKGROUND), &limits)?),
@@ -116,7 +122,11 @@ impl Input {
         let level = cpu::Level::detect();
         let progress = attempt.listener;
         let (background, scratch) = (background.as_ref(), attempt.scratch());
-        let part = Part::of(&video, self.params.from_s, self.params.to_s);
+        let source: &dyn FrameSource = match &masked {
+            Some(masked) => masked,
+            None => &video,
+        };
+        let part = Part::of(source, self.params.from_s, self.params.to_s);
         let film = Counted::new(&part, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
             .map_err(|cause| refusal::illustrated(&part, cause))?;

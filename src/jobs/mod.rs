@@ -31,6 +31,8 @@ pub mod flock; // library -> flock
 pub mod fish; // library -> virtual fish
 pub mod overlay; // footage -> the same with its poses drawn over it
 
+pub mod masks; // footage -> which of it is the animal, where that is given
+
 pub mod refusal; // footage that could not be measured -> a picture of why
 
 pub mod at_once; // library -> what somebody waits for

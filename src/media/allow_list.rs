@@ -11,7 +11,7 @@ use super::limits::Limits;
 const FORMATS: &str = "mov,matroska,avi,mpegts,asf,mpeg,flv,ogg,h264,hevc";
 
 /// Decoders that may run, by ffmpeg's names.
-const DECODERS: &str = "h264,hevc,vp8,vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
+const DECODERS: &str = "h264,hevc,vp8,vp9,libvpx,libvpx-vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
                         ffv1,rawvideo,wmv2,wmv3,vc1,mpeg1video,huffyuv,ffvhuff,png,theora,flv,h263";
 
 /// Decoders of sound and titles. Nothing of theirs is ever decoded to the end, but ffprobe gives up

@@ -7,4 +7,6 @@ pub struct Hints {
     pub fps: Option<f64>,
     /// Width of a pixel over its height.
     pub pixel_aspect: Option<f64>,
+    /// Gives the alpha channel instead of the colors, as gray.
+    pub of_alpha: bool,
 }

@@ -39,6 +39,14 @@ impl Video {
         }))
     }
 
+    /// Whether the footage has an alpha channel, which may be opaque throughout.
+    pub fn has_alpha(&self) -> bool {
+        match &self.0 {
+            Kind::Film(film) => film.has_alpha(),
+            Kind::Pictures(pictures) => pictures.has_alpha(),
+        }
+    }
+
     /// Returns what is worth knowing of the file: assumptions, and faults that were mended.
     pub fn notes(&self) -> &[Note] {
         match &self.0 {

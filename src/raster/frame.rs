@@ -16,6 +16,18 @@ pub struct Frame {
     pub color: ColorSpec,
     /// Y, then U, then V, without padding.
     pub planes: Vec<u8>,
+    /// How much of each pixel is the animal, where that is given.
+    pub mask: Option<GivenMask>,
+}
+
+/// How much of each pixel of a frame is the animal, as its footage or a person says.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct GivenMask {
+    /// 0..=255 for each pixel, row by row.
+    pub alpha: Vec<u8>,
+    /// Whether pixels that are the animal in part show what lies behind it too, as a camera films them. The colors of
+    /// footage that has an alpha channel are the animal's alone.
+    pub is_mixed: bool,
 }
 
 impl Frame {
@@ -26,6 +38,7 @@ impl Frame {
             height,
             color,
             planes: vec![0; Frame::n_bytes(width, height)],
+            mask: None,
         }
     }
 
@@ -38,6 +51,12 @@ impl Frame {
     /// The luma plane, row by row.
     pub fn luma(&self) -> &[u8] {
         &self.planes[..self.width as usize * self.height as usize]
+    }
+
+    /// What each value of luma is as gray, 0..=255.
+    pub fn gray_levels(&self) -> [u8; 256] {
+        let convert = self.color.to_rgb();
+        std::array::from_fn(|luma| convert.convert(luma as u8, 128, 128)[1])
     }
 
     /// The two chroma planes, rows of `chroma_width`.

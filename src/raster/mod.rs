@@ -13,7 +13,7 @@ pub mod runs;
 
 pub use canvas::Canvas;
 pub use color::{ColorSpec, Matrix, Range};
-pub use frame::Frame;
+pub use frame::{Frame, GivenMask};
 pub use image::{RgbImage, RgbaImage};
 pub use mask::Mask;
 pub use pen::Pen;

@@ -13,6 +13,9 @@ pub const VIDEO: &str = "video";
 /// The name of the given background's file in its folder.
 pub const BACKGROUND: &str = "background";
 
+/// The name of the given masks' file in its folder.
+pub const MASKS: &str = "masks";
+
 /// One footage as stored.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct Footage {
@@ -26,9 +29,11 @@ pub struct Footage {
     pub sha256: Vec<u8>,
     /// SHA-256 of the given background; empty when none was given.
     pub background_sha256: Vec<u8>,
+    /// SHA-256 of the given masks; empty when none were given.
+    pub masks_sha256: Vec<u8>,
     /// What the user called it: a label, never a path.
     pub name: String,
-    /// Size of the video and background, bytes.
+    /// Size of the video, background and masks, bytes.
     pub size_bytes: i64,
     /// Columns, square pixels.
     pub width: i64,
@@ -125,11 +130,12 @@ impl Store {
 
     async fn footage_of_bytes(&self, footage: &Footage) -> Result<Option<Footage>, Error> {
         let sql = "select * from footage where sha256 = $1 and background_sha256 = $2 \
-                   and owner = $3";
+                   and owner = $3 and masks_sha256 = $4";
         let row = sql::query(sql)
             .bind(&footage.sha256)
             .bind(&footage.background_sha256)
-            .bind(&footage.owner);
+            .bind(&footage.owner)
+            .bind(&footage.masks_sha256);
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
@@ -141,8 +147,8 @@ impl Store {
         let mut transaction = self.begin().await?;
         sql::query(
             "insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, \
-             height, fps, n_frames_hint, sample, created_ms, owner) \
-             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13)",
+             height, fps, n_frames_hint, sample, created_ms, owner, masks_sha256) \
+             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14)",
         )
         .bind(footage.id)
         .bind(&footage.folder)
@@ -157,6 +163,7 @@ impl Store {
         .bind(footage.sample)
         .bind(footage.created_ms)
         .bind(&footage.owner)
+        .bind(&footage.masks_sha256)
         .execute(&mut transaction)
         .await?;
         blobs::insert(&mut transaction, &footage.folder, files).await?;
@@ -214,6 +221,7 @@ mod tests {
             folder: format!("footage/{id}"),
             sha256: vec![sha256; 32],
             background_sha256: Vec::new(),
+            masks_sha256: Vec::new(),
             name: String::new(),
             size_bytes: 0,
             width: 64,

@@ -8,6 +8,7 @@
 //! but for what is cast on things much darker than the ground (`cast`), and for the faintest rim of shadows.
 
 mod cast;
+mod given;
 mod solid;
 
 use self::cast::Ground;
@@ -28,7 +29,7 @@ pub struct Matte {
 }
 
 /// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
-/// pixels wide, or 2 % of it.
+/// pixels wide, or 2 % of it. Where a mask is given, alpha is the mask's.
 pub fn pull(
     frame: &Frame,
     plate: &Plate,
@@ -36,6 +37,9 @@ pub fn pull(
     silhouette: &Mask,
     length_px: f64,
 ) -> Matte {
+    if let Some(given) = &frame.mask {
+        return given::pull(frame, given, silhouette);
+    }
     let band_px = ((0.02 * length_px).round() as u32).clamp(2, 8);
     let rect = silhouette
         .rect

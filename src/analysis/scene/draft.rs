@@ -64,6 +64,14 @@ impl Draft {
         Ok(Draft::new(samples, parts, plates, params.threshold))
     }
 
+    /// The median of all samples as the only plate.
+    pub(super) fn of_all(samples: &Samples, params: &Params) -> Draft {
+        let part = whole(samples);
+        let median = samples.median_frame(part.samples);
+        let plate = Plate::without_noise(median, params.threshold);
+        Draft::new(samples, vec![part], vec![plate], params.threshold)
+    }
+
     /// The given picture as the only plate.
     pub(super) fn given(
         image: &RgbImage,
@@ -80,12 +88,10 @@ impl Draft {
         let mut frame = Frame::new(first.width, first.height, first.color);
         frame.draw_rgb(image, Rect::of_size(first.width, first.height));
         let mut plate = Plate::without_noise(frame, params.threshold);
-        let all = u64::MAX >> (64 - samples.frames.len());
-        even_out_light(samples, all, &mut plate);
-        let part = Part {
-            samples: all,
-            light: 0,
-        };
+        let part = whole(samples);
+        if !samples.are_masked() {
+            even_out_light(samples, part.samples, &mut plate);
+        }
         Ok(Draft::new(
             samples,
             vec![part],
@@ -327,6 +333,14 @@ impl Draft {
                 ..Plate::of(frame, std::mem::take(&mut plate.sigma), threshold)
             };
         }
+    }
+}
+
+/// All samples, in one light.
+fn whole(samples: &Samples) -> Part {
+    Part {
+        samples: u64::MAX >> (64 - samples.frames.len()),
+        light: 0,
     }
 }
 

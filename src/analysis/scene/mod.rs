@@ -62,6 +62,8 @@ pub struct Scene {
     pub several_animals: bool,
     /// Where the animal is mirrored, if it is.
     pub mirror: Option<Mirror>,
+    /// Every frame comes with a mask, which says what is the animal.
+    pub is_masked: bool,
 }
 
 /// What a frame is compared with.
@@ -77,8 +79,34 @@ pub struct Placed<'a> {
 }
 
 impl Scene {
+    /// The scene of finished plates, with the subject as they show it, and as the track will.
+    fn of(draft: Draft, samples: &Samples, company: Company) -> Result<Scene, Error> {
+        let survey = Survey::of(samples, &draft.plates, &draft.plate_of);
+        let frames = samples.frame_idx.iter().copied();
+        Ok(Scene {
+            plates: draft.plates,
+            likely: frames.zip(draft.plate_of).collect(),
+            subject: survey.subject.ok_or(Error::NothingMoves)?,
+            tether_px: survey.tether_px,
+            several_animals: matches!(company, Company::Animals),
+            mirror: match company {
+                Company::Image(mirror) => Some(mirror),
+                Company::None | Company::Animals => None,
+            },
+            is_masked: samples.are_masked(),
+        })
+    }
+
     /// The plate whose scene a frame shows; `None` when it shows none of them (a black frame, a title card).
     pub fn place(&self, frame_idx: usize, frame: &Frame) -> Option<Placed<'_>> {
+        if self.is_masked {
+            return Some(Placed {
+                plate_idx: 0,
+                plate: &self.plates[0],
+                light: Light::SAME,
+                boxes: Vec::new(),
+            });
+        }
         let after = self.likely.partition_point(|(at, _)| *at < frame_idx);
         let around = [after.checked_sub(1), Some(after)];
         let near = around
@@ -128,6 +156,9 @@ pub fn estimate(
     progress: &dyn Progress,
 ) -> Result<Scene, Error> {
     let mut samples = Samples::spread(source, params, progress)?;
+    if samples.are_masked() {
+        return of_masked(&mut samples, given, params);
+    }
     let mut draft = match given {
         Some(image) => Draft::given(image, &mut samples, params)?,
         None => Draft::of_states(&mut samples, params)?,
@@ -150,26 +181,25 @@ pub fn estimate(
     let company = refusal::judge(&survey, &samples, params)?;
     let seen = Occupancy::of(&samples, &draft.plates, &draft.plate_of, &survey);
     draft.finish(&samples, &seen, &survey, given.is_some());
-    // As the finished plates show it, and the track will.
-    let survey = Survey::of(&samples, &draft.plates, &draft.plate_of);
-    let tether_px = survey.tether_px;
-    let subject = survey.subject.ok_or(Error::NothingMoves)?;
-    Ok(Scene {
-        plates: draft.plates,
-        likely: samples
-            .frame_idx
-            .iter()
-            .copied()
-            .zip(draft.plate_of)
-            .collect(),
-        subject,
-        tether_px,
-        several_animals: matches!(company, Company::Animals),
-        mirror: match company {
-            Company::Image(mirror) => Some(mirror),
-            Company::None | Company::Animals => None,
-        },
-    })
+    Scene::of(draft, &samples, company)
+}
+
+/// The scene behind an animal that masks tell apart: whatever moves, dims or flickers there is no matter.
+fn of_masked(
+    samples: &mut Samples,
+    given: Option<&RgbImage>,
+    params: &Params,
+) -> Result<Scene, Error> {
+    let mut draft = match given {
+        Some(image) => Draft::given(image, samples, params)?,
+        None => Draft::of_all(samples, params),
+    };
+    let survey = Survey::of(samples, &draft.plates, &draft.plate_of);
+    let company = refusal::judge_masked(&survey, samples, params)?;
+    let seen = Occupancy::of(samples, &draft.plates, &draft.plate_of, &survey);
+    draft.paint(samples, &seen, given.is_some());
+    draft.finish(samples, &seen, &survey, given.is_some());
+    Scene::of(draft, samples, company)
 }
 
 #[cfg(test)]

@@ -41,7 +41,8 @@ impl Occupancy {
             };
             for (at, component) in components.iter().enumerate() {
                 // What is left of a ghost may be small.
-                if component.area < least_area && !survey.looks[k][at].is_ghost {
+                let is_small = component.area < least_area && !samples.are_masked();
+                if is_small && !survey.looks[k][at].is_ghost {
                     continue;
                 }
                 let rect = component

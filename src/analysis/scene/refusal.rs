@@ -74,6 +74,32 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
             box_px: look.box_px,
         });
     }
+    company(survey, samples, subject, params)
+}
+
+/// Judges a film whose masks are given: a scene that moves is no reason to refuse it.
+pub(super) fn judge_masked(
+    survey: &Survey,
+    samples: &Samples,
+    params: &Params,
+) -> Result<Company, Error> {
+    if let Some(at) = params.animal_at
+        && !survey.is_pinned
+    {
+        return Err(Error::NothingAtPoint(at));
+    }
+    let subject = survey.subject.as_ref().ok_or(Error::MasksEmpty)?;
+    company(survey, samples, subject, params)
+}
+
+/// The animal's company, where that is no reason to refuse.
+fn company(
+    survey: &Survey,
+    samples: &Samples,
+    subject: &Subject,
+    params: &Params,
+) -> Result<Company, Error> {
+    let n_samples = survey.looks.len() as f64;
     let (in_samples, pairs): (Vec<usize>, Vec<[&Look; 2]>) = (0..survey.looks.len())
         .filter_map(|k| {
             let (looks, at) = (&survey.looks[k], survey.animal[k]?);
@@ -86,6 +112,7 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
         return Ok(Company::None);
     }
     match Mirror::of(&pairs, subject.diagonal_px) {
+        Some(_) if samples.are_masked() => Ok(Company::None),
         Some(mirror) => Ok(Company::Image(mirror)),
         None if params.follow == Follow::One && params.animal_at.is_none() => {
             // A pair in the middle of those found: neither has only just come in.

@@ -85,6 +85,11 @@ impl Samples {
         self.frame_idx[k] as f64 / self.fps
     }
 
+    /// Whether each comes with a mask, which says what is the animal.
+    pub(super) fn are_masked(&self) -> bool {
+        self.frames.iter().all(|frame| frame.mask.is_some())
+    }
+
     /// Changes the samples of `part`.
     pub(super) fn change(&mut self, part: u64, change: impl Fn(&mut Frame) + Sync) {
         let members = self.frames.par_iter_mut().enumerate();

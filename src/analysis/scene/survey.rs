@@ -42,6 +42,8 @@ pub(super) struct Survey {
     pub(super) tether_px: Option<u32>,
     /// Something is where the animal was said to be.
     pub(super) is_pinned: bool,
+    /// Masks say what is the animal.
+    is_masked: bool,
     /// Which component of each sample is the animal.
     pub(super) animal: Vec<Option<usize>>,
 }
@@ -60,6 +62,9 @@ impl Survey {
             .map(of_sample)
             .collect();
         let whole = Survey::of_components(found.clone(), samples, plates, plate_of);
+        if samples.are_masked() {
+            return whole;
+        }
         let Some(thin_px) = whole.thin_px(samples) else {
             return whole;
         };
@@ -127,6 +132,7 @@ impl Survey {
                 .as_ref()
                 .map_or(0.0, |subject| subject.worth(&looks)),
             tether_px: None,
+            is_masked: samples.are_masked(),
             is_pinned: pinned.is_some(),
             found,
             looks,
@@ -169,7 +175,7 @@ impl Survey {
 
     /// Whether a component is scenery that sways.
     pub(super) fn is_scenery(&self, k: usize, at: usize) -> bool {
-        scenery::is_scenery(&self.found, &self.animal, &self.found[k][at])
+        !self.is_masked && scenery::is_scenery(&self.found, &self.animal, &self.found[k][at])
     }
 
     /// Area from which a component counts as something that moves, pixels.
@@ -198,6 +204,9 @@ fn look(frame: &Frame, plate: &Plate, component: &Component) -> Look {
         picture,
         plate.light,
     );
+    if frame.mask.is_some() {
+        return look;
+    }
     Look {
         is_shadow: shadow::is_shadow_alone(&difference, plate, component),
         is_ghost: is_ghost(frame, plate, component),

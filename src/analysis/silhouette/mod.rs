@@ -5,6 +5,7 @@
 //! of it count when they hang together with a certain one.
 
 pub mod blocks;
+mod given;
 pub mod shadow;
 pub mod tether;
 
@@ -23,6 +24,8 @@ const GROWTH_PX: u32 = 16;
 
 /// The components of foreground pixels of a frame, from the top left; raw: neither holes nor ragged edges mended
 /// (`shaped` does). Nothing inside the `ignored` boxes counts.
+///
+/// Where a mask is given they are those of the mask.
 pub fn components(frame: &Frame, plate: &Plate, light: &Light, ignored: &[Rect]) -> Vec<Component> {
     let (boxes, _) = plate.blocks.proposals(frame, light, MARGIN_PX);
     components_of(frame, plate, light, boxes, ignored)
@@ -36,6 +39,9 @@ pub fn components_of(
     boxes: Vec<Rect>,
     ignored: &[Rect],
 ) -> Vec<Component> {
+    if let Some(mask) = &frame.mask {
+        return given::components(mask, [frame.width, frame.height], ignored);
+    }
     let mut found: Vec<Component> = Vec::new();
     for rect in boxes {
         for component in components_in(frame, plate, light, rect, ignored) {

@@ -190,7 +190,10 @@ fn look(
     };
     let mut candidates = Vec::with_capacity(described.len());
     for (component, look, cost) in described {
-        let silhouette = silhouette::shaped(&component, frame.width, frame.height);
+        let silhouette = match scene.is_masked {
+            true => component.mask(component.rect),
+            false => silhouette::shaped(&component, frame.width, frame.height),
+        };
         if silhouette.area() == 0 {
             continue;
         }
@@ -250,7 +253,7 @@ fn described(
         if component.area as f64 >= LEAST_OTHER * subject.area_px() {
             others.push(Other::of(&whole, subject, is_image(&whole)));
         }
-        if component.area as f64 > MERGED * subject.area_px() {
+        if component.area as f64 > MERGED * subject.area_px() && !scene.is_masked {
             let difference =
                 silhouette::difference(frame, placed.plate, &placed.light, component.rect);
             for part in parting::parts_of(&component, &difference, subject.area_px()) {

@@ -23,6 +23,7 @@ pub(super) fn filters(probe: &Probe, stretch: Option<&Stretch>, wanted: &Wanted)
         filters.push("bwdif=mode=send_frame:deint=interlaced".to_owned());
     }
     filters.extend(wanted.filter());
+    filters.extend(probe.of_alpha.then(|| "alphaextract".to_owned()));
     filters.extend(stretch.map(Stretch::filter));
     let turn = turn_filters(probe.turn);
     filters.extend(turn.iter().map(|&filter| filter.to_owned()));
@@ -31,7 +32,7 @@ pub(super) fn filters(probe: &Probe, stretch: Option<&Stretch>, wanted: &Wanted)
         "scale={}:{}:flags=bicubic+accurate_rnd+bitexact",
         probe.width, probe.height
     );
-    match is_rgb(&probe.pix_fmt) {
+    match is_rgb(&probe.pix_fmt) && !probe.of_alpha {
         true => scale += ":out_range=tv:out_color_matrix=bt601",
         false => {
             let stored = if probe.color_space.starts_with("bt2020") {

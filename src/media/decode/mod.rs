@@ -69,6 +69,11 @@ impl Film {
         &self.probe.notes
     }
 
+    /// Whether it has an alpha channel.
+    pub(super) fn has_alpha(&self) -> bool {
+        self.probe.has_alpha
+    }
+
     /// Returns its file.
     pub(super) fn files(&self) -> &[PathBuf] {
         std::slice::from_ref(&self.path)
@@ -91,6 +96,9 @@ impl Film {
                 .into();
         if matches!(wanted, Wanted::InTime { .. }) {
             args.extend(["-skip_frame", "noref"].map(Into::into));
+        }
+        if let Some(decoder) = probe.decoder {
+            args.extend(["-c:v", decoder].map(Into::into));
         }
         args.extend(input_args(probe.container, &self.path, &self.limits));
         let stream = format!("0:{}", probe.stream_idx);

@@ -39,6 +39,10 @@ pub(super) struct Pictures {
     fps: f64,
     /// The range of gray that is used, where the first picture is gray of more than 8 bits.
     stretch: Option<Stretch>,
+    /// The first picture has an alpha channel.
+    has_alpha: bool,
+    /// The alpha channel is shown, as gray.
+    of_alpha: bool,
     notes: Vec<Note>,
 }
 
@@ -60,7 +64,7 @@ impl Pictures {
             wanted_fps: hints.fps,
         };
         let (timeline, mut notes) = Timeline::found(&vec![None; n_pictures], &claims, limits)?;
-        let first = source.read(limits)?.picture(0)?;
+        let (first, has_alpha) = source.read(limits, false)?.picture(0)?;
         let stored = first.size();
         let shown = shown_size(stored, hints);
         check_size(u64::from(shown[0]), u64::from(shown[1]), limits)?;
@@ -71,9 +75,13 @@ impl Pictures {
             shown,
             fps: timeline.fps(),
             stretch: None,
+            has_alpha,
+            of_alpha: hints.of_alpha,
             notes: Vec::new(),
         };
-        if let Picture::Gray16(_) = first {
+        if let Picture::Gray16(_) = first
+            && !hints.of_alpha
+        {
             let stretch = pictures.measure_gray()?;
             notes.push(stretch.note(16));
             pictures.stretch = Some(stretch);
@@ -87,6 +95,11 @@ impl Pictures {
         &self.notes
     }
 
+    /// Whether they have an alpha channel.
+    pub(super) fn has_alpha(&self) -> bool {
+        self.has_alpha
+    }
+
     /// Returns the files that hold them.
     pub(super) fn files(&self) -> &[PathBuf] {
         self.source.files()
@@ -94,10 +107,10 @@ impl Pictures {
 
     /// The range of gray that pictures spread over the footage use.
     fn measure_gray(&self) -> Result<Stretch, Error> {
-        let mut reader = self.source.read(&self.limits)?;
+        let mut reader = self.source.read(&self.limits, false)?;
         let mut counts = vec![0_u64; 1 << 16];
         for idx in spread_idx(self.source.n_pictures(), LEAST_FRAMES) {
-            if let Picture::Gray16(picture) = reader.picture(idx)? {
+            if let (Picture::Gray16(picture), _) = reader.picture(idx)? {
                 picture
                     .iter()
                     .for_each(|&level| counts[usize::from(level)] += 1);
@@ -108,7 +121,7 @@ impl Pictures {
 
     /// Decodes a picture into a frame. Fails where it has another size than the first.
     fn show(&self, reader: &mut Reader<'_>, idx: usize, frame: &mut Frame) -> Result<(), Error> {
-        let picture = reader.picture(idx)?;
+        let (picture, _) = reader.picture(idx)?;
         if picture.size() != self.stored {
             return Err(Error::PicturesDiffer {
                 number: idx + 1,
@@ -155,14 +168,14 @@ impl FrameSource for Pictures {
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
         Ok(Box::new(PictureStream {
             pictures: self,
-            reader: self.source.read(&self.limits)?,
+            reader: self.source.read(&self.limits, self.of_alpha)?,
             n_given: 0,
         }))
     }
 
     /// Decodes the wanted pictures and no others.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
-        let mut reader = self.source.read(&self.limits)?;
+        let mut reader = self.source.read(&self.limits, self.of_alpha)?;
         let mut frame = Frame::default();
         for idx in spread_idx(self.source.n_pictures(), n) {
             self.show(&mut reader, idx, &mut frame)?;

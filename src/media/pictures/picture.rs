@@ -14,6 +14,14 @@ use crate::media::stretch::Stretch;
 /// Gray of 16 bits.
 pub(super) type Gray16Image = image::ImageBuffer<image::Luma<u16>, Vec<u16>>;
 
+/// The alpha of a picture.
+fn alpha_of(image: DynamicImage) -> GrayImage {
+    let rgba = image.into_rgba8();
+    GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| {
+        image::Luma([rgba.get_pixel(x, y).0[3]])
+    })
+}
+
 /// A decoded picture, without its alpha.
 pub(super) enum Picture {
     /// Gray of 8 bits.
@@ -25,14 +33,25 @@ pub(super) enum Picture {
 }
 
 impl Picture {
-    /// Decodes a PNG, JPEG, BMP or the first page of a TIFF.
-    pub(super) fn decoded(bytes: &[u8], limits: &Limits) -> Result<Picture, Error> {
+    /// Decodes a PNG, JPEG, BMP or the first page of a TIFF, or the alpha of one, opaque where it has none; and says
+    /// whether it has an alpha channel. That of a TIFF is passed over.
+    pub(super) fn decoded(
+        bytes: &[u8],
+        limits: &Limits,
+        of_alpha: bool,
+    ) -> Result<(Picture, bool), Error> {
         if stack::is_tiff(bytes) {
             let mut pages = stack::open(Cursor::new(bytes), limits)?;
-            return stack::page(&mut pages, 0, limits);
+            return Ok((stack::page(&mut pages, 0, limits)?, false));
         }
         let formats = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp];
-        decode(bytes, &formats, limits).map(Picture::of)
+        let image = decode(bytes, &formats, limits)?;
+        let has_alpha = image.color().has_alpha();
+        let picture = match of_alpha {
+            true => Picture::Gray(alpha_of(image)),
+            false => Picture::of(image),
+        };
+        Ok((picture, has_alpha))
     }
 
     fn of(image: DynamicImage) -> Picture {

@@ -85,8 +85,12 @@ impl Source {
         }
     }
 
-    /// Starts reading.
-    pub(super) fn read<'a>(&'a self, limits: &'a Limits) -> Result<Reader<'a>, Error> {
+    /// Starts reading the pictures, or their alpha.
+    pub(super) fn read<'a>(
+        &'a self,
+        limits: &'a Limits,
+        of_alpha: bool,
+    ) -> Result<Reader<'a>, Error> {
         let open = |path| -> Result<BufReader<File>, Error> {
             let file = File::open(path).map_err(Error::io("opening the pictures"))?;
             Ok(BufReader::new(file))
@@ -98,7 +102,11 @@ impl Source {
             }
             Source::Stack(path, _) => Place::Stack(Box::new(stack::open(open(path)?, limits)?)),
         };
-        Ok(Reader { place, limits })
+        Ok(Reader {
+            place,
+            limits,
+            of_alpha,
+        })
     }
 }
 
@@ -106,6 +114,7 @@ impl Source {
 pub(super) struct Reader<'a> {
     place: Place<'a>,
     limits: &'a Limits,
+    of_alpha: bool,
 }
 
 enum Place<'a> {
@@ -115,20 +124,20 @@ enum Place<'a> {
 }
 
 impl Reader<'_> {
-    /// Decodes a picture, counted from 0. Fails with its number where it cannot be decoded.
-    pub(super) fn picture(&mut self, idx: usize) -> Result<Picture, Error> {
-        let limits = self.limits;
+    /// Decodes a picture, counted from 0, and says whether it has an alpha channel. Fails with its number where it cannot be decoded.
+    pub(super) fn picture(&mut self, idx: usize) -> Result<(Picture, bool), Error> {
+        let (limits, of_alpha) = (self.limits, self.of_alpha);
         let picture = match &mut self.place {
             Place::Folder(files) => File::open(&files[idx])
                 .map_err(Error::io("opening a picture"))
                 .and_then(|file| bytes_of(file, limits))
-                .and_then(|bytes| Picture::decoded(&bytes, limits)),
+                .and_then(|bytes| Picture::decoded(&bytes, limits, of_alpha)),
             Place::Zip(archive, entries) => archive
                 .by_index(entries[idx])
                 .map_err(refused)
                 .and_then(|entry| bytes_of(entry, limits))
-                .and_then(|bytes| Picture::decoded(&bytes, limits)),
-            Place::Stack(pages) => stack::page(pages, idx, limits),
+                .and_then(|bytes| Picture::decoded(&bytes, limits, of_alpha)),
+            Place::Stack(pages) => stack::page(pages, idx, limits).map(|page| (page, false)),
         };
         picture.map_err(|error| match error {
             Error::NotAVideo(why) => Error::NotAVideo(format!("picture {}: {why}", idx + 1)),

@@ -42,7 +42,7 @@ const CODECS: [&str; 21] = [
 /// What ffprobe is asked for.
 const HEADER_ENTRIES: &str = "stream=index,codec_name,codec_type,codec_tag_string,\
     width,height,pix_fmt,sample_aspect_ratio,r_frame_rate,avg_frame_rate,time_base,color_range,color_space,\
-    field_order:stream_disposition=attached_pic:stream_tags=enc_key_id:stream_side_data=displaymatrix";
+    field_order:stream_disposition=attached_pic:stream_tags=enc_key_id,alpha_mode:stream_side_data=displaymatrix";
 
 /// Headers longer than this are not believed.
 const MAX_HEADER_BYTES: usize = 1 << 20;
@@ -226,6 +226,27 @@ pub(in crate::media) fn is_rgb(pix_fmt: &str) -> bool {
     ]
     .iter()
     .any(|start| pix_fmt.starts_with(start))
+}
+
+/// Whether a stream has an alpha channel: by its pixel format, or as WebM has it, in packets beside those of the
+/// picture.
+pub(super) fn has_alpha(stream: &Value) -> bool {
+    let of_format = [
+        "yuva", "rgba", "bgra", "argb", "abgr", "gbrap", "ya8", "ya16",
+    ];
+    let pix_fmt = text(&stream["pix_fmt"]);
+    of_format.iter().any(|start| pix_fmt.starts_with(start))
+        || number(&stream["tags"]["alpha_mode"]) == Some(1.0)
+        || number(&stream["tags"]["ALPHA_MODE"]) == Some(1.0)
+}
+
+/// The decoder that reads alpha that lies beside the picture's own packets; ffmpeg's own one passes it over.
+pub(super) fn alpha_decoder(stream: &Value) -> Option<&'static str> {
+    match text(&stream["codec_name"]) {
+        "vp8" => Some("libvpx"),
+        "vp9" => Some("libvpx-vp9"),
+        _ => None,
+    }
 }
 
 pub(super) fn text(value: &Value) -> &str {

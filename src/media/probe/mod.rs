@@ -21,17 +21,23 @@ use crate::media::error::{Damage, Error};
 use crate::media::hints::Hints;
 use crate::media::limits::Limits;
 use crate::media::note::Note;
-use crate::raster::ColorSpec;
+use crate::raster::{ColorSpec, Matrix, Range};
 use ending::Ending;
 use header::{
-    Turn, check_codec, color_of, index_of, is_interlaced, number, ratio, read_header, shown_size,
-    text, video_streams,
+    Turn, alpha_decoder, check_codec, color_of, has_alpha, index_of, is_interlaced, number, ratio,
+    read_header, shown_size, text, video_streams,
 };
 use packets::{AllPackets, Packets, Pictures};
 use timeline::{Claims, Timeline};
 
 /// A larger file may turn out to be none of ours: its packets are read only once its headers are good.
 const MOST_READ_EARLY: u64 = 64 << 20;
+
+/// Gray whose levels stay as they are.
+pub(in crate::media) const GRAY: ColorSpec = ColorSpec {
+    matrix: Matrix::Bt601,
+    range: Range::Full,
+};
 
 /// A film that is within the limits.
 #[derive(Clone, Debug)]
@@ -52,6 +58,11 @@ pub(in crate::media) struct Probe {
     pub(in crate::media) color_space: String,
     /// How the given frames are to be read.
     pub(in crate::media) color: ColorSpec,
+    /// The alpha channel is given, as gray of the full range; and the decoder that this needs, if it is not the usual one.
+    pub(in crate::media) of_alpha: bool,
+    pub(in crate::media) decoder: Option<&'static str>,
+    /// There is an alpha channel.
+    pub(in crate::media) has_alpha: bool,
     /// Stored in two fields.
     pub(in crate::media) interlaced: bool,
     /// Pictures that decoding gives, as far as can be told before.
@@ -115,7 +126,13 @@ pub(in crate::media) fn probe(path: &Path, limits: &Limits, hints: &Hints) -> Re
         turn,
         pix_fmt: text(&stream["pix_fmt"]).to_owned(),
         color_space: text(&stream["color_space"]).to_owned(),
-        color: color_of(stream),
+        color: match hints.of_alpha {
+            true => GRAY,
+            false => color_of(stream),
+        },
+        of_alpha: hints.of_alpha,
+        decoder: alpha_decoder(stream).filter(|_| hints.of_alpha),
+        has_alpha: has_alpha(stream),
         interlaced: is_interlaced(stream),
         n_pictures: found.times_s.len(),
         has_plain_times: found.has_plain_times && notes.is_empty(),

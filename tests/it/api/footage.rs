@@ -6,7 +6,7 @@ use serde_json::json;
 
 use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
-use crate::common::clip::TINY;
+use crate::common::clip::{SWIM, SWIM_MASKS, TINY};
 use crate::common::pictures::{stack_of_grays, zip_of_grays};
 
 #[tokio::test]
@@ -153,5 +153,54 @@ async fn a_packed_body_is_refused() {
     let answer = app.post("/v1/footage").header("content-encoding", "gzip");
     let answer = answer.body(TINY.clone()).send().await.unwrap();
     assert_eq!(code_of(answer, 415).await, "unsupported_media_type");
+    app.assert_sound().await;
+}
+
+/// A form with a film and its masks.
+fn with_masks(video: &[u8], masks: &[u8]) -> Form {
+    Form::new()
+        .part("video", Part::bytes(video.to_vec()))
+        .part("masks", Part::bytes(masks.to_vec()))
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn masks_that_come_with_a_film_are_taken_instead_of_its_colors() {
+    let app = TestApp::working().await;
+    let plain = app.upload(&SWIM).await;
+    let form = with_masks(&SWIM, &SWIM_MASKS);
+    let answer = app.send_form("/v1/footage", form).await;
+    let footage = json_of(answer, StatusCode::CREATED).await;
+    assert_ne!(footage["id"], plain, "the same film with masks is another");
+    assert_eq!(footage["has_masks"], true);
+    let again = app.send_form("/v1/footage", with_masks(&SWIM, &SWIM_MASKS));
+    let again = json_of(again.await, StatusCode::OK).await;
+    assert_eq!(again["id"], footage["id"]);
+    // By its colors nothing would be found that differs by so much.
+    let body = json!({"footage_id": footage["id"], "params": {"threshold": 200}});
+    let accepted = app.accept("/v1/analyses", body).await;
+    let job = app.ended_job(&accepted["job_id"]).await;
+    assert_eq!(job["state"], "done", "{job}");
+    let library = accepted["library_id"].as_str().unwrap();
+    let poses = app
+        .json(&format!("/v1/libraries/{library}/poses.json"))
+        .await;
+    let frames = poses["frames"].as_array().unwrap();
+    assert!(frames.iter().all(|pose| pose["detected"] == true));
+    let path = format!("/v1/footage/{}", footage["id"].as_str().unwrap());
+    app.delete(&path).send().await.unwrap();
+    assert_eq!(app.n_folders("footage").await, 1);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn masks_of_another_size_are_refused_at_the_door() {
+    let app = TestApp::idle().await;
+    let answer = app.send_form("/v1/footage", with_masks(&SWIM, &TINY)).await;
+    assert_eq!(code_of(answer, 422).await, "masks_differ");
+    let answer = app
+        .send_form("/v1/footage", with_masks(&SWIM, b"no masks"))
+        .await;
+    assert_eq!(code_of(answer, 422).await, "not_a_video");
+    assert_eq!(app.n_folders("footage").await, 0);
     app.assert_sound().await;
 }

@@ -2,10 +2,11 @@
 
 use std::sync::LazyLock;
 
+use flockreel::fish::film::Film;
 use flockreel::fish::sample::{SampleFilm, SampleParams};
-use flockreel::footage::FrameSource;
-use flockreel::media::{VideoFormat, VideoWriter};
-use flockreel::raster::Frame;
+use flockreel::footage::{FootageFormat, FrameSource};
+use flockreel::media::VideoWriter;
+use flockreel::raster::{Frame, RgbImage};
 
 /// Ten frames of 64x64: enough to be admitted.
 pub(crate) static TINY: LazyLock<Vec<u8>> = LazyLock::new(|| film(10, 64, 64));
@@ -13,9 +14,31 @@ pub(crate) static TINY: LazyLock<Vec<u8>> = LazyLock::new(|| film(10, 64, 64));
 /// Ten seconds of 320x240: enough for a library with transitions.
 pub(crate) static SWIM: LazyLock<Vec<u8>> = LazyLock::new(|| film(300, 320, 240));
 
+/// A mask for each frame of SWIM: white where the fish is.
+pub(crate) static SWIM_MASKS: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let params = SampleParams {
+        n_frames: 300,
+        width: 320,
+        height: 240,
+        ..SampleParams::default()
+    };
+    let film = SampleFilm::new(params).unwrap();
+    let fish = Film::new(film.motion().clone(), film.background().clone());
+    encoded(&film.format(), |k, frame| {
+        let drawing = fish.draw(k);
+        let mut picture = RgbImage::new(frame.width, frame.height);
+        for y in 0..drawing.rect.h {
+            for x in 0..drawing.rect.w {
+                let level = (255.0 * drawing.alpha(x, y)) as u8;
+                let at = [drawing.rect.x + x, drawing.rect.y + y];
+                picture.set_pixel(at[0], at[1], [level; 3]);
+            }
+        }
+        frame.draw_all_rgb(&picture);
+    })
+});
+
 fn film(n_frames: usize, width: u32, height: u32) -> Vec<u8> {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("film.mp4");
     let params = SampleParams {
         n_frames,
         width,
@@ -23,16 +46,17 @@ fn film(n_frames: usize, width: u32, height: u32) -> Vec<u8> {
         ..SampleParams::default()
     };
     let film = SampleFilm::new(params).unwrap();
-    let (fps, color) = (film.format().fps, film.format().color);
-    let format = VideoFormat {
-        width,
-        height,
-        fps,
-        color,
-    };
-    let mut writer = VideoWriter::create(&path, &format).unwrap();
-    let (mut stream, mut frame) = (film.open().unwrap(), Frame::default());
-    while stream.next_frame(&mut frame).unwrap().is_some() {
+    encoded(&film.format(), |k, frame| film.render(k, frame))
+}
+
+/// A film of frames that `draw` gives.
+fn encoded(format: &FootageFormat, draw: impl Fn(usize, &mut Frame)) -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("film.mp4");
+    let mut writer = VideoWriter::create(&path, &(*format).into()).unwrap();
+    let mut frame = Frame::new(format.width, format.height, format.color);
+    for k in 0..format.n_frames_hint {
+        draw(k, &mut frame);
         writer.write(&frame).unwrap();
     }
     writer.finish().unwrap();

@@ -2,7 +2,7 @@
 
 use std::io::{Cursor, Write};
 
-use image::{GrayImage, ImageFormat, Luma};
+use image::{GrayImage, ImageFormat, Luma, RgbaImage};
 use tiff::encoder::{TiffEncoder, colortype};
 use zip::CompressionMethod;
 use zip::write::SimpleFileOptions;
@@ -19,6 +19,13 @@ pub(crate) fn gray(k: usize) -> GrayImage {
 
 /// A picture as the bytes of a file.
 pub(crate) fn encoded(image: &GrayImage, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    image.write_to(&mut bytes, format).expect("in memory");
+    bytes.into_inner()
+}
+
+/// The same of a picture with alpha.
+pub(crate) fn encoded_rgba(image: &RgbaImage, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).expect("in memory");
     bytes.into_inner()

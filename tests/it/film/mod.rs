@@ -4,6 +4,7 @@ mod accuracy;
 mod cases;
 mod hints;
 mod labels;
+mod masks;
 mod one;
 mod rates;
 mod reproduce;

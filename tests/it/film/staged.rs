@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use flockreel::analysis::{Error, Params, analyze};
 use flockreel::cpu::Level;
+use flockreel::fish::motion::Motion;
 use flockreel::fish::sample::{SampleFilm, SampleParams};
 use flockreel::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use flockreel::geometry::wrap_rad;
@@ -119,6 +120,11 @@ impl Staged {
     /// The scene without the fish.
     pub(super) fn scene(&self) -> &RgbImage {
         self.film.background()
+    }
+
+    /// How the fish swims in the film as it is.
+    pub(super) fn motion(&self) -> &Motion {
+        self.film.motion()
     }
 
     /// Where the fish is in a frame.

@@ -57,6 +57,7 @@ async fn library(store: &Store) -> Uuid {
         folder: String::new(),
         sha256: files[0].sha256.clone(),
         background_sha256: Vec::new(),
+        masks_sha256: Vec::new(),
         name: "film".into(),
         size_bytes: 4,
         width: 1,

@@ -252,6 +252,7 @@ fn hints_override_rate_and_pixel_aspect_of_any_file() {
     let hints = Hints {
         fps: Some(2.0),
         pixel_aspect: Some(2.0),
+        ..Hints::default()
     };
     let video = Video::open_with(&film, &Limits::default(), &hints).expect("a good film");
     let format = video.format();

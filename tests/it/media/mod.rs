@@ -2,6 +2,7 @@
 //! else opened, nothing left behind.
 
 mod advice;
+mod alpha;
 pub(crate) mod bad;
 pub(crate) mod cage;
 pub(crate) mod corpus;

@@ -16,7 +16,7 @@ use crate::common::pictures::{SIZE, encoded, gray, stack, stack_of_grays, zip_of
 fn open(path: &Path, fps: Option<f64>) -> Video {
     let hints = Hints {
         fps,
-        pixel_aspect: None,
+        ..Hints::default()
     };
     Video::open_with(path, &Limits::default(), &hints)
         .unwrap_or_else(|error| panic!("{path:?}: {error}"))
@@ -112,6 +112,7 @@ fn gray_of_16_bits_is_stretched_and_pixels_become_square() {
     let hints = Hints {
         fps: Some(10.0),
         pixel_aspect: Some(2.0),
+        ..Hints::default()
     };
     let video = open(&path, Some(10.0));
     let [

@@ -29,6 +29,7 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
         draft,
         video,
         background: None,
+        masks: None,
         name: "swim".into(),
         owner: Owner::local(),
     };
