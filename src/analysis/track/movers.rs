@@ -213,7 +213,7 @@ mod tests {
     fn who_comes_again_later_is_told_of_twice_in_order_of_time() {
         let seen = |k: u32| match k {
             0..20 => vec![at(50, 50, 10, 10)],
-            10..60 => vec![at(200, 80, 10, 10)],
+            20..60 => vec![at(200, 80, 10, 10)],
             60.. => vec![at(50, 50, 10, 10)],
         };
         let times: Vec<f64> = of(seen).iter().map(|mover| mover.from_s).collect();
