@@ -107,8 +107,10 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	python3 bench/render.py target/demo/library $(RELEASE)
 	target/bench-venv/bin/python bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
-accuracy: build ## the poses against the truth of a film generator: make accuracy GENERATOR=goldfish.py
-	python3 bench/accuracy.py $(RELEASE) $(GENERATOR)
+accuracy: build ## the poses against the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
+	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
+	@target/bench-venv/bin/python -c "import numpy, cv2, PIL" 2>/dev/null || target/bench-venv/bin/pip install -q numpy opencv-python-headless pillow
+	target/bench-venv/bin/python bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST))
 
 papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md
 	python3 bench/papers.py $(RELEASE)

@@ -1,70 +1,257 @@
 #!/usr/bin/env python3
-"""How right the poses are, on films of a generator that knows the truth, against what is wanted.
+"""How right the poses are: on generated films, on films that go wrong (cases.py), and on labelled recordings.
 
-    accuracy.py FLOCKREEL GENERATOR [--seeds 1,2,3,4,5] [--keep FOLDER] [-- GENERATOR FLAGS...]
+    accuracy.py FLOCKREEL GENERATOR [--footage FOLDER] [--against FLOCKREEL] [--films FOLDER]
 
-GENERATOR is a Python script called as `GENERATOR STEM --seed N [--hard] FLAGS` that writes STEM.mp4 and
-STEM.truth.json (camera, animal, frames); films already in FOLDER are not filmed again. Each film is
-analyzed with its camera and animal, scored by score.py, and the medians over the seeds are printed.
-Ends with 1 when a bar is missed.
+GENERATOR is a script called as `GENERATOR STEM --seed N [--hard] [--colour C]` that writes STEM.mp4, STEM.truth.json and
+STEM.background.png. Films are kept in the folder (target/accuracy). Writes bench/results/accuracy.json and, from that,
+docs/ACCURACY.md. With --against the generated films are measured by another program too: errors and processor time.
 """
-import json, pathlib, statistics, subprocess, sys, tempfile
+import argparse, concurrent.futures, json, math, os, pathlib, resource, statistics, subprocess, sys, tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
-# Measure, key of score.py, bar on plain films, bar on hard ones, whether more is better.
-BARS = [
-    ("detected frames", "detected_share", 1.0, 0.99, True),
-    ("centroid p50, px", "centroid_px_p50", 0.4, 0.6, False),
-    ("centroid p95, px", "centroid_px_p95", 1.0, 2.0, False),
-    ("head right", "head_right_share", 0.998, 0.99, True),
-    ("heading p50, deg", "heading_deg_p50", 3.0, 4.0, False),
-    ("heading p95, deg", "heading_deg_p95", 10.0, 14.0, False),
-    ("depth after one scale, m", "z_scaled_rmse_m", 0.020, 0.030, False),
-    ("direction p50, deg", "forward_deg_p50", 8.0, 10.0, False),
-    ("direction p90, deg", "forward_deg_p90", 20.0, 28.0, False),
-]
+RESULTS = HERE / "results" / "accuracy.json"
+PAGE = HERE.parent / "docs" / "ACCURACY.md"
+SEEDS = (1, 2, 3)
+# Right is within this share of the body length; far is beyond the second.
+RIGHT, FAR = .1, .25
 
 
-def score(program, generator, stem, seed, hard, flags):
-    film, truth = stem.with_suffix(".mp4"), stem.with_suffix(".truth.json")
-    if not truth.exists():
-        words = [sys.executable, generator, stem, "--seed", seed, *(["--hard"] if hard else []), *flags]
-        subprocess.run([str(w) for w in words], check=True)
-    known = json.loads(truth.read_text())
-    camera = stem.with_suffix(".camera.json")
-    camera.write_text(json.dumps({k: known["camera"][k] for k in ("z_min_m", "pane_px_per_m")}))
+def wrap(angle):
+    return (angle + math.pi) % (2 * math.pi) - math.pi
+
+
+def quantile(values, share):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(share * (len(values) - 1) + .5))] if values else None
+
+
+def analyze(program, film, *flags):
+    """The poses and the advice, or the code of the refusal; and the processor time, seconds."""
     with tempfile.TemporaryDirectory() as folder:
         library = pathlib.Path(folder) / "library"
-        words = [program, "analyze", film, "-o", library, "--camera", camera, "--animal-length",
-                 known["animal"]["length_m"], "--animal-height", known["animal"]["height_m"]]
-        subprocess.run([str(w) for w in words], check=True, capture_output=True)
-        words = [sys.executable, HERE / "score.py", library / "poses.json", truth]
-        return json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        done = subprocess.run([str(w) for w in (program, "analyze", film, "-o", library, *flags)], capture_output=True, text=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        if done.returncode:
+            lines = [line for line in done.stderr.splitlines() if line.endswith(")")]
+            return lines[-1].rsplit("(", 1)[1].rstrip(")") if lines else "failed", cpu_s
+        return json.loads((library / "poses.json").read_text()), cpu_s
+
+
+def score_case(poses, truth):
+    """Frame by frame against a known truth, in body lengths; `sure` and `heads` are pairs (confidence, is right)."""
+    rows = truth["frames"]
+    length_px = quantile([max(row["box_px"][2:]) for row in rows if row.get("centroid_px")], .9)
+    found = flips = n_aside = invented = n_there = 0
+    off, sure, heads, turns = [], [], [], []
+    # A container may repeat the last frame.
+    for pose, row in zip(poses["frames"], rows):
+        if not row["centroid_px"] or row["centroid_px"][0] is None:
+            invented += pose["detected"]
+            continue
+        n_there += 1
+        if not pose["detected"]:
+            continue
+        found += 1
+        # The generator counts pixels from (0, 0), flockreel from (0.5, 0.5).
+        gap = math.dist(pose["centroid_px"], [v + .5 for v in row["centroid_px"]]) / length_px
+        off.append(gap)
+        sure.append((pose["confidence"], gap <= RIGHT))
+        forward = row["forward"]
+        if math.hypot(forward[0], forward[1]) > .5 and pose["heading_rad"] is not None:
+            turn = abs(wrap(pose["heading_rad"] - math.atan2(forward[1], forward[0])))
+            n_aside += 1
+            flips += turn > math.pi / 2
+            turns.append(turn)
+            heads.append((pose["head_confidence"], turn <= math.pi / 2))
+    return {
+        "found": found / max(n_there, 1), "invented": invented, "off_p50": quantile(off, .5), "off_p95": quantile(off, .95),
+        "right": sum(gap <= RIGHT for gap in off) / max(len(off), 1), "far": sum(gap > FAR for gap in off),
+        "sure_and_far": sum(gap > FAR and c > .9 for gap, (c, _) in zip(off, sure)), "n": n_there, "flips": flips, "n_aside": n_aside,
+        "heading_deg_p50": math.degrees(quantile(turns, .5)) if turns else None,
+    }, sure, heads
+
+
+def calibration(films):
+    """Ten bins from .5 to 1; every film weighs the same. The expected error, and how far bins of 200 frames are off."""
+    bins = [[0.0, 0.0, 0.0, 0] for _ in range(10)]
+    films = [pairs for pairs in films if pairs]
+    for pairs in films:
+        for confidence, is_right in pairs:
+            row = bins[min(9, max(0, int((confidence - .5) * 20)))]
+            weight = 1 / len(pairs) / len(films)
+            row[0] += weight
+            row[1] += weight * confidence
+            row[2] += weight * is_right
+            row[3] += 1
+    rows = [{"share": w, "confidence": c / w, "right": r / w, "frames": n} for w, c, r, n in bins if w]
+    return {"bins": rows, "ece": sum(row["share"] * abs(row["confidence"] - row["right"]) for row in rows),
+            "worst_bin": max(abs(row["confidence"] - row["right"]) for row in rows if row["frames"] >= 200)}
+
+
+def score_labels(poses, labels):
+    length_px = max(math.dist(row["nose_px"], row["tail_base_px"]) for row in labels["frames"]
+                    if row.get("nose_px") and row.get("tail_base_px"))
+    seen = [row for row in labels["frames"] if row["visible"] and not row["ambiguous"]]
+    pose_of = lambda row: poses["frames"][row["frame"]]
+    found = [row for row in seen if pose_of(row)["detected"]]
+    off = [math.dist(pose_of(row)["centroid_px"], row["centroid_px"]) / length_px for row in found if row["centroid_px"]]
+    heads = [row for row in found if row["head_visible"] and row["nose_px"] and row["tail_base_px"]]
+    told = [row for row in heads if pose_of(row)["head_confidence"] and pose_of(row)["head_confidence"] > .5]
+    way = lambda row: math.atan2(row["nose_px"][1] - row["tail_base_px"][1], row["nose_px"][0] - row["tail_base_px"][0])
+    wrong = [row["frame"] for row in told if abs(wrap(pose_of(row)["heading_rad"] - way(row))) > math.pi / 2]
+    axes = [abs(wrap(pose_of(row)["heading_rad"] - row["body_axis_rad"])) for row in told if row.get("body_axis_rad") is not None]
+    return {"view": poses["view"], "view_right": poses["view"] == labels["view"], "n": len(seen), "found": len(found),
+            "heads": len(heads), "heads_told": len(told), "heads_wrong": wrong, "centroids": len(off),
+            "off_max": max(off, default=0), "far": sum(gap > FAR for gap in off),
+            "axis_deg_p50": math.degrees(statistics.median(axes)) if axes else None}
+
+
+def generated(program, generator, folder):
+    """The papers' own setting: films of 1200 frames, camera and animal known. Scores by score.py."""
+    scores = {}
+    for kind, flags in (("plain", []), ("hard", ["--hard"])):
+        for seed in SEEDS:
+            stem = folder / f"generated-{kind}-{seed}"
+            truth = stem.with_suffix(".truth.json")
+            if not truth.exists():
+                subprocess.run([str(w) for w in (sys.executable, generator, stem, "--seed", seed, *flags)], check=True)
+            known = json.loads(truth.read_text())
+            camera = stem.with_suffix(".camera.json")
+            camera.write_text(json.dumps({k: known["camera"][k] for k in ("z_min_m", "pane_px_per_m")}))
+            poses, cpu_s = analyze(program, stem.with_suffix(".mp4"), "--camera", camera, "--animal-length",
+                                   known["animal"]["length_m"], "--animal-height", known["animal"]["height_m"])
+            with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+                json.dump(poses, file)
+                file.flush()
+                words = [sys.executable, HERE / "score.py", file.name, truth]
+                score = json.loads(subprocess.run([str(w) for w in words], check=True, capture_output=True, text=True).stdout)
+            scores.setdefault(kind, []).append({**score, "cpu_s": cpu_s})
+    return scores
+
+
+def case(program, film):
+    name, path, truth, flags = film
+    poses, _ = analyze(program, path, *flags)
+    if isinstance(poses, str):
+        return name, {"refused": poses}, [], []
+    return name, *score_case(poses, json.loads(truth.read_text()))
+
+
+def measure(args):
+    import cases
+    folder = args.films
+    films = cases.films(args.generator, folder)
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        scored = list(pool.map(lambda film: case(args.program, film), films))
+    results = {
+        "cases": {name: score for name, score, _, _ in scored},
+        "confidence": calibration([sure for _, _, sure, _ in scored]),
+        "head_confidence": calibration([heads for _, _, _, heads in scored]),
+        "generated": generated(args.program, args.generator, folder),
+    }
+    if args.against:
+        results["against"] = generated(args.against, args.generator, folder)
+    if args.footage:
+        results["labels"] = {}
+        for path in sorted((HERE / "labels").glob("*.json")):
+            labels = json.loads(path.read_text())
+            poses, _ = analyze(args.program, args.footage / labels["clip"])
+            results["labels"][path.stem] = {"refused": poses} if isinstance(poses, str) else score_labels(poses, labels)
+    return results
+
+
+def bars(results):
+    """(what, figure, bar, whether it is met)."""
+    cases = results["cases"].values()
+    measured = [score for score in cases if "refused" not in score]
+    n = sum(score["n"] for score in measured)
+    far = sum(score["sure_and_far"] for score in measured) / n
+    rows = [("sure (> .9) and more than .25 body length off, of all frames", f"{far:.3%}", "< .3 %", far < .003)]
+    for name in ("confidence", "head_confidence"):
+        ece, worst = results[name]["ece"], results[name]["worst_bin"]
+        rows.append((f"`{name}`: expected calibration error", f"{ece:.4f}", "< .03", ece < .03))
+        rows.append((f"`{name}`: worst bin of 200 frames or more", f"{worst:.3f}", "<= .1", worst <= .1))
+    clips = {name: clip for name, clip in results.get("labels", {}).items() if "refused" not in clip}
+    if clips:
+        least = min(clip["found"] / clip["n"] for clip in clips.values())
+        rows.append(("recordings: found where the labeller sees the animal, least of all", f"{least:.1%}", "> 95 %", least > .95))
+        told = min(clip["heads_told"] / max(clip["heads"], 1) for clip in clips.values())
+        rows.append(("recordings: head told where it is visible, least of all", f"{told:.1%}", "> 85 %", told > .85))
+        wrong = sum(len(clip["heads_wrong"]) for clip in clips.values()) / sum(clip["heads_told"] for clip in clips.values())
+        rows.append(("recordings: head at the wrong end", f"{wrong:.1%}", "< 1 %", wrong < .01))
+        off = sum(clip["far"] for clip in clips.values()) / sum(clip["centroids"] for clip in clips.values())
+        rows.append(("recordings: centroid more than .25 body length off", f"{off:.1%}", "< 1 %", off < .01))
+        views = sum(not clip["view_right"] for clip in clips.values())
+        rows.append(("recordings: wrong view", str(views), "0", views == 0))
+        axis = clips["mouse_round_arena"]["axis_deg_p50"]
+        rows.append(("arena mouse: heading against the body's axis, median", f"{axis:.1f}\u00b0", "< 1.5\u00b0", axis < 1.5))
+    if "against" in results:
+        for kind in results["generated"]:
+            for key in ("centroid_px_p95", "heading_deg_p50", "forward_deg_p50"):
+                now, then = ([s[key] for s in results[name][kind]] for name in ("generated", "against"))
+                ratio = statistics.median(now) / statistics.median(then)
+                spread = (max(then) - min(then)) / statistics.median(then)
+                rows.append((f"generated, {kind}: {key} over the other program's", f"{ratio:.2f}", f"<= {1 + max(.05, spread):.2f}",
+                             ratio <= 1 + max(.05, spread)))
+        cpu = [sum(s["cpu_s"] for s in results[name]["plain"]) for name in ("generated", "against")]
+        rows.append(("processor time over the other program's", f"{cpu[0] / cpu[1]:.2f}", "<= 1.3", cpu[0] <= 1.3 * cpu[1]))
+    return rows
+
+
+def page(results):
+    yield "# How right the poses are\n"
+    yield "Written by `make accuracy GENERATOR=goldfish.py FOOTAGE=folder` from `bench/results/accuracy.json`. Lengths are body lengths.\n"
+    yield "| measure | figure | bar | |\n| --- | ---: | ---: | --- |"
+    for what, figure, bar, met in bars(results):
+        yield f"| {what} | {figure} | {bar} | {'' if met else 'missed'} |"
+    yield "\n## Films that go wrong\n"
+    yield "`bench/cases.py`: a synthetic fish to whose film something happens; each three times, of other seeds and strengths.\n"
+    yield "| film | found | off, median | off, p95 | within .1 | far | invented | heads wrong |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+    for name, s in results["cases"].items():
+        yield f"| {name} | refused: `{s['refused']}` | | | | | | |" if "refused" in s else (
+            f"| {name} | {s['found']:.1%} | {s['off_p50']:.3f} | {s['off_p95']:.3f} | {s['right']:.1%} | {s['far']} | {s['invented']} "
+            f"| {s['flips']} of {s['n_aside']} |")
+    for name in ("confidence", "head_confidence"):
+        yield f"\n## `{name}`\n\nOf all these films, each of which weighs the same.\n"
+        yield "| mean | right | share of the frames | frames |\n| ---: | ---: | ---: | ---: |"
+        for row in results[name]["bins"]:
+            yield f"| {row['confidence']:.3f} | {row['right']:.3f} | {row['share']:.1%} | {row['frames']} |"
+    if "labels" in results:
+        yield "\n## Recordings\n\nForty frames of each, labelled by eye (`bench/labels`).\n"
+        yield "| clip | view | found | head told | head wrong | centroid off, most | far |\n| --- | --- | ---: | ---: | ---: | ---: | ---: |"
+        for name, c in results["labels"].items():
+            yield f"| {name} | refused: `{c['refused']}` | | | | | |" if "refused" in c else (
+                f"| {name} | {c['view']}{'' if c['view_right'] else ' (wrong)'} | {c['found']} of {c['n']} | {c['heads_told']} of {c['heads']} "
+                f"| {len(c['heads_wrong'])} | {c['off_max']:.2f} | {c['far']} |")
+    yield "\n## The papers' setting\n\nFilms of 1200 frames with a calibrated camera and a known animal, seeds 1 to 3: median, least and most.\n"
+    yield "| measure | plain | hard |\n| --- | ---: | ---: |"
+    for key in ("detected_share", "centroid_px_p50", "centroid_px_p95", "head_right_share", "heading_deg_p50", "heading_deg_p95",
+                "z_scaled_rmse_m", "forward_deg_p50", "forward_deg_p90"):
+        cells = []
+        for kind in ("plain", "hard"):
+            values = [s[key] for s in results["generated"][kind]]
+            cells.append(f"{statistics.median(values):.4g} ({min(values):.4g} to {max(values):.4g})")
+        yield f"| `{key}` | {cells[0]} | {cells[1]} |"
 
 
 def main():
-    words = sys.argv[1:]
-    flags = words[words.index("--") + 1:] if "--" in words else []
-    words = words[:words.index("--")] if "--" in words else words
-    option = lambda name, usual: words[words.index(name) + 1] if name in words else usual
-    seeds = [int(s) for s in option("--seeds", "1,2,3,4,5").split(",")]
-    folder = pathlib.Path(option("--keep", None) or tempfile.mkdtemp())
-    missed = 0
-    for kind, hard in (("easy", False), ("hard", True)):
-        scores = [score(words[0], words[1], folder / f"{kind}{seed}", seed, hard, flags) for seed in seeds]
-        print(f"{kind}, {len(seeds)} films: median (least to most)")
-        for name, key, *bars, more in BARS:
-            values = [s[key] for s in scores]
-            if None in values:
-                print(f"  {name:26} not measured in every film")
-                missed += 1
-                continue
-            bar, middle = bars[hard], statistics.median(values)
-            met = middle >= bar if more else middle < bar
-            missed += not met
-            span = f"({min(values):.4g} to {max(values):.4g})"
-            print(f"  {name:26} {middle:8.4g} {span:24} wanted {'>=' if more else '<'} {bar:g}{'' if met else '  MISSED'}")
-    sys.exit(1 if missed else 0)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("generator", type=pathlib.Path)
+    parser.add_argument("--footage", type=pathlib.Path)
+    parser.add_argument("--against", type=pathlib.Path)
+    parser.add_argument("--films", type=pathlib.Path, default=HERE.parent / "target" / "accuracy")
+    args = parser.parse_args()
+    args.program = args.program.resolve()
+    results = measure(args)
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+    PAGE.write_text("\n".join(page(results)) + "\n")
+    for what, figure, bar, met in bars(results):
+        print(f"{what:76} {figure:>9} {bar:>9}{'' if met else '  MISSED'}")
 
 
 main()
