@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use flockreel::code::Code;
+use flockreel::jobs::masks::Masks;
 use flockreel::media::{Hints, Limits, Video};
 
 use super::{read_all, read_whole};
@@ -123,6 +124,30 @@ fn each_command_of_an_advice_makes_a_film_that_is_taken() {
         Ok(50)
     );
     tried.push(Code::TooManyFrames);
+    // A mask for each picture of a film whose pictures have no constant rate.
+    let slowing = "-vf setpts=N*N*0.01/TB -fps_mode vfr -c:v mpeg4 slowing.mkv";
+    let film = films.test_picture("64x48", 40, slowing);
+    let masks = films.test_picture("64x48", 40, "-c:v ffv1 masks.mkv");
+    let masked = |fps| {
+        let (limits, hints) = (
+            Limits::default(),
+            Hints {
+                fps,
+                ..Hints::default()
+            },
+        );
+        let video = Video::open_with(&film, &limits, &hints).expect("a good film");
+        let masks = Masks::open(&video, (&film, Some(&masks)), &limits, &hints);
+        let masks = masks.expect("they can be read").expect("they are given");
+        let masked = masks.over(&video).expect("of one size");
+        read_all(&masked).map(|frames| frames.len())
+    };
+    let refusal = masked(None).map_err(|error| error.code);
+    assert_eq!(refusal, Err(Code::MasksDiffer));
+    for fps in rates(Code::MasksDiffer) {
+        assert_eq!(masked(Some(fps)).expect("they match"), 40);
+    }
+    tried.push(Code::MasksDiffer);
     for &code in Code::ALL {
         let is_told = !commands(code).is_empty() || !rates(code).is_empty();
         assert_eq!(tried.contains(&code), is_told, "{code}");
