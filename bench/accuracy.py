@@ -254,4 +254,5 @@ def main():
         print(f"{what:76} {figure:>9} {bar:>9}{'' if met else '  MISSED'}")
 
 
-main()
+if __name__ == "__main__":
+    main()

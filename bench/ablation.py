@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+"""Whether each rule of the measurement earns its place: a few films with every rule switched off, one by one.
+
+    ablation.py GENERATOR [--footage FOLDER] [--films FOLDER]
+
+One program is built of a copy of the sources in which every rule of ablation.toml has a switch. Films are those of
+cases.py and the first seconds of labelled recordings. What was measured stays in target/ablation as long as sources and
+rules are the same. Writes bench/results/ablation.json and, from that, docs/ABLATION.md.
+"""
+import argparse, concurrent.futures, hashlib, json, os, pathlib, re, shutil, subprocess, tempfile, tomllib, zipfile
+
+import cv2
+import numpy as np
+
+from accuracy import score_case, score_labels
+import cases
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent
+PLACE = ROOT / "target" / "ablation"
+SOURCES = PLACE / "sources"
+RESULTS = HERE / "results" / "ablation.json"
+PAGE = ROOT / "docs" / "ABLATION.md"
+SWITCH = """
+/// Whether the rule of that name is switched off.
+#[doc(hidden)]
+pub fn rule_off(name: &str) -> bool {
+    static OFF: std::sync::OnceLock<String> = std::sync::OnceLock::new();
+    OFF.get_or_init(|| std::env::var("FLOCKREEL_RULE_OFF").unwrap_or_default()) == name
+}
+"""
+CASES = ("title_card-3002", "camera_bump-3002", "lights_dim-3002", "infrared-3002", "mains_banding-3002", "resting_animal-3002",
+         "hand_at_start-3002", "tether-3002", "surface_mirror-3002", "large_animal-3022", "hard-2", "silver-3")
+CLIPS = {"mouse_round_arena": 20, "mouse_homecage_bedding": 12, "dog_side_with_hand": 10, "zebrafish_juvenile_single": 10}
+# A film is better or worse by this many points, or when it is refused.
+CLEARLY = 1.0
+
+
+def off(name):
+    """The switch of a rule; asked once, for it stands in inner loops."""
+    return ("{ static OFF: std::sync::OnceLock<bool> = std::sync::OnceLock::new(); "
+            f'*OFF.get_or_init(|| crate::rule_off("{name}")) }}')
+
+
+def lay_out(rules):
+    """The sources with their switches; files that stay the same keep their time, and others go."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    texts = {name: (ROOT / name).read_bytes() for name in filter(None, listed.split("\0")) if (ROOT / name).is_file()}
+    for rule in rules:
+        text = texts[rule["file"]].decode()
+        assert text.count(rule["old"]) == 1, f"{rule['name']}: stands {text.count(rule['old'])} times in {rule['file']}"
+        new = re.sub(r"\bOFF\[([a-z-]+)\]", lambda match: off(match[1]), rule["new"])
+        new = re.sub(r"\bOFF\b(?! [:.])(?!\.get)", off(rule["name"]), new) if "names" not in rule else new
+        texts[rule["file"]] = text.replace(rule["old"], new).encode()
+    texts["src/lib.rs"] += SWITCH.encode()
+    for path in SOURCES.rglob("*.rs") if SOURCES.is_dir() else []:
+        if str(path.relative_to(SOURCES)) not in texts and "target" not in path.parts:
+            path.unlink()
+    for name, text in texts.items():
+        path = SOURCES / name
+        if not path.is_file() or path.read_bytes() != text:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text)
+    shutil.copytree(ROOT / "target" / "vendor", SOURCES / "target" / "vendor", dirs_exist_ok=True)
+
+
+def build():
+    environment = {**os.environ, "CARGO_TARGET_DIR": str(PLACE / "target"), "CARGO_PROFILE_RELEASE_LTO": "off",
+                   "CARGO_PROFILE_RELEASE_DEBUG": "0"}
+    subprocess.run(["cargo", "build", "--release", "--locked", "--bin", "flockreel"], cwd=SOURCES, env=environment, check=True)
+    return PLACE / "target" / "release" / "flockreel"
+
+
+def halo(library):
+    """Alpha more than 2.5 pixels outside the contour of a half, of all alpha: median over 20 mattes."""
+    shares = []
+    with zipfile.ZipFile(library / "mattes.zip") as archive:
+        names = archive.namelist()
+        for name in names[::max(1, len(names) // 20)]:
+            rgba = cv2.imdecode(np.frombuffer(archive.read(name), np.uint8), cv2.IMREAD_UNCHANGED)
+            if rgba is None or rgba.ndim < 3 or rgba.shape[2] < 4 or not rgba[..., 3].any():
+                continue
+            alpha = np.pad(rgba[..., 3], 8)
+            away = cv2.distanceTransform((alpha < 128).astype(np.uint8), cv2.DIST_L2, 5)
+            shares.append(float(alpha[away > 2.5].sum() / alpha.sum()))
+    return float(np.median(shares)) if shares else None
+
+
+def measure(program, film, rule):
+    """Points of 100: frames right, heads right, halo; or the code of a refusal."""
+    name, path, flags, known = film
+    with tempfile.TemporaryDirectory() as folder:
+        library = pathlib.Path(folder) / "library"
+        words = [program, "analyze", path, "-o", library, *flags]
+        done = subprocess.run([str(w) for w in words], capture_output=True, text=True, env={**os.environ, "FLOCKREEL_RULE_OFF": rule})
+        if done.returncode:
+            lines = [line for line in done.stderr.splitlines() if line.endswith(")")]
+            return {"refused": lines[-1].rsplit("(", 1)[1].rstrip(")") if lines else "failed"}
+        poses = json.loads((library / "poses.json").read_text())
+        points = {"halo": 100 * (halo(library) or 0)}
+    if "clip" in known:
+        known = {**known, "frames": [row for row in known["frames"] if row["frame"] < len(poses["frames"])]}
+        score = score_labels(poses, known)
+        right = (score["found"] - score["far"]) / score["n"]
+        heads = 1 - len(score["heads_wrong"]) / max(score["heads_told"], 1)
+        points |= {"view": 100.0 * score["view_right"]}
+    else:
+        score, _, _ = score_case(poses, known)
+        right = score["found"] * score["right"] - score["invented"] / score["n"]
+        heads = 1 - score["flips"] / max(score["n_aside"], 1)
+        points |= {"view": 100.0 * (poses["view"] == "side")}
+    points |= {"animals": -100.0 * ("several_animals" in done.stderr)}
+    return {"right": 100 * right, "heads": 100 * heads, **points}
+
+
+def change(with_rule, without):
+    """What a film loses without a rule, points; below 0 where it gains."""
+    if "refused" in with_rule or "refused" in without:
+        return 100.0 * (("refused" in without) - ("refused" in with_rule))
+    gains = [with_rule[key] - without[key] for key in ("right", "heads", "view", "animals")] + [without["halo"] - with_rule["halo"]]
+    return max(gains, key=abs)
+
+
+def verdict(losses):
+    worse = [name for name, loss in losses.items() if loss > CLEARLY]
+    better = [name for name, loss in losses.items() if loss < -CLEARLY]
+    if better:
+        return "doubtful"
+    return {0: "nothing", 1: "one film"}.get(len(worse), "useful")
+
+
+def page(results, rules):
+    yield "# Which rules earn their place\n"
+    yield ("Written by `make ablation` from `bench/results/ablation.json`: each rule of `bench/ablation.toml` switched off, one by one. "
+           "Points of 100 that a film loses without it (frames within .1 body length, heads at their end, the view, halo of the sprites; "
+           "100 where it is refused); only those of more than a point are named, and those that a film gains have a minus.\n")
+    yield "| rule | what it says | verdict | films |\n| --- | --- | --- | --- |"
+    for rule in rules:
+        for name in rule.get("names", [rule["name"]]):
+            losses = results["rules"][name]
+            named = ", ".join(f"{film} {loss:.0f}" for film, loss in losses.items() if abs(loss) > CLEARLY)
+            yield f"| `{name}` | {rule['says']} | {verdict(losses)} | {named} |"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("generator", type=pathlib.Path)
+    parser.add_argument("--footage", type=pathlib.Path)
+    parser.add_argument("--films", type=pathlib.Path, default=ROOT / "target" / "accuracy")
+    args = parser.parse_args()
+    rules = tomllib.loads((HERE / "ablation.toml").read_text())["rule"]
+    names = [name for rule in rules for name in rule.get("names", [rule["name"]])]
+    lay_out(rules)
+    program = build()
+    films = [(name, path, flags, json.loads(truth.read_text())) for name, path, truth, flags in cases.films(args.generator, args.films)
+             if name in CASES]
+    for clip, seconds in CLIPS.items() if args.footage else []:
+        labels = json.loads((HERE / "labels" / f"{clip}.json").read_text())
+        films.append((clip, args.footage / labels["clip"], ["--to", str(seconds)], labels))
+    digest = hashlib.sha256(program.read_bytes()).hexdigest()[:16]
+    kept = PLACE / digest
+    kept.mkdir(parents=True, exist_ok=True)
+
+    def measured(film, rule):
+        file = kept / f"{rule or 'all'}-{film[0]}.json"
+        if not file.exists():
+            file.write_text(json.dumps(measure(program, film, rule)))
+        return json.loads(file.read_text())
+
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        base = dict(zip((film[0] for film in films), pool.map(lambda film: measured(film, ""), films)))
+        results = {"all": base, "rules": {}}
+        for name in names:
+            scores = pool.map(lambda film: measured(film, name), films)
+            losses = {film[0]: change(base[film[0]], score) for film, score in zip(films, scores)}
+            results["rules"][name] = losses
+            print(f"{name:24}{verdict(losses):10}", *(f"{f} {v:.0f}" for f, v in losses.items() if abs(v) > CLEARLY), flush=True)
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+    PAGE.write_text("\n".join(page(results, rules)) + "\n")
+
+
+main()
