@@ -83,7 +83,10 @@ def walk_through(program, address, folder):
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
     command = [program, "token", "create", "--name", "walk", "--data", data]
     token = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
-    walk = Walk(address, film, token)
+    moving = folder / "moving.mp4"
+    picture = "mandelbrot=size=640x480:rate=25,scroll=h=0.013:v=0.007,scale=160:120"
+    subprocess.run(["ffmpeg", "-v", "error", "-f", "lavfi", "-i", picture, "-frames:v", "60", moving], check=True)
+    walk = Walk(address, (film, moving), token)
     walk.whole()
     never = tell(folder / "seen", walk.document.raw_schema)
     for operation in never:

@@ -21,8 +21,10 @@ CHECKS = ["not_a_server_error", "status_code_conformance", "content_type_conform
 class Walk:
     """Calls of operations by name, and the statuses that each has answered with."""
 
-    def __init__(self, address, film, token):
-        self.address, self.film, self.token = address, film.read_bytes(), token
+    def __init__(self, address, films, token):
+        self.address, self.token = address, token
+        # One that can be measured, and one whose scene moves.
+        self.film, self.moving = (film.read_bytes() for film in films)
         self.document = schemathesis.openapi.from_url(f"{address}/openapi.json")
         self.checks = list(schemathesis.checks.CHECKS.get_by_names(CHECKS))
 
@@ -39,6 +41,7 @@ class Walk:
     def whole(self):
         self.watch()
         ids = self.make()
+        self.refuse()
         self.upload()
         self.read(ids)
         self.sign_in()
@@ -70,12 +73,19 @@ class Walk:
         return {"footage": footage, "library": library, "flock": flock["flock_id"], "fish": fish["fish_id"],
                 "job": flock["job_id"]}
 
-    def wait_for(self, job):
+    def refuse(self):
+        """A film that cannot be measured, and the picture of why."""
+        job = self.call("POST /v1/analyses", body=self.moving, media_type=STREAM).json()["job_id"]
+        refused = self.wait_for(job, "failed")
+        assert refused["error"]["picture"], refused
+        self.call("GET /v1/jobs/{id}/refused.jpg", {"id": job})
+
+    def wait_for(self, job, state="done"):
         while True:
             answer = self.call("GET /v1/jobs/{id}", {"id": job}, headers={"Prefer": "wait=5"}).json()
             if answer["finished_at"]:
-                assert answer["state"] == "done", answer
-                return
+                assert answer["state"] == state, answer
+                return answer
 
     def upload(self):
         self.call("OPTIONS /v1/uploads")
