@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench accuracy papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench accuracy ablation motion papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -107,10 +107,20 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	python3 bench/render.py target/demo/library $(RELEASE)
 	target/bench-venv/bin/python bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
-accuracy: build ## the poses against the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
-	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
-	@target/bench-venv/bin/python -c "import numpy, cv2, PIL" 2>/dev/null || target/bench-venv/bin/pip install -q numpy opencv-python-headless pillow
+accuracy: build target/bench-venv/ready ## the poses against the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
 	target/bench-venv/bin/python bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST))
+
+# The tools of bench/ that read films and pictures.
+target/bench-venv/ready:
+	@python3 -m venv target/bench-venv
+	@target/bench-venv/bin/pip install -q numpy opencv-python-headless pillow
+	@touch $@
+
+ablation: target/vendor target/bench-venv/ready ## every rule of the measurement switched off once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
+	target/bench-venv/bin/python bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
+
+motion: build target/bench-venv/ready ## whether flocks move as their animals moved: make motion LIBRARIES="folder ..."
+	target/bench-venv/bin/python bench/motion.py $(RELEASE) $(LIBRARIES)
 
 papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md
 	python3 bench/papers.py $(RELEASE)

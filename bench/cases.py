@@ -16,7 +16,8 @@ class Base:
     """A film of the generator, with its scene and its truth."""
 
     def __init__(self, generator, folder, seed, *flags, n_frames=N_FRAMES):
-        stem = folder / "-".join(["base", str(seed), str(n_frames), *flags]).replace("--", "").replace(" ", "")
+        name = "-".join(["base", str(seed), str(n_frames), *flags]).replace("--", "")
+        stem = folder / name.replace(" ", "").replace(".", "_")
         if not stem.with_suffix(".truth.json").exists():
             words = [sys.executable, generator, stem, "--seed", seed, "--frames", n_frames, *flags]
             subprocess.run([str(w) for w in words], check=True)
@@ -191,7 +192,7 @@ def films(generator, folder):
     for seed, length in zip((3022, 3023, 3024), LARGE):
         def make(path):
             # Small, because the generator's fish is made of points, and enlarged.
-            small = ["--size", "160x120", "--length", str(length), "--height", str(.55 * length), "--crf", "8"]
+            small = ["--size", "160x120", "--length", str(length), "--height", f"{.55 * length:.3f}", "--crf", "8"]
             base = Base(generator, folder, seed, *small)
             rows = ((cv2.resize(image, (640, 480), interpolation=cv2.INTER_CUBIC), {
                 **pose, "centroid_px": [4 * (v + .5) - .5 for v in pose["centroid_px"]],

@@ -12,7 +12,7 @@ use std::time::Instant;
 use flockreel::cpu::Level;
 use flockreel::flock::lens::Lens;
 use flockreel::flock::motion::motion_of;
-use flockreel::flock::plan::Planner;
+use flockreel::flock::plan::{Model, Planner};
 use flockreel::flock::{BoidTrack, Params, Stats, plan_flock};
 use flockreel::formats::library_dir;
 use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Poses, Sprites, View};
@@ -82,7 +82,10 @@ fn time(
     let motion = motion_of(library, &Lens::of(library, params));
     let run = || {
         let start = Instant::now();
-        let plans = pool.install(|| Planner::new(library, &motion, boids, params).plan(&Silent));
+        let plans = pool.install(|| {
+            let model = Model::new(library, &motion, params);
+            Planner::new(&model, boids).plan(&Silent)
+        });
         std::hint::black_box(plans.expect("plans"));
         start.elapsed().as_secs_f64()
     };

@@ -94,7 +94,7 @@ pub(super) fn simulate_loop(
 }
 
 /// To be called before each of so many frames, or some more.
-fn steps(n_frames: usize, progress: &dyn Progress) -> impl FnMut() -> Result<(), Error> {
+pub(super) fn steps(n_frames: usize, progress: &dyn Progress) -> impl FnMut() -> Result<(), Error> {
     let mut gone = 0;
     move || {
         if progress.cancelled() {
@@ -107,7 +107,7 @@ fn steps(n_frames: usize, progress: &dyn Progress) -> impl FnMut() -> Result<(),
 }
 
 impl Course {
-    fn new(boids: &Boids, lens: &Lens) -> Course {
+    pub(super) fn new(boids: &Boids, lens: &Lens) -> Course {
         let track = BoidTrack {
             forward: (!lens.is_flat()).then(Vec::new),
             ..BoidTrack::default()
@@ -120,13 +120,24 @@ impl Course {
         }
     }
 
-    fn record(&mut self, boids: &Boids, lens: &Lens) {
+    pub(super) fn record(&mut self, boids: &Boids, lens: &Lens) {
         for (id, track) in self.tracks.iter_mut().enumerate() {
             record(track, lens, boids, id);
         }
         let predator = boids.predator().map(|place| seen(place, lens, boids));
         self.predator_px.extend(predator);
         self.orders.push(as_told(boids.order()));
+    }
+}
+
+impl Course {
+    /// Goes on with another.
+    pub(super) fn append(&mut self, later: Course) {
+        for (track, later) in self.tracks.iter_mut().zip(later.tracks) {
+            track.append(later);
+        }
+        self.orders.extend(later.orders);
+        self.predator_px.extend(later.predator_px);
     }
 }
 
@@ -151,13 +162,14 @@ fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
 
 /// A boid's moment, as it is seen.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
-    let (place, velocity) = (boids.positions()[id], boids.velocities()[id]);
+    let (place, velocity) = (boids.positions()[id], boids.motion(id));
     track.position_px.push(seen(place, lens, boids));
     if let Some(forward) = &mut track.forward {
-        forward.push(unit(velocity).map(|part| rounded(part, 5)));
+        forward.push(unit(boids.velocities()[id]).map(|part| rounded(part, 5)));
     }
     let [vx, vy] = lens.picture_velocity(place, velocity);
-    let heading = Turns::from_rad(libm::atan2(vy, vx));
+    let [x, y] = lens.picture_velocity(place, boids.velocities()[id]);
+    let heading = Turns::from_rad(libm::atan2(y, x));
     track.heading_rad.push(rounded(heading.to_rad(), 5));
     track.speed_bl_per_s.push(rounded(vx.hypot(vy), 3));
 }

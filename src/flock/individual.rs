@@ -2,6 +2,8 @@
 //! is shown (DESIGN.md, flock.json). Numbers are rounded when they are made, so that the file holds
 //! exactly what was computed with.
 
+use std::ops::Range;
+
 /// One simulated animal with its sprites.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Individual {
@@ -84,6 +86,28 @@ pub struct PlanCost {
     pub gap: f64,
     /// The plan is the cheapest of all, not just of those tried: its gap is 0.
     pub exact: bool,
+}
+
+impl BoidTrack {
+    /// The frames of a range alone.
+    pub(super) fn part(&self, range: Range<usize>) -> BoidTrack {
+        BoidTrack {
+            position_px: self.position_px[range.clone()].to_vec(),
+            forward: (self.forward.as_ref()).map(|all| all[range.clone()].to_vec()),
+            heading_rad: self.heading_rad[range.clone()].to_vec(),
+            speed_bl_per_s: self.speed_bl_per_s[range].to_vec(),
+        }
+    }
+
+    /// Goes on with another.
+    pub(super) fn append(&mut self, later: BoidTrack) {
+        self.position_px.extend(later.position_px);
+        if let (Some(forward), Some(later)) = (&mut self.forward, later.forward) {
+            forward.extend(later);
+        }
+        self.heading_rad.extend(later.heading_rad);
+        self.speed_bl_per_s.extend(later.speed_bl_per_s);
+    }
 }
 
 impl Fade {

@@ -1,14 +1,17 @@
 //! Library to flock: simulate boids, plan which real frames follow them best, place those frames in
 //! the picture, and composite them (O 4 and 5; ALGORITHMS.md 6 to 8).
 
+mod advance;
 pub mod boids;
 pub mod check;
 pub mod composite;
 mod course;
 pub mod error;
+mod follow;
 pub mod individual;
 pub mod lens;
 pub mod motion;
+mod natural;
 pub mod params;
 mod passing;
 pub mod placement;
@@ -31,12 +34,13 @@ pub use space::Space;
 use self::boids::Boids;
 use self::boids::calibration::Calibration;
 use self::boids::tank::Tank;
+use self::course::Course;
 use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
-use self::params::MatchBy;
-use self::placement::Stage;
-use self::plan::{Plan, Planner};
+use self::params::{MatchBy, Position};
+use self::placement::{Placed, Stage};
+use self::plan::{Model, Plan, Planner};
 use crate::library::Library;
 use crate::progress::Progress;
 
@@ -97,25 +101,24 @@ pub fn plan_flock(
     let params = &told(params, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::of(library, &lens, &motion, params);
-    let calibration = Calibration::of(library, &motion, lens.is_flat());
+    let calibration = Calibration::of(library, &motion, lens.is_flat()).in_tank(&tank);
     let boids = Boids::at_random(params, &calibration, (&lens, &tank), library.poses.fps);
-    let course = match params.is_loop {
-        true => course::simulate_loop(boids, &lens, (params.frames, library.poses.fps), progress)?,
-        false => course::simulate(boids, &lens, params.frames, progress)?,
-    };
-    let planner = Planner::new(library, &motion, &course.tracks, params);
-    let plans = match &course.heirs {
-        Some(heirs) => planner.plan_loop(heirs, progress)?,
-        None => planner.plan(progress)?,
-    };
+    let model = Model::new(library, &motion, params);
     let stage = Stage {
         library,
         motion: &motion,
         params,
         lens: &lens,
         tank: &tank,
+        calibration: &calibration,
     };
-    let individuals = place(&stage, &course.tracks, &plans, course.heirs.as_deref());
+    let (course, plans, placed) = match params.position {
+        Position::Film => follow::play(boids, (&model, &stage), progress)?,
+        Position::Leash | Position::Boid | Position::Papers => {
+            whole(boids, (&model, &stage), progress)?
+        }
+    };
+    let individuals = individuals(&model, &course, &plans, placed);
     Ok(Flock {
         fps: library.poses.fps,
         image_size_px: library.poses.image_size_px,
@@ -139,43 +142,69 @@ pub fn plan_flock(
     })
 }
 
+/// Simulates a whole film, then plans and places it: tracks, plans and places by id.
+fn whole(
+    boids: Boids,
+    (model, stage): (&Model, &Stage),
+    progress: &dyn Progress,
+) -> Result<(Course, Vec<Plan>, Vec<Placed>), Error> {
+    let n_frames = stage.params.frames;
+    let course = match stage.params.is_loop {
+        true => {
+            let length = (n_frames, stage.library.poses.fps);
+            course::simulate_loop(boids, stage.lens, length, progress)?
+        }
+        false => course::simulate(boids, stage.lens, n_frames, progress)?,
+    };
+    progress.report("planning", 0.0);
+    let planner = Planner::new(model, &course.tracks);
+    let plans = match &course.heirs {
+        Some(heirs) => planner.plan_loop(heirs, progress)?,
+        None => planner.plan(progress)?,
+    };
+    let shown: Vec<_> = plans.iter().map(|plan| model.shown(&plan.states)).collect();
+    let placed = stage.placed(&shown, &course.tracks, course.heirs.as_deref());
+    Ok((course, plans, placed))
+}
+
 /// The parameters as they can be met: without depth, directions are headings.
 fn told(params: &Params, lens: &Lens) -> Params {
     let mut params = params.clone();
+    if params.is_loop && params.position == Position::Film {
+        params.position = Position::Leash;
+    }
     if lens.is_flat() && params.matching.by == MatchBy::Direction {
         params.matching.by = MatchBy::Heading;
     }
     params
 }
 
-fn place(
-    stage: &Stage,
-    tracks: &[BoidTrack],
+fn individuals(
+    model: &Model,
+    course: &Course,
     plans: &[Plan],
-    heirs: Option<&[u32]>,
+    placed: Vec<Placed>,
 ) -> Vec<Individual> {
-    let shown: Vec<_> = plans.iter().map(|plan| &plan.shown[..]).collect();
-    let placed = match heirs {
-        Some(heirs) => stage.place_loop(&shown, tracks, heirs),
-        None => stage.place(&shown, tracks),
-    };
     (0u32..)
         .zip(placed)
-        .zip(tracks.iter().zip(plans))
-        .map(|((id, placed), (boid, plan))| Individual {
-            id,
-            source_frame: plan.shown.iter().map(|shown| shown.0).collect(),
-            mirrored: plan.shown.iter().map(|shown| shown.1).collect(),
-            rotation_rad: placed.rotation_rad,
-            continues_as: heirs.map(|heirs| heirs[id as usize]),
-            fades: placed.fades,
-            centroid_px: placed.centroid_px,
-            heading_rad: placed.heading_rad,
-            forward: placed.forward,
-            scale: placed.scale,
-            depth_m: placed.depth_m,
-            boid: boid.clone(),
-            cost: plan.cost,
+        .zip(course.tracks.iter().zip(plans))
+        .map(|((id, placed), (boid, plan))| {
+            let shown = model.shown(&plan.states);
+            Individual {
+                id,
+                source_frame: shown.iter().map(|shown| shown.0).collect(),
+                mirrored: shown.iter().map(|shown| shown.1).collect(),
+                rotation_rad: placed.rotation_rad,
+                continues_as: course.heirs.as_ref().map(|heirs| heirs[id as usize]),
+                fades: placed.fades,
+                centroid_px: placed.centroid_px,
+                heading_rad: placed.heading_rad,
+                forward: placed.forward,
+                scale: placed.scale,
+                depth_m: placed.depth_m,
+                boid: boid.clone(),
+                cost: plan.cost.told(),
+            }
         })
         .collect()
 }

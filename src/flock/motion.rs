@@ -8,6 +8,9 @@ use crate::library::{Library, Pose, View};
 
 /// A speed in space is told where at least this share of the direction lies in the picture's plane.
 const LEAST_LEVEL: f64 = 0.7;
+/// Who is seen head-on swims sideways in the picture as well: no speed in space is more than the inverse of this times
+/// that in the picture.
+const LEAST_SEEN: f64 = 0.5;
 /// Directions are compared over this time either way.
 const TURN_SPAN_S: f64 = 0.1;
 
@@ -26,10 +29,22 @@ pub struct FrameMotion {
     pub forward: Vec3,
     /// Distance from the camera, body lengths; 0 where the lens is flat.
     pub depth_bl: f64,
+    /// Body lengths in space to one of `length_px` in the picture, at its depth.
+    pub nearer: f64,
     /// Speed in space, body lengths a second, where enough of it is in the picture's plane.
     pub pace_bl_per_s: Option<f64>,
     /// How fast the direction in space changed, where it was found a tenth of a second before and after.
     pub swing_rad_per_s: Option<f64>,
+}
+
+impl FrameMotion {
+    /// How fast it is in space, body lengths a second: from its speed in the picture and how much of its direction lies in
+    /// the picture's plane, of which at least `LEAST_SEEN` is taken for granted.
+    pub fn speed_in_space(&self) -> f64 {
+        let [x, y, _] = self.forward;
+        let level = x.hypot(y);
+        self.nearer * self.speed_bl_per_s / level.clamp(LEAST_SEEN, 1.0)
+    }
 }
 
 /// The motion at every frame: central differences over two frames either way where the animal was
@@ -51,6 +66,7 @@ pub fn motion_of(library: &Library, lens: &Lens) -> Vec<FrameMotion> {
             FrameMotion {
                 forward: forwards[frame].unwrap_or_default(),
                 depth_bl,
+                nearer,
                 pace_bl_per_s: moved.and_then(|moved| {
                     let [x, y, _] = forwards[frame]?;
                     let level = x.hypot(y);

@@ -78,10 +78,9 @@ pub struct Matching {
     /// Cost of each frame that an individual shows again within 3 s, radians; 0 = no matter, and every plan is the
     /// cheapest.
     pub w_p: f64,
-    /// Frames that a plan looks ahead, 20..=2000; null = to the end of the film, so that the plan is the cheapest.
-    /// With it memory does not grow with the film, plans follow boids whose later ways they need not know,
-    /// `cost.gap` says what that costs, and repeats are paid for but not avoided. Not in a loop.
-    pub horizon_frames: Option<u32>,
+    /// Frames that are planned at a time with `position: film`, 2..=2000; null = those of three seconds. After each
+    /// segment the boids go on from where the animals are.
+    pub segment_frames: Option<u32>,
 }
 
 /// What real frames and boids are matched by.
@@ -114,7 +113,10 @@ pub enum Separation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Position {
-    /// Along its own heading, drawn gently to the boid.
+    /// As the animal moved in the frames shown, steered toward the boid within what nobody sees: a step is a fifth longer
+    /// or shorter at most. Boids go at the speeds of the film.
+    Film,
+    /// Along its own heading at the boid's speed, drawn gently to the boid.
     Leash,
     /// Where the boid is.
     Boid,
@@ -145,11 +147,11 @@ impl Default for Matching {
             w_d: 0.3,
             w_r: 0.1,
             rho_deg: 10.0,
-            w_v: 0.1,
+            w_v: 0.3,
             wx: 1.2,
             w_c: 0.45,
             w_p: 0.0,
-            horizon_frames: None,
+            segment_frames: None,
         }
     }
 }
@@ -167,7 +169,7 @@ impl Default for Params {
             fade_frames: 4,
             mirror: true,
             separation: Separation::Repulsion,
-            position: Position::Leash,
+            position: Position::Film,
             leaders: true,
             tank: TankExtent::Seen,
             goals: Vec::new(),
@@ -237,7 +239,7 @@ impl Params {
                 wx: 0.0,
                 w_c: 0.0,
                 w_p: 0.0,
-                horizon_frames: None,
+                segment_frames: None,
             },
             dwell_frames: Some(1),
             fade_frames: 0,
@@ -268,9 +270,6 @@ impl Params {
                     "position papers sums up speeds and never comes back: not in a loop".into(),
                 );
             }
-        }
-        if self.is_loop && self.matching.horizon_frames.is_some() {
-            return Err("matching.horizon_frames sees no end of the film: not in a loop".into());
         }
         if let Some(dwell) = self.dwell_frames {
             within("dwell_frames", f64::from(dwell), 1.0, 120.0)?;
@@ -306,8 +305,8 @@ impl Matching {
         for (name, value) in weights {
             within(name, value, 0.0, 4.0)?;
         }
-        if let Some(frames) = self.horizon_frames {
-            within("matching.horizon_frames", f64::from(frames), 20.0, 2000.0)?;
+        if let Some(frames) = self.segment_frames {
+            within("matching.segment_frames", f64::from(frames), 2.0, 2000.0)?;
         }
         within("matching.w_d", self.w_d, 0.0, 1.0)?;
         within("matching.rho_deg", self.rho_deg, 0.0, 45.0)

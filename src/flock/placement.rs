@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::boids::calibration::Calibration;
 use super::boids::tank::Tank;
 use super::individual::{BoidTrack, Fade, rounded};
 use super::lens::Lens;
@@ -37,6 +38,8 @@ pub struct Stage<'a> {
     pub lens: &'a Lens,
     /// Where individuals may be.
     pub tank: &'a Tank,
+    /// What the animal was seen to do.
+    pub calibration: &'a Calibration,
 }
 
 /// How an individual is shown.
@@ -65,12 +68,12 @@ struct Way<'a> {
     depth_bl: &'a [f64],
 }
 
-/// How the frame before the first is shown, in a loop.
+/// How the frame before the first is shown, in a loop or by the segment before.
 #[derive(Clone, Copy)]
-struct Before {
-    state: (u32, bool),
-    heading_rad: f64,
-    centroid_px: [f64; 2],
+pub(super) struct Before {
+    pub(super) state: (u32, bool),
+    pub(super) heading_rad: f64,
+    pub(super) centroid_px: [f64; 2],
 }
 
 /// Whether something else than the next frame is shown after `before`.
@@ -79,15 +82,28 @@ pub fn is_jump(before: (u32, bool), after: (u32, bool)) -> bool {
 }
 
 impl Stage<'_> {
-    /// Places all individuals, by id.
-    pub fn place(&self, shown: &[&[(u32, bool)]], boids: &[BoidTrack]) -> Vec<Placed> {
+    /// Places all individuals of a film, by id; of a loop with the heir of each.
+    pub fn placed(
+        &self,
+        shown: &[Vec<(u32, bool)>],
+        boids: &[BoidTrack],
+        heirs: Option<&[u32]>,
+    ) -> Vec<Placed> {
+        let shown: Vec<&[(u32, bool)]> = shown.iter().map(Vec::as_slice).collect();
+        match heirs {
+            Some(heirs) => self.place_loop(&shown, boids, heirs),
+            None => self.place(&shown, boids),
+        }
+    }
+
+    fn place(&self, shown: &[&[(u32, bool)]], boids: &[BoidTrack]) -> Vec<Placed> {
         (shown.par_iter().zip(boids))
             .map(|(shown, boid)| self.place_one(shown, boid, None))
             .collect()
     }
 
     /// Places all individuals, by id, so that the last frame of each plays into the first of its heir.
-    pub fn place_loop(
+    fn place_loop(
         &self,
         shown: &[&[(u32, bool)]],
         boids: &[BoidTrack],
@@ -155,6 +171,17 @@ impl Stage<'_> {
 
     fn place_one(&self, shown: &[(u32, bool)], boid: &BoidTrack, before: Option<Before>) -> Placed {
         let heading_rad = self.headings(shown, boid, before);
+        let centroid_px = self.positions(&heading_rad, boid, before);
+        self.with_fades(shown, boid, (heading_rad, centroid_px))
+    }
+
+    /// An individual that points and is as said.
+    pub(super) fn with_fades(
+        &self,
+        shown: &[(u32, bool)],
+        boid: &BoidTrack,
+        (heading_rad, centroid_px): (Vec<f64>, Vec<[f64; 2]>),
+    ) -> Placed {
         let depth_bl = self.depths_bl(boid);
         let rotation_rad: Vec<f64> = shown
             .iter()
@@ -169,7 +196,7 @@ impl Stage<'_> {
                     .collect()
             }),
             rotation_rad,
-            centroid_px: self.positions(&heading_rad, boid, before),
+            centroid_px,
             scale: (shown.iter().zip(&depth_bl))
                 .map(|(state, &depth_bl)| self.scale(state.0, depth_bl))
                 .collect(),
@@ -189,12 +216,12 @@ impl Stage<'_> {
     }
 
     /// How far from the camera is what lies so far behind the tank's front.
-    fn depth_bl(&self, behind_px: f64) -> f64 {
+    pub(super) fn depth_bl(&self, behind_px: f64) -> f64 {
         self.tank.corners[0][2] + behind_px / self.lens.length_px
     }
 
     /// How much larger than in its frame an animal looks at another depth (ALGORITHMS.md 8).
-    fn scale(&self, frame: u32, depth_bl: f64) -> f64 {
+    pub(super) fn scale(&self, frame: u32, depth_bl: f64) -> f64 {
         if self.lens.is_flat() {
             return 1.0;
         }
@@ -204,7 +231,7 @@ impl Stage<'_> {
     }
 
     /// The heading of a source frame on its mirror side.
-    fn source_heading(&self, (frame, mirrored): (u32, bool)) -> f64 {
+    pub(super) fn source_heading(&self, (frame, mirrored): (u32, bool)) -> f64 {
         let heading = self.motion[frame as usize].heading_rad;
         if mirrored {
             mirrored_rad(heading)
@@ -222,7 +249,7 @@ impl Stage<'_> {
     }
 
     /// The rotation that shows a source frame with a heading, as far as the view allows.
-    fn rotation(&self, state: (u32, bool), heading_rad: f64) -> f64 {
+    pub(super) fn rotation(&self, state: (u32, bool), heading_rad: f64) -> f64 {
         let gap = wrap_rad(heading_rad - self.source_heading(state));
         match self.library.poses.view {
             View::Top => gap,
@@ -235,7 +262,7 @@ impl Stage<'_> {
 
     /// The headings shown. In top view the boid's own. In side view the frame's, rotated toward the
     /// boid's; the rotation follows slowly, and at a jump takes up what it can of the step.
-    fn headings(
+    pub(super) fn headings(
         &self,
         shown: &[(u32, bool)],
         boid: &BoidTrack,
@@ -276,7 +303,7 @@ impl Stage<'_> {
     ) -> Vec<[f64; 2]> {
         let fps = self.library.poses.fps;
         let pull = match self.params.position {
-            Position::Leash => 1.0 - libm::exp(-1.0 / (LEASH_S * fps)),
+            Position::Film | Position::Leash => 1.0 - libm::exp(-1.0 / (LEASH_S * fps)),
             Position::Boid => 1.0,
             Position::Papers => 0.0,
         };

@@ -51,3 +51,36 @@ pub struct Patch {
     /// Indices of the patches that can be played after it, rising.
     pub next: Vec<u32>,
 }
+
+impl Playback {
+    /// The same without jumps to where playback cannot go on: a jump comes `dwell` frames after another at the earliest,
+    /// and some runs end before that. Without `mirror` there are no jumps that change the side.
+    pub fn without_dead_ends(&self, mirror: bool, dwell: usize) -> Playback {
+        let mut jumps = self.jumps.clone();
+        jumps.retain(|jump| mirror || !jump.mirrored);
+        let n = self.component.len();
+        let at = |frame: u32| self.component.binary_search(&frame).ok();
+        loop {
+            let mut leaves = vec![false; n];
+            for from in jumps.iter().filter_map(|jump| at(jump.from)) {
+                leaves[from] = true;
+            }
+            // Whether a jump lies ahead in the run, and how many frames of the run do.
+            let mut n_ahead = vec![0; n];
+            for k in (0..n.saturating_sub(1)).rev() {
+                if self.component[k + 1] == self.component[k] + 1 {
+                    leaves[k] |= leaves[k + 1];
+                    n_ahead[k] = n_ahead[k + 1] + 1;
+                }
+            }
+            let n_before = jumps.len();
+            jumps.retain(|jump| {
+                at(jump.to).is_some_and(|to| n_ahead[to] + 1 >= dwell && leaves[to + dwell - 1])
+            });
+            if jumps.len() == n_before {
+                let component = self.component.clone();
+                return Playback { jumps, component };
+            }
+        }
+    }
+}

@@ -1,6 +1,7 @@
 //! What a boid may do is what the animal was seen to do: speeds, turn rates, and in side view how
 //! steeply it points (ALGORITHMS.md 7, "from the footage").
 
+use super::tank::Tank;
 use crate::flock::motion::FrameMotion;
 use crate::library::{Library, View};
 use crate::order::percentile;
@@ -42,6 +43,10 @@ const STEEPER: f64 = 0.02;
 const STEEPER_IN_PICTURE: f64 = 0.15;
 /// Share of the frames that are slower, or turn less, than a boid may at most.
 const FASTEST: f64 = 0.95;
+/// No boid turns faster.
+const FASTEST_TURN_RAD_PER_S: f64 = 6.0;
+/// The circle in which a boid can turn has at most this share of the narrower half of its tank as its radius.
+const TURNED_IN: f64 = 0.5;
 /// And of those that are slower than it must be.
 const SLOWEST: f64 = 0.05;
 /// A boid may point this steeply whatever was seen.
@@ -75,7 +80,9 @@ impl Calibration {
         let cruise = cruise.max(0.25 * fast).max(0.05);
         let mut swings: Vec<f64> = shown().filter_map(|m| m.swing_rad_per_s).collect();
         let turn_rad_per_s = percentile(&mut swings, FASTEST)
-            .map_or(unknown.turn_rad_per_s, |rate| rate.clamp(0.5, 6.0));
+            .map_or(unknown.turn_rad_per_s, |rate| {
+                rate.clamp(0.5, FASTEST_TURN_RAD_PER_S)
+            });
         Calibration {
             cruise_bl_per_s: cruise,
             speed_limits_bl_per_s: [slow.max(0.25 * cruise).min(cruise), fast.max(cruise)],
@@ -86,6 +93,18 @@ impl Calibration {
                 let elevations = shown().map(|m| libm::asin(libm::sin(m.heading_rad)));
                 Slopes::of(pitches.collect(), elevations.collect())
             }),
+        }
+    }
+
+    /// The same, but turning at least so sharply that who goes at cruising speed can turn round within a tank: in a short film of
+    /// a narrow one the animal may never be seen to.
+    pub fn in_tank(self, tank: &Tank) -> Calibration {
+        let [x, y, z] = tank.reach_bl;
+        let narrow_bl = if tank.is_flat() { x.min(y) } else { x.min(z) };
+        let least = self.cruise_bl_per_s / (TURNED_IN * narrow_bl).max(1e-3);
+        Calibration {
+            turn_rad_per_s: self.turn_rad_per_s.max(least.min(FASTEST_TURN_RAD_PER_S)),
+            ..self
         }
     }
 

@@ -58,6 +58,15 @@ mod draw {
     pub(super) const NOISE: u64 = 5;
 }
 
+/// How a filmed animal gets on, whatever the rules wish.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gait {
+    /// Its speed, body lengths a second. Who is slower than usual is turned less by its rules, and who rests not at all.
+    pub speed_bl_per_s: f64,
+    /// How fast it turns by itself, in the plane of the picture.
+    pub turn_rad_per_s: f64,
+}
+
 /// Boids in their tank.
 pub struct Boids<'a> {
     /// With radii that fit the tank.
@@ -76,6 +85,8 @@ pub struct Boids<'a> {
     time_s: f64,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
+    /// How each gets on, by id; when empty, as it swims.
+    gaits: Vec<Gait>,
     room: Room,
     hunter: Option<Hunter>,
     meeting: Option<Meeting>,
@@ -125,6 +136,7 @@ impl<'a> Boids<'a> {
             time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],
+            gaits: Vec::new(),
             room: Room::of(n),
             hunter: None,
             meeting: None,
@@ -174,6 +186,20 @@ impl<'a> Boids<'a> {
     /// How fast everybody is, by id, body lengths a second.
     pub fn velocities(&self) -> &[Vec3] {
         &self.velocities
+    }
+
+    /// Has everybody get on as filmed from now on, by id: their rules say where to, the film says how.
+    pub fn go_as(&mut self, gaits: Vec<Gait>) {
+        self.gaits = gaits;
+    }
+
+    /// The velocity at which one gets on, body lengths a second.
+    pub fn motion(&self, id: usize) -> Vec3 {
+        self.at_filmed_speed::<f64>(
+            &[id as u32; lanes::MOST],
+            self.positions[id],
+            self.velocities[id],
+        )
     }
 
     /// Lets the film begin so many frames later.

@@ -26,7 +26,8 @@ const FARTHER: f64 = 1.03;
 /// What is the same for all in one step.
 struct Pace<'a> {
     steering: Steering<'a>,
-    /// cos and sin of the widest turn.
+    /// The widest turn at the animal's own speed, and cos and sin of it.
+    turn_rad: f64,
     cos_sin: (f64, f64),
     /// The share of what wanders that is kept, and the spread of what is added, in its own spreads.
     wander: [f64; 2],
@@ -90,6 +91,7 @@ impl Boids<'_> {
                 hunter: self.hunter.as_ref(),
                 cos_half_view: libm::cos(half_view_rad.min(std::f64::consts::PI)),
             },
+            turn_rad,
             cos_sin: (libm::cos(turn_rad), libm::sin(turn_rad)),
             wander: [keep, (1.0 - keep * keep).sqrt()],
             kicks: [0, 1].map(|k| random::row(self.params.seed, &[draw::WANDER, self.step_idx, k])),
@@ -204,9 +206,11 @@ impl Boids<'_> {
         };
         let wished = self.wished(&moment, (&ids, &before), pace);
         let sideways = cross(splat3(self.tank.up()), velocity);
-        let turned = turned_at_most(velocity, wished, pace.cos_sin, sideways);
+        let ahead = self.turned_as_filmed(&ids, velocity);
+        let turned = turned_at_most(ahead, wished, self.widest_turn(&ids, pace), sideways);
         let next = self.within_limits(turned, position, velocity);
-        let place = add_scaled(position, L::splat(self.step_s), next);
+        let way = self.at_filmed_speed(&ids, position, next);
+        let place = add_scaled(position, L::splat(self.step_s), way);
         let (place, next) = self.kept_in(place, (velocity, next));
         // A slanting wall reflects more steeply than the animal swims.
         let next = self.within_limits(next, position, velocity);
@@ -304,6 +308,58 @@ impl Boids<'_> {
         let moves = L::splat(1e-9).less(speed);
         let direction = select3::<L>(moves, velocity, before);
         scaled(speed.clamp(L::splat(least), most), unit(direction))
+    }
+
+    /// cos and sin of the widest turn of each: who is slower than usual turns less, and who rests does not turn.
+    #[inline(always)]
+    fn widest_turn<L: Lanes>(&self, ids: &[u32; lanes::MOST], pace: &Pace) -> (L, L) {
+        if self.gaits.is_empty() {
+            return (L::splat(pace.cos_sin.0), L::splat(pace.cos_sin.1));
+        }
+        let mut turns_rad = [0.0; lanes::MOST];
+        for lane in 0..L::N {
+            let speed = self.gaits[ids[lane] as usize].speed_bl_per_s;
+            let share = (speed / self.calibration.cruise_bl_per_s).min(1.0);
+            turns_rad[lane] = share * pace.turn_rad;
+        }
+        (
+            L::from_fn(|lane| libm::cos(turns_rad[lane])),
+            L::from_fn(|lane| libm::sin(turns_rad[lane])),
+        )
+    }
+
+    /// The velocity of each, turned as it was filmed to turn by itself.
+    #[inline(always)]
+    fn turned_as_filmed<L: Lanes>(&self, ids: &[u32; lanes::MOST], velocity: [L; 3]) -> [L; 3] {
+        if self.gaits.is_empty() || !self.tank.is_flat() {
+            return velocity;
+        }
+        let mut turns_rad = [0.0; lanes::MOST];
+        for lane in 0..L::N {
+            turns_rad[lane] = self.step_s * self.gaits[ids[lane] as usize].turn_rad_per_s;
+        }
+        let cos = L::from_fn(|lane| libm::cos(turns_rad[lane]));
+        let sin = L::from_fn(|lane| libm::sin(turns_rad[lane]));
+        let [x, y, z] = velocity;
+        [cos * x - sin * y, sin * x + cos * y, z]
+    }
+
+    /// The velocity at which each gets on: in the direction that it swims in, as fast as it was filmed; in flight at
+    /// least as fast as it would.
+    #[inline(always)]
+    pub(super) fn at_filmed_speed<L: Lanes>(
+        &self,
+        ids: &[u32; lanes::MOST],
+        position: [L; 3],
+        velocity: [L; 3],
+    ) -> [L; 3] {
+        if self.gaits.is_empty() {
+            return velocity;
+        }
+        let filmed = L::from_fn(|lane| self.gaits[ids[lane] as usize].speed_bl_per_s);
+        let flees = self.habitat.flees(position, self.hunter.as_ref());
+        let speed = L::select(flees, filmed.max(norm(velocity)), filmed);
+        scaled(speed, unit(velocity))
     }
 
     /// The error of a course with zones, in each direction.

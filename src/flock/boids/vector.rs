@@ -72,10 +72,9 @@ pub fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 pub fn turned_at_most<L: Lanes>(
     from: [L; 3],
     to: [L; 3],
-    cos_sin: (f64, f64),
+    (cos, sin): (L, L),
     aside: [L; 3],
 ) -> [L; 3] {
-    let (cos, sin) = (L::splat(cos_sin.0), L::splat(cos_sin.1));
     let (speed, u, course) = (norm(to), unit(from), unit(to));
     let along = dot(course, u);
     let turns = L::and(along.less(cos), L::splat(0.0).less(norm(u)));

@@ -5,10 +5,13 @@ use super::graph::Graph;
 use super::steps::Taken;
 use super::violation::Violation;
 use crate::flock::Flock;
+use crate::flock::follow::segments;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
+use crate::flock::params::{Params, Position};
 use crate::flock::plan::cost::{CEILING, Feature, Weights};
 use crate::flock::plan::crowd::{Crowd, Lookalike};
+use crate::flock::plan::segment::future_costs;
 use crate::flock::plan::trellis::Trellis;
 use crate::geometry::Turns;
 use crate::library::Library;
@@ -35,6 +38,10 @@ pub(super) struct Ledger<'a> {
     /// Of each individual, the names of what it shows.
     plans: Vec<Vec<u32>>,
     pub(super) dwell: usize,
+    /// The first frames of what was planned at a time, and the frame after the last.
+    pub(super) segments: Vec<usize>,
+    /// What each state of the graph costs in the long run; none where playback ends.
+    pub(super) future: Vec<Option<u64>>,
 }
 
 /// One individual's costs.
@@ -43,20 +50,22 @@ pub(super) struct Bill {
     wanted: Vec<Feature>,
     /// Whom it should not look like.
     lookalikes: Vec<Vec<Lookalike>>,
-    /// What the plan has cost before each frame is shown, jumps to it included, and at the end.
-    pub(super) before: Vec<u64>,
-    /// What its repeats cost, turns; no part of `before`.
+    /// What the jump to each frame costs, and in a loop to the one after the last; 0 where there is none.
+    jumps: Vec<u64>,
+    /// What the plan costs, its repeats aside, turns.
+    total: u64,
+    /// What its repeats cost, turns.
     pub(super) repetition: u64,
 }
 
 impl Bill {
     pub(super) fn total(&self) -> u64 {
-        self.before.last().copied().unwrap_or(0) + self.repetition
+        self.total + self.repetition
     }
 
-    /// Whether anyone is to be avoided at any time.
-    pub(super) fn has_crowd(&self) -> bool {
-        self.lookalikes.iter().any(|near| !near.is_empty())
+    /// What the jump to a frame costs, turns.
+    pub(super) fn jump_at(&self, t: usize) -> u64 {
+        self.jumps.get(t).copied().unwrap_or(0)
     }
 }
 
@@ -70,7 +79,13 @@ impl<'a> Ledger<'a> {
     ) -> Ledger<'a> {
         let params = &flock.params;
         let weights = Weights::new(&params.matching, library);
-        let trellis = Trellis::new(&library.playback, params.mirror, |_| 0);
+        let dwell = dwell(library, params);
+        let trellis = Trellis::new(
+            &library.playback.without_dead_ends(params.mirror, dwell),
+            params.mirror,
+            |distance| weights.of_jump(distance, library.epsilon),
+        );
+        let future = future_costs(&trellis, dwell);
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let shown = graph.shown().iter();
         let names: Vec<u32> = shown
@@ -82,11 +97,19 @@ impl<'a> Ledger<'a> {
             crowd: Crowd::new(params.matching.w_c, library.poses.fps, length_px),
             features: weights.features(&trellis, &motion_of(library, &Lens::of(library, params))),
             plans: plans.iter().map(named).collect(),
+            future: (names.iter())
+                .map(|&name| future[name as usize].map(u64::from))
+                .collect(),
             names,
-            dwell: params
-                .dwell_frames
-                .map_or(library.clip_frames, |frames| frames as usize)
-                .max(1),
+            dwell,
+            segments: match params.position {
+                Position::Film => segments(
+                    params.frames as usize,
+                    params.matching.segment_frames,
+                    flock.fps,
+                ),
+                _ => vec![0, params.frames as usize],
+            },
             trellis,
             weights,
         }
@@ -95,20 +118,18 @@ impl<'a> Ledger<'a> {
     /// Sums an individual's costs and compares them with what the file says.
     pub(super) fn bill(&self, id: usize, jumps: &[Taken]) -> Result<Bill, Violation> {
         let mut bill = Bill {
-            wanted: self
-                .weights
-                .wanted(&self.flock.individuals[id].boid, self.flock.fps),
+            wanted: self.wanted(id),
             lookalikes: self.lookalikes(id),
-            before: vec![0],
+            jumps: vec![0; self.plans[id].len() + 1],
+            total: 0,
             repetition: self.repetition(id),
         };
         let (mut heading, mut speed, mut crowd, mut total) = (0, 0, 0, 0);
-        let mut jumps_left = jumps.iter().peekable();
+        for jump in jumps {
+            bill.jumps[jump.t] = jump.cost;
+            total += jump.cost;
+        }
         for (t, &name) in self.plans[id].iter().enumerate() {
-            if let Some(jump) = jumps_left.next_if(|jump| jump.t == t) {
-                total += jump.cost;
-                bill.before[t] = total;
-            }
             let [of_heading, of_speed] =
                 (self.weights).of_state(bill.wanted[t], self.features[name as usize]);
             let of_crowd = self.crowd.cost_of(&self.trellis, &bill.lookalikes[t], name);
@@ -117,13 +138,8 @@ impl<'a> Ledger<'a> {
             let price = self.price(bill.wanted[t], name, of_crowd);
             crowd += price - self.price(bill.wanted[t], name, 0);
             total += price;
-            bill.before.push(total);
         }
-        if let (Some(jump), Some(before)) = (jumps_left.next(), bill.before.last_mut()) {
-            // What follows the last frame of a loop.
-            total += jump.cost;
-            *before = total;
-        }
+        bill.total = total;
         let transition = jumps.iter().map(|jump| jump.cost).sum();
         let said = &self.flock.individuals[id].cost;
         for (part, said, found) in [
@@ -147,13 +163,27 @@ impl<'a> Ledger<'a> {
         Ok(bill)
     }
 
+    /// What a boid wants at every frame, each segment by itself.
+    fn wanted(&self, id: usize) -> Vec<Feature> {
+        let boid = &self.flock.individuals[id].boid;
+        let of = |segment: &[usize]| {
+            let boid = boid.part(segment[0]..segment[1]);
+            self.weights.wanted(&boid, self.flock.fps)
+        };
+        self.segments.windows(2).flat_map(of).collect()
+    }
+
     /// Every frame that shows what was shown less than 3 s before costs `w_p`.
     fn repetition(&self, id: usize) -> u64 {
         let plan = &self.plans[id];
         let span = (REPEAT_S * self.flock.fps).round() as usize;
         let is_repeat = |&t: &usize| plan[t.saturating_sub(span - 1)..t].contains(&plan[t]);
         let n_repeats = (0..plan.len()).filter(is_repeat).count() as u64;
-        n_repeats * (self.flock.params.matching.w_p * Turns::PER_RAD).round() as u64
+        n_repeats * self.repeat_cost()
+    }
+
+    fn repeat_cost(&self) -> u64 {
+        (self.flock.params.matching.w_p * Turns::PER_RAD).round() as u64
     }
 
     /// By how much the file says that a plan may be cheaper.
@@ -174,15 +204,35 @@ impl<'a> Ledger<'a> {
         self.flock.individuals[id].cost.exact
     }
 
-    /// What showing each state of the graph costs at frame `t`, turns, with the crowd or without.
-    pub(super) fn row(&self, graph: &Graph, bill: &Bill, t: usize, with_crowd: bool) -> Vec<u64> {
+    /// What showing each state of the graph costs at frame `t` of the segment that begins at `first`, turns: with the crowd and
+    /// what was shown before the segment, or without.
+    pub(super) fn row(
+        &self,
+        graph: &Graph,
+        (id, bill): (usize, &Bill),
+        (first, t): (usize, usize),
+        with_crowd: bool,
+    ) -> Vec<u64> {
         let mut crowd = vec![0; self.names.len()];
         if with_crowd {
             for near in &bill.lookalikes[t] {
                 self.add_lookalike(graph, near, &mut crowd);
             }
         }
-        let price = |(&name, crowd)| self.price(bill.wanted[t], name, crowd);
+        let span = (REPEAT_S * self.flock.fps).round() as usize;
+        let from = (t + 1).saturating_sub(span).min(first);
+        let shown = match with_crowd && self.repeat_cost() > 0 {
+            true => &self.plans[id][from..first],
+            false => &[],
+        };
+        let price = |(&name, crowd)| {
+            let repeat = if shown.contains(&name) {
+                self.repeat_cost()
+            } else {
+                0
+            };
+            self.price(bill.wanted[t], name, crowd) + repeat
+        };
         self.names.iter().zip(crowd).map(price).collect()
     }
 
@@ -219,6 +269,13 @@ impl<'a> Ledger<'a> {
             .map(|t| self.crowd.lookalikes(&individuals[id].boid, others(), t))
             .collect()
     }
+}
+
+/// Least frames between two jumps.
+pub(super) fn dwell(library: &Library, params: &Params) -> usize {
+    let usual = library.clip_frames;
+    let frames = params.dwell_frames.map_or(usual, |frames| frames as usize);
+    frames.max(1)
 }
 
 /// Radians of the file as turns.

@@ -1,8 +1,9 @@
 //! What may follow what, read straight off the library: states are (frame of the component, mirror side),
 //! edges are "the next frame" and every jump on every side. Nothing here is sorted for speed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use super::cost::dwell;
 use crate::flock::Flock;
 use crate::flock::plan::cost::Weights;
 use crate::library::Library;
@@ -27,6 +28,25 @@ pub(super) struct Graph {
     costs: BTreeMap<(usize, usize), u64>,
     /// Both sides may be shown.
     pub(super) mirror: bool,
+}
+
+/// Drops the jumps after which playback ends: a dwell on there is no frame, or no jump left to take.
+fn drop_dead_ends(costs: &mut BTreeMap<(usize, usize), u64>, next: &[Option<usize>], dwell: usize) {
+    loop {
+        let leaving: BTreeSet<usize> = costs.keys().map(|&(from, _)| from).collect();
+        let run = |state: usize| std::iter::successors(Some(state), |&state| next[state]);
+        let goes_on = |&to: &usize| {
+            let after_dwell = run(to).nth(dwell - 1);
+            after_dwell.is_some_and(|state| run(state).any(|state| leaving.contains(&state)))
+        };
+        let targets: BTreeSet<usize> = costs.keys().map(|&(_, to)| to).collect();
+        let live: BTreeSet<usize> = targets.into_iter().filter(goes_on).collect();
+        let n_before = costs.len();
+        costs.retain(|(_, to), _| live.contains(to));
+        if costs.len() == n_before {
+            return;
+        }
+    }
 }
 
 impl Graph {
@@ -54,11 +74,13 @@ impl Graph {
                 }
             }
         }
+        let next: Vec<Option<usize>> = states
+            .iter()
+            .map(|&(frame, side)| at(frame + 1, side))
+            .collect();
+        drop_dead_ends(&mut costs, &next, dwell(library, &flock.params));
         Graph {
-            next: states
-                .iter()
-                .map(|&(frame, side)| at(frame + 1, side))
-                .collect(),
+            next,
             jumps: (costs.iter())
                 .map(|(&(from, to), &cost)| Edge { from, to, cost })
                 .collect(),

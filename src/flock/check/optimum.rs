@@ -17,7 +17,7 @@ const NEVER: u64 = u64::MAX / 4;
 /// W at one frame: `[k - 1][state]`.
 type Column = Vec<Vec<u64>>;
 
-/// Checks that the plan is the cheapest, if it claims so, and that its lower bound is one. Returns how
+/// Checks that the plan of every segment is the cheapest, if they claim so, and that its lower bound is one. Returns how
 /// many edges were looked at.
 pub(super) fn check(
     graph: &Graph,
@@ -33,44 +33,40 @@ pub(super) fn check(
         id,
         n_edges: 0,
     };
-    let n_frames = bill.before.len() - 1;
     let since_start = if ends.is_some() { 1 } else { ledger.dwell };
     let since = since_jump(graph, (since_start, ledger.dwell), states);
-    // What the plan costs if from each frame on it goes the cheapest way.
-    let mut at_best = vec![0; n_frames];
-    let row = |t: usize| ledger.row(graph, bill, t, true);
-    let cheapest = search.cheapest((n_frames, ends), row, |t, column| {
-        at_best[t] = bill.before[t] + column[since[t] - 1][states[t]];
-    })?;
-    let left_at = at_best.iter().position(|&cost| cost > cheapest);
-    if let Some(t) = left_at.filter(|_| ledger.is_exact(id)) {
-        return Err(Violation::Suboptimal {
-            id,
-            t,
-            cost: bill.total(),
-            cheapest,
-        });
+    let (mut cheapest, mut alone, mut expected) = (0, 0, 0);
+    for segment in ledger.segments.windows(2) {
+        let (first, end) = (segment[0], segment[1]);
+        let part = Part {
+            first,
+            end,
+            start: (first > 0).then(|| (states[first - 1], since[first - 1])),
+            ends,
+            future: (end < states.len()).then_some(&ledger.future[..]),
+        };
+        cheapest += search.check(&part, ledger, bill, (states, &since))?;
+        expected += part.beyond(states[end - 1]);
+        let open = Part {
+            ends: None,
+            future: None,
+            ..part
+        };
+        let row = |t: usize| ledger.row(graph, (id, bill), (first, t), false);
+        alone += search.cheapest(&open, row, |_, _, _| {})?;
     }
     let gap = ledger.gap(id)?;
     if ledger.is_exact(id) != (gap == 0) {
         return Err(Violation::Exact { id, gap });
     }
-    if bill.total() > cheapest + gap {
-        let found = bill.total() - cheapest;
+    let found = bill.total() + expected;
+    if found > cheapest + gap {
         return Err(Violation::Gap {
             id,
             said: gap,
-            found,
+            found: found - cheapest,
         });
     }
-    let alone = match bill.has_crowd() || ends.is_some() {
-        true => search.cheapest(
-            (n_frames, None),
-            |t| ledger.row(graph, bill, t, false),
-            |_, _| {},
-        )?,
-        false => cheapest,
-    };
     let said = ledger.lower_bound(id)?;
     match said > alone {
         true => Err(Violation::LowerBound {
@@ -80,6 +76,19 @@ pub(super) fn check(
         }),
         false => Ok(search.n_edges),
     }
+}
+
+/// What is planned at a time.
+#[derive(Clone, Copy)]
+struct Part<'a> {
+    first: usize,
+    end: usize,
+    /// The state before it, and the frames since the last jump.
+    start: Option<(usize, usize)>,
+    /// In a loop the state that it must begin with, and the one that comes after it.
+    ends: Option<(usize, usize)>,
+    /// What is expected after it, by state.
+    future: Option<&'a [Option<u64>]>,
 }
 
 /// Frames since the last jump, 1 on its own frame; never above the dwell.
@@ -101,41 +110,106 @@ struct Search<'a> {
     n_edges: u64,
 }
 
+impl Part<'_> {
+    /// What is expected after it when it ends with a state.
+    fn beyond(&self, state: usize) -> u64 {
+        self.future.and_then(|future| future[state]).unwrap_or(0)
+    }
+}
+
 impl Search<'_> {
-    /// What the cheapest plan costs, every edge looked at; `on_column` is shown W from the last frame to
-    /// the first. `ends`: the state that it must begin with, and the one that comes after it.
+    /// Checks that the plan of a part is the cheapest, if it claims so; what the cheapest costs with what is expected after it.
+    fn check(
+        &mut self,
+        part: &Part<'_>,
+        ledger: &Ledger<'_>,
+        bill: &Bill,
+        (states, since): (&[usize], &[usize]),
+    ) -> Result<u64, Violation> {
+        let (first, end, id) = (part.first, part.end, self.id);
+        let graph = self.graph;
+        let row = |t: usize| ledger.row(graph, (id, bill), (first, t), true);
+        // What the plan costs if from each frame on it goes the cheapest way, and what each frame costs.
+        let mut at_best = vec![0; end - first];
+        let mut shown = vec![0; end - first];
+        let least = self.cheapest(part, row, |t, costs, column| {
+            at_best[t - first] = column[since[t] - 1][states[t]];
+            shown[t - first] = costs[states[t]];
+        })?;
+        let mut spent = bill.jump_at(first);
+        let mut left_at = None;
+        for t in first..end {
+            if spent + at_best[t - first] > least {
+                left_at = left_at.or(Some(t));
+            }
+            spent += shown[t - first];
+            // In a loop a jump may lead to what comes after the last frame.
+            if t + 1 < end || part.ends.is_some() {
+                spent += bill.jump_at(t + 1);
+            }
+        }
+        match left_at.filter(|_| ledger.is_exact(id)) {
+            Some(t) => Err(Violation::Suboptimal {
+                id,
+                t,
+                cost: spent + part.beyond(states[end - 1]),
+                cheapest: least,
+            }),
+            None => Ok(least),
+        }
+    }
+
+    /// What the cheapest plan of a part costs with what is expected after it, every edge looked at; `on_column` is shown what
+    /// each state costs and W, from the last frame to the first.
     fn cheapest(
         &mut self,
-        (n_frames, ends): (usize, Option<(usize, usize)>),
+        part: &Part<'_>,
         row: impl Fn(usize) -> Vec<u64>,
-        mut on_column: impl FnMut(usize, &Column),
+        mut on_column: impl FnMut(usize, &[u64], &Column),
     ) -> Result<u64, Violation> {
-        let mut after: Column = vec![row(n_frames - 1); self.dwell];
-        let mut n_open = n_frames;
-        match ends {
+        let last = part.end - 1;
+        let costs = row(last);
+        let mut n_open = part.end;
+        let mut after: Column;
+        match part.ends {
             None => {
-                on_column(n_frames - 1, &after);
+                let beyond = |state: usize| part.future.map_or(Some(0), |future| future[state]);
+                let ended = (costs.iter().enumerate())
+                    .map(|(state, &cost)| beyond(state).map_or(NEVER, |beyond| cost + beyond));
+                after = vec![ended.collect(); self.dwell];
+                on_column(last, &costs, &after);
                 n_open -= 1;
             }
             Some((_, next)) => {
+                after = vec![vec![NEVER; costs.len()]; self.dwell];
                 for after in &mut after {
-                    after.fill(NEVER);
                     after[next] = 0;
                 }
             }
         }
-        for t in (0..n_open).rev() {
+        for t in (part.first..n_open).rev() {
             let costs = row(t);
             let now = self.fill(&costs, &after);
             self.certify(t, &costs, &now, &after)?;
-            on_column(t, &now);
+            on_column(t, &costs, &now);
             after = now;
         }
-        if let Some((first, _)) = ends {
+        if let Some((first, _)) = part.ends {
             return Ok(after[0][first]);
         }
-        let starts = after.last().into_iter().flatten();
-        Ok(starts.copied().min().unwrap_or(NEVER))
+        let Some((state, since)) = part.start else {
+            let starts = after.last().into_iter().flatten();
+            return Ok(starts.copied().min().unwrap_or(NEVER));
+        };
+        let goes_on = self.graph.next[state];
+        let mut least = goes_on.map_or(NEVER, |next| after[since.min(self.dwell - 1)][next]);
+        if since >= self.dwell {
+            let jumps = self.graph.jumps.iter().filter(|jump| jump.from == state);
+            least = jumps.fold(least, |least, jump| {
+                least.min(jump.cost + after[0][jump.to])
+            });
+        }
+        Ok(least)
     }
 
     /// W at a frame from W at the next.

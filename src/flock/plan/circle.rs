@@ -106,7 +106,7 @@ impl Planner<'_> {
             rows,
             asked,
             n_frames: self.places.len(),
-            dwell: self.dwell,
+            dwell: self.model.dwell,
         }
     }
 
@@ -153,8 +153,8 @@ impl Planner<'_> {
 
     /// The states that are jumped to, by what the cheapest plan that begins with each costs.
     fn beginnings(&self, wanted: &[Feature]) -> Vec<u32> {
-        let costs = self.costs_before(wanted, &vec![0; self.trellis.n_states()]);
-        let mut targets = self.trellis.targets().to_vec();
+        let costs = self.costs_before(wanted, &vec![0; self.model.trellis.n_states()]);
+        let mut targets = self.model.trellis.targets().to_vec();
         targets.sort_by_key(|&target| costs[target as usize]);
         targets
     }
@@ -162,7 +162,7 @@ impl Planner<'_> {
     /// The cheapest that each of a circle can begin with, each the heir of the one before, when the first
     /// of them begins with `first` and the last leads back to that; `None` if none does.
     fn circle(&self, first: u32, wanted: &[&[Feature]]) -> Option<Vec<u32>> {
-        let mut back = vec![FORBIDDEN; self.trellis.n_states()];
+        let mut back = vec![FORBIDDEN; self.model.trellis.n_states()];
         back[first as usize] = 0;
         let mut then = vec![back];
         for wanted in wanted.iter().rev() {

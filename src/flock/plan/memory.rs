@@ -19,7 +19,8 @@ pub const N_REPLANS: usize = 3;
 pub struct Memory {
     /// Turns for every frame shown again.
     pub cost: u32,
-    span_frames: usize,
+    /// Shown again within so many frames is a repeat.
+    pub span_frames: usize,
 }
 
 /// A frame shown again.
@@ -67,10 +68,37 @@ impl Memory {
 
     /// What a plan's repeats cost, turns.
     pub fn cost_of<State: std::hash::Hash + Eq + Copy>(&self, states: &[State]) -> u32 {
-        match self.cost {
-            0 => 0,
-            cost => cost * self.repeats(states).len() as u32,
+        self.cost_after(&[], states, 0)
+    }
+
+    /// What the repeats of `states` cost, turns, but for those among its first `n_before`, when `before` was shown just
+    /// before.
+    pub fn cost_after<State: std::hash::Hash + Eq + Copy>(
+        &self,
+        before: &[State],
+        states: &[State],
+        n_before: usize,
+    ) -> u32 {
+        if self.cost == 0 {
+            return 0;
         }
+        let repeats = self.repeats(&[before, states].concat());
+        let is_new = |repeat: &&Repeat| repeat.t >= before.len() + n_before;
+        self.cost * repeats.iter().filter(is_new).count() as u32
+    }
+
+    /// By state, the frame of a segment before which showing it repeats what was shown before; its frame 0 is when the
+    /// last of `shown` was.
+    pub fn repeated_until(&self, shown: &[u32], n_states: usize) -> Vec<u16> {
+        let mut until = vec![0; n_states];
+        for (ago, &state) in shown.iter().rev().enumerate() {
+            let end = self
+                .span_frames
+                .saturating_sub(ago)
+                .min(usize::from(u16::MAX));
+            until[state as usize] = until[state as usize].max(end as u16);
+        }
+        until
     }
 
     /// Nothing is dearer yet.

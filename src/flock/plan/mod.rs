@@ -7,24 +7,26 @@ pub mod circle;
 pub mod cost;
 pub mod crowd;
 mod fill;
-pub mod horizon;
 pub mod landings;
 #[cfg(target_arch = "x86_64")]
 mod lanes;
 pub mod memory;
 mod round;
 mod rows;
+pub mod segment;
 pub mod trellis;
 pub mod viterbi;
+
+use std::ops::AddAssign;
 
 use rayon::prelude::*;
 
 use self::circle::Ends;
 use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Places, Settled};
-use self::horizon::Horizon;
 use self::memory::Memory;
 use self::round::Round;
+use self::segment::{Standing, future_costs};
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path, Shelf};
 use super::error::Error;
@@ -36,13 +38,65 @@ use crate::geometry::Turns;
 use crate::library::Library;
 use crate::progress::Progress;
 
-/// What one individual shows, and what that costs.
-#[derive(Clone, Debug, PartialEq)]
+/// What one individual shows in some frames, and what that costs.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// Source frame and mirror side at every output frame.
-    pub shown: Vec<(u32, bool)>,
-    /// What it costs.
-    pub cost: PlanCost,
+    /// States, one for each frame.
+    pub states: Vec<u32>,
+    /// What they cost.
+    pub cost: Spent,
+}
+
+impl Plan {
+    /// Goes on with another.
+    pub fn append(&mut self, later: Plan) {
+        self.states.extend(later.states);
+        self.cost += later.cost;
+    }
+}
+
+/// What a plan costs, in its parts; turns.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Spent {
+    heading: u64,
+    speed: u64,
+    transition: u64,
+    crowd: u64,
+    repetition: u64,
+    total: u64,
+    lower_bound: u64,
+    gap: u64,
+}
+
+impl AddAssign for Spent {
+    fn add_assign(&mut self, other: Spent) {
+        self.heading += other.heading;
+        self.speed += other.speed;
+        self.transition += other.transition;
+        self.crowd += other.crowd;
+        self.repetition += other.repetition;
+        self.total += other.total;
+        self.lower_bound += other.lower_bound;
+        self.gap += other.gap;
+    }
+}
+
+impl Spent {
+    /// As files tell it.
+    pub fn told(&self) -> PlanCost {
+        let rad = |turns: u64| rounded(turns as f64 / Turns::PER_RAD, 6);
+        PlanCost {
+            total: rad(self.total),
+            heading: rad(self.heading),
+            speed: rad(self.speed),
+            transition: rad(self.transition),
+            crowd: rad(self.crowd),
+            repetition: rad(self.repetition),
+            lower_bound: rad(self.lower_bound),
+            gap: rad(self.gap),
+            exact: self.gap == 0,
+        }
+    }
 }
 
 /// The best path found for one individual.
@@ -52,13 +106,15 @@ struct Found {
     path: Path,
     /// What its repeats cost, turns.
     repetition: u32,
-    /// What no path costs less than, turns.
+    /// What is expected to come after its last frame, turns.
+    beyond: u32,
+    /// What no path costs less than, with all that, turns.
     least: u32,
 }
 
 impl Found {
     fn cost(&self) -> u32 {
-        self.path.cost + self.repetition
+        self.path.cost + self.repetition + self.beyond
     }
 
     /// Becomes another where that costs less.
@@ -66,13 +122,19 @@ impl Found {
         if other.cost() < self.cost() {
             self.path = other.path.clone();
             self.repetition = other.repetition;
+            self.beyond = other.beyond;
         }
     }
 }
 
-/// Everything that plans are computed from.
-pub struct Planner<'a> {
-    trellis: Trellis,
+/// What plans are made of, whoever follows whom: a library's playback and its prices.
+pub struct Model {
+    /// What may follow what.
+    pub trellis: Trellis,
+    /// What playback costs in the long run from every state on, turns; `None` where it ends.
+    pub future: Vec<Option<u32>>,
+    /// Least frames between two jumps.
+    pub dwell: usize,
     weights: Weights,
     /// By state.
     features: Vec<Feature>,
@@ -80,61 +142,112 @@ pub struct Planner<'a> {
     memory: Memory,
     /// The states that look like each state.
     alike: Vec<[u32; 2]>,
-    /// By frame, where each boid is.
-    places: Vec<Places>,
-    dwell: usize,
     fps: f64,
     shelf: Shelf,
-    /// How far plans look ahead; to the end, when absent.
-    horizon: Option<Horizon>,
-    boids: &'a [BoidTrack],
-    /// Of each individual, in a loop.
-    ends: Vec<Ends>,
 }
 
-impl<'a> Planner<'a> {
-    /// Lays out the library's playback for the plan of `boids`.
-    pub fn new(
-        library: &Library,
-        motion: &[FrameMotion],
-        boids: &'a [BoidTrack],
-        params: &Params,
-    ) -> Planner<'a> {
+impl Model {
+    /// Lays out the library's playback.
+    pub fn new(library: &Library, motion: &[FrameMotion], params: &Params) -> Model {
         let weights = Weights::new(&params.matching, library);
-        let trellis = Trellis::new(&library.playback, params.mirror, |distance| {
+        let dwell = params
+            .dwell_frames
+            .map_or(library.clip_frames, |frames| frames as usize)
+            .max(1);
+        let playback = library.playback.without_dead_ends(params.mirror, dwell);
+        let trellis = Trellis::new(&playback, params.mirror, |distance| {
             weights.of_jump(distance, library.epsilon)
         });
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let crowd = Crowd::new(params.matching.w_c, fps, length_px);
-        let features = weights.features(&trellis, motion);
-        let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
-        let place = |t| boids.iter().map(|boid| crowd.place(boid, t)).collect();
-        let dwell = params
-            .dwell_frames
-            .map_or(library.clip_frames, |frames| frames as usize)
-            .max(1);
-        let horizon = params.matching.horizon_frames;
-        Planner {
-            features,
+        Model {
+            features: weights.features(&trellis, motion),
             alike: crowd.alike(&trellis),
-            places: (0..n_frames).map(place).collect(),
             crowd,
             memory: Memory::new(params.matching.w_p, fps),
-            horizon: horizon.map(|n| Horizon::new(n as usize, &trellis, dwell)),
+            future: future_costs(&trellis, dwell),
             dwell,
             trellis,
             weights,
             fps,
             shelf: Shelf::default(),
+        }
+    }
+
+    /// The frames and mirror sides of states.
+    pub fn shown(&self, states: &[u32]) -> Vec<(u32, bool)> {
+        let shown = states.iter();
+        shown
+            .filter_map(|&state| self.trellis.shown(state as usize))
+            .collect()
+    }
+
+    /// What pointing as in a state costs a boid at the first frame of its track; turns.
+    pub fn heading_cost(&self, boid: &BoidTrack, state: usize) -> u32 {
+        let wanted = self.weights.wanted(boid, self.fps)[0];
+        self.weights.of_state(wanted, self.features[state])[0]
+    }
+
+    /// How many of the frames shown last matter to what follows.
+    pub fn n_remembered(&self) -> usize {
+        self.memory.span_frames
+    }
+}
+
+/// Everything that the plans of some frames are computed from.
+pub struct Planner<'a> {
+    model: &'a Model,
+    /// By frame, where each boid is.
+    places: Vec<Places>,
+    boids: &'a [BoidTrack],
+    /// Where each has come to; none at the beginning of a film. With them the first frame is the last of those before.
+    standings: &'a [Standing],
+    /// Nothing comes after these frames.
+    is_last: bool,
+    /// Of each individual, in a loop.
+    ends: Vec<Ends>,
+}
+
+impl<'a> Planner<'a> {
+    /// For a whole film.
+    pub fn new(model: &'a Model, boids: &'a [BoidTrack]) -> Planner<'a> {
+        Planner::of_segment(model, boids, &[], true)
+    }
+
+    /// For a segment of a film in which everyone goes on from where it stands; `boids`: their tracks in the segment alone.
+    pub fn of_segment(
+        model: &'a Model,
+        boids: &'a [BoidTrack],
+        standings: &'a [Standing],
+        is_last: bool,
+    ) -> Planner<'a> {
+        let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
+        let place = |t| {
+            boids
+                .iter()
+                .map(|boid| model.crowd.place(boid, t))
+                .collect()
+        };
+        let before = (!standings.is_empty()).then_some(0);
+        Planner {
+            model,
+            places: before.into_iter().chain(0..n_frames).map(place).collect(),
             boids,
+            standings,
+            is_last,
             ends: Vec::new(),
         }
     }
 
+    /// Frames before the first that is planned.
+    fn n_before(&self) -> usize {
+        usize::from(!self.standings.is_empty())
+    }
+
     /// The plans of all boids, by id, the last frame of each played into the first of the heir it has.
     pub fn plan_loop(mut self, heirs: &[u32], progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
-        if self.places.len() <= self.dwell {
+        if self.places.len() <= self.model.dwell {
             return Err(Error::LoopDoesNotClose(self.places.len()));
         }
         let wanted = self.wanted();
@@ -149,15 +262,18 @@ impl<'a> Planner<'a> {
     }
 
     fn wanted(&self) -> Vec<Vec<Feature>> {
+        let before = vec![Feature::default(); self.n_before()];
         (self.boids.par_iter())
-            .map(|boid| self.weights.wanted(boid, self.fps))
+            .map(|boid| {
+                let wanted = self.model.weights.wanted(boid, self.model.fps);
+                before.iter().copied().chain(wanted).collect()
+            })
             .collect()
     }
 
     /// The plans of all boids, by id, each the cheapest among those that it looks out for; meanwhile
     /// what each would cost alone.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
-        progress.report("planning", 0.0);
         let wanted = self.wanted();
         let mut settled = Settled::new(self.places.len());
         let (paths, bounds) = rayon::join(
@@ -183,15 +299,14 @@ impl<'a> Planner<'a> {
                 return Err(Error::Cancelled);
             }
             let first = paths.len();
-            let n_watched = self.crowd.n_watched(first);
-            let alike = |id: &usize| self.crowd.n_watched(*id) == n_watched;
+            let n_watched = self.model.crowd.n_watched(first);
+            let alike = |id: &usize| self.model.crowd.n_watched(*id) == n_watched;
             let end = first + (first..wanted.len()).take_while(alike).count();
             let round = self.round(wanted, first, end).paths(settled)?;
             for found in &round {
-                settled.push(self.film_of(&found.path), &self.alike);
+                settled.push(self.film_of(&found.path), &self.model.alike);
             }
             paths.extend(round);
-            progress.report("planning", paths.len() as f64 / wanted.len() as f64);
         }
         Ok(paths)
     }
@@ -207,70 +322,82 @@ impl<'a> Planner<'a> {
 
     fn film(&self) -> Film<'_> {
         Film {
-            trellis: &self.trellis,
+            trellis: &self.model.trellis,
             n_frames: self.places.len() + usize::from(!self.ends.is_empty()),
-            dwell: self.dwell,
+            dwell: self.model.dwell,
             cpu: Level::detect(),
-            shelf: &self.shelf,
+            shelf: &self.model.shelf,
         }
     }
 
     /// The plan with its cost in parts, summed anew from the states; what is left of the path's cost is
     /// the crowd's.
     fn costed(&self, found: &Found, wanted: &[Feature], lower_bound: u32) -> Plan {
-        let path = &found.path;
+        let (path, n_before) = (&found.path, self.n_before());
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
-        let states = self.film_of(path);
-        for (&wanted, &state) in wanted.iter().zip(states) {
-            let feature = self.features[state as usize];
-            let [h, s] = self.weights.of_state(wanted, feature);
-            heading += h;
-            speed += s;
-            alone += self.weights.total(wanted, feature);
+        let states = &self.film_of(path)[n_before..];
+        for (&wanted, &state) in wanted[n_before..].iter().zip(states) {
+            let feature = self.model.features[state as usize];
+            let [h, s] = self.model.weights.of_state(wanted, feature);
+            heading += u64::from(h);
+            speed += u64::from(s);
+            alone += self.model.weights.total(wanted, feature);
         }
         let transition = self.transition_cost(path);
-        let rad = |turns: u32| rounded(f64::from(turns) / Turns::PER_RAD, 6);
         Plan {
-            shown: states
-                .iter()
-                .filter_map(|&state| self.trellis.shown(state as usize))
-                .collect(),
-            cost: PlanCost {
-                total: rad(found.cost()),
-                heading: rad(heading),
-                speed: rad(speed),
-                transition: rad(transition),
-                crowd: rad(path.cost - alone - transition),
-                repetition: rad(found.repetition),
-                lower_bound: rad(lower_bound),
-                gap: rad(found.cost() - found.least),
-                exact: found.cost() == found.least,
+            states: states.to_vec(),
+            cost: Spent {
+                heading,
+                speed,
+                transition: u64::from(transition),
+                crowd: u64::from(path.cost - alone - transition),
+                repetition: u64::from(found.repetition),
+                total: u64::from(path.cost + found.repetition),
+                lower_bound: u64::from(lower_bound),
+                gap: u64::from(found.cost() - found.least),
             },
         }
     }
 
-    /// A path that is the cheapest but for its repeats.
-    fn found(&self, path: Path) -> Found {
+    /// A path that is the cheapest but for what it repeats of itself: `path.cost` counts what it repeats of the frames
+    /// before, and what is expected after it.
+    fn found(&self, id: usize, (wanted, settled): (&[Feature], &Settled), path: Path) -> Found {
+        let least = path.cost;
+        let states = self.film_of(&path);
+        let last = states[states.len() - 1] as usize;
+        let future = self.model.future[last].filter(|_| !self.is_last);
+        let before = match self.standings.get(id) {
+            Some(standing) => &standing.shown[..standing.shown.len() - 1],
+            None => &[],
+        };
         Found {
-            repetition: self.memory.cost_of(self.film_of(&path)),
-            least: path.cost,
-            path,
+            repetition: self
+                .model
+                .memory
+                .cost_after(before, states, self.n_before()),
+            beyond: future.unwrap_or(0),
+            least,
+            path: Path {
+                cost: self.cost_among(id, wanted, settled, &path),
+                states: path.states,
+            },
         }
     }
 
     /// What a path costs among those settled, its repeats aside, turns.
     fn cost_among(&self, id: usize, wanted: &[Feature], settled: &Settled, path: &Path) -> u32 {
-        let n_watched = self.crowd.n_watched(id);
+        let model = self.model;
+        let n_watched = model.crowd.n_watched(id);
         let mut cost = self.transition_cost(path);
-        for (t, &state) in self.film_of(path).iter().enumerate() {
+        for (t, &state) in self.film_of(path).iter().enumerate().skip(self.n_before()) {
             let places = &self.places[t];
             let of_one = |other: usize| {
-                let [first, end] = self.alike[settled.at(t)[other] as usize];
+                let [first, end] = model.alike[settled.at(t)[other] as usize];
                 let is_alike = (first..end).contains(&state);
-                is_alike.then(|| self.crowd.cost_at(places.of(id), places.of(other)))
+                is_alike.then(|| model.crowd.cost_at(places.of(id), places.of(other)))
             };
             let crowd: u32 = (0..n_watched).filter_map(of_one).sum();
-            let alone = (self.weights).total(wanted[t], self.features[state as usize]);
+            let alone = (model.weights).total(wanted[t], model.features[state as usize]);
             cost += (alone + crowd).min(CEILING - 1);
         }
         cost
@@ -285,14 +412,9 @@ impl<'a> Planner<'a> {
     fn transition_cost(&self, path: &Path) -> u32 {
         let steps = path.states.windows(2);
         let jumps = steps.filter(|step| step[1] != step[0] + 1);
-        jumps.map(|step| self.jump_cost(step[0], step[1])).sum()
-    }
-
-    fn jump_cost(&self, from: u32, to: u32) -> u32 {
-        let k = self.trellis.targets().binary_search(&to);
-        let sources = k.map_or(&[][..], |k| self.trellis.sources(k));
-        let at = sources.binary_search_by_key(&from, |source| source.0);
-        at.map_or(0, |at| sources[at].1)
+        jumps
+            .map(|step| self.model.trellis.jump_cost(step[0], step[1]))
+            .sum()
     }
 }
 

@@ -3,12 +3,13 @@
 
 use rayon::prelude::*;
 
-use super::circle::{Asked, Closed, Then};
+use super::circle::{Asked, Closed, FORBIDDEN, Then};
 use super::cost::Feature;
 use super::crowd::Settled;
 use super::memory::N_REPLANS;
 use super::rows::{Alone, InCrowd};
-use super::viterbi::{Film, Path};
+use super::segment::Begun;
+use super::viterbi::Film;
 use super::{Found, Planner};
 use crate::flock::error::Error;
 use crate::progress::Progress;
@@ -31,18 +32,22 @@ impl Round<'_> {
             .collect()
     }
 
-    /// What the cheapest path of each costs alone, turns.
+    /// What the cheapest path of each costs alone, and nothing expected after it; turns.
     pub(super) fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         let planner = self.planner;
         let open = Film {
             n_frames: planner.places.len(),
             ..planner.film()
         };
-        let least = |wanted: &Vec<Feature>| match progress.cancelled() {
-            true => Err(Error::Cancelled),
-            false => (open.least_cost(&mut Alone { planner, wanted })).ok_or(Error::NoTransitions),
+        let least = |(idx, wanted): (usize, &Vec<Feature>)| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let rows = Alone { planner, wanted };
+            let mut rows = self.begun(self.first + idx, rows);
+            (open.least_cost(&mut rows)).ok_or(Error::NoTransitions)
         };
-        self.wanted.par_iter().map(least).collect()
+        self.wanted.par_iter().enumerate().map(least).collect()
     }
 
     /// In a loop, the costs of plans that begin and go on as they must.
@@ -55,44 +60,61 @@ impl Round<'_> {
         self.planner.closed(rows, asked)
     }
 
+    /// The costs of plans that go on from where each stands.
+    fn begun<'b, R>(&self, id: usize, rows: R) -> Begun<'b, R> {
+        let standing = self.planner.standings.get(id);
+        Begun {
+            rows,
+            from: standing.and_then(|standing| Some((standing.state()?, standing.held))),
+            repeats: None,
+            n_frames: self.planner.places.len(),
+            future: None,
+        }
+    }
+
     fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Found, Error> {
-        let (planner, memory) = (self.planner, self.planner.memory);
+        let planner = self.planner;
+        let (model, memory) = (planner.model, planner.model.memory);
         let n_frames = planner.places.len();
         let (film, ends) = (planner.film(), planner.ends.get(id).copied());
+        let shown = planner.standings.get(id).filter(|_| memory.cost > 0);
+        let repeated = shown.map(|s| memory.repeated_until(&s.shown, model.trellis.n_states()));
         let rows = InCrowd::new(planner, settled, id, wanted);
-        let open = self.closed(id, rows.clone());
-        if let Some(horizon) = &planner.horizon {
-            let least = film.least_cost(&mut open.clone());
-            let plan = horizon.path(&film, &open).zip(least);
-            let (states, least) = plan.ok_or(Error::NoTransitions)?;
-            let mut path = Path { states, cost: 0 };
-            path.cost = planner.cost_among(id, wanted, settled, &path);
-            return Ok(Found {
-                least,
-                ..planner.found(path)
+        let found = |rows: InCrowd<'_>| {
+            let costs = Begun {
+                repeats: repeated.as_deref().map(|until| (until, memory.cost)),
+                future: (!planner.is_last).then_some(&model.future[..]),
+                ..self.begun(id, self.closed(id, rows))
+            };
+            let path = film.cheapest_path(&costs)?;
+            let is_closed = ends.is_none_or(|ends| ends.holds(&path.states));
+            let is_open = path.cost < FORBIDDEN;
+            Some((
+                planner.found(id, (wanted, settled), path),
+                is_closed && is_open,
+            ))
+        };
+        let (mut last, holds) = found(rows.clone()).ok_or(Error::NoTransitions)?;
+        if !holds {
+            return Err(match ends {
+                Some(_) => Error::LoopDoesNotClose(n_frames),
+                None => Error::NoTransitions,
             });
         }
-        let path = film.cheapest_path(&open).ok_or(Error::NoTransitions)?;
-        let is_closed = |path: &Path| ends.is_none_or(|ends| ends.holds(&path.states));
-        if !is_closed(&path) {
-            return Err(Error::LoopDoesNotClose(n_frames));
-        }
-        let mut last = planner.found(path);
-        let mut found = last.clone();
+        let mut best = last.clone();
         let mut raised = memory.nothing_raised(n_frames);
         for _ in 0..N_REPLANS {
-            if last.repetition == 0 {
+            let states = planner.film_of(&last.path);
+            if memory.cost == 0 || memory.repeats(states).is_empty() {
                 break;
             }
-            memory.raise(&mut raised, planner.film_of(&last.path));
-            let dearer = self.closed(id, rows.clone().raised(&raised));
-            let path = film.cheapest_path(&dearer).ok_or(Error::NoTransitions)?;
-            last = planner.found(path);
-            if is_closed(&last.path) {
-                last.path.cost = planner.cost_among(id, wanted, settled, &last.path);
-                found.keep_cheaper(&last);
+            memory.raise(&mut raised, states);
+            let holds;
+            (last, holds) = found(rows.clone().raised(&raised)).ok_or(Error::NoTransitions)?;
+            if holds {
+                best.keep_cheaper(&last);
             }
         }
-        Ok(found)
+        Ok(best)
     }
 }

@@ -26,7 +26,7 @@ impl Rows for Alone<'_> {
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         let wanted = |t: usize| self.wanted.get(t).copied().unwrap_or_default();
         let (wanted, planner) = (block.times.map(wanted), self.planner);
-        (planner.weights).fill(&wanted, &planner.features, (block, first), out);
+        (planner.model.weights).fill(&wanted, &planner.model.features, (block, first), out);
     }
 }
 
@@ -53,7 +53,7 @@ impl<'a> InCrowd<'a> {
             settled,
             id,
             raised: None,
-            added: Added::new(planner.trellis.n_states()),
+            added: Added::new(planner.model.trellis.n_states()),
         }
     }
 
@@ -70,7 +70,7 @@ impl<'a> InCrowd<'a> {
         self.added.clear();
         let planner = self.alone.planner;
         let moments = block.moments(planner.places.len());
-        let n_watched = planner.crowd.n_watched(self.id);
+        let n_watched = planner.model.crowd.n_watched(self.id);
         for first in (0..n_watched).step_by(TOGETHER) {
             self.gather_some(&moments, first..n_watched.min(first + TOGETHER));
         }
@@ -95,7 +95,7 @@ impl<'a> InCrowd<'a> {
                 &planner.places[moments.frame(moment)],
                 (self.id, others.clone()),
             );
-            planner.crowd.costs_at(pair, places, moment, costs);
+            planner.model.crowd.costs_at(pair, places, moment, costs);
         }
         for (other, costs) in others.zip(costs) {
             if *costs == [0; FRAMES] {
@@ -104,7 +104,7 @@ impl<'a> InCrowd<'a> {
             let mut moment = moments.range.start;
             while moment < moments.range.end {
                 let t = moments.frame(moment);
-                let alike = planner.alike[self.settled.at(t)[other] as usize];
+                let alike = planner.model.alike[self.settled.at(t)[other] as usize];
                 let n_steady = usize::from(self.settled.steady_at(t)[other]);
                 let n = n_steady.min(moments.range.end - moment);
                 (self.added).add(alike, moment, &costs[moment..moment + n]);

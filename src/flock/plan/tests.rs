@@ -1,9 +1,10 @@
 //! Plans of whole flocks: their certificates, and their cost told from the outside.
 
 use super::*;
+use crate::flock::follow::segments;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
-use crate::flock::params::MatchBy;
+use crate::flock::params::{MatchBy, Position};
 use crate::flock::plan::landings::Way;
 use crate::flock::plan::viterbi::{Block, FRAMES, Rows};
 use crate::flock::synthetic;
@@ -38,7 +39,16 @@ fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
     let features = weights.features(&trellis, &motion);
     let individual = &flock.individuals[id];
     let boid = &individual.boid;
-    let wanted = weights.wanted(boid, flock.fps);
+    let of_segment = |segment: &[usize]| {
+        let boid = boid.part(segment[0]..segment[1]);
+        weights.wanted(&boid, flock.fps)
+    };
+    let n_frames = flock.params.frames as usize;
+    let segments = match flock.params.position {
+        Position::Film => segments(n_frames, flock.params.matching.segment_frames, flock.fps),
+        _ => vec![0, n_frames],
+    };
+    let wanted: Vec<Feature> = segments.windows(2).flat_map(of_segment).collect();
     let state = |i: usize, t: usize| {
         let other = &flock.individuals[i];
         trellis
@@ -95,15 +105,16 @@ fn the_plans_of_a_flock_hold_their_certificates() {
     let (library, flock) = flock(View::Side, "school");
     let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
     let motion = motion_of(&library, &Lens::of(&library, &flock.params));
-    let planner = Planner::new(&library, &motion, &boids, &flock.params);
+    let model = Model::new(&library, &motion, &flock.params);
+    let planner = Planner::new(&model, &boids);
     let mut settled = Settled::new(planner.places.len());
     for (id, boid) in boids.iter().enumerate() {
-        let wanted = planner.weights.wanted(boid, planner.fps);
+        let wanted = planner.model.weights.wanted(boid, planner.model.fps);
         let rows = || rows::InCrowd::new(&planner, &settled, id, &wanted);
         let film = planner.film();
         let path = film.cheapest_path(&rows()).unwrap();
         let columns = film.potentials(&mut rows());
-        let (mut rows, n_states) = (rows(), planner.trellis.n_states());
+        let (mut rows, n_states) = (rows(), planner.model.trellis.n_states());
         let costs: Vec<Vec<[u32; FRAMES]>> = (0..wanted.len())
             .map(|t| {
                 let mut row = vec![[0; FRAMES]; n_states];
@@ -124,10 +135,15 @@ fn the_plans_of_a_flock_hold_their_certificates() {
             })
             .collect();
         let cost_at = |t: usize, state: usize| costs[t][state][FRAMES - 1];
-        let checked =
-            certificate::check(&planner.trellis, planner.dwell, &cost_at, &columns, &path);
+        let checked = certificate::check(
+            &planner.model.trellis,
+            planner.model.dwell,
+            &cost_at,
+            &columns,
+            &path,
+        );
         assert_eq!(checked, Ok(()), "individual {id}");
-        settled.push(&path.states, &planner.alike);
+        settled.push(&path.states, &planner.model.alike);
     }
 }
 
@@ -140,14 +156,14 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
             return u32::MAX;
         }
         let settled = Settled::new(planner.places.len());
-        let repetition = planner.memory.cost_of(&path[..wanted.len()]);
+        let repetition = planner.model.memory.cost_of(&path[..wanted.len()]);
         let path = viterbi::Path {
             states: path.clone(),
             cost: 0,
         };
         return planner.cost_among(0, wanted, &settled, &path) + repetition;
     }
-    let trellis = &planner.trellis;
+    let trellis = &planner.model.trellis;
     let states = 0..trellis.n_states() as u32;
     let shown = states.filter(|&state| trellis.shown(state as usize).is_some());
     let since_jump = (path.iter().rev().zip(path.iter().rev().skip(1)))
@@ -162,7 +178,7 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
         Some(&last) => {
             let jumps = shown.filter(|&state| {
                 let k = trellis.targets().binary_search(&state);
-                since_jump >= planner.dwell
+                since_jump >= planner.model.dwell
                     && k.is_ok_and(|k| trellis.sources(k).iter().any(|s| s.0 == last))
             });
             let on = trellis.continues(last as usize, 1).then_some(last + 1);
@@ -195,13 +211,14 @@ fn a_plan_that_repeats_lies_between_its_bound_and_the_cheapest_that_knew_of_no_r
         let aware = plan_flock(&library, &params, &Silent).unwrap();
         let boids: Vec<BoidTrack> = aware.individuals.iter().map(|i| i.boid.clone()).collect();
         let motion = motion_of(&library, &Lens::of(&library, &aware.params));
-        let planner = Planner::new(&library, &motion, &boids, &aware.params);
-        let wanted = planner.weights.wanted(&boids[0], planner.fps);
+        let model = Model::new(&library, &motion, &aware.params);
+        let planner = Planner::new(&model, &boids);
+        let wanted = planner.model.weights.wanted(&boids[0], planner.model.fps);
         let least = least_by_brute_force(&planner, &wanted, &mut Vec::new());
         let turns = |rad: f64| (rad * Turns::PER_RAD).round() as u32;
         let (cost, before) = (aware.individuals[0].cost, unaware.individuals[0].cost);
         let repeats = (unaware.stats.repeats_per_100_frames * 0.32).round() as u32;
-        let unaware_cost = turns(before.total) + repeats * planner.memory.cost;
+        let unaware_cost = turns(before.total) + repeats * planner.model.memory.cost;
         assert!(turns(cost.total) <= unaware_cost, "{cost:?} {before:?}");
         assert!(least <= turns(cost.total), "{least} {cost:?}");
         assert_eq!(turns(cost.total - cost.gap), turns(before.total));
@@ -233,12 +250,13 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
         let one = &flock.individuals[0];
         let boids = [one.boid.clone()];
         let motion = motion_of(&library, &Lens::of(&library, &flock.params));
-        let mut planner = Planner::new(&library, &motion, &boids, &flock.params);
-        let wanted = [planner.weights.wanted(&boids[0], planner.fps)];
+        let model = Model::new(&library, &motion, &flock.params);
+        let mut planner = Planner::new(&model, &boids);
+        let wanted = [planner.model.weights.wanted(&boids[0], planner.model.fps)];
         let own = (one.source_frame[0], one.mirrored[0]);
         // Nothing plays on into the first frame of all: to it one jumps.
         for (frame, side) in [own, (200, false)] {
-            let first = planner.trellis.state(frame, side);
+            let first = planner.model.trellis.state(frame, side);
             let first = first.expect("a frame of the component");
             planner.ends = vec![Ends { first, next: first }];
             let mut settled = Settled::new(planner.places.len());
@@ -302,8 +320,16 @@ fn after_a_jump_at_least_the_dwell_is_played() {
 
 #[test]
 fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
-    let gap = |name: &str| {
-        let (library, flock) = flock(View::Side, name);
+    let gap = |by: MatchBy| {
+        let library = synthetic::library(View::Side);
+        let mut params = Params {
+            count: 10,
+            frames: 120,
+            position: Position::Boid,
+            ..Params::default()
+        };
+        (params.matching.by, params.matching.w_v) = (by, 0.1);
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
         let motion = motion_of(&library, &Lens::of(&library, &flock.params));
         let gaps = flock.individuals.iter().flat_map(|individual| {
             (0..individual.source_frame.len()).map(|t| {
@@ -318,7 +344,7 @@ fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
         });
         gaps.sum::<f64>()
     };
-    let (by_place, by_heading) = (gap("position"), gap("school"));
+    let (by_place, by_heading) = (gap(MatchBy::Position), gap(MatchBy::Heading));
     assert!(by_place < by_heading, "{by_place} {by_heading}");
 }
 

@@ -111,6 +111,14 @@ impl Trellis {
         &self.sources[range]
     }
 
+    /// What the jump from a state to another costs, turns; 0 where there is none.
+    pub fn jump_cost(&self, from: u32, to: u32) -> u32 {
+        let k = self.targets.binary_search(&to);
+        let sources = k.map_or(&[][..], |k| self.sources(k));
+        let at = sources.binary_search_by_key(&from, |source| source.0);
+        at.map_or(0, |at| sources[at].1)
+    }
+
     /// The jumps as the recursion takes them, from station to station: as time runs, or against it.
     pub fn landings(&self, way: Way) -> &Landings {
         match way {

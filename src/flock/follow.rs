@@ -1,0 +1,159 @@
+//! A flock that moves as its animal moved: boids say where to, the film says how (ALGORITHMS.md 6 to 8).
+//!
+//! Segment by segment: boids start from where the animals are and go at the speeds at which each would go on by
+//! itself; plans follow them from what each shows; and the animals get on by the steps that were filmed, steered toward
+//! their boids within what nobody sees. Nothing asks for a speed that the film does not have, so nobody glides.
+
+use rayon::prelude::*;
+
+use super::Error;
+use super::advance::Advanced;
+use super::boids::Boids;
+use super::boids::vector::{norm, scaled};
+use super::course::{Course, steps};
+use super::individual::BoidTrack;
+use super::natural::Natural;
+use super::placement::{Before, Placed, Stage};
+use super::plan::segment::Standing;
+use super::plan::{Model, Plan, Planner};
+use crate::library::View;
+use crate::progress::Progress;
+
+/// What a segment lasts when nothing is said.
+const SEGMENT_S: f64 = 3.0;
+
+/// The first frames of segments, and the frame after the last.
+pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -> Vec<usize> {
+    let n = segment_frames.map_or((SEGMENT_S * fps).round() as usize, |n| n as usize);
+    let mut ends: Vec<usize> = (0..n_frames).step_by(n.max(2)).collect();
+    ends.push(n_frames);
+    ends
+}
+
+/// What everyone is and has done so far.
+struct Flock {
+    course: Course,
+    plans: Vec<Plan>,
+    advanced: Vec<Advanced>,
+    standings: Vec<Standing>,
+}
+
+/// Has boids form, and plays a film; tracks, plans and places by id.
+pub(super) fn play(
+    mut boids: Boids,
+    (model, stage): (&Model, &Stage),
+    progress: &dyn Progress,
+) -> Result<(Course, Vec<Plan>, Vec<Placed>), Error> {
+    let (params, fps) = (stage.params, stage.library.poses.fps);
+    let n_frames = params.frames as usize;
+    let mut step = steps(boids.n_frames_before() + n_frames, progress);
+    boids.form(&mut step)?;
+    let n = boids.positions().len();
+    let natural = Natural::new(model, stage.motion, params.seed);
+    let mut flock = Flock {
+        course: Course::new(&boids, stage.lens),
+        plans: vec![Plan::default(); n],
+        advanced: vec![Advanced::default(); n],
+        standings: Vec::new(),
+    };
+    let ends = segments(n_frames, params.matching.segment_frames, fps);
+    for segment in ends.windows(2) {
+        let (first, end) = (segment[0], segment[1]);
+        let states = flock.natural_states(&boids, (model, &natural, stage), segment)?;
+        let mut course = Course::new(&boids, stage.lens);
+        for t in first..end {
+            step()?;
+            let gait = |states: &Vec<u32>| natural.gait(states[t - first]);
+            boids.go_as(states.iter().map(gait).collect());
+            if t > 0 {
+                boids.advance();
+            }
+            course.record(&boids, stage.lens);
+        }
+        let is_last = end == n_frames;
+        let planner = Planner::of_segment(model, &course.tracks, &flock.standings, is_last);
+        let plans = planner.plan(progress)?;
+        flock.go_on((model, stage), &course.tracks, plans);
+        flock.course.append(course);
+        flock.draw_back(&mut boids, stage);
+    }
+    let placed = (flock.advanced.into_par_iter().zip(&flock.plans))
+        .zip(&flock.course.tracks)
+        .map(|((one, plan), boid)| {
+            let shown = model.shown(&plan.states);
+            stage.with_fades(&shown, boid, (one.heading_rad, one.centroid_px))
+        })
+        .collect();
+    Ok((flock.course, flock.plans, placed))
+}
+
+impl Flock {
+    /// The states that each would show in a segment by itself.
+    fn natural_states(
+        &self,
+        boids: &Boids,
+        (model, natural, stage): (&Model, &Natural, &Stage),
+        segment: &[usize],
+    ) -> Result<Vec<Vec<u32>>, Error> {
+        let n_frames = segment[1] - segment[0];
+        let mut moment = Course::new(boids, stage.lens);
+        moment.record(boids, stage.lens);
+        let begun = |id: usize| {
+            let cost = |state| model.heading_cost(&moment.tracks[id], state);
+            let begun = natural.beginning(id, cost).ok_or(Error::NoTransitions)?;
+            let key = [id as u64, 0];
+            let mut states = natural.states((begun, 0), n_frames - 1, key);
+            states.insert(0, begun);
+            Ok(states)
+        };
+        let goes_on = |id: usize| {
+            let standing = &self.standings[id];
+            let state = standing.state().ok_or(Error::NoTransitions)?;
+            let key = [id as u64, segment[0] as u64];
+            Ok(natural.states((state, standing.held), n_frames, key))
+        };
+        let all = (0..self.plans.len()).into_par_iter();
+        match self.standings.is_empty() {
+            true => all.map(begun).collect(),
+            false => all.map(goes_on).collect(),
+        }
+    }
+
+    /// Has everyone play what was planned for a segment.
+    fn go_on(&mut self, (model, stage): (&Model, &Stage), boids: &[BoidTrack], plans: Vec<Plan>) {
+        self.standings.resize(plans.len(), Standing::default());
+        let kept = (model.dwell, model.n_remembered());
+        for (id, plan) in plans.into_iter().enumerate() {
+            self.standings[id].go_on(&plan.states, kept);
+            let shown = model.shown(&plan.states);
+            let before = self.plans[id].states.last().and_then(|&state| {
+                Some(Before {
+                    state: model.trellis.shown(state as usize)?,
+                    heading_rad: *self.advanced[id].heading_rad.last()?,
+                    centroid_px: *self.advanced[id].centroid_px.last()?,
+                })
+            });
+            self.advanced[id].append(stage.advance(&shown, &boids[id], before));
+            self.plans[id].append(plan);
+        }
+    }
+
+    /// Puts boids to where the animals are; from above, where any direction can be shown, they also take theirs.
+    fn draw_back(&self, boids: &mut Boids, stage: &Stage) {
+        let mut positions = boids.positions().to_vec();
+        let mut velocities = boids.velocities().to_vec();
+        for (id, one) in self.advanced.iter().enumerate() {
+            let ends = one.centroid_px.last().zip(one.heading_rad.last());
+            let Some((&centroid_px, &heading_rad)) = ends else {
+                continue;
+            };
+            let place = stage.lens.place_bl(centroid_px, positions[id][2]);
+            positions[id] = boids.inside(place);
+            if stage.library.poses.view == View::Top {
+                let direction = [libm::cos(heading_rad), libm::sin(heading_rad), 0.0];
+                velocities[id] = scaled(norm(velocities[id]), direction);
+            }
+        }
+        boids.show(positions, velocities, boids.predator());
+    }
+}

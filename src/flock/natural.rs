@@ -1,0 +1,120 @@
+//! How an animal would go on by itself: the frames after the one that it shows, and where they end a jump to others.
+//!
+//! A boid goes at the speeds of that, so that it asks for nothing that the film does not have: rest is followed by rest
+//! for as long as the animal rested, a dart by what came after it.
+
+use super::boids::Gait;
+use super::motion::FrameMotion;
+use super::plan::Model;
+use crate::random;
+
+/// Of the states that an individual may begin with, so many are drawn, and the one that costs it least is taken.
+const N_DRAWN: u64 = 24;
+/// A jump that costs so many turns more is e times as rare.
+const RARER_TURNS: f64 = 3000.0;
+
+/// What random numbers are for.
+mod draw {
+    pub(super) const BEGIN: u64 = 21;
+    pub(super) const JUMP: u64 = 22;
+}
+
+/// What may come after each state, and how fast the animal is in it.
+pub(super) struct Natural<'a> {
+    model: &'a Model,
+    seed: u64,
+    /// Jumps by the state that they leave: where to, and what they cost.
+    jumps: Vec<Vec<(u32, u32)>>,
+    /// By state.
+    gaits: Vec<Gait>,
+}
+
+impl<'a> Natural<'a> {
+    pub(super) fn new(model: &'a Model, motion: &[FrameMotion], seed: u64) -> Natural<'a> {
+        let trellis = &model.trellis;
+        let mut jumps = vec![Vec::new(); trellis.n_states()];
+        for (k, &target) in trellis.targets().iter().enumerate() {
+            for &(source, cost) in trellis.sources(k) {
+                jumps[source as usize].push((target, cost));
+            }
+        }
+        let gait = |state| {
+            let Some((frame, mirrored)) = trellis.shown(state) else {
+                return Gait::default();
+            };
+            let moved = &motion[frame as usize];
+            let side = if mirrored { -1.0 } else { 1.0 };
+            Gait {
+                speed_bl_per_s: moved.speed_in_space(),
+                turn_rad_per_s: side * moved.turn_rad_per_s,
+            }
+        };
+        Natural {
+            model,
+            seed,
+            jumps,
+            gaits: (0..trellis.n_states()).map(gait).collect(),
+        }
+    }
+
+    /// A state for individual `id` to begin with: of some drawn by chance, so that rest and motion are as common as in the
+    /// film, the one with the least `cost`. `None` where playback never goes on.
+    pub(super) fn beginning(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
+        let goes_on: Vec<u32> = (0..self.jumps.len() as u32)
+            .filter(|&state| {
+                self.model.future[state as usize].is_some()
+                    && self.model.trellis.shown(state as usize).is_some()
+            })
+            .collect();
+        let drawn = (0..N_DRAWN).filter_map(|k| {
+            let at = random::unit(self.seed, &[draw::BEGIN, id as u64, k]);
+            goes_on.get((at * goes_on.len() as f64) as usize).copied()
+        });
+        drawn.min_by_key(|&state| cost(state as usize))
+    }
+
+    /// The states of the next `n` frames from `state` on, which must play on for `held` frames.
+    pub(super) fn states(
+        &self,
+        (mut state, mut held): (u32, usize),
+        n: usize,
+        key: [u64; 2],
+    ) -> Vec<u32> {
+        let mut states = Vec::with_capacity(n);
+        for t in 0..n as u64 {
+            let next = state as usize + 1;
+            let goes_on = self.model.trellis.continues(state as usize, 1)
+                && (held > 0 || self.model.future[next].is_some());
+            state = match goes_on {
+                true => state + 1,
+                false => {
+                    held = self.model.dwell;
+                    self.jump(state, [draw::JUMP, key[0], key[1], t])
+                        .unwrap_or(state)
+                }
+            };
+            held = held.saturating_sub(1);
+            states.push(state);
+        }
+        states
+    }
+
+    /// Where one jumps to from a state, the dearer the rarer.
+    fn jump(&self, state: u32, key: [u64; 4]) -> Option<u32> {
+        let jumps = &self.jumps[state as usize];
+        let least = jumps.iter().map(|jump| jump.1).min()?;
+        let share = |cost: u32| libm::exp(-f64::from(cost - least) / RARER_TURNS);
+        let sum: f64 = jumps.iter().map(|jump| share(jump.1)).sum();
+        let mut left = sum * random::unit(self.seed, &key);
+        let chosen = jumps.iter().find(|jump| {
+            left -= share(jump.1);
+            left < 0.0
+        });
+        Some(chosen.or(jumps.last())?.0)
+    }
+
+    /// How the animal gets on in a state.
+    pub(super) fn gait(&self, state: u32) -> Gait {
+        self.gaits[state as usize]
+    }
+}

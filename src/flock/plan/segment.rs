@@ -1,0 +1,183 @@
+//! Plans of a film segment by segment (ALGORITHMS.md 6, live and endless).
+//!
+//! A segment's plan goes on from where that of the segment before it ended: from the state shown last, which may
+//! have to play on for a while, and with what was shown in the last seconds dearer than it was. The cheapest way
+//! over the segment is found exactly; what comes after it is told by what each state costs in the long run,
+//! F(s) = min over successors of (jump's cost + 0.995 F(s')), the future cost of Schoedl et al. (Video Textures, 2000).
+
+use super::circle::FORBIDDEN;
+use super::trellis::Trellis;
+use super::viterbi::{Block, FRAMES, Rows};
+
+/// What lies a frame later counts by so much less.
+const DISCOUNT: f64 = 0.995;
+/// Rounds in which the future cost settles; what has not by then is told a little too low.
+const MOST_ROUNDS: usize = 256;
+
+/// Where an individual has come to.
+#[derive(Clone, Debug, Default)]
+pub struct Standing {
+    /// What it has shown so far, the oldest first: at least all of the time in which a repeat is noticed.
+    pub shown: Vec<u32>,
+    /// For how many frames it must play on before it may jump.
+    pub held: usize,
+}
+
+impl Standing {
+    /// After it has shown `states` as well; a jump may come `dwell` frames after another. As elsewhere a film may begin
+    /// in the middle of a run.
+    pub fn go_on(&mut self, states: &[u32], (dwell, n_kept): (usize, usize)) {
+        let is_first = self.shown.is_empty();
+        let before = self.shown.last().copied();
+        let followed: Vec<u32> = before.into_iter().chain(states.iter().copied()).collect();
+        let steps = followed.windows(2).rev();
+        let since = steps.take_while(|step| step[1] == step[0] + 1).count();
+        let has_jumped = since + 1 < followed.len();
+        self.held = match (has_jumped, is_first) {
+            (true, _) => dwell.saturating_sub(since + 1),
+            (false, true) => 0,
+            (false, false) => self.held.saturating_sub(states.len()),
+        };
+        self.shown.extend(states);
+        let n_forgotten = self.shown.len().saturating_sub(n_kept.max(1));
+        self.shown.drain(..n_forgotten);
+    }
+
+    /// The state shown last.
+    pub fn state(&self) -> Option<u32> {
+        self.shown.last().copied()
+    }
+}
+
+/// The costs of a segment's frames. With a beginning its first frame is the last of the segment before, at which only
+/// the state shown there may be.
+#[derive(Clone)]
+pub(super) struct Begun<'a, R> {
+    pub(super) rows: R,
+    /// The state shown last before the segment, and for how many frames it must play on.
+    pub(super) from: Option<(u32, usize)>,
+    /// By state, the frame before which showing it is a repeat of what was shown before the segment; and what that costs.
+    pub(super) repeats: Option<(&'a [u16], u32)>,
+    pub(super) n_frames: usize,
+    /// What lies beyond; nothing at the end of the film.
+    pub(super) future: Option<&'a [Option<u32>]>,
+}
+
+impl<R: Rows> Rows for Begun<'_, R> {
+    #[inline(always)]
+    fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
+        self.rows.fill(block, first, out);
+        if let Some((until, cost)) = self.repeats {
+            for (station, out) in (first..).zip(&mut *out) {
+                let until = usize::from(until[block.state(station)]);
+                for (out, &t) in out.iter_mut().zip(&block.times) {
+                    *out += if t < until { cost } else { 0 };
+                }
+            }
+        }
+        for (lane, &t) in block.times.iter().enumerate() {
+            // Where it stands, and where it has gone on to: between them there is but one way.
+            let only = |(state, held): (u32, usize)| match held.min(self.n_frames - 1) {
+                held if t == 0 || t == held => Some(state as usize + t),
+                _ => None,
+            };
+            if let Some(only) = self.from.and_then(only) {
+                for (station, out) in (first..).zip(&mut *out) {
+                    out[lane] = match block.state(station) == only {
+                        true if t == 0 => 0,
+                        true => out[lane],
+                        false => FORBIDDEN,
+                    };
+                }
+            }
+            if let Some(future) = self.future.filter(|_| t + 1 == self.n_frames) {
+                for (station, out) in (first..).zip(&mut *out) {
+                    out[lane] += future[block.state(station)].unwrap_or(FORBIDDEN);
+                }
+            }
+        }
+    }
+}
+
+/// What playback costs from each state on, for ever: the jumps that it cannot do without, each at its price
+/// and discounted by when it comes.
+pub(in crate::flock) fn future_costs(trellis: &Trellis, dwell: usize) -> Vec<Option<u32>> {
+    let after_dwell = (0..dwell).fold(1.0, |share, _| share * DISCOUNT);
+    let mut future = vec![0.0f64; trellis.n_states()];
+    for _ in 0..MOST_ROUNDS {
+        let mut next = vec![f64::INFINITY; future.len()];
+        for (k, &target) in trellis.targets().iter().enumerate() {
+            let landed = target as usize;
+            if !trellis.continues(landed, dwell - 1) {
+                continue;
+            }
+            let later = after_dwell * future[landed + dwell - 1];
+            for &(source, cost) in trellis.sources(k) {
+                let through = f64::from(cost) + later;
+                next[source as usize] = next[source as usize].min(through);
+            }
+        }
+        for state in (0..next.len().saturating_sub(1)).rev() {
+            if trellis.continues(state, 1) {
+                next[state] = next[state].min(DISCOUNT * next[state + 1]);
+            }
+        }
+        let settled = next == future;
+        future = next;
+        if settled {
+            break;
+        }
+    }
+    let most = f64::from(FORBIDDEN / 2);
+    let whole = |cost: f64| cost.is_finite().then(|| cost.min(most).round() as u32);
+    future.into_iter().map(whole).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::{Jump, Playback};
+
+    /// 0 to 39, from whose end one jumps back to the start for 7, and from 20 to 2 for 50.
+    fn trellis() -> Trellis {
+        let jump = |from, to, cost| Jump {
+            from,
+            to,
+            cost,
+            mirrored: false,
+        };
+        let playback = Playback {
+            jumps: vec![jump(20, 2, 50), jump(39, 0, 7)],
+            component: (0..40).collect(),
+        };
+        Trellis::new(&playback, false, |d| d as u32)
+    }
+
+    #[test]
+    fn who_has_jumped_must_play_on_and_remembers_what_it_showed_last() {
+        let mut standing = Standing::default();
+        standing.go_on(&[5, 6, 7], (4, 100));
+        assert_eq!(
+            (standing.state(), standing.held),
+            (Some(7), 0),
+            "it began in a run"
+        );
+        standing.go_on(&[20, 21], (4, 100));
+        assert_eq!((standing.state(), standing.held), (Some(21), 2));
+        standing.go_on(&[22], (4, 3));
+        assert_eq!((&standing.shown[..], standing.held), (&[20, 21, 22][..], 1));
+        standing.go_on(&[23, 24, 25], (4, 3));
+        assert_eq!(standing.held, 0);
+    }
+
+    #[test]
+    fn what_must_be_jumped_is_dearer_the_sooner_it_comes() {
+        let trellis = trellis();
+        let future = future_costs(&trellis, 4);
+        let of = |frame| future[trellis.state(frame, false).expect("a state") as usize];
+        assert!(of(39) > of(10) && of(10) > of(0), "{future:?}");
+        // Forty frames for 7: about 7 / (1 - 0.995^40) at the jump.
+        assert!((36..=42).contains(&of(39).expect("playback goes on")));
+        assert_eq!(future[0], None, "nothing leaves a barrier");
+    }
+}
