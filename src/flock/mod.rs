@@ -1,7 +1,6 @@
 //! Library to flock: simulate boids, plan which real frames follow them best, place those frames in
 //! the picture, and composite them (O 4 and 5; ALGORITHMS.md 6 to 8).
 
-mod advance;
 pub mod boids;
 pub mod check;
 pub mod composite;
@@ -11,7 +10,6 @@ mod follow;
 pub mod individual;
 pub mod lens;
 pub mod motion;
-mod natural;
 pub mod params;
 mod passing;
 pub mod placement;

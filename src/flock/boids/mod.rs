@@ -7,12 +7,12 @@
 //! number of threads.
 
 pub mod calibration;
+mod gait;
 pub mod grid;
 pub mod habitat;
 pub mod lanes;
 pub mod leadership;
 pub mod measures;
-mod meeting;
 pub mod nearest;
 mod overlap;
 pub mod params;
@@ -26,8 +26,8 @@ mod walls;
 use std::convert::Infallible;
 
 use self::calibration::Calibration;
+pub use self::gait::{Gait, Meeting};
 use self::habitat::{Habitat, Hunter};
-pub use self::meeting::Meeting;
 use self::room::Room;
 use self::tank::Tank;
 use self::vector::{Vec3, scaled};
@@ -56,15 +56,6 @@ mod draw {
     pub(super) const LEAD: u64 = 3;
     pub(super) const COURSE: u64 = 4;
     pub(super) const NOISE: u64 = 5;
-}
-
-/// How a filmed animal gets on, whatever the rules wish.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Gait {
-    /// Its speed, body lengths a second. Who is slower than usual is turned less by its rules, and who rests not at all.
-    pub speed_bl_per_s: f64,
-    /// How fast it turns by itself, in the plane of the picture.
-    pub turn_rad_per_s: f64,
 }
 
 /// Boids in their tank.
@@ -186,20 +177,6 @@ impl<'a> Boids<'a> {
     /// How fast everybody is, by id, body lengths a second.
     pub fn velocities(&self) -> &[Vec3] {
         &self.velocities
-    }
-
-    /// Has everybody get on as filmed from now on, by id: their rules say where to, the film says how.
-    pub fn go_as(&mut self, gaits: Vec<Gait>) {
-        self.gaits = gaits;
-    }
-
-    /// The velocity at which one gets on, body lengths a second.
-    pub fn motion(&self, id: usize) -> Vec3 {
-        self.at_filmed_speed::<f64>(
-            &[id as u32; lanes::MOST],
-            self.positions[id],
-            self.velocities[id],
-        )
     }
 
     /// Lets the film begin so many frames later.

@@ -24,11 +24,11 @@ const FLIGHT_PACE: f64 = 1.6;
 const FARTHER: f64 = 1.03;
 
 /// What is the same for all in one step.
-struct Pace<'a> {
+pub(super) struct Pace<'a> {
     steering: Steering<'a>,
     /// The widest turn at the animal's own speed, and cos and sin of it.
-    turn_rad: f64,
-    cos_sin: (f64, f64),
+    pub(super) turn_rad: f64,
+    pub(super) cos_sin: (f64, f64),
     /// The share of what wanders that is kept, and the spread of what is added, in its own spreads.
     wander: [f64; 2],
     /// What is added to the turn and to the slope, by id.
@@ -308,58 +308,6 @@ impl Boids<'_> {
         let moves = L::splat(1e-9).less(speed);
         let direction = select3::<L>(moves, velocity, before);
         scaled(speed.clamp(L::splat(least), most), unit(direction))
-    }
-
-    /// cos and sin of the widest turn of each: who is slower than usual turns less, and who rests does not turn.
-    #[inline(always)]
-    fn widest_turn<L: Lanes>(&self, ids: &[u32; lanes::MOST], pace: &Pace) -> (L, L) {
-        if self.gaits.is_empty() {
-            return (L::splat(pace.cos_sin.0), L::splat(pace.cos_sin.1));
-        }
-        let mut turns_rad = [0.0; lanes::MOST];
-        for lane in 0..L::N {
-            let speed = self.gaits[ids[lane] as usize].speed_bl_per_s;
-            let share = (speed / self.calibration.cruise_bl_per_s).min(1.0);
-            turns_rad[lane] = share * pace.turn_rad;
-        }
-        (
-            L::from_fn(|lane| libm::cos(turns_rad[lane])),
-            L::from_fn(|lane| libm::sin(turns_rad[lane])),
-        )
-    }
-
-    /// The velocity of each, turned as it was filmed to turn by itself.
-    #[inline(always)]
-    fn turned_as_filmed<L: Lanes>(&self, ids: &[u32; lanes::MOST], velocity: [L; 3]) -> [L; 3] {
-        if self.gaits.is_empty() || !self.tank.is_flat() {
-            return velocity;
-        }
-        let mut turns_rad = [0.0; lanes::MOST];
-        for lane in 0..L::N {
-            turns_rad[lane] = self.step_s * self.gaits[ids[lane] as usize].turn_rad_per_s;
-        }
-        let cos = L::from_fn(|lane| libm::cos(turns_rad[lane]));
-        let sin = L::from_fn(|lane| libm::sin(turns_rad[lane]));
-        let [x, y, z] = velocity;
-        [cos * x - sin * y, sin * x + cos * y, z]
-    }
-
-    /// The velocity at which each gets on: in the direction that it swims in, as fast as it was filmed; in flight at
-    /// least as fast as it would.
-    #[inline(always)]
-    pub(super) fn at_filmed_speed<L: Lanes>(
-        &self,
-        ids: &[u32; lanes::MOST],
-        position: [L; 3],
-        velocity: [L; 3],
-    ) -> [L; 3] {
-        if self.gaits.is_empty() {
-            return velocity;
-        }
-        let filmed = L::from_fn(|lane| self.gaits[ids[lane] as usize].speed_bl_per_s);
-        let flees = self.habitat.flees(position, self.hunter.as_ref());
-        let speed = L::select(flees, filmed.max(norm(velocity)), filmed);
-        scaled(speed, unit(velocity))
     }
 
     /// The error of a course with zones, in each direction.

@@ -14,10 +14,9 @@ pub mod memory;
 mod round;
 mod rows;
 pub mod segment;
+mod spent;
 pub mod trellis;
 pub mod viterbi;
-
-use std::ops::AddAssign;
 
 use rayon::prelude::*;
 
@@ -27,77 +26,16 @@ use self::crowd::{Crowd, Places, Settled};
 use self::memory::Memory;
 use self::round::Round;
 use self::segment::{Standing, future_costs};
+pub use self::spent::{Plan, Spent};
 use self::trellis::Trellis;
 use self::viterbi::{Film, Path, Shelf};
 use super::error::Error;
-use super::individual::{BoidTrack, PlanCost, rounded};
+use super::individual::BoidTrack;
 use super::motion::FrameMotion;
 use super::params::Params;
 use crate::cpu::Level;
-use crate::geometry::Turns;
 use crate::library::Library;
 use crate::progress::Progress;
-
-/// What one individual shows in some frames, and what that costs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Plan {
-    /// States, one for each frame.
-    pub states: Vec<u32>,
-    /// What they cost.
-    pub cost: Spent,
-}
-
-impl Plan {
-    /// Goes on with another.
-    pub fn append(&mut self, later: Plan) {
-        self.states.extend(later.states);
-        self.cost += later.cost;
-    }
-}
-
-/// What a plan costs, in its parts; turns.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Spent {
-    heading: u64,
-    speed: u64,
-    transition: u64,
-    crowd: u64,
-    repetition: u64,
-    total: u64,
-    lower_bound: u64,
-    gap: u64,
-}
-
-impl AddAssign for Spent {
-    fn add_assign(&mut self, other: Spent) {
-        self.heading += other.heading;
-        self.speed += other.speed;
-        self.transition += other.transition;
-        self.crowd += other.crowd;
-        self.repetition += other.repetition;
-        self.total += other.total;
-        self.lower_bound += other.lower_bound;
-        self.gap += other.gap;
-    }
-}
-
-impl Spent {
-    /// As files tell it.
-    pub fn told(&self) -> PlanCost {
-        let rad = |turns: u64| rounded(turns as f64 / Turns::PER_RAD, 6);
-        PlanCost {
-            total: rad(self.total),
-            heading: rad(self.heading),
-            speed: rad(self.speed),
-            transition: rad(self.transition),
-            crowd: rad(self.crowd),
-            repetition: rad(self.repetition),
-            lower_bound: rad(self.lower_bound),
-            gap: rad(self.gap),
-            exact: self.gap == 0,
-        }
-    }
-}
 
 /// The best path found for one individual.
 #[derive(Clone, Debug)]

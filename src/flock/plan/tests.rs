@@ -9,6 +9,7 @@ use crate::flock::plan::landings::Way;
 use crate::flock::plan::viterbi::{Block, FRAMES, Rows};
 use crate::flock::synthetic;
 use crate::flock::{Flock, plan_flock};
+use crate::geometry::Turns;
 use crate::library::View;
 use crate::progress::Silent;
 

@@ -1,8 +1,8 @@
 //! How an individual gets on: by the steps that the animal took in the frames shown, each steered toward the boid
 //! within what nobody sees (ALGORITHMS.md 8).
 
-use super::individual::{BoidTrack, rounded};
-use super::placement::{Before, Stage, is_jump};
+use crate::flock::individual::{BoidTrack, rounded};
+use crate::flock::placement::{Before, Stage, is_jump};
 use crate::geometry::wrap_rad;
 use crate::library::View;
 
@@ -21,13 +21,13 @@ const STEERED: f64 = 1.0;
 
 /// Where an individual points and is, frame by frame.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Advanced {
-    pub(super) heading_rad: Vec<f64>,
-    pub(super) centroid_px: Vec<[f64; 2]>,
+pub(in crate::flock) struct Advanced {
+    pub(in crate::flock) heading_rad: Vec<f64>,
+    pub(in crate::flock) centroid_px: Vec<[f64; 2]>,
 }
 
 impl Advanced {
-    pub(super) fn append(&mut self, later: Advanced) {
+    pub(in crate::flock) fn append(&mut self, later: Advanced) {
         self.heading_rad.extend(later.heading_rad);
         self.centroid_px.extend(later.centroid_px);
     }
@@ -35,7 +35,7 @@ impl Advanced {
 
 impl Stage<'_> {
     /// Where an individual gets to that shows some frames after `before`.
-    pub(super) fn advance(
+    pub(in crate::flock) fn advance(
         &self,
         shown: &[(u32, bool)],
         boid: &BoidTrack,

@@ -3,9 +3,9 @@
 //! A boid goes at the speeds of that, so that it asks for nothing that the film does not have: rest is followed by rest
 //! for as long as the animal rested, a dart by what came after it.
 
-use super::boids::Gait;
-use super::motion::FrameMotion;
-use super::plan::Model;
+use crate::flock::boids::Gait;
+use crate::flock::motion::FrameMotion;
+use crate::flock::plan::Model;
 use crate::random;
 
 /// Of the states that an individual may begin with, so many are drawn, and the one that costs it least is taken.
@@ -15,12 +15,12 @@ const RARER_TURNS: f64 = 3000.0;
 
 /// What random numbers are for.
 mod draw {
-    pub(super) const BEGIN: u64 = 21;
-    pub(super) const JUMP: u64 = 22;
+    pub(in crate::flock) const BEGIN: u64 = 21;
+    pub(in crate::flock) const JUMP: u64 = 22;
 }
 
 /// What may come after each state, and how fast the animal is in it.
-pub(super) struct Natural<'a> {
+pub(in crate::flock) struct Natural<'a> {
     model: &'a Model,
     seed: u64,
     /// Jumps by the state that they leave: where to, and what they cost.
@@ -30,7 +30,11 @@ pub(super) struct Natural<'a> {
 }
 
 impl<'a> Natural<'a> {
-    pub(super) fn new(model: &'a Model, motion: &[FrameMotion], seed: u64) -> Natural<'a> {
+    pub(in crate::flock) fn new(
+        model: &'a Model,
+        motion: &[FrameMotion],
+        seed: u64,
+    ) -> Natural<'a> {
         let trellis = &model.trellis;
         let mut jumps = vec![Vec::new(); trellis.n_states()];
         for (k, &target) in trellis.targets().iter().enumerate() {
@@ -59,7 +63,11 @@ impl<'a> Natural<'a> {
 
     /// A state for individual `id` to begin with: of some drawn by chance, so that rest and motion are as common as in the
     /// film, the one with the least `cost`. `None` where playback never goes on.
-    pub(super) fn beginning(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
+    pub(in crate::flock) fn beginning(
+        &self,
+        id: usize,
+        cost: impl Fn(usize) -> u32,
+    ) -> Option<u32> {
         let goes_on: Vec<u32> = (0..self.jumps.len() as u32)
             .filter(|&state| {
                 self.model.future[state as usize].is_some()
@@ -74,7 +82,7 @@ impl<'a> Natural<'a> {
     }
 
     /// The states of the next `n` frames from `state` on, which must play on for `held` frames.
-    pub(super) fn states(
+    pub(in crate::flock) fn states(
         &self,
         (mut state, mut held): (u32, usize),
         n: usize,
@@ -114,7 +122,7 @@ impl<'a> Natural<'a> {
     }
 
     /// How the animal gets on in a state.
-    pub(super) fn gait(&self, state: u32) -> Gait {
+    pub(in crate::flock) fn gait(&self, state: u32) -> Gait {
         self.gaits[state as usize]
     }
 }

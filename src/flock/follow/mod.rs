@@ -4,15 +4,18 @@
 //! itself; plans follow them from what each shows; and the animals get on by the steps that were filmed, steered toward
 //! their boids within what nobody sees. Nothing asks for a speed that the film does not have, so nobody glides.
 
+mod advance;
+mod natural;
+
 use rayon::prelude::*;
 
+use self::advance::Advanced;
+use self::natural::Natural;
 use super::Error;
-use super::advance::Advanced;
 use super::boids::Boids;
 use super::boids::vector::{norm, scaled};
 use super::course::{Course, steps};
 use super::individual::BoidTrack;
-use super::natural::Natural;
 use super::placement::{Before, Placed, Stage};
 use super::plan::segment::Standing;
 use super::plan::{Model, Plan, Planner};

@@ -1,0 +1,67 @@
+//! What a plan shows and costs, whole or a segment of it.
+
+use std::ops::AddAssign;
+
+use crate::flock::individual::{PlanCost, rounded};
+use crate::geometry::Turns;
+
+/// What one individual shows in some frames, and what that costs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// States, one for each frame.
+    pub states: Vec<u32>,
+    /// What they cost.
+    pub cost: Spent,
+}
+
+impl Plan {
+    /// Goes on with another.
+    pub fn append(&mut self, later: Plan) {
+        self.states.extend(later.states);
+        self.cost += later.cost;
+    }
+}
+
+/// What a plan costs, in its parts; turns.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Spent {
+    pub(super) heading: u64,
+    pub(super) speed: u64,
+    pub(super) transition: u64,
+    pub(super) crowd: u64,
+    pub(super) repetition: u64,
+    pub(super) total: u64,
+    pub(super) lower_bound: u64,
+    pub(super) gap: u64,
+}
+
+impl AddAssign for Spent {
+    fn add_assign(&mut self, other: Spent) {
+        self.heading += other.heading;
+        self.speed += other.speed;
+        self.transition += other.transition;
+        self.crowd += other.crowd;
+        self.repetition += other.repetition;
+        self.total += other.total;
+        self.lower_bound += other.lower_bound;
+        self.gap += other.gap;
+    }
+}
+
+impl Spent {
+    /// As files tell it.
+    pub fn told(&self) -> PlanCost {
+        let rad = |turns: u64| rounded(turns as f64 / Turns::PER_RAD, 6);
+        PlanCost {
+            total: rad(self.total),
+            heading: rad(self.heading),
+            speed: rad(self.speed),
+            transition: rad(self.transition),
+            crowd: rad(self.crowd),
+            repetition: rad(self.repetition),
+            lower_bound: rad(self.lower_bound),
+            gap: rad(self.gap),
+            exact: self.gap == 0,
+        }
+    }
+}
