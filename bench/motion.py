@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Whether a flock moves as its animal moved: speeds, states, rest, loops and look-alikes of planned flocks.
 
-    bench/motion.py PROGRAM LIBRARY_DIR... [--count N] [--frames 300] [--seed 1] [--set JSON]
+    bench/motion.py PROGRAM LIBRARY_DIR... [--count N] [--frames 300] [--seed 1] [--matching JSON]
 
 Plans a flock of each library and compares what it shows with what was filmed, at frames two or more away from a jump.
 Speeds are those of the centroid over two frames, body lengths a second, divided by the scale of the sprite.
@@ -66,7 +66,7 @@ def measure(flock, poses, component):
     shown, filmed = shown[ok], filmed[ok]
     resting = filmed < REST
     classes = [np.bincount(class_of(v, usual), minlength=4) / max(len(v), 1) for v in (known, shown)]
-    alike = lookalikes(people, length_px, fps)
+    alike = lookalikes(people, length_px)
     return {
         "as_filmed": float(np.mean(np.abs(shown - filmed) <= np.maximum(.25 * filmed, .05))),
         "correlation": float(np.corrcoef(shown, filmed)[0, 1]) if len(shown) > 2 else 0.0,
@@ -79,7 +79,7 @@ def measure(flock, poses, component):
     }
 
 
-def lookalikes(people, length_px, fps):
+def lookalikes(people, length_px):
     """Share of animals and frames with another within 3 body lengths that shows nearly the same frame on the same side."""
     places = np.array([one["centroid_px"] for one in people], float)
     frames = np.array([one["source_frame"] for one in people])

@@ -8,8 +8,8 @@ use crate::library::{Library, Pose, View};
 
 /// A speed in space is told where at least this share of the direction lies in the picture's plane.
 const LEAST_LEVEL: f64 = 0.7;
-/// Who is seen head-on swims sideways in the picture as well: no speed in space is more than the inverse of this times
-/// that in the picture.
+/// Least share of the direction in the picture's plane with which a speed in the picture is divided. An animal seen head-on also
+/// moves sideways, so the quotient would grow without bound. A free choice.
 const LEAST_SEEN: f64 = 0.5;
 /// Directions are compared over this time either way.
 const TURN_SPAN_S: f64 = 0.1;
@@ -38,8 +38,8 @@ pub struct FrameMotion {
 }
 
 impl FrameMotion {
-    /// How fast it is in space, body lengths a second: from its speed in the picture and how much of its direction lies in
-    /// the picture's plane, of which at least `LEAST_SEEN` is taken for granted.
+    /// Speed in space, body lengths a second: the speed in the picture over the share of the direction in the picture's plane,
+    /// at least `LEAST_SEEN`.
     pub fn speed_in_space(&self) -> f64 {
         let [x, y, _] = self.forward;
         let level = x.hypot(y);

@@ -78,8 +78,8 @@ pub struct Matching {
     /// Cost of each frame that an individual shows again within 3 s, radians; 0 = no matter, and every plan is the
     /// cheapest.
     pub w_p: f64,
-    /// Frames that are planned at a time with `position: film`, 2..=2000; null = those of three seconds. After each
-    /// segment the boids go on from where the animals are.
+    /// Frames of a segment, 2..=2000; null = three seconds. With `position: film` a flock is simulated, planned and placed one
+    /// segment at a time, and boids begin each segment at the positions of their animals.
     pub segment_frames: Option<u32>,
 }
 
@@ -113,8 +113,8 @@ pub enum Separation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Position {
-    /// As the animal moved in the frames shown, steered toward the boid within what nobody sees: a step is a fifth longer
-    /// or shorter at most. Boids go at the speeds of the film.
+    /// By the steps that the animal took in the frames shown, each corrected toward the boid by a fifth of its length at
+    /// most. Boids take their speeds from the film. A loop is placed as with `leash`.
     Film,
     /// Along its own heading at the boid's speed, drawn gently to the boid.
     Leash,

@@ -53,8 +53,8 @@ pub struct Patch {
 }
 
 impl Playback {
-    /// The same without jumps to where playback cannot go on: a jump comes `dwell` frames after another at the earliest,
-    /// and some runs end before that. Without `mirror` there are no jumps that change the side.
+    /// The same without jumps after which playback must end: two jumps are at least `dwell` frames apart, and some runs are
+    /// shorter than that. Without `mirror` all jumps that change the side are left out.
     pub fn without_dead_ends(&self, mirror: bool, dwell: usize) -> Playback {
         let mut jumps = self.jumps.clone();
         jumps.retain(|jump| mirror || !jump.mirrored);

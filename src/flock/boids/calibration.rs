@@ -45,7 +45,8 @@ const STEEPER_IN_PICTURE: f64 = 0.15;
 const FASTEST: f64 = 0.95;
 /// No boid turns faster.
 const FASTEST_TURN_RAD_PER_S: f64 = 6.0;
-/// The circle in which a boid can turn has at most this share of the narrower half of its tank as its radius.
+/// Greatest radius of a turn, as a share of half the width of the tank. A free choice: a boid that swims along the middle can
+/// turn round before either wall.
 const TURNED_IN: f64 = 0.5;
 /// And of those that are slower than it must be.
 const SLOWEST: f64 = 0.05;
@@ -96,8 +97,8 @@ impl Calibration {
         }
     }
 
-    /// The same, but turning at least so sharply that who goes at cruising speed can turn round within a tank: in a short film of
-    /// a narrow one the animal may never be seen to.
+    /// The same with a turn rate that lets a boid turn round in the tank at cruising speed. A short film may never show the
+    /// animal turning.
     pub fn in_tank(self, tank: &Tank) -> Calibration {
         let [x, y, z] = tank.reach_bl;
         let narrow_bl = if tank.is_flat() { x.min(y) } else { x.min(z) };

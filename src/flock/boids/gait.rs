@@ -1,12 +1,12 @@
-//! What boids are told besides their rules: to get on as a filmed animal did, where their rules say where to and the film says
-//! how fast and how they turn by themselves; and in a loop, where to be.
+//! Motion that is imposed on boids in addition to their rules: the speed and the turn rate of the filmed animal (the rules then
+//! choose the direction alone), and in a loop the positions to return to.
 
 use super::Boids;
 use super::lanes::{self, Lanes};
 use super::step::Pace;
 use super::vector::{Vec3, add_scaled, minus, norm, scaled, unit};
 
-/// Who is to meet a place closes in on it with this time constant.
+/// Time constant with which a boid approaches the position that it must reach.
 const MEETING_S: f64 = 0.6;
 
 /// How a filmed animal gets on, whatever the rules wish.

@@ -38,9 +38,9 @@ pub(super) struct Ledger<'a> {
     /// Of each individual, the names of what it shows.
     plans: Vec<Vec<u32>>,
     pub(super) dwell: usize,
-    /// The first frames of what was planned at a time, and the frame after the last.
+    /// The first frame of each segment, and at the end the number of frames.
     pub(super) segments: Vec<usize>,
-    /// What each state of the graph costs in the long run; none where playback ends.
+    /// Future cost of each state of the graph, turns; `None` for a state from which playback cannot continue.
     pub(super) future: Vec<Option<u64>>,
 }
 
@@ -50,11 +50,11 @@ pub(super) struct Bill {
     wanted: Vec<Feature>,
     /// Whom it should not look like.
     lookalikes: Vec<Vec<Lookalike>>,
-    /// What the jump to each frame costs, and in a loop to the one after the last; 0 where there is none.
+    /// Cost of the jump to each frame, turns; 0 without a jump. The last entry is the jump from the end of a loop to its start.
     jumps: Vec<u64>,
-    /// What the plan costs, its repeats aside, turns.
+    /// Cost of the plan without its repeats, turns.
     total: u64,
-    /// What its repeats cost, turns.
+    /// Cost of its repeats, turns.
     pub(super) repetition: u64,
 }
 
@@ -63,7 +63,7 @@ impl Bill {
         self.total + self.repetition
     }
 
-    /// What the jump to a frame costs, turns.
+    /// Cost of the jump to a frame, turns; 0 without a jump.
     pub(super) fn jump_at(&self, t: usize) -> u64 {
         self.jumps.get(t).copied().unwrap_or(0)
     }
@@ -163,7 +163,7 @@ impl<'a> Ledger<'a> {
         Ok(bill)
     }
 
-    /// What a boid wants at every frame, each segment by itself.
+    /// The features that a boid asks for at every frame. Turn rates are differences within one segment, as in the planner.
     fn wanted(&self, id: usize) -> Vec<Feature> {
         let boid = &self.flock.individuals[id].boid;
         let of = |segment: &[usize]| {
@@ -204,24 +204,24 @@ impl<'a> Ledger<'a> {
         self.flock.individuals[id].cost.exact
     }
 
-    /// What showing each state of the graph costs at frame `t` of the segment that begins at `first`, turns: with the crowd and
-    /// what was shown before the segment, or without.
+    /// Cost of showing each state of the graph at frame `t` of the segment that begins at frame `first`, turns. `in_flock` adds
+    /// the costs of look-alikes and of repeating what was shown before the segment.
     pub(super) fn row(
         &self,
         graph: &Graph,
         (id, bill): (usize, &Bill),
         (first, t): (usize, usize),
-        with_crowd: bool,
+        in_flock: bool,
     ) -> Vec<u64> {
         let mut crowd = vec![0; self.names.len()];
-        if with_crowd {
+        if in_flock {
             for near in &bill.lookalikes[t] {
                 self.add_lookalike(graph, near, &mut crowd);
             }
         }
         let span = (REPEAT_S * self.flock.fps).round() as usize;
         let from = (t + 1).saturating_sub(span).min(first);
-        let shown = match with_crowd && self.repeat_cost() > 0 {
+        let shown = match in_flock && self.repeat_cost() > 0 {
             true => &self.plans[id][from..first],
             false => &[],
         };

@@ -30,7 +30,8 @@ pub(super) struct Graph {
     pub(super) mirror: bool,
 }
 
-/// Drops the jumps after which playback ends: a dwell on there is no frame, or no jump left to take.
+/// Drops the jumps after which playback must end: the run at their target is shorter than the dwell, or no jump leaves it
+/// after the dwell.
 fn drop_dead_ends(costs: &mut BTreeMap<(usize, usize), u64>, next: &[Option<usize>], dwell: usize) {
     loop {
         let leaving: BTreeSet<usize> = costs.keys().map(|&(from, _)| from).collect();

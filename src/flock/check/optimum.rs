@@ -78,16 +78,16 @@ pub(super) fn check(
     }
 }
 
-/// What is planned at a time.
+/// A segment of a plan.
 #[derive(Clone, Copy)]
 struct Part<'a> {
     first: usize,
     end: usize,
-    /// The state before it, and the frames since the last jump.
+    /// The state at the frame before it, and the frames since the last jump there; `None` for the first segment.
     start: Option<(usize, usize)>,
     /// In a loop the state that it must begin with, and the one that comes after it.
     ends: Option<(usize, usize)>,
-    /// What is expected after it, by state.
+    /// Future cost by state, turns; `None` for the last segment.
     future: Option<&'a [Option<u64>]>,
 }
 
@@ -111,14 +111,15 @@ struct Search<'a> {
 }
 
 impl Part<'_> {
-    /// What is expected after it when it ends with a state.
+    /// Future cost of ending with a state, turns.
     fn beyond(&self, state: usize) -> u64 {
         self.future.and_then(|future| future[state]).unwrap_or(0)
     }
 }
 
 impl Search<'_> {
-    /// Checks that the plan of a part is the cheapest, if it claims so; what the cheapest costs with what is expected after it.
+    /// Checks that the plan of a segment is the cheapest, if it claims so. Returns the least cost of a plan of the segment, with
+    /// the future cost of its last state.
     fn check(
         &mut self,
         part: &Part<'_>,
@@ -129,7 +130,7 @@ impl Search<'_> {
         let (first, end, id) = (part.first, part.end, self.id);
         let graph = self.graph;
         let row = |t: usize| ledger.row(graph, (id, bill), (first, t), true);
-        // What the plan costs if from each frame on it goes the cheapest way, and what each frame costs.
+        // For each frame: the least cost from there to the end, and the cost of the state shown.
         let mut at_best = vec![0; end - first];
         let mut shown = vec![0; end - first];
         let least = self.cheapest(part, row, |t, costs, column| {
@@ -159,8 +160,8 @@ impl Search<'_> {
         }
     }
 
-    /// What the cheapest plan of a part costs with what is expected after it, every edge looked at; `on_column` is shown what
-    /// each state costs and W, from the last frame to the first.
+    /// The least cost of a plan of a segment, with the future cost of its last state; looks at every edge. `on_column` receives
+    /// the frame, the cost of each state there, and W, from the last frame to the first.
     fn cheapest(
         &mut self,
         part: &Part<'_>,

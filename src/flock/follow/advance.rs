@@ -1,5 +1,5 @@
-//! How an individual gets on: by the steps that the animal took in the frames shown, each steered toward the boid
-//! within what nobody sees (ALGORITHMS.md 8).
+//! Headings and positions of an individual from the filmed steps of the frames that it shows, each corrected a little toward its
+//! boid.
 
 use crate::flock::individual::{BoidTrack, rounded};
 use crate::flock::placement::{Before, Stage, is_jump};
@@ -8,34 +8,35 @@ use crate::library::View;
 
 /// Time constant with which an individual is drawn to its boid.
 const PULL_S: f64 = 0.5;
-/// A step leads elsewhere than filmed by this share of its length at most ...
+/// The correction of a step is at most this share of its length: below the quarter up to which shown and filmed speeds count as
+/// the same (`bench/motion.py`).
 const WARP: f64 = 0.2;
-/// ... or of this speed, where that is more and the animal is as fast around the frame: what hovers to and fro is drawn
-/// aside as well, what rests is not.
+/// A step of an animal that hovers may be short although the animal moves. There the same share of the mean speed around the
+/// frame is allowed, up to this speed. An animal at rest has no such speed, and is not moved.
 const HOVERING_BL_PER_S: f64 = 0.2;
-/// So long either way is around a frame.
+/// Half the time over which that mean is taken.
 const AROUND_S: f64 = 0.25;
-/// From above, an animal at its usual speed is turned toward its boid at most at this share of the greatest turn rate
-/// that it was seen at, besides its own turns; a slower one less, and one that rests not at all.
+/// From above, headings are corrected toward the boid at up to this share of the greatest turn rate of the boids, in proportion
+/// to the speed below cruising speed: an animal at rest is not turned.
 const STEERED: f64 = 1.0;
 
-/// Where an individual points and is, frame by frame.
+/// Headings and positions of an individual, by frame.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(in crate::flock) struct Advanced {
-    pub(in crate::flock) heading_rad: Vec<f64>,
-    pub(in crate::flock) centroid_px: Vec<[f64; 2]>,
+pub(super) struct Advanced {
+    pub(super) heading_rad: Vec<f64>,
+    pub(super) centroid_px: Vec<[f64; 2]>,
 }
 
 impl Advanced {
-    pub(in crate::flock) fn append(&mut self, later: Advanced) {
+    pub(super) fn append(&mut self, later: Advanced) {
         self.heading_rad.extend(later.heading_rad);
         self.centroid_px.extend(later.centroid_px);
     }
 }
 
 impl Stage<'_> {
-    /// Where an individual gets to that shows some frames after `before`.
-    pub(in crate::flock) fn advance(
+    /// Headings and positions of an individual over the frames `shown`, which follow `before`.
+    pub(super) fn advance(
         &self,
         shown: &[(u32, bool)],
         boid: &BoidTrack,
@@ -76,7 +77,7 @@ impl Stage<'_> {
         }
     }
 
-    /// The headings from above: each as much further as the animal turned, and steered.
+    /// Headings in top view: each is the one before, plus the filmed turn, plus the correction.
     fn carried_headings(
         &self,
         shown: &[(u32, bool)],
@@ -105,8 +106,7 @@ impl Stage<'_> {
         headings
     }
 
-    /// How far the animal turned before a frame: in the film, where the frame before is shown before; as fast as it turned
-    /// there, where it is jumped to.
+    /// The filmed turn from one state to the next. At a jump, where it was not filmed: the turn rate at the target, for a frame.
     fn filmed_turn_rad(&self, before: (u32, bool), state: (u32, bool)) -> f64 {
         if !is_jump(before, state) {
             return wrap_rad(self.source_heading(state) - self.source_heading(before));
@@ -115,7 +115,7 @@ impl Stage<'_> {
         if state.1 { -rate } else { rate }
     }
 
-    /// The same of its way in the picture, pixels.
+    /// The filmed step from one state to the next, pixels. At a jump: the velocity at the target, for a frame.
     fn filmed_step_px(&self, before: (u32, bool), state: (u32, bool)) -> [f64; 2] {
         let poses = &self.library.poses.frames;
         let [from, to] = [before, state].map(|state| poses[state.0 as usize].centroid_px);
@@ -139,7 +139,7 @@ impl Stage<'_> {
         speeds.sum::<f64>() / n
     }
 
-    /// A place within the tank: that, or on the way to it from the boid.
+    /// A position within the tank: `place` itself, or the point at which the way from the boid to it leaves the tank.
     fn kept_in(&self, place: [f64; 2], goal: [f64; 2], depth_bl: f64) -> [f64; 2] {
         let [from, to] = [goal, place].map(|px| self.lens.place_bl(px, depth_bl));
         match self.tank.holds(to) {
@@ -149,6 +149,7 @@ impl Stage<'_> {
     }
 }
 
+/// A step rotated and scaled.
 fn turned(step: [f64; 2], turn_rad: f64, scale: f64) -> [f64; 2] {
     let (cos, sin) = (scale * libm::cos(turn_rad), scale * libm::sin(turn_rad));
     [cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]]

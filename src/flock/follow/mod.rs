@@ -1,8 +1,9 @@
-//! A flock that moves as its animal moved: boids say where to, the film says how (ALGORITHMS.md 6 to 8).
+//! Flocks whose motion comes from the film (`position: film`). Boids choose directions; speeds and steps are filmed ones.
 //!
-//! Segment by segment: boids start from where the animals are and go at the speeds at which each would go on by
-//! itself; plans follow them from what each shows; and the animals get on by the steps that were filmed, steered toward
-//! their boids within what nobody sees. Nothing asks for a speed that the film does not have, so nobody glides.
+//! A flock is made segment by segment. At the beginning of a segment each boid is put at the position of its animal. It moves
+//! at the speeds of the animal's natural continuation (`natural`). The plan of the segment follows it from the frame shown last
+//! (`plan::segment`). The animal then moves by the filmed steps of the planned frames, corrected a little toward the boid
+//! (`advance`).
 
 mod advance;
 mod natural;
@@ -22,10 +23,10 @@ use super::plan::{Model, Plan, Planner};
 use crate::library::View;
 use crate::progress::Progress;
 
-/// What a segment lasts when nothing is said.
+/// Default length of a segment. From the side a turn takes about a second and pays only after it, so plans must look beyond it.
 const SEGMENT_S: f64 = 3.0;
 
-/// The first frames of segments, and the frame after the last.
+/// The first frame of each segment, and at the end the number of frames.
 pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -> Vec<usize> {
     let n = segment_frames.map_or((SEGMENT_S * fps).round() as usize, |n| n as usize);
     let mut ends: Vec<usize> = (0..n_frames).step_by(n.max(2)).collect();
@@ -33,7 +34,7 @@ pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -
     ends
 }
 
-/// What everyone is and has done so far.
+/// All individuals up to the present segment, by id.
 struct Flock {
     course: Course,
     plans: Vec<Plan>,
@@ -41,7 +42,7 @@ struct Flock {
     standings: Vec<Standing>,
 }
 
-/// Has boids form, and plays a film; tracks, plans and places by id.
+/// Makes a flock with boids that have not formed yet: the tracks of boids, plans and placements, by id.
 pub(super) fn play(
     mut boids: Boids,
     (model, stage): (&Model, &Stage),
@@ -91,7 +92,7 @@ pub(super) fn play(
 }
 
 impl Flock {
-    /// The states that each would show in a segment by itself.
+    /// The natural continuation of each individual over a segment.
     fn natural_states(
         &self,
         boids: &Boids,
@@ -122,7 +123,7 @@ impl Flock {
         }
     }
 
-    /// Has everyone play what was planned for a segment.
+    /// Appends the plans of a segment and places them.
     fn go_on(&mut self, (model, stage): (&Model, &Stage), boids: &[BoidTrack], plans: Vec<Plan>) {
         self.standings.resize(plans.len(), Standing::default());
         let kept = (model.dwell, model.n_remembered());
@@ -141,7 +142,8 @@ impl Flock {
         }
     }
 
-    /// Puts boids to where the animals are; from above, where any direction can be shown, they also take theirs.
+    /// Puts each boid at the position of its animal. From above a boid also takes its animal's heading; from the side it keeps
+    /// its own, since the animal can show only headings that were filmed.
     fn draw_back(&self, boids: &mut Boids, stage: &Stage) {
         let mut positions = boids.positions().to_vec();
         let mut velocities = boids.velocities().to_vec();

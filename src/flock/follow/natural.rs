@@ -1,40 +1,38 @@
-//! How an animal would go on by itself: the frames after the one that it shows, and where they end a jump to others.
+//! The natural continuation of an animal: the frames that follow the one it shows in the film, and at the end of a run a random
+//! jump.
 //!
-//! A boid goes at the speeds of that, so that it asks for nothing that the film does not have: rest is followed by rest
-//! for as long as the animal rested, a dart by what came after it.
+//! A boid takes its speeds from this continuation. So it asks for speeds that the film has, in the order in which the film has
+//! them: a rest lasts as long as the animal rested.
 
 use crate::flock::boids::Gait;
 use crate::flock::motion::FrameMotion;
 use crate::flock::plan::Model;
 use crate::random;
 
-/// Of the states that an individual may begin with, so many are drawn, and the one that costs it least is taken.
+/// Random states of which an individual begins with the cheapest. A free choice: more of them point more as the boid does, and
+/// show rest and motion less in the shares of the film.
 const N_DRAWN: u64 = 24;
-/// A jump that costs so many turns more is e times as rare.
+/// A jump that costs this many turns more is e times as rare. A free choice: a sixth of the cost of a jump at D = epsilon.
 const RARER_TURNS: f64 = 3000.0;
 
 /// What random numbers are for.
 mod draw {
-    pub(in crate::flock) const BEGIN: u64 = 21;
-    pub(in crate::flock) const JUMP: u64 = 22;
+    pub(super) const BEGIN: u64 = 21;
+    pub(super) const JUMP: u64 = 22;
 }
 
-/// What may come after each state, and how fast the animal is in it.
-pub(in crate::flock) struct Natural<'a> {
+/// Continuations of all states of a trellis.
+pub(super) struct Natural<'a> {
     model: &'a Model,
     seed: u64,
-    /// Jumps by the state that they leave: where to, and what they cost.
+    /// By source state: (target state, cost in turns) of each jump.
     jumps: Vec<Vec<(u32, u32)>>,
     /// By state.
     gaits: Vec<Gait>,
 }
 
 impl<'a> Natural<'a> {
-    pub(in crate::flock) fn new(
-        model: &'a Model,
-        motion: &[FrameMotion],
-        seed: u64,
-    ) -> Natural<'a> {
+    pub(super) fn new(model: &'a Model, motion: &[FrameMotion], seed: u64) -> Natural<'a> {
         let trellis = &model.trellis;
         let mut jumps = vec![Vec::new(); trellis.n_states()];
         for (k, &target) in trellis.targets().iter().enumerate() {
@@ -61,13 +59,9 @@ impl<'a> Natural<'a> {
         }
     }
 
-    /// A state for individual `id` to begin with: of some drawn by chance, so that rest and motion are as common as in the
-    /// film, the one with the least `cost`. `None` where playback never goes on.
-    pub(in crate::flock) fn beginning(
-        &self,
-        id: usize,
-        cost: impl Fn(usize) -> u32,
-    ) -> Option<u32> {
+    /// The first state of individual `id`: of some random states, which show rest and motion in the shares of the film, the one
+    /// with the least `cost`. `None` if playback cannot continue from any state.
+    pub(super) fn beginning(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
         let goes_on: Vec<u32> = (0..self.jumps.len() as u32)
             .filter(|&state| {
                 self.model.future[state as usize].is_some()
@@ -81,8 +75,8 @@ impl<'a> Natural<'a> {
         drawn.min_by_key(|&state| cost(state as usize))
     }
 
-    /// The states of the next `n` frames from `state` on, which must play on for `held` frames.
-    pub(in crate::flock) fn states(
+    /// The states of the `n` frames after `state`. A jump may come after `held` frames at the earliest.
+    pub(super) fn states(
         &self,
         (mut state, mut held): (u32, usize),
         n: usize,
@@ -107,7 +101,7 @@ impl<'a> Natural<'a> {
         states
     }
 
-    /// Where one jumps to from a state, the dearer the rarer.
+    /// The target of a random jump from a state; dearer jumps are rarer. `None` without a jump.
     fn jump(&self, state: u32, key: [u64; 4]) -> Option<u32> {
         let jumps = &self.jumps[state as usize];
         let least = jumps.iter().map(|jump| jump.1).min()?;
@@ -121,8 +115,8 @@ impl<'a> Natural<'a> {
         Some(chosen.or(jumps.last())?.0)
     }
 
-    /// How the animal gets on in a state.
-    pub(in crate::flock) fn gait(&self, state: u32) -> Gait {
+    /// Speed and turn rate of the animal in a state.
+    pub(super) fn gait(&self, state: u32) -> Gait {
         self.gaits[state as usize]
     }
 }

@@ -71,8 +71,8 @@ impl Memory {
         self.cost_after(&[], states, 0)
     }
 
-    /// What the repeats of `states` cost, turns, but for those among its first `n_before`, when `before` was shown just
-    /// before.
+    /// Cost of the repeats in `states`, turns, when `before` was shown before them. Repeats among the first `n_before` states are
+    /// not counted.
     pub fn cost_after<State: std::hash::Hash + Eq + Copy>(
         &self,
         before: &[State],
@@ -87,8 +87,7 @@ impl Memory {
         self.cost * repeats.iter().filter(is_new).count() as u32
     }
 
-    /// By state, the frame of a segment before which showing it repeats what was shown before; its frame 0 is when the
-    /// last of `shown` was.
+    /// By state, the first frame at which showing it is no repeat of `shown`. Frame 0 is the frame of the last state of `shown`.
     pub fn repeated_until(&self, shown: &[u32], n_states: usize) -> Vec<u16> {
         let mut until = vec![0; n_states];
         for (ago, &state) in shown.iter().rev().enumerate() {

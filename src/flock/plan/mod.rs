@@ -44,9 +44,9 @@ struct Found {
     path: Path,
     /// What its repeats cost, turns.
     repetition: u32,
-    /// What is expected to come after its last frame, turns.
+    /// Future cost of its last state, turns.
     beyond: u32,
-    /// What no path costs less than, with all that, turns.
+    /// A lower bound of the cost of any path, repetition and future cost included, turns.
     least: u32,
 }
 
@@ -65,11 +65,11 @@ impl Found {
     }
 }
 
-/// What plans are made of, whoever follows whom: a library's playback and its prices.
+/// What plans of one library and one set of parameters have in common: the trellis and the costs of states and jumps.
 pub struct Model {
     /// What may follow what.
     pub trellis: Trellis,
-    /// What playback costs in the long run from every state on, turns; `None` where it ends.
+    /// Future cost by state, turns; `None` for a state from which playback cannot continue.
     pub future: Vec<Option<u32>>,
     /// Least frames between two jumps.
     pub dwell: usize,
@@ -121,13 +121,13 @@ impl Model {
             .collect()
     }
 
-    /// What pointing as in a state costs a boid at the first frame of its track; turns.
+    /// The heading cost of a state at the first frame of a boid's track, turns.
     pub fn heading_cost(&self, boid: &BoidTrack, state: usize) -> u32 {
         let wanted = self.weights.wanted(boid, self.fps)[0];
         self.weights.of_state(wanted, self.features[state])[0]
     }
 
-    /// How many of the frames shown last matter to what follows.
+    /// Number of the last states shown on which the costs of later frames depend.
     pub fn n_remembered(&self) -> usize {
         self.memory.span_frames
     }
@@ -139,9 +139,9 @@ pub struct Planner<'a> {
     /// By frame, where each boid is.
     places: Vec<Places>,
     boids: &'a [BoidTrack],
-    /// Where each has come to; none at the beginning of a film. With them the first frame is the last of those before.
+    /// By id, what was shown before; empty for the first segment. Otherwise frame 0 of `places` is the frame before the segment.
     standings: &'a [Standing],
-    /// Nothing comes after these frames.
+    /// No segment follows.
     is_last: bool,
     /// Of each individual, in a loop.
     ends: Vec<Ends>,
@@ -153,7 +153,7 @@ impl<'a> Planner<'a> {
         Planner::of_segment(model, boids, &[], true)
     }
 
-    /// For a segment of a film in which everyone goes on from where it stands; `boids`: their tracks in the segment alone.
+    /// For a segment; `boids` are their tracks in that segment alone.
     pub fn of_segment(
         model: &'a Model,
         boids: &'a [BoidTrack],
@@ -178,7 +178,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Frames before the first that is planned.
+    /// Frames of `places` before the first frame that is planned.
     fn n_before(&self) -> usize {
         usize::from(!self.standings.is_empty())
     }
@@ -297,8 +297,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// A path that is the cheapest but for what it repeats of itself: `path.cost` counts what it repeats of the frames
-    /// before, and what is expected after it.
+    /// The costs of the cheapest path, whose `path.cost` counts the future cost and repeats of what was shown before the
+    /// segment, but not repeats within it.
     fn found(&self, id: usize, (wanted, settled): (&[Feature], &Settled), path: Path) -> Found {
         let least = path.cost;
         let states = self.film_of(&path);

@@ -32,7 +32,7 @@ impl Round<'_> {
             .collect()
     }
 
-    /// What the cheapest path of each costs alone, and nothing expected after it; turns.
+    /// Cost of the cheapest path of each alone, without a future cost, turns.
     pub(super) fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         let planner = self.planner;
         let open = Film {
@@ -60,7 +60,7 @@ impl Round<'_> {
         self.planner.closed(rows, asked)
     }
 
-    /// The costs of plans that go on from where each stands.
+    /// The costs of plans that continue from what an individual has shown before.
     fn begun<'b, R>(&self, id: usize, rows: R) -> Begun<'b, R> {
         let standing = self.planner.standings.get(id);
         Begun {

@@ -1,9 +1,8 @@
-//! Plans of a film segment by segment (ALGORITHMS.md 6, live and endless).
+//! What a plan of a segment depends on besides its own frames.
 //!
-//! A segment's plan goes on from where that of the segment before it ended: from the state shown last, which may
-//! have to play on for a while, and with what was shown in the last seconds dearer than it was. The cheapest way
-//! over the segment is found exactly; what comes after it is told by what each state costs in the long run,
-//! F(s) = min over successors of (jump's cost + 0.995 F(s')), the future cost of Schoedl et al. (Video Textures, 2000).
+//! It continues from the state shown last, which may have to play on before the next jump. States shown in the last three
+//! seconds cost more. Its last state adds a future cost F(s) = min over successors of (jump's cost + 0.995 F(s')) (Schoedl et
+//! al., Video Textures, 2000). With these the plan of the segment is found exactly.
 
 use super::circle::FORBIDDEN;
 use super::trellis::Trellis;
@@ -14,18 +13,18 @@ const DISCOUNT: f64 = 0.995;
 /// Rounds in which the future cost settles; what has not by then is told a little too low.
 const MOST_ROUNDS: usize = 256;
 
-/// Where an individual has come to.
+/// What an individual has shown before a segment.
 #[derive(Clone, Debug, Default)]
 pub struct Standing {
-    /// What it has shown so far, the oldest first: at least all of the time in which a repeat is noticed.
+    /// States, oldest first; at least those of the time in which a repeat costs.
     pub shown: Vec<u32>,
-    /// For how many frames it must play on before it may jump.
+    /// Frames that it must play on before it may jump.
     pub held: usize,
 }
 
 impl Standing {
-    /// After it has shown `states` as well; a jump may come `dwell` frames after another. As elsewhere a film may begin
-    /// in the middle of a run.
+    /// Appends `states`. At most `n_kept` states are kept; two jumps are at least `dwell` frames apart. As elsewhere a flock may
+    /// begin in the middle of a run.
     pub fn go_on(&mut self, states: &[u32], (dwell, n_kept): (usize, usize)) {
         let is_first = self.shown.is_empty();
         let before = self.shown.last().copied();
@@ -49,17 +48,17 @@ impl Standing {
     }
 }
 
-/// The costs of a segment's frames. With a beginning its first frame is the last of the segment before, at which only
-/// the state shown there may be.
+/// Costs of the frames of a segment. With `from`, frame 0 is the last frame of the segment before, where only that state is
+/// allowed and costs nothing.
 #[derive(Clone)]
 pub(super) struct Begun<'a, R> {
     pub(super) rows: R,
     /// The state shown last before the segment, and for how many frames it must play on.
     pub(super) from: Option<(u32, usize)>,
-    /// By state, the frame before which showing it is a repeat of what was shown before the segment; and what that costs.
+    /// By state the first frame at which showing it is no repeat of what was shown before the segment; and the cost of a repeat.
     pub(super) repeats: Option<(&'a [u16], u32)>,
     pub(super) n_frames: usize,
-    /// What lies beyond; nothing at the end of the film.
+    /// Future cost by state, turns; `None` for the last segment.
     pub(super) future: Option<&'a [Option<u32>]>,
 }
 

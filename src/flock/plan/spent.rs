@@ -1,4 +1,4 @@
-//! What a plan shows and costs, whole or a segment of it.
+//! The plan of an individual and its cost, for a segment or a whole flock.
 
 use std::ops::AddAssign;
 
