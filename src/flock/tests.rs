@@ -53,7 +53,7 @@ fn nobody_glides() {
             }
         }
         assert!(
-            20 * n_as_filmed > 17 * n_all,
+            10 * n_as_filmed > 9 * n_all,
             "{view:?}: {n_as_filmed} of {n_all}"
         );
     }

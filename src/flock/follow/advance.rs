@@ -154,3 +154,57 @@ fn turned(step: [f64; 2], turn_rad: f64, scale: f64) -> [f64; 2] {
     let (cos, sin) = (scale * libm::cos(turn_rad), scale * libm::sin(turn_rad));
     [cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::Params;
+    use crate::flock::boids::calibration::Calibration;
+    use crate::flock::boids::tank::Tank;
+    use crate::flock::lens::Lens;
+    use crate::flock::motion::motion_of;
+    use crate::flock::synthetic;
+
+    #[test]
+    fn steps_stay_near_the_filmed_ones_however_far_away_the_boid_is() {
+        for view in [View::Side, View::Top] {
+            let (library, params) = (synthetic::library(view), Params::default());
+            let lens = Lens::of(&library, &params);
+            let motion = motion_of(&library, &lens);
+            let tank = Tank::of(&library, &lens, &motion, &params);
+            let calibration = Calibration::of(&library, &motion, lens.is_flat());
+            let stage = Stage {
+                library: &library,
+                motion: &motion,
+                params: &params,
+                lens: &lens,
+                tank: &tank,
+                calibration: &calibration,
+            };
+            let [x, y] = lens.picture_px(tank.middle);
+            let shown: Vec<(u32, bool)> = (100..130).map(|frame| (frame, false)).collect();
+            let boid = BoidTrack {
+                position_px: vec![[x + 60.0, y + 20.0, 0.0]; shown.len()],
+                heading_rad: vec![2.0; shown.len()],
+                ..BoidTrack::default()
+            };
+            let before = Before {
+                state: (99, false),
+                heading_rad: motion[99].heading_rad,
+                centroid_px: [x, y],
+            };
+            let advanced = stage.advance(&shown, &boid, Some(before));
+            for t in 1..shown.len() {
+                let [from, to] = [t - 1, t].map(|t| advanced.centroid_px[t]);
+                let [dx, dy] = stage.filmed_step_px(shown[t - 1], shown[t]);
+                let filmed_px = stage.scale(shown[t].0, stage.depth_bl(0.0)) * dx.hypot(dy);
+                let step_px = (to[0] - from[0]).hypot(to[1] - from[1]);
+                let gap_px = (step_px - filmed_px).abs();
+                assert!(
+                    gap_px < 0.25 * filmed_px + 0.05,
+                    "{view:?} {t}: {step_px} {filmed_px}"
+                );
+            }
+        }
+    }
+}
