@@ -38,8 +38,8 @@ CLEARLY = 1.0
 
 def off(name):
     """The switch of a rule; asked once, for it stands in inner loops."""
-    return ("{ static OFF: std::sync::OnceLock<bool> = std::sync::OnceLock::new(); "
-            f'*OFF.get_or_init(|| crate::rule_off("{name}")) }}')
+    return ("({ static OFF: std::sync::OnceLock<bool> = std::sync::OnceLock::new(); "
+            f'*OFF.get_or_init(|| crate::rule_off("{name}")) }})')
 
 
 def lay_out(rules):

@@ -24,10 +24,9 @@ const FILL_SEED: u64 = 1;
 const N_LIGHT: usize = 16;
 /// Where more than this share of the picture differs in most samples, higher thresholds are tried ...
 const BUSY: f64 = 0.03;
-/// ... and taken if the animal differs by this many times as much as they ask for, on average, ...
+/// ... and taken if the animal differs by this many times as much as they ask for, on average, and stands out more than
+/// at lower ones.
 const STARK: f64 = 2.0;
-/// ... and they explain the samples better by this factor.
-const MUCH_BETTER: f64 = 1.5;
 /// Medians of short windows are taken that explain the samples better than the commonest values by this factor.
 const FAR_BETTER: f64 = 3.0;
 
@@ -111,7 +110,8 @@ impl Draft {
     }
 
     /// Surveys the samples. Where much of the picture differs, raised thresholds are tried too, and the one at which a
-    /// subject that is stark even there explains the samples best is kept: a black mouse among bedding that it kicks about.
+    /// subject that is stark even there stands out most is kept: a black mouse among bedding that it kicks about, which at
+    /// low thresholds hangs together with the bedding.
     pub(super) fn survey(&mut self, samples: &Samples) -> Survey {
         let usual = Threshold::usual(self.threshold);
         let mut best = (self.survey_at(usual, samples), usual);
@@ -126,7 +126,7 @@ impl Draft {
                 .as_ref()
                 .map_or(0.0, |subject| subject.contrast);
             let is_stark = contrast >= STARK * f64::from(raised.core);
-            if is_stark && survey.worth > MUCH_BETTER * best.0.worth {
+            if is_stark && survey.starkness() > best.0.starkness() {
                 best = (survey, raised);
             }
         }

@@ -7,7 +7,6 @@ use super::samples::Samples;
 use super::scenery;
 use crate::analysis::silhouette::{self, shadow, tether};
 use crate::analysis::subject::{Color, LEAST_AREA_PX, Look, Subject, touches_border};
-use crate::geometry::Rect;
 use crate::order;
 use crate::raster::runs::{Component, Run};
 use crate::raster::{Frame, RgbImage};
@@ -20,6 +19,11 @@ const MOST_COMPONENTS: usize = 24;
 /// A ghost does not move: it is seen just where it is in at least this many samples. A ghost that hangs together with the
 /// animal moves, and is neither.
 pub(super) const GHOST_SAMPLES: usize = 3;
+
+/// The surroundings of a component begin this far outside it, for its rim is blurred, pixels; a free choice ...
+const MARGIN_PX: u32 = 2;
+/// ... and are at least this wide, or a quarter of the root of its area.
+const RING_PX: u32 = 6;
 
 /// An animal is tethered that is led so in more than this share of the samples in which it is seen.
 const TETHERED: f64 = 0.5;
@@ -167,6 +171,12 @@ impl Survey {
         (n_tethered as f64 > TETHERED * animals.len() as f64).then_some(thin_px)
     }
 
+    /// How well the subject explains the samples, whatever its size: a threshold that is too low adds scenery to it.
+    pub(super) fn starkness(&self) -> f64 {
+        let area_px = self.subject.as_ref().map_or(1.0, Subject::area_px);
+        self.worth / area_px.sqrt()
+    }
+
     /// How much differs in half of the samples, pixels.
     pub(super) fn differing_px(&self) -> f64 {
         let of = |looks: &Vec<Look>| looks.iter().map(|look| look.area_px).sum::<f64>();
@@ -249,28 +259,20 @@ pub(super) fn color_in(picture: &RgbImage, component: &Component) -> Color {
     Color::of(component.runs.iter().flat_map(row))
 }
 
-/// Whether a component's outline lives in the plate rather than in the frame: the sum over the
-/// outline of |grad I| - |grad B| is negative (ALGORITHMS.md 2.2).
+/// Whether the plate shows the thing and the frame does not: what the frame shows inside the component is more like its
+/// surroundings than what the plate shows there (ALGORITHMS.md 2.2 compares gradients along the outline, which takes a smooth
+/// animal before a rough texture for a ghost).
 fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
-    let (w, h) = (frame.width as usize, frame.height as usize);
-    let rect: Rect = component.rect.inflated(1, frame.width, frame.height);
+    let away_px = MARGIN_PX + RING_PX.max((component.area as f64).sqrt() as u32 / 4);
+    let rect = component.rect.inflated(away_px, frame.width, frame.height);
     let mask = component.mask(rect);
-    let inner = mask.eroded();
-    let gradient = |luma: &[u8], x: usize, y: usize| {
-        let at = |x: usize, y: usize| i32::from(luma[y * w + x]);
-        let dx = at((x + 1).min(w - 1), y) - at(x.saturating_sub(1), y);
-        let dy = at(x, (y + 1).min(h - 1)) - at(x, y.saturating_sub(1));
-        (dx.abs() + dy.abs()) as f32
+    let (near, far) = (mask.dilated_by(MARGIN_PX), mask.dilated_by(away_px));
+    let rgb = frame.rgb(rect);
+    let color = |is_counted: &dyn Fn(usize) -> bool| {
+        let counted = (0..mask.bits.len()).filter(|&k| is_counted(k));
+        Color::of(counted.map(|k| &rgb.pixels[3 * k..3 * k + 3]))
     };
-    let mut sum = 0.0;
-    for (k, (&set, &inside)) in mask.bits.iter().zip(&inner.bits).enumerate() {
-        if set == 1 && inside == 0 {
-            let (x, y) = (
-                rect.x as usize + k % mask.width(),
-                rect.y as usize + k / mask.width(),
-            );
-            sum += gradient(frame.luma(), x, y) - gradient(plate.frame.luma(), x, y);
-        }
-    }
-    sum < 0.0
+    let inside = color(&|k| mask.bits[k] == 1);
+    let around = color(&|k| far.bits[k] == 1 && near.bits[k] == 0);
+    inside.distance(&around) < color_in(&plate.rgb, component).distance(&around)
 }
