@@ -75,6 +75,7 @@ def measure(flock, poses, component):
         "states_off": float(np.abs(classes[0] - classes[1]).max()),
         "jumps": 100 * n_jumps / n, "heading_p90_deg": float(np.degrees(np.quantile(np.concatenate(errors), .9))),
         "loops": float(np.mean(loops)), "lookalikes": alike,
+        **({"overlap": overlap(people, poses, poses["image_size_px"][::-1])} if poses["view"] == "top" else {}),
         **{key: flock["stats"][key] for key in ("polarization", "wall_violations", "room_for", "path_deviation_p95_bl", "variety")},
     }
 
@@ -89,6 +90,26 @@ def lookalikes(people, length_px):
     both = near & same
     both[np.arange(len(people)), np.arange(len(people))] = False
     return float(both.any(1).mean())
+
+
+def overlap(people, poses, shape):
+    """Share of the bodies' area that lies under or over another body: ellipses of the outlines' areas and lengths, every 10th frame."""
+    height, width = (side // 2 for side in shape)
+    y, x = np.mgrid[0:height, 0:width]
+    covered, total = 0, 0
+    for t in range(0, len(people[0]["source_frame"]), 10):
+        count = np.zeros((height, width), np.uint8)
+        for one in people:
+            pose = poses["frames"][one["source_frame"][t]]
+            a = pose["length_px"] / 2 * (one.get("scale") or [1])[t if one.get("scale") else 0]
+            b = pose["area_px"] / math.pi / (pose["length_px"] / 2) * a / (pose["length_px"] / 2)
+            (cx, cy), angle = one["centroid_px"][t], one["heading_rad"][t]
+            dx, dy = 2 * x - cx, 2 * y - cy
+            along, across = dx * math.cos(angle) + dy * math.sin(angle), dy * math.cos(angle) - dx * math.sin(angle)
+            count += (along / a) ** 2 + (across / b) ** 2 <= 1
+        covered += int(count[count > 1].sum())
+        total += int(count.sum())
+    return covered / max(total, 1)
 
 
 def main():

@@ -24,9 +24,7 @@ const FILL_SEED: u64 = 1;
 const N_LIGHT: usize = 16;
 /// Where more than this share of the picture differs in most samples, higher thresholds are tried ...
 const BUSY: f64 = 0.03;
-/// ... and taken if the animal differs by this many times as much as they ask for, on average, and stands out more than
-/// at lower ones.
-const STARK: f64 = 2.0;
+/// ... and taken if the animal differs on average by as much as any of them asks for, and stands out more than at lower ones.
 /// Medians of short windows are taken that explain the samples better than the commonest values by this factor.
 const FAR_BETTER: f64 = 3.0;
 
@@ -125,7 +123,7 @@ impl Draft {
                 .subject
                 .as_ref()
                 .map_or(0.0, |subject| subject.contrast);
-            let is_stark = contrast >= STARK * f64::from(raised.core);
+            let is_stark = contrast >= f64::from(raised.most);
             if is_stark && survey.starkness() > best.0.starkness() {
                 best = (survey, raised);
             }

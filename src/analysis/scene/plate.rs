@@ -37,8 +37,10 @@ pub struct Plate {
 /// From which difference on a pixel counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
-    /// Least difference that certainly is no background, levels of 255; 4 sigma where that is more.
+    /// Least difference that certainly is no background, levels of 255; 4 sigma where that is more ...
     pub core: u8,
+    /// ... but at most this.
+    pub most: u8,
     /// Share of it from which a pixel counts beside one that certainly does.
     pub weak_share: f32,
 }
@@ -48,14 +50,17 @@ impl Threshold {
     pub const fn usual(core: u8) -> Threshold {
         Threshold {
             core,
+            most: u8::MAX,
             weak_share: 0.5,
         }
     }
 
-    /// Where the scene differs by half as much, only the whole counts.
+    /// Where the scene differs by half as much, only the whole counts. The animal is known to differ by twice as much; a
+    /// higher threshold, where the scene was changed meanwhile, would make holes in it.
     pub const fn raised(core: u8) -> Threshold {
         Threshold {
             core,
+            most: core.saturating_mul(2),
             weak_share: 1.0,
         }
     }
@@ -68,7 +73,7 @@ impl Plate {
         Plate {
             probes: light::probes(&rgb),
             rgb,
-            core_threshold: core_thresholds(&sigma, threshold),
+            core_threshold: core_thresholds(&sigma, Threshold::usual(threshold)),
             blocks: Blocks::of(&frame),
             frame,
             other: None,
@@ -88,7 +93,7 @@ impl Plate {
 
     /// Sets from which difference on a pixel counts.
     pub(super) fn set_threshold(&mut self, threshold: Threshold) {
-        self.core_threshold = core_thresholds(&self.sigma, threshold.core);
+        self.core_threshold = core_thresholds(&self.sigma, threshold);
         self.weak_share = threshold.weak_share;
     }
 
@@ -98,7 +103,8 @@ impl Plate {
     }
 }
 
-fn core_thresholds(sigma: &[f32], threshold: u8) -> Vec<u8> {
-    let of = |s: &f32| (4.0 * s).max(f32::from(threshold)).min(255.0) as u8;
+fn core_thresholds(sigma: &[f32], threshold: Threshold) -> Vec<u8> {
+    let [least, most] = [threshold.core, threshold.most].map(f32::from);
+    let of = |s: &f32| (4.0 * s).max(least).min(most) as u8;
     sigma.iter().map(of).collect()
 }

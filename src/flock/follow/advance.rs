@@ -1,6 +1,9 @@
 //! Headings and positions of an individual from the filmed steps of the frames that it shows, each corrected a little toward its
 //! boid.
 
+use rayon::prelude::*;
+
+use super::company::{self, Mover};
 use crate::flock::individual::{BoidTrack, rounded};
 use crate::flock::placement::{Before, Stage, is_jump};
 use crate::geometry::wrap_rad;
@@ -16,6 +19,15 @@ const WARP: f64 = 0.2;
 const HOVERING_BL_PER_S: f64 = 0.2;
 /// Half the time over which that mean is taken.
 const AROUND_S: f64 = 0.25;
+/// An animal that lies upon another is drawn to a place this far aside of its boid, body lengths.
+const ASIDE_BL: f64 = 1.0;
+/// From above, the course to follow is the sum of the boid's direction, the way to the boid, at this weight for each body
+/// length ...
+const PURSUED_PER_BL: f64 = 1.0;
+/// ... and the way aside from the others, at this weight. Of .5 to 4, the least overlap in `bench/motion.py`.
+const EVADED: f64 = 2.0;
+/// Time constant with which headings follow that course. From above alone: from the side headings are filmed ones.
+const TURN_S: f64 = 0.25;
 /// From above, headings are corrected toward the boid at up to this share of the greatest turn rate of the boids, in proportion
 /// to the speed below cruising speed: an animal at rest is not turned.
 const STEERED: f64 = 1.0;
@@ -34,76 +46,160 @@ impl Advanced {
     }
 }
 
-impl Stage<'_> {
-    /// Headings and positions of an individual over the frames `shown`, which follow `before`.
-    pub(super) fn advance(
-        &self,
-        shown: &[(u32, bool)],
-        boid: &BoidTrack,
-        before: Option<Before>,
-    ) -> Advanced {
-        let heading_rad = match self.library.poses.view {
-            View::Side => self.headings(shown, boid, before),
-            View::Top => self.carried_headings(shown, boid, before),
-        };
-        let mut centroid_px = Vec::with_capacity(shown.len());
-        let mut last = before.map(|before| (before.state, before.centroid_px));
-        for (t, &state) in shown.iter().enumerate() {
-            let [x, y, behind_px] = boid.position_px[t];
-            let (goal, depth_bl) = ([x, y], self.depth_bl(behind_px));
-            let place = match last {
-                None => goal,
-                Some((before, place)) => {
-                    let turn = self.rotation(state, heading_rad[t]);
-                    let scale = self.scale(state.0, depth_bl);
-                    let step = turned(self.filmed_step_px(before, state), turn, scale);
-                    let pull = 1.0 - libm::exp(-1.0 / (PULL_S * self.library.poses.fps));
-                    let off = [0, 1].map(|axis| pull * (goal[axis] - place[axis] - step[axis]));
-                    let hovering = self.speed_around(state.0).min(HOVERING_BL_PER_S);
-                    let hovering_px =
-                        scale * hovering * self.lens.length_px / self.library.poses.fps;
-                    let most_px = WARP * step[0].hypot(step[1]).max(hovering_px);
-                    let share = (most_px / off[0].hypot(off[1]).max(1e-9)).min(1.0);
-                    [0, 1].map(|axis| place[axis] + step[axis] + share * off[axis])
-                }
-            };
-            let place = self.kept_in(place, goal, depth_bl).map(|px| rounded(px, 2));
-            centroid_px.push(place);
-            last = Some((state, place));
-        }
-        Advanced {
-            heading_rad,
-            centroid_px,
+/// Where a boid is and points.
+#[derive(Clone, Copy, Debug)]
+struct Goal {
+    centroid_px: [f64; 2],
+    behind_px: f64,
+    heading_rad: f64,
+}
+
+impl Goal {
+    fn of(boid: &BoidTrack, t: usize) -> Goal {
+        let [x, y, behind_px] = boid.position_px[t];
+        Goal {
+            centroid_px: [x, y],
+            behind_px,
+            heading_rad: boid.heading_rad[t],
         }
     }
+}
 
-    /// Headings in top view: each is the one before, plus the filmed turn, plus the correction.
-    fn carried_headings(
+impl Stage<'_> {
+    /// Headings and positions of all individuals over the frames `shown`, which follow `before`, by id.
+    pub(super) fn advance(
         &self,
-        shown: &[(u32, bool)],
-        boid: &BoidTrack,
-        before: Option<Before>,
-    ) -> Vec<f64> {
-        let fps = self.library.poses.fps;
-        let most_rad = STEERED * self.calibration.turn_rad_per_s / fps;
-        let pull = 1.0 - libm::exp(-1.0 / (PULL_S * fps));
-        let mut last = before.map(|before| (before.state, before.heading_rad));
-        let mut headings = Vec::with_capacity(shown.len());
-        for (&state, &goal) in shown.iter().zip(&boid.heading_rad) {
-            let heading = match last {
-                None => goal,
-                Some((before, heading)) => {
-                    let heading = heading + self.filmed_turn_rad(before, state);
-                    let speed = self.motion[state.0 as usize].speed_bl_per_s;
-                    let most_rad = most_rad * (speed / self.calibration.cruise_bl_per_s).min(1.0);
-                    heading + (pull * wrap_rad(goal - heading)).clamp(-most_rad, most_rad)
-                }
+        shown: &[Vec<(u32, bool)>],
+        boids: &[BoidTrack],
+        before: &[Option<Before>],
+    ) -> Vec<Advanced> {
+        let is_flat = self.library.poses.view == View::Top;
+        let mut advanced: Vec<Advanced> = (0..shown.len())
+            .into_par_iter()
+            .map(|id| Advanced {
+                heading_rad: match is_flat {
+                    true => Vec::new(),
+                    false => self.headings(&shown[id], &boids[id], before[id]),
+                },
+                centroid_px: Vec::new(),
+            })
+            .collect();
+        let n_frames = shown.first().map_or(0, Vec::len);
+        let mut last: Vec<Option<Before>> = before.to_vec();
+        for t in 0..n_frames {
+            let asides = match is_flat {
+                true => self.asides(&last),
+                false => vec![[0.0; 2]; last.len()],
             };
-            let heading = rounded(wrap_rad(heading), 5);
-            headings.push(heading);
-            last = Some((state, heading));
+            let each = advanced
+                .par_iter_mut()
+                .zip(&mut last)
+                .zip(asides)
+                .enumerate();
+            each.with_min_len(64)
+                .for_each(|(id, ((one, last), aside))| {
+                    let state = shown[id][t];
+                    let goal = Goal::of(&boids[id], t);
+                    if is_flat {
+                        one.heading_rad
+                            .push(self.carried_heading(state, goal, *last, aside));
+                    }
+                    let heading_rad = one.heading_rad[t];
+                    let centroid_px =
+                        self.carried_centroid((state, heading_rad), goal, *last, aside);
+                    one.centroid_px.push(centroid_px);
+                    *last = Some(Before {
+                        state,
+                        heading_rad,
+                        centroid_px,
+                    });
+                });
         }
-        headings
+        advanced
+    }
+
+    /// For each individual the direction in which it avoids the others, weighted by how near they come.
+    fn asides(&self, last: &[Option<Before>]) -> Vec<[f64; 2]> {
+        let movers: Vec<Mover> = last
+            .iter()
+            .map(|before| {
+                before.map_or(Mover::default(), |before| {
+                    let turn = self.rotation(before.state, before.heading_rad);
+                    let moved = &self.motion[before.state.0 as usize];
+                    let [vx, vy] = moved.velocity_bl_per_s;
+                    let side = if before.state.1 { -1.0 } else { 1.0 };
+                    Mover {
+                        position_bl: before.centroid_px.map(|px| px / self.lens.length_px),
+                        velocity_bl_per_s: turned([side * vx, vy], turn, 1.0),
+                        is_there: true,
+                    }
+                })
+            })
+            .collect();
+        company::asides(&movers)
+    }
+
+    /// The position after a filmed step and its correction.
+    fn carried_centroid(
+        &self,
+        (state, heading_rad): ((u32, bool), f64),
+        goal: Goal,
+        last: Option<Before>,
+        aside: [f64; 2],
+    ) -> [f64; 2] {
+        let depth_bl = self.depth_bl(goal.behind_px);
+        let Some(before) = last else {
+            return self
+                .kept_in(goal.centroid_px, goal.centroid_px, depth_bl)
+                .map(|px| rounded(px, 2));
+        };
+        let fps = self.library.poses.fps;
+        let turn = self.rotation(state, heading_rad);
+        let scale = self.scale(state.0, depth_bl);
+        let step = turned(self.filmed_step_px(before.state, state), turn, scale);
+        let pull = 1.0 - libm::exp(-1.0 / (PULL_S * fps));
+        let wanted = [0, 1].map(|axis| {
+            goal.centroid_px[axis] - before.centroid_px[axis] - step[axis]
+                + ASIDE_BL * self.lens.length_px * aside[axis]
+        });
+        let off = wanted.map(|px| pull * px);
+        let hovering = self.speed_around(state.0).min(HOVERING_BL_PER_S);
+        let hovering_px = scale * hovering * self.lens.length_px / fps;
+        let most_px = WARP * step[0].hypot(step[1]).max(hovering_px);
+        let share = (most_px / off[0].hypot(off[1]).max(1e-9)).min(1.0);
+        let place = [0, 1].map(|axis| before.centroid_px[axis] + step[axis] + share * off[axis]);
+        self.kept_in(place, goal.centroid_px, depth_bl)
+            .map(|px| rounded(px, 2))
+    }
+
+    /// A heading in top view: the one before, plus the filmed turn, plus the correction toward the boid's course and aside.
+    fn carried_heading(
+        &self,
+        state: (u32, bool),
+        goal: Goal,
+        last: Option<Before>,
+        aside: [f64; 2],
+    ) -> f64 {
+        let Some(before) = last else {
+            return goal.heading_rad;
+        };
+        let fps = self.library.poses.fps;
+        let heading = before.heading_rad + self.filmed_turn_rad(before.state, state);
+        let course = [libm::cos(goal.heading_rad), libm::sin(goal.heading_rad)];
+        let [x, y] = [0, 1].map(|axis| {
+            let behind_bl =
+                (goal.centroid_px[axis] - before.centroid_px[axis]) / self.lens.length_px;
+            course[axis] + PURSUED_PER_BL * behind_bl + EVADED * aside[axis]
+        });
+        let speed = self.motion[state.0 as usize].speed_bl_per_s;
+        let most_rad = STEERED * self.calibration.turn_rad_per_s / fps
+            * (speed / self.calibration.cruise_bl_per_s).min(1.0);
+        let pull = 1.0 - libm::exp(-1.0 / (TURN_S * fps));
+        let wanted = wrap_rad(libm::atan2(y, x) - heading);
+        rounded(
+            wrap_rad(heading + (pull * wanted).clamp(-most_rad, most_rad)),
+            5,
+        )
     }
 
     /// The filmed turn from one state to the next. At a jump, where it was not filmed: the turn rate at the target, for a frame.
@@ -193,7 +289,7 @@ mod tests {
                 heading_rad: motion[99].heading_rad,
                 centroid_px: [x, y],
             };
-            let advanced = stage.advance(&shown, &boid, Some(before));
+            let advanced = &stage.advance(&[shown.clone()], &[boid], &[Some(before)])[0];
             for t in 1..shown.len() {
                 let [from, to] = [t - 1, t].map(|t| advanced.centroid_px[t]);
                 let [dx, dy] = stage.filmed_step_px(shown[t - 1], shown[t]);

@@ -6,6 +6,7 @@
 //! (`advance`).
 
 mod advance;
+mod company;
 mod natural;
 
 use rayon::prelude::*;
@@ -127,17 +128,22 @@ impl Flock {
     fn go_on(&mut self, (model, stage): (&Model, &Stage), boids: &[BoidTrack], plans: Vec<Plan>) {
         self.standings.resize(plans.len(), Standing::default());
         let kept = (model.dwell, model.n_remembered());
-        for (id, plan) in plans.into_iter().enumerate() {
-            self.standings[id].go_on(&plan.states, kept);
-            let shown = model.shown(&plan.states);
-            let before = self.plans[id].states.last().and_then(|&state| {
+        let shown: Vec<Vec<(u32, bool)>> =
+            plans.iter().map(|plan| model.shown(&plan.states)).collect();
+        let before: Vec<Option<Before>> = (self.plans.iter().zip(&self.advanced))
+            .map(|(plan, one)| {
+                let &state = plan.states.last()?;
                 Some(Before {
                     state: model.trellis.shown(state as usize)?,
-                    heading_rad: *self.advanced[id].heading_rad.last()?,
-                    centroid_px: *self.advanced[id].centroid_px.last()?,
+                    heading_rad: *one.heading_rad.last()?,
+                    centroid_px: *one.centroid_px.last()?,
                 })
-            });
-            self.advanced[id].append(stage.advance(&shown, &boids[id], before));
+            })
+            .collect();
+        let advanced = stage.advance(&shown, boids, &before);
+        for (id, (plan, advanced)) in plans.into_iter().zip(advanced).enumerate() {
+            self.standings[id].go_on(&plan.states, kept);
+            self.advanced[id].append(advanced);
             self.plans[id].append(plan);
         }
     }

@@ -1,0 +1,128 @@
+//! Collision avoidance for animals seen from above (Reynolds 1999, unaligned collision avoidance): each one predicts where the
+//! others will be nearest to it and steers away from that place.
+
+use rayon::prelude::*;
+
+/// How far ahead collisions are predicted. A free choice: about the time in which a mouse turns aside.
+const AHEAD_S: f64 = 0.6;
+/// Centroids nearer than this are avoided. A free choice between the width and the length of a body.
+const CLEAR_BL: f64 = 0.8;
+
+/// Position and velocity of an animal seen from above.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Mover {
+    pub(super) position_bl: [f64; 2],
+    pub(super) velocity_bl_per_s: [f64; 2],
+    /// It has a position; an animal that has none yet is avoided by nobody.
+    pub(super) is_there: bool,
+}
+
+/// For each animal the sum of the ways away from the others that it is about to come too near to. Each way is at most 1 long:
+/// longer the nearer and the sooner.
+pub(super) fn asides(movers: &[Mover]) -> Vec<[f64; 2]> {
+    let mut by_x: Vec<usize> = (0..movers.len())
+        .filter(|&id| movers[id].is_there)
+        .collect();
+    by_x.sort_by(|&a, &b| movers[a].position_bl[0].total_cmp(&movers[b].position_bl[0]));
+    let fastest = movers
+        .iter()
+        .map(|m| m.velocity_bl_per_s[0].hypot(m.velocity_bl_per_s[1]));
+    let reach_bl = CLEAR_BL + 2.0 * AHEAD_S * fastest.fold(0.0, f64::max);
+    let of = |&one: &Mover| {
+        let x = one.position_bl[0];
+        let first = by_x.partition_point(|&id| movers[id].position_bl[0] < x - reach_bl);
+        let near = by_x[first..].iter().map(|&id| &movers[id]);
+        let near = near.take_while(|other| other.position_bl[0] <= x + reach_bl);
+        near.map(|other| aside(&one, other))
+            .fold([0.0; 2], |[x, y], [dx, dy]| [x + dx, y + dy])
+    };
+    movers.par_iter().with_min_len(64).map(of).collect()
+}
+
+/// The way of one animal away from another.
+fn aside(one: &Mover, other: &Mover) -> [f64; 2] {
+    let offset = [0, 1].map(|k| one.position_bl[k] - other.position_bl[k]);
+    let relative = [0, 1].map(|k| one.velocity_bl_per_s[k] - other.velocity_bl_per_s[k]);
+    let square = relative[0] * relative[0] + relative[1] * relative[1];
+    let closing = -(offset[0] * relative[0] + offset[1] * relative[1]);
+    let after_s = if square > 1e-9 {
+        (closing / square).clamp(0.0, AHEAD_S)
+    } else {
+        0.0
+    };
+    let then = [0, 1].map(|k| offset[k] + after_s * relative[k]);
+    let distance_bl = then[0].hypot(then[1]);
+    if distance_bl >= CLEAR_BL || offset == [0.0; 2] {
+        return [0.0; 2];
+    }
+    let strength = (1.0 - distance_bl / CLEAR_BL) * (1.0 - 0.5 * after_s / AHEAD_S);
+    // Two that would meet head on both go to their left.
+    let way = match distance_bl > 0.05 {
+        true => then,
+        false => [-offset[1], offset[0]],
+    };
+    let length = way[0].hypot(way[1]).max(1e-9);
+    way.map(|part| strength * part / length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mover(position_bl: [f64; 2], velocity_bl_per_s: [f64; 2]) -> Mover {
+        Mover {
+            position_bl,
+            velocity_bl_per_s,
+            is_there: true,
+        }
+    }
+
+    /// How near two animals that steer as they are told come to each other, body lengths.
+    fn nearest_bl(mut movers: [Mover; 2]) -> f64 {
+        const STEP_S: f64 = 0.05;
+        let mut nearest_bl = f64::INFINITY;
+        for _ in 0..60 {
+            let asides = asides(&movers);
+            for (mover, aside) in movers.iter_mut().zip(asides) {
+                let speed = mover.velocity_bl_per_s[0].hypot(mover.velocity_bl_per_s[1]);
+                let wanted = [0, 1].map(|k| mover.velocity_bl_per_s[k] + 4.0 * STEP_S * aside[k]);
+                let length = wanted[0].hypot(wanted[1]);
+                mover.velocity_bl_per_s = wanted.map(|v| v * speed / length);
+                for k in 0..2 {
+                    mover.position_bl[k] += STEP_S * mover.velocity_bl_per_s[k];
+                }
+            }
+            let [a, b] = movers.map(|mover| mover.position_bl);
+            nearest_bl = nearest_bl.min((a[0] - b[0]).hypot(a[1] - b[1]));
+        }
+        nearest_bl
+    }
+
+    #[test]
+    fn animals_that_would_collide_pass_each_other() {
+        let head_on = [
+            mover([0.0, 0.0], [1.0, 0.0]),
+            mover([2.0, 0.0], [-1.0, 0.0]),
+        ];
+        let crossing = [
+            mover([0.0, 0.0], [1.0, 0.0]),
+            mover([1.0, -1.2], [0.0, 1.0]),
+        ];
+        for movers in [head_on, crossing] {
+            let nearest_bl = nearest_bl(movers);
+            assert!(nearest_bl > 0.4, "{nearest_bl}");
+        }
+    }
+
+    #[test]
+    fn animals_that_do_not_come_near_keep_their_course() {
+        let parallel = [mover([0.0, 0.0], [1.0, 0.0]), mover([0.0, 1.0], [1.0, 0.0])];
+        let parting = [
+            mover([0.0, 0.0], [-1.0, 0.0]),
+            mover([1.0, 0.0], [1.0, 0.0]),
+        ];
+        for movers in [parallel, parting] {
+            assert_eq!(asides(&movers), [[0.0; 2]; 2]);
+        }
+    }
+}
