@@ -35,7 +35,7 @@ fn main() {
 /// Seconds of a step: the least of three times `steps`.
 fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
     let params = Params {
-        count,
+        count: Some(count),
         leaders: false,
         ..Params::default()
     };

@@ -41,7 +41,7 @@ fn main() {
         None => made_library(n_frames),
     };
     let params = Params {
-        count: number(count),
+        count: Some(number(count)),
         frames: number(frames),
         mirror,
         ..Params::default()

@@ -192,7 +192,7 @@ pub(super) async fn preview_flock(
     Json(request): Json<FlockRequest>,
 ) -> Result<Response<Body>, Problem> {
     let params: Params = params::read(request.params)?;
-    let n_shown = u64::from(params.count) * u64::from(params.frames);
+    let n_shown = u64::from(params.most_individuals()) * u64::from(params.frames);
     if n_shown > MOST_PREVIEWED {
         return Err(Problem {
             code: Code::InvalidParams,

@@ -61,7 +61,7 @@ mod tests {
     fn a_stored_plan_holds_and_one_changed_by_hand_exits_with_2_and_a_sentence() {
         let library = synthetic::library(View::Side);
         let params = Params {
-            count: 2,
+            count: Some(2),
             frames: 50,
             ..Params::default()
         };

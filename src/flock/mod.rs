@@ -1,6 +1,7 @@
 //! Library to flock: simulate boids, plan which real frames follow them best, place those frames in
 //! the picture, and composite them (O 4 and 5; ALGORITHMS.md 6 to 8).
 
+pub mod advice;
 pub mod boids;
 pub mod check;
 pub mod composite;
@@ -36,7 +37,7 @@ use self::course::Course;
 use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
-use self::params::{MatchBy, Position};
+use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
 use self::placement::{Placed, Stage};
 use self::plan::{Model, Plan, Planner};
 use crate::library::Library;
@@ -96,9 +97,15 @@ pub fn plan_flock(
         return Err(Error::NoTransitions);
     }
     let lens = Lens::of(library, params);
-    let params = &told(params, &lens);
+    let mut params = told(params, &lens);
     let motion = motion_of(library, &lens);
-    let tank = Tank::of(library, &lens, &motion, params);
+    let tank = Tank::of(library, &lens, &motion, &params);
+    params.count = Some(
+        params
+            .count
+            .unwrap_or(tank.room_for().clamp(2, MOST_BY_DEFAULT)),
+    );
+    let params = &params;
     let calibration = Calibration::of(library, &motion, lens.is_flat()).in_tank(&tank);
     let boids = Boids::at_random(params, &calibration, (&lens, &tank), library.poses.fps);
     let model = Model::new(library, &motion, params);

@@ -13,8 +13,8 @@ use super::composite::params::Render;
 #[schema(as = FlockParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Individuals, 1..=2000.
-    pub count: u32,
+    /// Individuals, 1..=2000; null = as many as there is room for, 2 to 20.
+    pub count: Option<u32>,
     /// Frames of the film, 1..=10000; times the individuals at most 4,000,000.
     pub frames: u32,
     /// Everything random follows from it.
@@ -138,6 +138,8 @@ pub enum TankExtent {
 /// The most that individuals times frames may be: where everyone is in every frame is held in memory, and told in
 /// `flock.json`, with some hundreds of bytes each.
 const MOST_SHOWN: u64 = 4_000_000;
+/// Individuals where nothing is asked, if there is room for them.
+pub(super) const MOST_BY_DEFAULT: u32 = 20;
 
 impl Default for Matching {
     fn default() -> Matching {
@@ -159,7 +161,7 @@ impl Default for Matching {
 impl Default for Params {
     fn default() -> Params {
         Params {
-            count: 20,
+            count: None,
             frames: 400,
             seed: 1,
             is_loop: false,
@@ -253,11 +255,16 @@ impl Params {
         }
     }
 
+    /// Individuals asked for, or at most so many where nothing is asked.
+    pub fn most_individuals(&self) -> u32 {
+        self.count.unwrap_or(MOST_BY_DEFAULT)
+    }
+
     /// Checks every range; the sentence says which parameter is out of which range.
     pub fn check(&self) -> Result<(), String> {
-        within("count", f64::from(self.count), 1.0, 2000.0)?;
+        within("count", f64::from(self.most_individuals()), 1.0, 2000.0)?;
         within("frames", f64::from(self.frames), 1.0, 10_000.0)?;
-        let n_shown = u64::from(self.count) * u64::from(self.frames);
+        let n_shown = u64::from(self.most_individuals()) * u64::from(self.frames);
         if n_shown > MOST_SHOWN {
             return Err(format!(
                 "count times frames must be at most {MOST_SHOWN}: {n_shown}"
@@ -336,12 +343,12 @@ mod tests {
     #[test]
     fn what_is_out_of_range_is_named() {
         let no_one = Params {
-            count: 0,
+            count: Some(0),
             ..Params::default()
         };
         assert_eq!(no_one.check(), Err("count must lie in 1..=2000: 0".into()));
         let of = |count, frames| Params {
-            count,
+            count: Some(count),
             frames,
             ..Params::default()
         };

@@ -91,7 +91,7 @@ mod tests {
     fn what_a_file_tells_is_enough_to_reckon_order_distances_and_walls_anew() {
         for view in [View::Top, View::Side] {
             let params = Params {
-                count: 9,
+                count: Some(9),
                 frames: 40,
                 ..Params::default()
             };

@@ -9,7 +9,7 @@ use crate::progress::Silent;
 
 fn params(name: &str) -> Params {
     Params {
-        count: 12,
+        count: Some(12),
         frames: 150,
         ..Params::preset(name).expect("a known preset")
     }
@@ -88,7 +88,7 @@ fn a_flock_tells_its_order_frame_by_frame_and_in_the_mean() {
 fn a_flock_tells_how_many_the_tank_has_room_for() {
     let room_for = |view, count| {
         let params = Params {
-            count,
+            count: Some(count),
             tank: TankExtent::Picture,
             ..params("scatter")
         };
@@ -136,7 +136,7 @@ fn everybody_stays_in_the_picture() {
 #[test]
 fn a_crowd_goes_farther_than_the_animal_did_but_not_over_a_wall() {
     let params = Params {
-        count: 60,
+        count: Some(60),
         frames: 100,
         ..params("scatter")
     };
@@ -369,7 +369,7 @@ fn an_animal_too_small_for_sprites_is_refused_with_advice() {
 #[test]
 fn a_parameter_out_of_range_is_refused() {
     let none = Params {
-        count: 0,
+        count: Some(0),
         ..Params::default()
     };
     let error = plan_flock(&synthetic::library(View::Top), &none, &Silent).expect_err("nobody");

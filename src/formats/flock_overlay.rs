@@ -112,7 +112,7 @@ mod tests {
     #[test]
     fn every_boid_has_its_mark_where_it_is_at_any_size() {
         let params = Params {
-            count: 3,
+            count: Some(3),
             frames: 10,
             ..Params::default()
         };

@@ -69,7 +69,7 @@ pub struct Summary {
     pub advice: Vec<Advice>,
 }
 
-/// One thing that a library lacks, or that is worth knowing of its film's file.
+/// One thing that a library or a flock lacks, or that is worth knowing of a film's file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Advice {
     /// Its stable name, such as `little_playback` or `lacks_up`.
@@ -200,15 +200,19 @@ impl Summary {
 }
 
 impl Advice {
+    /// One piece of advice, as results hold it.
+    pub(super) fn new(code: &str, sentence: &impl ToString) -> Advice {
+        Advice {
+            code: code.to_owned(),
+            sentence: sentence.to_string(),
+        }
+    }
+
     /// What a library lacks, the gravest first, then what is worth knowing of its film's file.
     pub fn all(library: &Library, params: &Params, notes: &[Note]) -> Vec<Advice> {
         let all = analysis::stats::advice(library, params);
-        let plain = |(code, sentence): (&str, String)| Advice {
-            code: code.to_owned(),
-            sentence,
-        };
-        let of_library = all.iter().map(|one| (one.code(), one.to_string()));
-        let of_file = notes.iter().map(|note| (note.code(), note.to_string()));
-        of_library.chain(of_file).map(plain).collect()
+        let of_library = all.iter().map(|one| Advice::new(one.code(), one));
+        let of_file = notes.iter().map(|note| Advice::new(note.code(), note));
+        of_library.chain(of_file).collect()
     }
 }

@@ -43,6 +43,6 @@ export function flockForm(onFlock) {
 
 function wishesOf(form, libraryId) {
   const { count: individuals, frames, seed, preset } = form.elements;
-  const wishes = { library_id: libraryId, count: individuals.valueAsNumber, frames: frames.valueAsNumber, seed: seed.valueAsNumber };
+  const wishes = { library_id: libraryId, count: individuals.value ? individuals.valueAsNumber : null, frames: frames.valueAsNumber, seed: seed.valueAsNumber };
   return preset.value ? { ...wishes, preset: preset.value } : wishes;
 }

@@ -1,6 +1,6 @@
 // The stage: one flock, playing in a loop, with its downloads.
 // @ts-check
-import { byId } from "./element.js";
+import { byId, element } from "./element.js";
 import { count } from "./words.js";
 
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -18,6 +18,7 @@ export function showFlock(flock, filmName) {
   byId("stage-note").hidden = true;
   byId("stage-title").textContent = `A flock of ${count(flock.count)}`;
   byId("stage-facts").textContent = [origin, `${count(flock.frames)} frames`, `seed ${flock.seed}`].filter(Boolean).join(" · ");
+  byId("stage-advice").replaceChildren(...(flock.advice ?? []).map((/** @type {any} */ one) => element("li", {}, one.sentence)));
   byId("stage-video-link").href = source;
   byId("stage-plan-link").href = `/v1/flocks/${flock.id}/flock.json`;
   for (const [name, file] of [["tracks", "tracks.csv"], ["truth", "ground-truth.zip"]]) {

@@ -7,9 +7,10 @@ use super::samples::Samples;
 use super::scenery;
 use crate::analysis::silhouette::{self, shadow, tether};
 use crate::analysis::subject::{Color, LEAST_AREA_PX, Look, Subject, touches_border};
+use crate::geometry::Rect;
 use crate::order;
 use crate::raster::runs::{Component, Run};
-use crate::raster::{Frame, RgbImage};
+use crate::raster::{Frame, Mask, RgbImage};
 
 use super::light::Light;
 
@@ -259,20 +260,84 @@ pub(super) fn color_in(picture: &RgbImage, component: &Component) -> Color {
     Color::of(component.runs.iter().flat_map(row))
 }
 
-/// Whether the plate shows the thing and the frame does not: what the frame shows inside the component is more like its
-/// surroundings than what the plate shows there (ALGORITHMS.md 2.2 compares gradients along the outline, which takes a smooth
-/// animal before a rough texture for a ghost).
+/// Whether the plate shows the thing and the frame does not. Two measures from -1 to 1, positive for something that is there,
+/// are added: whether its outline is in the frame or in the plate (ALGORITHMS.md 2.2), and whether its color is. The outline
+/// counts by how much stronger it is than the texture around it: before rough bedding the outline of a smooth mouse says little.
 fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
-    let away_px = MARGIN_PX + RING_PX.max((component.area as f64).sqrt() as u32 / 4);
-    let rect = component.rect.inflated(away_px, frame.width, frame.height);
-    let mask = component.mask(rect);
-    let (near, far) = (mask.dilated_by(MARGIN_PX), mask.dilated_by(away_px));
-    let rgb = frame.rgb(rect);
-    let color = |is_counted: &dyn Fn(usize) -> bool| {
-        let counted = (0..mask.bits.len()).filter(|&k| is_counted(k));
-        Color::of(counted.map(|k| &rgb.pixels[3 * k..3 * k + 3]))
-    };
-    let inside = color(&|k| mask.bits[k] == 1);
-    let around = color(&|k| far.bits[k] == 1 && near.bits[k] == 0);
-    inside.distance(&around) < color_in(&plate.rgb, component).distance(&around)
+    let surroundings = Surroundings::of(frame, component);
+    let [texture, of_frame, of_plate] = surroundings.gradients(frame, &plate.frame);
+    let outline = (of_frame.max(of_plate) - texture).max(0.0);
+    let share = outline / (outline + texture).max(1e-9);
+    let behind = color_in(&plate.rgb, component);
+    let [inside, around] = surroundings.colors(frame);
+    let by_color = contrast(inside.distance(&around), behind.distance(&around));
+    share * contrast(of_frame, of_plate) + (1.0 - share) * by_color < 0.0
+}
+
+/// A component and the ring around it, in a box that holds both.
+struct Surroundings {
+    rect: Rect,
+    /// The component.
+    inside: Mask,
+    /// Its outermost pixels.
+    outline: Vec<usize>,
+    /// The ring, some pixels outside.
+    around: Vec<usize>,
+}
+
+impl Surroundings {
+    fn of(frame: &Frame, component: &Component) -> Surroundings {
+        let away_px = MARGIN_PX + RING_PX.max((component.area as f64).sqrt() as u32 / 4);
+        let rect = component.rect.inflated(away_px, frame.width, frame.height);
+        let inside = component.mask(rect);
+        let inner = inside.eroded();
+        let (near, far) = (inside.dilated_by(MARGIN_PX), inside.dilated_by(away_px));
+        let chosen = |is_chosen: &dyn Fn(usize) -> bool| {
+            (0..inside.bits.len()).filter(|&k| is_chosen(k)).collect()
+        };
+        Surroundings {
+            rect,
+            outline: chosen(&|k| inside.bits[k] == 1 && inner.bits[k] == 0),
+            around: chosen(&|k| far.bits[k] == 1 && near.bits[k] == 0),
+            inside,
+        }
+    }
+
+    /// Mean gradients, levels: of the plate in the ring, and along the outline of the frame and of the plate.
+    fn gradients(&self, frame: &Frame, plate: &Frame) -> [f64; 3] {
+        let (w, h) = (frame.width as usize, frame.height as usize);
+        let gradient = |luma: &[u8], k: usize| {
+            let x = self.rect.x as usize + k % self.inside.width();
+            let y = self.rect.y as usize + k / self.inside.width();
+            let at = |x: usize, y: usize| f64::from(luma[y * w + x]);
+            let dx = at((x + 1).min(w - 1), y) - at(x.saturating_sub(1), y);
+            let dy = at(x, (y + 1).min(h - 1)) - at(x, y.saturating_sub(1));
+            dx.abs() + dy.abs()
+        };
+        let mean = |luma: &[u8], pixels: &[usize]| {
+            let sum: f64 = pixels.iter().map(|&k| gradient(luma, k)).sum();
+            sum / pixels.len().max(1) as f64
+        };
+        [
+            mean(plate.luma(), &self.around),
+            mean(frame.luma(), &self.outline),
+            mean(plate.luma(), &self.outline),
+        ]
+    }
+
+    /// The colors of the frame inside the component and in the ring.
+    fn colors(&self, frame: &Frame) -> [Color; 2] {
+        let rgb = frame.rgb(self.rect);
+        let inside = (0..self.inside.bits.len()).filter(|&k| self.inside.bits[k] == 1);
+        let pixel = |k: usize| &rgb.pixels[3 * k..3 * k + 3];
+        [
+            Color::of(inside.map(pixel)),
+            Color::of(self.around.iter().map(|&k| pixel(k))),
+        ]
+    }
+}
+
+/// The difference of two positive quantities as a share of their sum.
+fn contrast(a: f64, b: f64) -> f64 {
+    (a - b) / (a + b).max(1e-9)
 }

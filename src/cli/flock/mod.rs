@@ -10,14 +10,12 @@ use serde_json::{Map, Value, json};
 
 use self::outputs::Outputs;
 use super::{Error, Listener, Summary};
+use crate::flock::advice::Advice;
 use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, params, svg};
 use crate::jobs::flock::film::Film;
 use crate::library::Library;
 use crate::media::{self, Tool};
-
-/// A loop whose headings are farther off, in a tenth of what is shown, is too short to be swum.
-const SHORT_LOOP_RAD: f64 = 0.35;
 
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]
@@ -26,7 +24,7 @@ pub struct Args {
     library: PathBuf,
     #[command(flatten)]
     outputs: Outputs,
-    /// Individuals, 1 to 2000.
+    /// Individuals, 1 to 2000. By default as many as there is room for, at most 20.
     #[arg(long)]
     count: Option<u32>,
     /// Frames, 1 to 10000.
@@ -85,7 +83,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             path.display()
         )))?;
     }
-    advice(&flock).iter().for_each(|advice| super::say(advice));
+    for advice in Advice::all(&flock) {
+        super::say(&format!("{advice} ({})", advice.code()));
+    }
     let film = Film {
         library: &library,
         flock: &flock,
@@ -96,31 +96,6 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     film.make(&targets, args.outputs.ground_truth.as_deref())
         .map_err(|error| Error::work(error.code(), &error))?;
     Ok(Some(summary(&args, &flock, began.elapsed())))
-}
-
-/// What would make it look better, each with a stable code.
-fn advice(flock: &Flock) -> Vec<String> {
-    let (count, room_for) = (flock.individuals.len(), flock.stats.room_for);
-    let is_full = room_for > 0 && count > room_for as usize;
-    let little_room = is_full.then(|| {
-        format!(
-            "there is room for about {room_for}, and of so many some lie over others: \
-             ask for fewer, or film from farther away (little_room)"
-        )
-    });
-    let error_rad = flock.stats.heading_error_p90_rad;
-    let is_short = flock.params.is_loop && error_rad > SHORT_LOOP_RAD;
-    let short_loop = is_short.then(|| {
-        let (loop_s, off_deg) = (
-            f64::from(flock.params.frames) / flock.fps,
-            error_rad.to_degrees(),
-        );
-        format!(
-            "in a loop of {loop_s:.1} s they do not come back to where they began by swimming: in a tenth of what is \
-             shown they head {off_deg:.0} degrees or more off their way: ask for more frames (short_loop)"
-        )
-    });
-    little_room.into_iter().chain(short_loop).collect()
 }
 
 fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
@@ -188,38 +163,5 @@ impl Args {
             overrides.extend(value.map(|value| (name.to_owned(), value)));
         }
         params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flock::synthetic;
-    use crate::library::View;
-    use crate::progress::Silent;
-
-    #[test]
-    fn too_many_and_too_short_a_loop_are_told() {
-        let library = synthetic::library(View::Top);
-        let params = Params {
-            count: 3,
-            frames: 40,
-            is_loop: true,
-            ..Params::default()
-        };
-        let mut flock = plan_flock(&library, &params, &Silent).expect("a good library");
-        flock.stats.room_for = 2;
-        flock.stats.heading_error_p90_rad = 1.0;
-        let [room, short] = &advice(&flock)[..] else {
-            panic!("{:?}", advice(&flock));
-        };
-        assert!(room.contains("room for about 2,") && room.ends_with("(little_room)"));
-        assert!(
-            short.contains("loop of 1.3 s") && short.contains(" 57 degrees"),
-            "{short}"
-        );
-        flock.stats.room_for = 3;
-        flock.params.is_loop = false;
-        assert!(advice(&flock).is_empty());
     }
 }

@@ -98,7 +98,7 @@ fn digest(mut boids: Boids, cpu: Level) -> u64 {
 fn every_preset_swims_as_it_always_did_to_the_last_bit() {
     for (name, expected) in DIGESTS {
         let params = Params {
-            count: 150,
+            count: Some(150),
             ..Params::preset(name).expect("a known preset")
         };
         for cpu in Level::available() {
@@ -119,7 +119,7 @@ fn every_preset_swims_as_it_always_did_to_the_last_bit() {
 fn whatever_else_is_in_the_tank_they_swim_as_they_always_did_to_the_last_bit() {
     let (center_px, radius_px, box_px) = ([200.0, 300.0], 60.0, [500.0, 100.0, 80.0, 200.0]);
     let params = Params {
-        count: 75,
+        count: Some(75),
         goals: vec![Goal {
             at_px: [700.0, 500.0],
             depth_bl: None,

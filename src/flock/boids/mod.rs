@@ -105,7 +105,7 @@ impl<'a> Boids<'a> {
     ) -> Self {
         let longest_s = LONGEST_STEP_BL / calibration.speed_limits_bl_per_s[1];
         let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
-        let n = params.count as usize;
+        let n = params.most_individuals() as usize;
         let closeness = tank.closeness(n);
         let n_frames_before = n_frames_before(calibration, fps);
         let n_steps = n_frames_before as f64 * f64::from(n_substeps);

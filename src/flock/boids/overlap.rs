@@ -175,7 +175,7 @@ mod tests {
     #[test]
     fn two_that_only_meet_in_the_step_are_pushed_apart() {
         let params = Params {
-            count: 2,
+            count: Some(2),
             leaders: false,
             ..Params::default()
         };
@@ -201,7 +201,7 @@ mod tests {
     /// The share of boids and seconds in which one never gets 0.15 of its way from where it was.
     fn jammed(preset: &str, seed: u64) -> f64 {
         let params = Params {
-            count: 12,
+            count: Some(12),
             seed,
             ..Params::preset(preset).expect("a known preset")
         };
@@ -229,7 +229,7 @@ mod tests {
                 .filter(|&(way, far)| *far < 0.15 * way)
                 .count();
         }
-        f64::from(jams as u32) / f64::from(n_seconds * params.count)
+        f64::from(jams as u32) / f64::from(n_seconds * params.most_individuals())
     }
 
     #[test]

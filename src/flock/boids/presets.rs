@@ -41,7 +41,7 @@ fn order(
         }),
     };
     let params = Params {
-        count,
+        count: Some(count),
         seed,
         ..preset(name)
     };
@@ -127,7 +127,7 @@ fn a_mill_turns_about_its_middle_and_is_as_full_all_the_way_round() {
 /// Boids in the open sea, as Couzin et al. have them: 3 units a second, 40 degrees a second.
 fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
     let mut params = Params {
-        count: 100,
+        count: Some(100),
         ..preset("zonal")
     };
     params.leaders = false;
@@ -152,7 +152,7 @@ fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
     let (params, calibration, tank) = at_sea(orientation_bl);
     let lens = Lens::flat(40.0);
     let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
-    let heap = (0..u64::from(params.count)).map(|id| {
+    let heap = (0..u64::from(params.most_individuals())).map(|id| {
         let draw = |word| 2.0 * random::unit(7, &[id, word]) - 1.0;
         let position = [0, 1, 2].map(|axis| 5.0 * draw(axis));
         (position, scaled(3.0, unit([3, 4, 5].map(draw))))

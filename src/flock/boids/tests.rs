@@ -41,7 +41,7 @@ fn preset(name: &str) -> Params {
 fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
     for name in Params::PRESETS {
         let params = Params {
-            count: 60,
+            count: Some(60),
             ..preset(name)
         };
         let (positions, velocities) = swim(View::Side, &params, 200);
@@ -59,7 +59,7 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
 /// A preset's flock in a tank, for 200 frames: how many were outside, and how many pairs too near.
 fn violations(name: &str, count: u32, greatest: Vec3) -> (u32, u32) {
     let params = Params {
-        count,
+        count: Some(count),
         ..preset(name)
     };
     let library = synthetic::library(View::Side);
@@ -98,7 +98,7 @@ fn nobody_turns_faster_than_the_animal_not_even_at_a_wall_or_in_a_crowd() {
         .flat_map(|name| [[4.0, 3.0, 0.0], [9.0, 5.0, 3.0]].map(|tank| (name, tank)))
     {
         let params = Params {
-            count: 30,
+            count: Some(30),
             ..preset(name)
         };
         let tank = Tank::new([0.0; 3], tank);
@@ -155,7 +155,7 @@ fn in_side_view_nobody_is_seen_more_steeply_than_most_frames_unless_it_would_hav
 /// One boid that swims at 1 BL/s, in turns of mostly less than 1 rad/s.
 fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
     let mut params = Params {
-        count: 1,
+        count: Some(1),
         leaders: false,
         ..preset("school")
     };
@@ -172,7 +172,10 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
 #[test]
 fn who_align_take_longer_to_form_while_they_are_of_two_courses_and_the_film_begins_no_later() {
     let (params, calibration) = alone(None);
-    let params = Params { count: 2, ..params };
+    let params = Params {
+        count: Some(2),
+        ..params
+    };
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [30.0, 30.0, 0.0]));
     let formed = |courses: [f64; 2]| {
         let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
@@ -203,7 +206,7 @@ fn a_slow_school_is_polarized_behind_a_camera_too() {
     };
     let order = |seed: u64| {
         let params = Params {
-            count: 20,
+            count: Some(20),
             seed,
             ..preset("school")
         };
@@ -272,7 +275,7 @@ fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
 #[test]
 fn any_number_of_threads_gives_the_same_numbers() {
     let params = Params {
-        count: 300,
+        count: Some(300),
         ..preset("school")
     };
     let with_threads = |n| {

@@ -77,7 +77,7 @@ mod tests {
             ..Calibration::default()
         };
         let params = Params {
-            count: 1,
+            count: Some(1),
             leaders: false,
             ..Params::default()
         };

@@ -115,8 +115,11 @@ fn belong_together(library: &Library, flock: &Flock) -> Result<(), Violation> {
         return Err(Violation::OtherLibrary);
     }
     let n_individuals = flock.individuals.len();
-    if n_individuals != flock.params.count as usize {
-        return Err(Violation::Count(n_individuals, flock.params.count));
+    if Some(n_individuals as u32) != flock.params.count {
+        return Err(Violation::Count(
+            n_individuals,
+            flock.params.count.unwrap_or(0),
+        ));
     }
     let misplaced = |(id, one): &(usize, &Individual)| one.id as usize != *id;
     match flock.individuals.iter().enumerate().find(misplaced) {

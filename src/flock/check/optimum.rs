@@ -274,7 +274,7 @@ mod tests {
     fn a_certificate_that_asks_too_much_of_one_state_is_refused() {
         let library = synthetic::library(View::Side);
         let params = Params {
-            count: 1,
+            count: Some(1),
             frames: 20,
             ..Params::default()
         };

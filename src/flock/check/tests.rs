@@ -10,7 +10,7 @@ use crate::progress::Silent;
 fn planned(view: View, preset: &str) -> (Library, Flock) {
     let library = synthetic::library(view);
     let params = Params {
-        count: 4,
+        count: Some(4),
         frames: 90,
         ..Params::preset(preset).expect("a known preset")
     };
@@ -70,7 +70,7 @@ fn what_the_planner_makes_holds() {
 fn a_plan_that_repeats_holds_with_what_its_repeats_cost_and_tells_its_gap() {
     let library = synthetic::few_looks();
     let mut params = Params {
-        count: 3,
+        count: Some(3),
         frames: 90,
         ..Params::default()
     };
@@ -100,7 +100,7 @@ fn the_plan_of_every_segment_is_the_cheapest_from_where_it_begins() {
     for (view, w_p) in [(View::Side, 0.0), (View::Top, 0.0), (View::Side, 0.1)] {
         let library = synthetic::library(view);
         let mut params = Params {
-            count: 5,
+            count: Some(5),
             frames: 100,
             ..Params::default()
         };
@@ -292,7 +292,7 @@ fn files_that_do_not_belong_together_are_told_first() {
 fn a_loop_holds_and_a_seam_that_is_no_step_is_named() {
     let library = synthetic::library(View::Side);
     let params = Params {
-        count: 4,
+        count: Some(4),
         frames: 90,
         is_loop: true,
         ..Params::default()

@@ -209,7 +209,7 @@ mod tests {
     fn from_the_side_the_floor_lies_below_everybody_and_the_nearer_the_lower() {
         let library = synthetic::library(library::View::Side);
         let params = Params {
-            count: 12,
+            count: Some(12),
             frames: 60,
             ..Params::default()
         };

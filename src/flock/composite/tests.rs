@@ -14,7 +14,7 @@ fn unprepared<E>(_: usize, _: &mut Shot) -> Result<(), E> {
 
 fn flock(library: &Library, name: &str) -> Flock {
     let params = Params {
-        count: 8,
+        count: Some(8),
         frames: 40,
         ..Params::preset(name).expect("a known preset")
     };

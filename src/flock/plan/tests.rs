@@ -22,7 +22,7 @@ fn flock(view: View, name: &str) -> (Library, Flock) {
         name => (name, MatchBy::Heading),
     };
     let mut params = Params {
-        count: 10,
+        count: Some(10),
         frames: 120,
         ..Params::preset(preset).expect("a known preset")
     };
@@ -199,7 +199,7 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
 fn a_plan_that_repeats_lies_between_its_bound_and_the_cheapest_that_knew_of_no_repeats() {
     let library = synthetic::few_looks();
     let mut params = Params {
-        count: 1,
+        count: Some(1),
         frames: 32,
         ..Params::default()
     };
@@ -239,7 +239,7 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
     let library = synthetic::few_looks();
     for seed in 0..16 {
         let params = Params {
-            count: 1,
+            count: Some(1),
             // Its frames come back after whole beats of ten only.
             frames: 30 + 10 * (seed as u32 % 2),
             seed,
@@ -277,7 +277,7 @@ fn a_loop_closes_wherever_any_film_of_its_length_leads_back_to_where_it_began() 
     let library = synthetic::few_looks();
     let plan = |count, frames, seed| {
         let params = Params {
-            count,
+            count: Some(count),
             frames,
             seed,
             is_loop: true,
@@ -324,7 +324,7 @@ fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
     let gap = |by: MatchBy| {
         let library = synthetic::library(View::Side);
         let mut params = Params {
-            count: 10,
+            count: Some(10),
             frames: 120,
             position: Position::Boid,
             ..Params::default()
@@ -363,7 +363,7 @@ fn whoever_is_in_a_later_round_looks_out_for_all_rounds_before() {
 fn a_large_flock_has_the_same_plans_for_any_number_of_threads_and_its_costs_add_up() {
     let library = synthetic::library(View::Side);
     let params = Params {
-        count: 90,
+        count: Some(90),
         frames: 40,
         ..Params::default()
     };

@@ -255,7 +255,7 @@ mod tests {
     fn reading_a_flock_returns_what_was_written() {
         let library = synthetic::library(View::Side);
         let params = Params {
-            count: 3,
+            count: Some(3),
             frames: 40,
             ..Params::default()
         };
@@ -270,7 +270,7 @@ mod tests {
     fn a_flock_whose_measures_have_different_numbers_of_frames_is_refused() {
         let library = synthetic::library(View::Top);
         let params = Params {
-            count: 2,
+            count: Some(2),
             frames: 5,
             ..Params::default()
         };

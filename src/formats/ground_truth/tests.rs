@@ -21,7 +21,7 @@ struct Told {
 fn told() -> Told {
     let library = synthetic::library(View::Side);
     let params = Params {
-        count: 10,
+        count: Some(10),
         frames: N_FRAMES as u32,
         ..Params::preset("swarm").expect("a known preset")
     };

@@ -163,7 +163,7 @@ mod tests {
     fn no_element_has_an_attribute_twice() {
         let mut library = crate::flock::synthetic::library(crate::library::View::Side);
         let flock = crate::flock::Params {
-            count: 3,
+            count: Some(3),
             frames: 40,
             ..Default::default()
         };

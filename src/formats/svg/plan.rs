@@ -181,7 +181,7 @@ mod tests {
 
     fn flock(count: u32) -> Flock {
         let params = Params {
-            count,
+            count: Some(count),
             frames: 60,
             ..Params::default()
         };

@@ -13,9 +13,10 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use self::film::{Backdrop, Film, Output, Target};
+use super::analysis::Advice;
 use super::{Attempt, Context, Error, Product, Stages};
 use crate::flock::composite::params::{Format, Render};
-use crate::flock::{Flock, Params, plan_flock};
+use crate::flock::{self, Flock, Params, plan_flock};
 use crate::formats::{flock_json, library_dir, svg};
 use crate::ids::{FlockId, JobId, LibraryId};
 use crate::library::Library;
@@ -56,6 +57,9 @@ pub struct Summary {
     pub frames: u32,
     /// The seed of everything random.
     pub seed: u64,
+    /// What would make it look better; empty for a flock that has room.
+    #[serde(default)]
+    pub advice: Vec<Advice>,
 }
 
 /// Queues a flock, after the job that makes its library if that is not done yet.
@@ -84,13 +88,17 @@ impl Input {
         let summary = Summary {
             fps: flock.fps,
             image_size_px: flock.image_size_px,
-            count: self.params.count,
+            count: flock.individuals.len() as u32,
             frames: self.params.frames,
             seed: self.params.seed,
+            advice: flock::advice::Advice::all(&flock)
+                .iter()
+                .map(|one| Advice::new(one.code(), one))
+                .collect(),
         };
         Ok(Product {
             made: Made::Flock(self.library_id.0),
-            params: serde_json::to_string(&self.params)?,
+            params: serde_json::to_string(&flock.params)?,
             summary: serde_json::to_string(&summary)?,
         })
     }

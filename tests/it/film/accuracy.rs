@@ -112,7 +112,7 @@ fn a_flock_is_the_same_for_any_number_of_threads() {
 
 fn small_flock() -> flock::Params {
     flock::Params {
-        count: 9,
+        count: Some(9),
         frames: 90,
         ..flock::Params::default()
     }

@@ -95,7 +95,7 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
             walls: Vec::new(),
         },
         params: Params {
-            count: 1,
+            count: Some(1),
             frames: n_frames as u32,
             ..Params::default()
         },

@@ -10,6 +10,9 @@ use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// The side of the square that a boid needs to keep the usual distances.
 const ROOM_BL: f64 = 1.2;
+/// The side of the square that an animal seen from above needs so that it seldom lies on another: of four mice in the
+/// round arena of `bench/motion.py` half a percent of the area does.
+const ROAM_BL: f64 = 1.6;
 /// The share of an even distance that boids can keep while they swim: told to keep more, a crowd is pushed about. In
 /// depth they get past each other more easily than in a plane.
 const KEPT: f64 = 0.45;
@@ -152,10 +155,17 @@ impl Tank {
         (self.section_bl2 / n as f64).sqrt()
     }
 
-    /// How many fit in as near as boids may come to each other: side by side, and in side view one behind another.
+    /// How many have room. In side view, how many fit in as near as boids may come to each other, side by side and one behind
+    /// another. From above, how many can move without lying on each other.
     pub fn room_for(&self) -> u32 {
-        let layers = (2.0 * self.reach_bl[2]).max(1.0);
-        (self.section_bl2 / (OVERLAP_BL * OVERLAP_BL) * layers).max(1.0) as u32
+        let n = match self.is_flat() {
+            true => self.section_bl2 / (ROAM_BL * ROAM_BL),
+            false => {
+                let layers = (2.0 * self.reach_bl[2]).max(1.0);
+                self.section_bl2 / (OVERLAP_BL * OVERLAP_BL) * layers
+            }
+        };
+        n.max(1.0) as u32
     }
 
     /// Inward pushes for whoever would pass a wall within `horizon_s`, growing to 1 at the wall.

@@ -42,7 +42,7 @@ impl Tank {
         let farther_px = FARTHER_BL * lens.length_px;
         loop {
             let tank = site.tank(&lines);
-            if lines.is_empty() || tank.has_room_beside(params.count as usize) {
+            if lines.is_empty() || tank.has_room_beside(params.most_individuals() as usize) {
                 return tank;
             }
             let moved = match &floor {

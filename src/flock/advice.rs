@@ -1,0 +1,97 @@
+//! What would make a flock look better.
+
+use super::Flock;
+
+/// A loop whose headings are off their boids' by more than this in a tenth of what is shown is too short.
+const SHORT_LOOP_RAD: f64 = 0.35;
+
+/// One thing that would make a flock look better, as a sentence.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Advice {
+    /// There are more individuals than have room.
+    #[error(
+        "there is room for about {room_for} animals, and there are {count}, so some lie over others: make a flock of fewer, or \
+         film from farther away"
+    )]
+    LittleRoom {
+        /// How many have room.
+        room_for: u32,
+        /// How many there are.
+        count: usize,
+    },
+    /// The loop is shorter than the way back takes.
+    #[error(
+        "this loop of {length_s:.1} s is too short for the animals to come back to where they began: in a tenth of what is \
+         shown they head {off_deg:.0} degrees or more off their way; ask for more frames"
+    )]
+    ShortLoop {
+        /// Seconds.
+        length_s: f64,
+        /// The 90th percentile of the difference between headings shown and asked for, degrees.
+        off_deg: f64,
+    },
+}
+
+impl Advice {
+    /// All that applies to a flock.
+    pub fn all(flock: &Flock) -> Vec<Advice> {
+        let (count, room_for) = (flock.individuals.len(), flock.stats.room_for);
+        let is_full = room_for > 0 && count > room_for as usize;
+        let little_room = is_full.then_some(Advice::LittleRoom { room_for, count });
+        let error_rad = flock.stats.heading_error_p90_rad;
+        let is_short = flock.params.is_loop && error_rad > SHORT_LOOP_RAD;
+        let short_loop = is_short.then(|| Advice::ShortLoop {
+            length_s: f64::from(flock.params.frames) / flock.fps,
+            off_deg: error_rad.to_degrees(),
+        });
+        little_room.into_iter().chain(short_loop).collect()
+    }
+
+    /// Its stable name.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Advice::LittleRoom { .. } => "little_room",
+            Advice::ShortLoop { .. } => "short_loop",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::{Params, plan_flock, synthetic};
+    use crate::library::View;
+    use crate::progress::Silent;
+
+    #[test]
+    fn too_many_and_too_short_a_loop_are_told() {
+        let library = synthetic::library(View::Top);
+        let params = Params {
+            count: Some(3),
+            frames: 40,
+            is_loop: true,
+            ..Params::default()
+        };
+        let mut flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        flock.stats.room_for = 2;
+        flock.stats.heading_error_p90_rad = 1.0;
+        let told: Vec<_> = Advice::all(&flock)
+            .iter()
+            .map(|a| (a.code(), a.to_string()))
+            .collect();
+        let [("little_room", room), ("short_loop", short)] = &told[..] else {
+            panic!("{told:?}");
+        };
+        assert!(
+            room.contains("room for about 2 animals, and there are 3"),
+            "{room}"
+        );
+        assert!(
+            short.contains("loop of 1.3 s") && short.contains(" 57 degrees"),
+            "{short}"
+        );
+        flock.stats.room_for = 3;
+        flock.params.is_loop = false;
+        assert!(Advice::all(&flock).is_empty());
+    }
+}
