@@ -12,12 +12,10 @@ pub mod individual;
 pub mod lens;
 pub mod motion;
 pub mod params;
-mod passing;
 pub mod placement;
 pub mod plan;
 pub mod quality;
 mod rotation;
-mod seam;
 pub mod space;
 #[cfg(test)]
 pub(crate) mod synthetic;

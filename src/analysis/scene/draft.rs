@@ -24,7 +24,9 @@ const FILL_SEED: u64 = 1;
 const N_LIGHT: usize = 16;
 /// Where more than this share of the picture differs in most samples, higher thresholds are tried ...
 const BUSY: f64 = 0.03;
-/// ... and taken if the animal differs on average by as much as any of them asks for, and stands out more than at lower ones.
+/// ... and taken if the animal differs on average by as much as any of them asks for, and stands out more than at lower ones
+/// by this factor: without scenery that hung together with it.
+const MUCH_BETTER: f64 = 1.5;
 /// Medians of short windows are taken that explain the samples better than the commonest values by this factor.
 const FAR_BETTER: f64 = 3.0;
 
@@ -108,7 +110,7 @@ impl Draft {
     }
 
     /// Surveys the samples. Where much of the picture differs, raised thresholds are tried too, and the one at which a
-    /// subject that is stark even there stands out most is kept: a black mouse among bedding that it kicks about, which at
+    /// subject that is stark even there stands out much more is kept: a black mouse among bedding that it kicks about, which at
     /// low thresholds hangs together with the bedding.
     pub(super) fn survey(&mut self, samples: &Samples) -> Survey {
         let usual = Threshold::usual(self.threshold);
@@ -124,7 +126,7 @@ impl Draft {
                 .as_ref()
                 .map_or(0.0, |subject| subject.contrast);
             let is_stark = contrast >= f64::from(raised.most);
-            if is_stark && survey.starkness() > best.0.starkness() {
+            if is_stark && survey.starkness() > MUCH_BETTER * best.0.starkness() {
                 best = (survey, raised);
             }
         }

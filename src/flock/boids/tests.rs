@@ -171,11 +171,8 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
 
 #[test]
 fn who_align_take_longer_to_form_while_they_are_of_two_courses_and_the_film_begins_no_later() {
-    let (params, calibration) = alone(None);
-    let params = Params {
-        count: Some(2),
-        ..params
-    };
+    let (mut params, calibration) = alone(None);
+    params.count = Some(2);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [30.0, 30.0, 0.0]));
     let formed = |courses: [f64; 2]| {
         let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);

@@ -1,14 +1,17 @@
 //! How a simulation goes, frame by frame, as files hold it (ALGORITHMS.md 7): straight through, or so that
 //! its end plays into its beginning.
 
+mod passing;
+mod seam;
+
+use self::passing::{Limits, go_aside};
+use self::seam::Moment;
 use super::boids::Boids;
 use super::boids::measures::Order;
 use super::boids::vector::{Vec3, unit};
 use super::error::Error;
 use super::individual::{BoidTrack, rounded};
 use super::lens::Lens;
-use super::passing::{Limits, go_aside};
-use super::seam::{self, Moment};
 use crate::geometry::Turns;
 use crate::progress::Progress;
 

@@ -3,9 +3,9 @@
 
 use rayon::prelude::*;
 
-use super::boids::measures::pairs_nearer;
-use super::boids::vector::{Vec3, add_scaled, dot, minus, norm, scaled, unit};
 use super::seam::{Moment, slope, smooth};
+use crate::flock::boids::measures::pairs_nearer;
+use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus, norm, scaled, unit};
 
 /// How long going aside takes, and coming back; longer where that were too fast.
 const ASIDE_S: [f64; 3] = [0.8, 1.6, 3.2];

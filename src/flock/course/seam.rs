@@ -6,8 +6,8 @@
 //! turns and the tank limit it as ever. What is still missing then is blended away, so that the frame
 //! after the last is the first.
 
-use super::boids::vector::{Vec3, add_scaled, dot, minus};
-use super::boids::{Boids, Meeting};
+use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus};
+use crate::flock::boids::{Boids, Meeting};
 
 /// How long meeting may take; at most four fifths of the film.
 const MEETING_S: f64 = 8.0;
