@@ -10,13 +10,15 @@ use super::boids::vector::{Vec3, norm, unit};
 use super::individual::rounded;
 use super::params::Params;
 use crate::geometry::Camera;
-use crate::library::{Library, View};
+use crate::library::{Library, Poses, View};
 use crate::order::median;
 
 /// Focal length of a camera that nothing is known of, widths of its picture: it sees 53 degrees across.
 const USUAL_FOCAL_WIDTHS: f64 = 1.0;
 /// A silhouette's height is taken as the median over this much time: fins open and close.
 const HEIGHT_SPAN_S: f64 = 0.5;
+/// Motion across the picture and in depth are compared over this time. A free choice: posture changes within it.
+const MOVED_IN_S: f64 = 0.5;
 
 /// From tank to picture. Places are body lengths: from the picture's corner where it is flat, from the
 /// camera's axis and center otherwise.
@@ -236,12 +238,40 @@ pub fn depths_bl(library: &Library, lens: &Lens) -> Vec<f64> {
     let heights: Vec<Option<f64>> = frames.iter().map(|pose| pose.height_px).collect();
     let usual_px = median(heights.iter().flatten().copied()).unwrap_or(1.0);
     let reach = (HEIGHT_SPAN_S * library.poses.fps / 2.0).round() as usize;
-    let depth = |frame: usize| {
+    let nearness = |frame: usize| {
         let around = frame.saturating_sub(reach)..(frame + reach + 1).min(frames.len());
-        let near = heights[around].iter().flatten().copied();
-        median(near).map_or(0.0, |px| lens.depth_at_bl(lens.length_px * px / usual_px))
+        Some(median(heights[around].iter().flatten().copied())? / usual_px)
     };
-    (0..frames.len()).map(depth).collect()
+    let nearness: Vec<Option<f64>> = (0..frames.len()).map(nearness).collect();
+    let share = share_of_depth(&library.poses, &nearness, lens);
+    let depth = |near: &Option<f64>| {
+        near.map_or(0.0, |near| {
+            lens.depth_at_bl(lens.length_px * libm::pow(near, share))
+        })
+    };
+    nearness.iter().map(depth).collect()
+}
+
+/// Which share of the changes of the silhouette's height comes from depth, 0..=1. An animal moves as much in depth as across the
+/// picture; when its height changes by more, as that of a bird that crouches and stretches on its perch, the rest is posture.
+/// `nearness` is the height over the usual one, by frame.
+fn share_of_depth(poses: &Poses, nearness: &[Option<f64>], lens: &Lens) -> f64 {
+    let span = ((MOVED_IN_S * poses.fps).round() as usize).max(1);
+    let depth_bl = lens.depth_at_bl(lens.length_px);
+    let moved = |frame: usize| {
+        let [from, to] = [frame, frame + span]
+            .map(|frame| Some((poses.frames.get(frame)?.centroid_px?, nearness[frame]?)));
+        let ((from_px, from_near), (to_px, to_near)) = (from?, to?);
+        let across_bl = libm::hypot(to_px[0] - from_px[0], to_px[1] - from_px[1]) / lens.length_px;
+        Some((across_bl, depth_bl * libm::log(to_near / from_near).abs()))
+    };
+    let (across_bl, deep_bl): (Vec<f64>, Vec<f64>) = (0..poses.frames.len().saturating_sub(span))
+        .filter_map(moved)
+        .unzip();
+    match (median(across_bl.into_iter()), median(deep_bl.into_iter())) {
+        (Some(across_bl), Some(deep_bl)) if across_bl < deep_bl => across_bl / deep_bl,
+        _ => 1.0,
+    }
 }
 
 #[cfg(test)]
@@ -320,5 +350,29 @@ mod tests {
             let depth = lens.depth_at_bl(60.0);
             assert!((lens.px_per_bl(depth) - 60.0).abs() < 1e-9);
         }
+    }
+
+    #[test]
+    fn an_animal_that_stretches_where_it_stands_does_not_come_nearer() {
+        let mut library = crate::flock::synthetic::library(View::Side);
+        let lens = Lens::of(&library, &Params::default());
+        let fps = library.poses.fps;
+        for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
+            let stretched = libm::sin(frame as f64 / fps);
+            pose.height_px = Some(30.0 * (1.0 + 0.3 * stretched));
+            pose.centroid_px = Some([100.0 + 2.0 * stretched, 80.0]);
+        }
+        let spread = |library: &Library| {
+            let depths = depths_bl(library, &lens);
+            let farthest = depths.iter().copied().fold(0.0, f64::max);
+            farthest / depths.iter().copied().fold(f64::INFINITY, f64::min)
+        };
+        let standing = spread(&library);
+        assert!(standing < 1.1, "{standing}");
+        for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
+            pose.centroid_px = Some([100.0 + 300.0 * libm::sin(frame as f64 / fps), 80.0]);
+        }
+        let swimming = spread(&library);
+        assert!(swimming > 1.5, "{swimming}");
     }
 }
