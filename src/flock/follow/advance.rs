@@ -3,7 +3,8 @@
 
 use rayon::prelude::*;
 
-use super::company::{self, Mover};
+use super::company::{self, CLEAR_BL, Mover};
+use super::perches::{self, Perches, Way};
 use crate::flock::individual::{BoidTrack, rounded};
 use crate::flock::placement::{Before, Stage, is_jump};
 use crate::geometry::wrap_rad;
@@ -63,30 +64,46 @@ impl Goal {
             heading_rad: boid.heading_rad[t],
         }
     }
+
+    /// The same at a seat, where there is one.
+    fn or_at(self, seat: Option<[f64; 2]>) -> Goal {
+        Goal {
+            centroid_px: seat.unwrap_or(self.centroid_px),
+            ..self
+        }
+    }
 }
 
 impl Stage<'_> {
-    /// Headings and positions of all individuals over the frames `shown`, which follow `before`, by id.
+    /// Headings and positions of all individuals over the frames `shown`, which follow `before`, by id. From the side, those that
+    /// come to rest come to `perches`.
     pub(super) fn advance(
         &self,
         shown: &[Vec<(u32, bool)>],
         boids: &[BoidTrack],
         before: &[Option<Before>],
+        perches: &Perches,
     ) -> Vec<Advanced> {
         let is_flat = self.library.poses.view == View::Top;
+        let headings = |id: usize| match is_flat {
+            true => Vec::new(),
+            false => self.headings(&shown[id], &boids[id], before[id]),
+        };
         let mut advanced: Vec<Advanced> = (0..shown.len())
             .into_par_iter()
             .map(|id| Advanced {
-                heading_rad: match is_flat {
-                    true => Vec::new(),
-                    false => self.headings(&shown[id], &boids[id], before[id]),
-                },
+                heading_rad: headings(id),
                 centroid_px: Vec::new(),
             })
             .collect();
-        let n_frames = shown.first().map_or(0, Vec::len);
+        let ways = |(id, one): (usize, &Advanced)| {
+            self.ways_to_rest(&shown[id], &one.heading_rad, &boids[id], before[id])
+        };
+        let ways: Vec<Vec<Way>> = advanced.par_iter().enumerate().map(ways).collect();
+        let seats = self.seats(shown, boids, before, perches);
         let mut last: Vec<Option<Before>> = before.to_vec();
-        for t in 0..n_frames {
+        for t in 0..shown.first().map_or(0, Vec::len) {
+            let others: Vec<[f64; 2]> = last.iter().flatten().map(|one| one.centroid_px).collect();
             let asides = match is_flat {
                 true => self.asides(&last),
                 false => vec![[0.0; 2]; last.len()],
@@ -99,14 +116,22 @@ impl Stage<'_> {
             each.with_min_len(64)
                 .for_each(|(id, ((one, last), aside))| {
                     let state = shown[id][t];
-                    let goal = Goal::of(&boids[id], t);
+                    let seat = seats[id].filter(|_| t == 0);
+                    let goal = Goal::of(&boids[id], t).or_at(seat);
                     if is_flat {
                         one.heading_rad
                             .push(self.carried_heading(state, goal, *last, aside));
                     }
                     let heading_rad = one.heading_rad[t];
+                    let landing =
+                        last.zip(ways[id].get(t).copied().flatten())
+                            .and_then(|(before, way)| {
+                                let clear_px = CLEAR_BL * self.lens.length_px;
+                                way.correction(before.centroid_px, perches, &others, clear_px)
+                            });
+                    let corrections = (aside, landing);
                     let centroid_px =
-                        self.carried_centroid((state, heading_rad), goal, *last, aside);
+                        self.carried_centroid((state, heading_rad), goal, *last, corrections);
                     one.centroid_px.push(centroid_px);
                     *last = Some(Before {
                         state,
@@ -145,7 +170,7 @@ impl Stage<'_> {
         (state, heading_rad): ((u32, bool), f64),
         goal: Goal,
         last: Option<Before>,
-        aside: [f64; 2],
+        (aside, landing): ([f64; 2], Option<[f64; 2]>),
     ) -> [f64; 2] {
         let depth_bl = self.depth_bl(goal.behind_px);
         let Some(before) = last else {
@@ -154,15 +179,14 @@ impl Stage<'_> {
                 .map(|px| rounded(px, 2));
         };
         let fps = self.library.poses.fps;
-        let turn = self.rotation(state, heading_rad);
         let scale = self.scale(state.0, depth_bl);
-        let step = turned(self.filmed_step_px(before.state, state), turn, scale);
+        let step = self.shown_step_px(before.state, (state, heading_rad), depth_bl);
         let pull = 1.0 - libm::exp(-1.0 / (PULL_S * fps));
         let wanted = [0, 1].map(|axis| {
             goal.centroid_px[axis] - before.centroid_px[axis] - step[axis]
                 + ASIDE_BL * self.lens.length_px * aside[axis]
         });
-        let off = wanted.map(|px| pull * px);
+        let off = landing.unwrap_or(wanted.map(|px| pull * px));
         let hovering = self.speed_around(state.0).min(HOVERING_BL_PER_S);
         let hovering_px = scale * hovering * self.lens.length_px / fps;
         let most_px = WARP * step[0].hypot(step[1]).max(hovering_px);
@@ -170,6 +194,68 @@ impl Stage<'_> {
         let place = [0, 1].map(|axis| before.centroid_px[axis] + step[axis] + share * off[axis]);
         self.kept_in(place, goal.centroid_px, depth_bl)
             .map(|px| rounded(px, 2))
+    }
+
+    /// The filmed step as it is shown, rotated and scaled, without a correction.
+    fn shown_step_px(
+        &self,
+        before: (u32, bool),
+        (state, heading_rad): ((u32, bool), f64),
+        depth_bl: f64,
+    ) -> [f64; 2] {
+        let turn = self.rotation(state, heading_rad);
+        turned(
+            self.filmed_step_px(before, state),
+            turn,
+            self.scale(state.0, depth_bl),
+        )
+    }
+
+    /// From the side, the way that is left to the next rest, by frame; none from above.
+    fn ways_to_rest(
+        &self,
+        shown: &[(u32, bool)],
+        heading_rad: &[f64],
+        boid: &BoidTrack,
+        before: Option<Before>,
+    ) -> Vec<Way> {
+        let mut last = before.map(|before| before.state);
+        let steps = shown.iter().zip(heading_rad).zip(&boid.position_px);
+        let steps: Vec<(bool, [f64; 2])> = steps
+            .map(|((&state, &heading_rad), place)| {
+                let depth_bl = self.depth_bl(place[2]);
+                let step = last.map_or([0.0; 2], |before| {
+                    self.shown_step_px(before, (state, heading_rad), depth_bl)
+                });
+                last = Some(state);
+                (perches::rests(&self.motion[state.0 as usize]), step)
+            })
+            .collect();
+        perches::ways(
+            &steps,
+            (perches::REST_S * self.library.poses.fps).ceil() as usize,
+        )
+    }
+
+    /// Where individuals begin that begin at rest: on perches.
+    fn seats(
+        &self,
+        shown: &[Vec<(u32, bool)>],
+        boids: &[BoidTrack],
+        before: &[Option<Before>],
+        perches: &Perches,
+    ) -> Vec<Option<[f64; 2]>> {
+        let mut taken = Vec::new();
+        (0..shown.len())
+            .map(|id| {
+                let &(frame, _) = shown[id].first().filter(|_| before[id].is_none())?;
+                let goal = Goal::of(&boids[id], 0).centroid_px;
+                let seat = perches::rests(&self.motion[frame as usize])
+                    .then(|| perches.nearest(goal, &taken, CLEAR_BL * self.lens.length_px))??;
+                taken.push(seat);
+                Some(seat)
+            })
+            .collect()
     }
 
     /// A heading in top view: the one before, plus the filmed turn, plus the correction toward the boid's course and aside.
@@ -289,7 +375,12 @@ mod tests {
                 heading_rad: motion[99].heading_rad,
                 centroid_px: [x, y],
             };
-            let advanced = &stage.advance(&[shown.clone()], &[boid], &[Some(before)])[0];
+            let advanced = &stage.advance(
+                std::slice::from_ref(&shown),
+                &[boid],
+                &[Some(before)],
+                &Perches::default(),
+            )[0];
             for t in 1..shown.len() {
                 let [from, to] = [t - 1, t].map(|t| advanced.centroid_px[t]);
                 let [dx, dy] = stage.filmed_step_px(shown[t - 1], shown[t]);

@@ -8,11 +8,13 @@
 mod advance;
 mod company;
 mod natural;
+mod perches;
 
 use rayon::prelude::*;
 
 use self::advance::Advanced;
 use self::natural::Natural;
+use self::perches::Perches;
 use super::Error;
 use super::boids::Boids;
 use super::boids::vector::{norm, scaled};
@@ -61,6 +63,7 @@ pub(super) fn play(
         advanced: vec![Advanced::default(); n],
         standings: Vec::new(),
     };
+    let perches = Perches::of(stage);
     let ends = segments(n_frames, params.matching.segment_frames, fps);
     for segment in ends.windows(2) {
         let (first, end) = (segment[0], segment[1]);
@@ -78,7 +81,7 @@ pub(super) fn play(
         let is_last = end == n_frames;
         let planner = Planner::of_segment(model, &course.tracks, &flock.standings, is_last);
         let plans = planner.plan(progress)?;
-        flock.go_on((model, stage), &course.tracks, plans);
+        flock.go_on((model, stage, &perches), &course.tracks, plans);
         flock.course.append(course);
         flock.draw_back(&mut boids, stage);
     }
@@ -125,7 +128,12 @@ impl Flock {
     }
 
     /// Appends the plans of a segment and places them.
-    fn go_on(&mut self, (model, stage): (&Model, &Stage), boids: &[BoidTrack], plans: Vec<Plan>) {
+    fn go_on(
+        &mut self,
+        (model, stage, perches): (&Model, &Stage, &Perches),
+        boids: &[BoidTrack],
+        plans: Vec<Plan>,
+    ) {
         self.standings.resize(plans.len(), Standing::default());
         let kept = (model.dwell, model.n_remembered());
         let shown: Vec<Vec<(u32, bool)>> =
@@ -140,7 +148,7 @@ impl Flock {
                 })
             })
             .collect();
-        let advanced = stage.advance(&shown, boids, &before);
+        let advanced = stage.advance(&shown, boids, &before, perches);
         for (id, (plan, advanced)) in plans.into_iter().zip(advanced).enumerate() {
             self.standings[id].go_on(&plan.states, kept);
             self.advanced[id].append(advanced);

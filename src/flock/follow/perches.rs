@@ -1,0 +1,158 @@
+//! Animals seen from the side rest where the animal was seen to rest: a bird on a perch, a dog on the floor. Whoever comes to rest
+//! within a segment is led to the nearest such place, by corrections no larger than others are.
+
+use crate::flock::motion::FrameMotion;
+use crate::flock::placement::Stage;
+use crate::library::View;
+
+/// An animal slower than this rests, body lengths a second.
+const REST_BL_PER_S: f64 = 0.1;
+/// A rest is at least this long. A free choice: fish pause for shorter times in open water.
+pub(super) const REST_S: f64 = 0.7;
+/// Places of rest nearer to each other than this are one.
+const SAME_BL: f64 = 0.1;
+
+/// Places in the picture at which the animal rested, pixels; none from above, where the whole floor is one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Perches(Vec<[f64; 2]>);
+
+/// The way from before a frame to the next rest, if there is one: its vector and its length, pixels, and the length of the
+/// frame's own step.
+pub(super) type Way = Option<ToRest>;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct ToRest {
+    way_px: [f64; 2],
+    length_px: f64,
+    step_px: f64,
+}
+
+/// Whether the animal rests.
+pub(super) fn rests(moved: &FrameMotion) -> bool {
+    moved.speed_bl_per_s < REST_BL_PER_S
+}
+
+/// The ways to the next rest of at least `n_rest` frames. `steps`: by frame, whether the animal rests and its step from the
+/// frame before, pixels.
+pub(super) fn ways(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Way> {
+    let mut ways = vec![None; steps.len()];
+    let mut ahead: Way = None;
+    let mut n_rested = 0;
+    for (t, &(rests, step)) in steps.iter().enumerate().rev() {
+        n_rested = if rests { n_rested + 1 } else { 0 };
+        if n_rested >= n_rest {
+            ahead = Some(ToRest::default());
+        } else if let Some(rest) = &mut ahead {
+            let step_px = libm::hypot(step[0], step[1]);
+            *rest = ToRest {
+                way_px: [0, 1].map(|axis| rest.way_px[axis] + step[axis]),
+                length_px: rest.length_px + step_px,
+                step_px,
+            };
+            ways[t] = ahead;
+        }
+    }
+    ways
+}
+
+impl Perches {
+    pub(super) fn of(stage: &Stage) -> Perches {
+        let mut places: Vec<[f64; 2]> = Vec::new();
+        if stage.library.poses.view == View::Top {
+            return Perches(places);
+        }
+        let same_px = SAME_BL * stage.lens.length_px;
+        let n_rest = (REST_S * stage.library.poses.fps).ceil() as usize;
+        let frames: Vec<usize> = (0..stage.motion.len()).collect();
+        let is_at_rest = |frame: &usize| {
+            rests(&stage.motion[*frame]) && stage.library.poses.frames[*frame].heading_rad.is_some()
+        };
+        let runs = frames.chunk_by(|a, b| is_at_rest(a) && is_at_rest(b));
+        for frame in runs.filter(|run| run.len() >= n_rest).flatten() {
+            let Some([x, y]) = stage.library.poses.frames[*frame].centroid_px else {
+                continue;
+            };
+            let is_known = |place: &[f64; 2]| libm::hypot(place[0] - x, place[1] - y) < same_px;
+            if !places.iter().any(is_known) {
+                places.push([x, y]);
+            }
+        }
+        Perches(places)
+    }
+
+    /// The nearest place that is clear of others by `clear_px`.
+    pub(super) fn nearest(
+        &self,
+        from_px: [f64; 2],
+        others: &[[f64; 2]],
+        clear_px: f64,
+    ) -> Option<[f64; 2]> {
+        let gap = |a: &[f64; 2], b: &[f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]);
+        let is_clear = |place: &&[f64; 2]| others.iter().all(|other| gap(place, other) >= clear_px);
+        let clear = self.0.iter().filter(is_clear);
+        clear
+            .min_by(|a, b| gap(a, &from_px).total_cmp(&gap(b, &from_px)))
+            .copied()
+    }
+}
+
+impl ToRest {
+    /// What to add to the frame's step in order to come to rest on the perch nearest to the end of the way, pixels; others are
+    /// kept clear of. Longer steps are corrected by more.
+    pub(super) fn correction(
+        &self,
+        place_px: [f64; 2],
+        perches: &Perches,
+        others: &[[f64; 2]],
+        clear_px: f64,
+    ) -> Option<[f64; 2]> {
+        let end = [0, 1].map(|axis| place_px[axis] + self.way_px[axis]);
+        let elsewhere: Vec<[f64; 2]> = others
+            .iter()
+            .copied()
+            .filter(|other| *other != place_px)
+            .collect();
+        let perch = perches.nearest(end, &elsewhere, clear_px)?;
+        let share = self.step_px / self.length_px.max(1e-9);
+        Some([0, 1].map(|axis| share * (perch[axis] - end[axis])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten steps to the right, then ten frames of rest.
+    fn flight() -> Vec<(bool, [f64; 2])> {
+        let step = |t| match t < 10 {
+            true => (false, [5.0, 0.0]),
+            false => (true, [0.0; 2]),
+        };
+        (0..20).map(step).collect()
+    }
+
+    fn landed(perches: &Perches, others: &[[f64; 2]]) -> [f64; 2] {
+        let mut place = [0.0, 0.0];
+        for ((_, step), way) in flight().into_iter().zip(ways(&flight(), 5)) {
+            let correction = way.and_then(|way| way.correction(place, perches, others, 8.0));
+            let [dx, dy] = correction.unwrap_or_default();
+            place = [place[0] + step[0] + dx, place[1] + step[1] + dy];
+        }
+        place
+    }
+
+    #[test]
+    fn whoever_comes_to_rest_comes_to_a_perch_that_is_free() {
+        let perches = Perches(vec![[46.0, 6.0], [58.0, -4.0], [0.0, 50.0]]);
+        let near = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]) < 1e-6;
+        assert!(near(landed(&perches, &[]), [46.0, 6.0]));
+        assert!(near(landed(&perches, &[[44.0, 6.0]]), [58.0, -4.0]));
+        assert!(near(landed(&Perches::default(), &[]), [50.0, 0.0]));
+    }
+
+    #[test]
+    fn a_short_pause_is_no_rest() {
+        assert!(ways(&flight(), 11).iter().all(Option::is_none));
+        assert!(ways(&flight(), 10)[..10].iter().all(Option::is_some));
+    }
+}
