@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench accuracy ablation motion papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench accuracy ablation flocks papers vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -119,8 +119,8 @@ target/bench-venv/ready:
 ablation: target/vendor target/bench-venv/ready ## every rule of the measurement switched off once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
 	target/bench-venv/bin/python bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
-motion: build target/bench-venv/ready ## whether flocks move as their animals moved: make motion LIBRARIES="folder ..."
-	target/bench-venv/bin/python bench/motion.py $(RELEASE) $(LIBRARIES)
+flocks: build target/bench-venv/ready ## whether flocks move as their animals do: make flocks GENERATOR=goldfish.py [FOOTAGE=folder]
+	target/bench-venv/bin/python bench/flocks.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
 papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md
 	python3 bench/papers.py $(RELEASE)

@@ -14,6 +14,7 @@ import numpy as np
 
 from accuracy import score_case, score_labels
 import cases
+from flocks import halo
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -71,19 +72,11 @@ def build():
     return PLACE / "target" / "release" / "flockreel"
 
 
-def halo(library):
-    """Alpha more than 2.5 pixels outside the contour of a half, of all alpha: median over 20 mattes."""
-    shares = []
+def mattes_halo(library):
+    """Alpha far outside the contour of the mattes, of all alpha."""
     with zipfile.ZipFile(library / "mattes.zip") as archive:
-        names = archive.namelist()
-        for name in names[::max(1, len(names) // 20)]:
-            rgba = cv2.imdecode(np.frombuffer(archive.read(name), np.uint8), cv2.IMREAD_UNCHANGED)
-            if rgba is None or rgba.ndim < 3 or rgba.shape[2] < 4 or not rgba[..., 3].any():
-                continue
-            alpha = np.pad(rgba[..., 3], 8)
-            away = cv2.distanceTransform((alpha < 128).astype(np.uint8), cv2.DIST_L2, 5)
-            shares.append(float(alpha[away > 2.5].sum() / alpha.sum()))
-    return float(np.median(shares)) if shares else None
+        pictures = (cv2.imdecode(np.frombuffer(archive.read(name), np.uint8), cv2.IMREAD_UNCHANGED) for name in archive.namelist())
+        return halo([rgba[..., 3] for rgba in pictures if rgba is not None and rgba.ndim == 3 and rgba.shape[2] == 4 and rgba[..., 3].any()])
 
 
 def measure(program, film, rule):
@@ -97,7 +90,7 @@ def measure(program, film, rule):
             lines = [line for line in done.stderr.splitlines() if line.endswith(")")]
             return {"refused": lines[-1].rsplit("(", 1)[1].rstrip(")") if lines else "failed"}
         poses = json.loads((library / "poses.json").read_text())
-        points = {"halo": 100 * (halo(library) or 0)}
+        points = {"halo": 100 * (mattes_halo(library) or 0)}
     if "clip" in known:
         known = {**known, "frames": [row for row in known["frames"] if row["frame"] < len(poses["frames"])]}
         score = score_labels(poses, known)

@@ -1,186 +1,265 @@
 #!/usr/bin/env python3
-"""How good flocks are: the measures of ALGORITHMS.md 9 on libraries that `flockreel analyze` made.
+"""Whether flocks move and look as their animals do: figures of planned flocks, over recordings and generated films.
 
-    bench/flocks.py PROGRAM LIBRARY_DIR... [--count 20] [--frames 400] [--seed 1] [--preset school] [--match BY] [--matching JSON]
+    flocks.py FLOCKREEL GENERATOR [--footage FOLDER] [--films FOLDER] [--only NAME...]
 
-For each library plans a flock, and prints what flock.json's stats say with their bars (* = missed), how far headings
-shown in the picture are from the boids' (with a camera the stats tell directions in space), how many frames
-the component has, and how visible the cuts are: for each jump that the flock plays, the step across it between
-the sprites as exported (RGB times alpha, and alpha; ALGORITHMS.md 5), over the median step between consecutive
-sprites, hard as if nothing were faded; and `faded`, the largest step between frames around a jump with the fades as
-they are drawn (`natural_window`: the same around frames without a jump). `jammed` is the share of boids and seconds in which one
-swims but does not get away. Needs numpy and cv2.
+Each film is analyzed with default settings, and flocks of 300 frames are planned with three seeds and as many animals as have
+room. Shown and filmed speeds are those of the centroid over two frames, body lengths a second, at frames two or more away from
+a jump; shown ones are divided by the scale of the sprite. Writes bench/results/flocks.json and, from that, docs/FLOCKS.md.
 """
-import argparse
-import json
-import pathlib
-import subprocess
-import sys
-import tempfile
+import argparse, json, math, pathlib, shutil, statistics, subprocess, tempfile
 
 import cv2
 import numpy as np
 
-# The figure, its greatest value, and how it is printed.
-BARS = [
-    ("heading_error_median_deg", 1.0),
-    ("heading_error_p90_deg", 6.0),
-    ("picture_median_deg", 1.0),
-    ("picture_p90_deg", 6.0),
-    ("jumps_per_100_frames", 4.0),
-    ("clone_share", 0.005),
-    ("cut_median", 1.3),
-    ("cut_above_natural_p99", 0.0),
-    ("faded_median", 1.3),
-    ("faded_above_natural_p99", 0.0),
-    ("path_deviation_p95_bl", 0.25),
-    ("slip_median_rad", 0.05),
-    ("jammed", 0.01),
-    ("wall_violations", 0),
-    ("overlap_violations", 0),
-]
+import cases
 
-# Who gets no farther than this share of its way in a second is jammed.
-JAMMED = 0.15
-
-# What a preset is known by: its least polarization and milling, and their greatest.
-PRESETS = {"school": ((0.65, 0), (1, 1)), "mill": ((0, 0.65), (0.35, 1)), "swarm": ((0, 0), (0.35, 0.35))}
-
+HERE = pathlib.Path(__file__).resolve().parent
+PLACE = HERE.parent / "target" / "flocks"
+RESULTS = HERE / "results" / "flocks.json"
+PAGE = HERE.parent / "docs" / "FLOCKS.md"
+CLIPS = ("goldfish_black_water", "mouse_round_arena", "zebrafish_juvenile_single", "zebra_finch_cage", "mouse_homecage_bedding",
+         "mouse_openfield", "dog_side_with_hand", "zebrafish_larva_single")
+GENERATED = ("plain-1", "silver-2", "dark-3")
+SEEDS, N_FRAMES = (1, 2, 3), 300
+REST, MOVING = .1, .3
 # Frames either side of a jump that a fade may change, and one more.
 AROUND = 3
+# By figure: what it says, its bar, how it is written, and for which films it is.
+ALL, SIDE, TOP = ("side", "top"), ("side",), ("top",)
+BARS = {
+    "as_filmed": ("shown speed within 25 % or .05 BL/s of the filmed one", lambda v: v > .85, "{:.1%}", ALL),
+    "correlation": ("correlation of shown and filmed speed", lambda v: v > .9, "{:.2f}", ALL),
+    "states_off": ("share of rest, slow, go or dart off the film's, largest", lambda v: v <= .1, "{:.1%}", ALL),
+    "rest_moving": ("resting animals shown moving", lambda v: v < .01, "{:.2%}", ALL),
+    "jumps": ("jumps in 100 frames", lambda v: v < 4, "{:.1f}", ALL),
+    "heading_p90_deg": ("heading off the boid's, 90th percentile, degrees", lambda v: v < 8, "{:.1f}", SIDE),
+    "loops": ("time in loops", lambda v: v < .02, "{:.1%}", ALL),
+    "lookalikes": ("animals with a look-alike within 3 BL", lambda v: v < .25, "{:.0%}", ALL),
+    "cuts_above_natural": ("jumps whose step is above the natural 99th percentile, faded", lambda v: v == 0, "{:.1%}", ALL),
+    "overlap": ("area of bodies that lie on each other", lambda v: v < .01, "{:.1%}", TOP),
+    "halo": ("alpha more than 2.5 px outside the contour", lambda v: v < .01, "{:.1%}", TOP),
+    "polarization": ("polarization", lambda v: True, "{:.2f}", ALL),
+    "playable": ("share of uncut frames that can be played", lambda v: True, "{:.0%}", ALL),
+    "individuals": ("animals that have room, at most 20", lambda v: True, "{:.0f}", ALL),
+}
+
+
+def wrap(angle):
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def class_of(speed, usual):
+    """0 rest, 1 slow, 2 go, 3 dart."""
+    return np.select([speed < REST, speed < .5 * usual, speed < 2 * usual], [0, 1, 2], 3)
+
+
+def film_speeds(poses, length_px):
+    """By frame, nan where the animal was not found before or after."""
+    nan = [math.nan, math.nan]
+    centroids = np.array([pose["centroid_px"] or nan for pose in poses["frames"]], float)
+    speeds = np.full(len(centroids), math.nan)
+    speeds[1:-1] = np.linalg.norm(centroids[2:] - centroids[:-2], axis=1) * poses["fps"] / 2 / length_px
+    return speeds
+
+
+def loops_share(one):
+    """Frames in runs of at most 32 played for the third time in a row or more."""
+    states = [2 * frame + side for frame, side in zip(one["source_frame"], one["mirrored"])]
+    looped = 0
+    for t in range(len(states)):
+        looped += any(t >= 2 * n and states[t] == states[t - n] == states[t - 2 * n] for n in range(2, 33))
+    return looped / len(states)
+
+
+def lookalikes(flock):
+    """Share of animals and frames with another within 3 body lengths that shows nearly the same frame on the same side."""
+    people = flock["individuals"]
+    places = np.array([one["centroid_px"] for one in people], float)
+    frames = np.array([one["source_frame"] for one in people])
+    sides = np.array([one["mirrored"] for one in people])
+    near = np.linalg.norm(places[:, None] - places[None], axis=-1) < 3 * flock["length_px"]
+    both = near & (np.abs(frames[:, None] - frames[None]) <= 10) & (sides[:, None] == sides[None])
+    both[np.arange(len(people)), np.arange(len(people))] = False
+    return float(both.any(1).mean())
+
+
+def overlap(flock, poses):
+    """Share of the bodies' area that lies under or over another body: ellipses of the outlines' areas and lengths, every 10th frame."""
+    width, height = (side // 2 for side in poses["image_size_px"])
+    y, x = np.mgrid[0:height, 0:width]
+    covered, total = 0, 0
+    for t in range(0, len(flock["individuals"][0]["source_frame"]), 10):
+        count = np.zeros((height, width), np.uint8)
+        for one in flock["individuals"]:
+            pose = poses["frames"][one["source_frame"][t]]
+            along, across = pose["length_px"] / 2, pose["area_px"] / math.pi / (pose["length_px"] / 2)
+            (cx, cy), angle = one["centroid_px"][t], one["heading_rad"][t]
+            dx, dy = 2 * x - cx, 2 * y - cy
+            a, b = dx * math.cos(angle) + dy * math.sin(angle), dy * math.cos(angle) - dx * math.sin(angle)
+            count += (a / along) ** 2 + (b / across) ** 2 <= 1
+        covered += int(count[count > 1].sum())
+        total += int(count.sum())
+    return covered / max(total, 1)
+
+
+def motion(flock, poses, component):
+    length_px, fps = flock["length_px"], poses["fps"]
+    film = film_speeds(poses, length_px)
+    known = film[component]
+    known = known[~np.isnan(known)]
+    usual = float(np.median(known[known >= REST])) if (known >= REST).any() else 1.0
+    shown, filmed, errors, n_jumps, n = [], [], [], 0, 0
+    for one in flock["individuals"]:
+        frames, sides = np.array(one["source_frame"]), np.array(one["mirrored"])
+        places = np.array(one["centroid_px"], float)
+        scale = np.array(one.get("scale") or np.ones(len(frames)), float)
+        jump = (frames[1:] != frames[:-1] + 1) | (sides[1:] != sides[:-1])
+        n_jumps, n = n_jumps + int(jump.sum()), n + len(frames)
+        speed = np.linalg.norm(places[2:] - places[:-2], axis=1) * fps / 2 / length_px / scale[1:-1]
+        whole = ~(jump[1:] | jump[:-1])
+        shown.append(speed[whole])
+        filmed.append(film[frames[1:-1]][whole])
+        errors.append(np.abs(wrap(np.array(one["heading_rad"]) - np.array(one["boid"]["heading_rad"]))))
+    shown, filmed = np.concatenate(shown), np.concatenate(filmed)
+    shown, filmed = shown[~np.isnan(filmed)], filmed[~np.isnan(filmed)]
+    resting = filmed < REST
+    shares = [np.bincount(class_of(v, usual), minlength=4) / max(len(v), 1) for v in (known, shown)]
+    return {
+        "as_filmed": float(np.mean(np.abs(shown - filmed) <= np.maximum(.25 * filmed, .05))),
+        "correlation": float(np.corrcoef(shown, filmed)[0, 1]),
+        "rest_moving": float(np.mean(shown[resting] > MOVING)) if resting.any() else 0.0,
+        "states_off": float(np.abs(shares[0] - shares[1]).max()),
+        "jumps": 100 * n_jumps / n, "heading_p90_deg": float(np.degrees(np.quantile(np.concatenate(errors), .9))),
+        "loops": statistics.mean(map(loops_share, flock["individuals"])), "lookalikes": lookalikes(flock),
+        "polarization": flock["stats"]["polarization"], "individuals": len(flock["individuals"]),
+    }
+
+
+def sprites_of(folder, poses):
+    """Sprites as they are compared (RGB times alpha, and alpha), in top view turned to heading 0; None where there is none."""
+    def compared(frame):
+        path = folder / f"{frame:06}.png"
+        rgba = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if path.exists() else None
+        if rgba is None or not rgba[..., 3].any():
+            return None
+        alpha = rgba[..., 3:].astype(np.int32)
+        planes = np.concatenate([(alpha * rgba[..., :3] + 127) // 255, alpha], axis=-1)
+        heading = poses["frames"][frame]["heading_rad"]
+        if poses["view"] == "side" or not heading:
+            return planes
+        height, width = planes.shape[:2]
+        # cv2 turns counterclockwise in the picture for a positive angle; a heading is clockwise.
+        turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), np.degrees(heading), 1)
+        return cv2.warpAffine(planes.astype(np.float32), turn, (width, height)).round().astype(np.int32)
+    return [compared(frame) for frame in range(len(poses["frames"]))]
+
+
+def halo(alphas):
+    """Alpha more than 2.5 pixels outside the contour of a half, of all alpha: median over 20 pictures."""
+    shares = []
+    for alpha in alphas[::max(1, len(alphas) // 20)]:
+        alpha = np.pad(alpha, 8)
+        away = cv2.distanceTransform((alpha < 128).astype(np.uint8), cv2.DIST_L2, 5)
+        shares.append(float(alpha[away > 2.5].sum() / alpha.sum()))
+    return statistics.median(shares) if shares else None
+
+
+def cuts_above_natural(flock, sprites, poses):
+    """Share of the jumps around which some step between drawn frames is above the 99th percentile of the film's steps."""
+    top = poses["view"] == "top"
+    turned = lambda sprite: sprite[::-1] if top else sprite[:, ::-1]
+    look = lambda frame, is_mirrored: turned(sprites[frame]) if is_mirrored else sprites[frame]
+    step = lambda a, b: float(np.abs(a - b).sum())
+    natural = [step(a, b) for a, b in zip(sprites, sprites[1:]) if a is not None and b is not None]
+    limit, above = float(np.percentile(natural, 99)), []
+    for one in flock["individuals"]:
+        shown = list(zip(one["source_frame"], one["mirrored"]))
+        fades = {fade["start"] + k: (frame, fade["mirrored"], fade["weight"][k])
+                 for fade in one["fade"] for k, frame in enumerate(fade["source_frame"])}
+
+        def drawn(t):
+            picture, fade = look(*shown[t]), fades.get(t)
+            return picture if fade is None else (1 - fade[2]) * picture + fade[2] * look(*fade[:2])
+
+        for t in range(AROUND, len(shown) - AROUND):
+            if shown[t] != (shown[t - 1][0] + 1, shown[t - 1][1]):
+                around = [drawn(u) for u in range(t - AROUND, t + AROUND)]
+                above.append(max(step(a, b) for a, b in zip(around, around[1:])) > limit)
+    return statistics.mean(above) if above else 0.0
+
+
+def measure(program, name, film, flags):
+    """The mean of each figure over the seeds, or the code of a refusal."""
+    library = PLACE / name
+    shutil.rmtree(library, ignore_errors=True)
+    run = lambda *words: subprocess.run([str(word) for word in (program, *words)], capture_output=True, text=True)
+    code = lambda done: done.stderr.rstrip().rsplit("(", 1)[-1].rstrip(")") if "(" in done.stderr else done.stderr.strip()
+    done = run("analyze", film, "-o", library, *flags)
+    if done.returncode:
+        codes = [line.rsplit("(", 1)[1].rstrip(")") for line in done.stderr.splitlines() if line.endswith(")")]
+        return {"refused": codes[-1] if codes else "failed"}
+    poses = json.loads((library / "poses.json").read_text())
+    component = json.loads((library / "library.json").read_text())["component"]
+    uncut = {pose["frame"] for pose in poses["frames"] if pose["detected"] and not pose["cut"]}
+    figures = []
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        run("sprites", library, "-o", folder / "sprites")
+        sprites = sprites_of(folder / "sprites", poses)
+        for seed in SEEDS:
+            plan = folder / "flock.json"
+            done = run("flock", library, "-o", folder / "flock.png", "--plan", plan, "--frames", N_FRAMES, "--seed", seed)
+            if done.returncode:
+                return {"refused": code(done)}
+            flock = json.loads(plan.read_text())
+            figures.append(motion(flock, poses, component) | {"cuts_above_natural": cuts_above_natural(flock, sprites, poses)}
+                           | ({"overlap": overlap(flock, poses)} if poses["view"] == "top" else {}))
+    means = {key: statistics.mean(one[key] for one in figures) for key in figures[0]}
+    return {"view": poses["view"], **means, "halo": halo([sprite[..., 3] for sprite in sprites if sprite is not None]), "playable": len(uncut & set(component)) / max(len(uncut), 1)}
+
+
+def page(results):
+    yield "# How flocks move\n"
+    yield ("Written by `make flocks GENERATOR=goldfish.py FOOTAGE=folder` from `bench/results/flocks.json`: flocks of 300 frames, the "
+           "mean of three seeds, with as many animals as have room and default settings. BL is a body length; * is missed. "
+           "Figures without a bar say what else is there.\n")
+    names = [name for name, film in results.items() if "refused" not in film]
+    for name, film in results.items():
+        if "refused" in film:
+            yield f"`{name}` is refused: `{film['refused']}`.\n"
+    for view in ("side", "top"):
+        seen = [name for name in names if results[name]["view"] == view]
+        yield f"## Filmed from {'the side' if view == 'side' else 'above'}\n"
+        yield "| | " + " | ".join(seen) + " |\n| --- |" + " ---: |" * len(seen)
+        for key, (says, holds, written, views) in BARS.items():
+            if view in views:
+                figures = [written.format(results[name][key]) + ("" if holds(results[name][key]) else " *") for name in seen]
+                yield f"| {says} | " + " | ".join(figures) + " |"
+        yield ""
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("program")
-    parser.add_argument("libraries", nargs="+", type=pathlib.Path)
-    for name, default in [("count", "20"), ("frames", "400"), ("seed", "1"), ("preset", "school"), ("match", None), ("matching", None)]:
-        parser.add_argument(f"--{name}", default=default)
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("generator", type=pathlib.Path)
+    parser.add_argument("--footage", type=pathlib.Path)
+    parser.add_argument("--films", type=pathlib.Path, default=HERE.parent / "target" / "accuracy")
+    parser.add_argument("--only", nargs="+", help="measure these films alone, and keep the figures of the others")
     args = parser.parse_args()
-    for library in args.libraries:
-        with tempfile.TemporaryDirectory() as folder:
-            figures = measure(args, library, pathlib.Path(folder))
-        if isinstance(figures, str):
-            print(f"{library.name:28} {figures}", flush=True)
-            continue
-        words = [f"{name} {figures[name]:.4g}{'*' if figures[name] > bar else ''}" for name, bar in BARS]
-        least, most = PRESETS.get(args.preset, ((0, 0), (1, 1)))
-        for name, low, high in zip(("polarization", "milling"), least, most):
-            words.append(f"{name} {figures[name]:.2f}{'' if low <= figures[name] <= high else '*'}")
-        print(f"{library.name:28} component {figures['component']} of {figures['n_frames']} frames, {', '.join(words)}, "
-              f"natural_window {figures['natural_window']:.3f}, variety {figures['variety']:.2f}, bound gap {figures['gap']:.3f}", flush=True)
-
-
-def measure(args, library, folder):
-    plan = folder / "flock.json"
-    words = [args.program, "flock", library, "-o", folder / "x.mp4", "--plan", plan]
-    for name in ("match", "matching"):
-        words += [f"--{name}", getattr(args, name)] if getattr(args, name) else []
-    for name in ("count", "frames", "seed", *(["preset"] if args.preset != "school" else [])):
-        words += [f"--{name}", getattr(args, name)]
-    done = subprocess.run(words, capture_output=True, text=True)
-    if done.returncode:
-        return "refused: " + done.stderr.strip().splitlines()[-1]
-    flock = json.loads(plan.read_text())
-    known = json.loads((library / "library.json").read_text())
-    poses = json.loads((library / "poses.json").read_text())
-    n_frames = len(poses["frames"])
-    subprocess.run([args.program, "sprites", library, "-o", folder / "sprites"], check=True, capture_output=True)
-    median, p99, cuts, faded, windows = cut_steps(folder / "sprites", flock, poses)
-    stats, costs = flock["stats"], [one["cost"] for one in flock["individuals"]]
-    total, bound = (sum(cost[key] for cost in costs) for key in ("total", "lower_bound"))
-    gaps = np.concatenate([np.subtract(one["heading_rad"], one["boid"]["heading_rad"]) for one in flock["individuals"]])
-    gaps = np.degrees(np.abs((gaps + np.pi) % (2 * np.pi) - np.pi))
-    return {
-        **stats,
-        "picture_median_deg": float(np.median(gaps)),
-        "picture_p90_deg": float(np.percentile(gaps, 90)),
-        "heading_error_median_deg": np.degrees(stats["heading_error_median_rad"]),
-        "heading_error_p90_deg": np.degrees(stats["heading_error_p90_rad"]),
-        "jammed": jammed(flock),
-        "component": len(known["component"]),
-        "n_frames": n_frames,
-        "cut_median": float(np.median(cuts)) / median if cuts else 0.0,
-        "cut_above_natural_p99": float(np.mean([cut > p99 for cut in cuts])) if cuts else 0.0,
-        "faded_median": float(np.median(faded)) / median if faded else 0.0,
-        "faded_above_natural_p99": float(np.mean([step > p99 for step in faded])) if faded else 0.0,
-        "natural_window": float(np.median(windows)) / median,
-        "gap": (total - bound) / max(total, 1e-9),
-    }
-
-
-def jammed(flock):
-    """The share of boids and seconds in which a boid never gets a sixth or so of its way from where it was."""
-    second = round(flock["fps"])
-    places = np.array([one["boid"]["position"] for one in flock["individuals"]]) / flock["length_px"]
-    speeds = np.array([one["boid"]["speed"] for one in flock["individuals"]])
-    n = places.shape[1] - second
-    if n <= 0:
-        return 0.0
-    ways = np.linalg.norm(np.stack([places[:, k : k + n] for k in range(1, second + 1)]) - places[:, :n], axis=3).max(axis=0)
-    swum = np.cumsum(speeds, axis=1) / flock["fps"]
-    return float((ways < JAMMED * (swum[:, second:] - swum[:, :-second])).mean())
-
-
-def cut_steps(folder, flock, poses):
-    """The median and the 99th percentile of natural steps, the step of each cut played, the largest step around
-    each with its fades, and the largest step of as many consecutive frames of the footage.
-
-    In top view sprites are turned to heading 0 first, and mirrored top to bottom.
-    """
-    top = poses["view"] == "top"
-    headings = [(frame["heading_rad"] or 0.0) if top else 0.0 for frame in poses["frames"]]
-    sprites = [compared(folder / f"{frame:06}.png", heading) for frame, heading in enumerate(headings)]
-    mirrored = (lambda sprite: sprite[::-1]) if top else (lambda sprite: sprite[:, ::-1])
-    step = lambda a, b: float(np.abs(a - b).sum())
-    natural = [step(a, b) for a, b in zip(sprites, sprites[1:]) if a is not None and b is not None]
-    span = 2 * AROUND - 1
-    windows = [max(natural[k : k + span]) for k in range(0, len(natural) - span, span)]
-    cuts, faded, known = [], [], {}
-    for one in flock["individuals"]:
-        shown = list(zip(one["source_frame"], one["mirrored"]))
-        fades = {}
-        for fade in one["fade"]:
-            for k, frame in enumerate(fade["source_frame"]):
-                fades[fade["start"] + k] = (frame, fade["mirrored"], fade["weight"][k])
-        for t, ((a, side), (b, other)) in enumerate(zip(shown, shown[1:]), start=1):
-            if (b, other) == (a + 1, side) or sprites[a] is None or sprites[b] is None:
-                continue
-            key = (a, b, side != other)
-            if key not in known:
-                known[key] = step(sprites[a], mirrored(sprites[b]) if key[2] else sprites[b])
-            cuts.append(known[key])
-            if AROUND <= t <= len(shown) - AROUND:
-                drawn = [blended(sprites, shown[u], fades.get(u), mirrored) for u in range(t - AROUND, t + AROUND)]
-                if all(picture is not None for picture in drawn):
-                    faded.append(max(step(a, b) for a, b in zip(drawn, drawn[1:])))
-    return float(np.median(natural)), float(np.percentile(natural, 99)), cuts, faded, windows
-
-
-def blended(sprites, shown, fade, mirrored):
-    """What a frame of an individual shows, with what fades into it; None where a sprite is missing."""
-    look = lambda frame, is_mirrored: mirrored(sprites[frame]) if is_mirrored else sprites[frame]
-    if sprites[shown[0]] is None or (fade and sprites[fade[0]] is None):
-        return None
-    picture = look(*shown)
-    return picture if fade is None else (1 - fade[2]) * picture + fade[2] * look(*fade[:2])
-
-
-def compared(path, turned_rad):
-    """A sprite turned back by an angle, as it is compared; None where the animal was not found."""
-    rgba = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if path.exists() else None
-    if rgba is None or not rgba[..., 3].any():
-        return None
-    rgba = rgba.astype(np.int32)
-    alpha = rgba[..., 3:]
-    planes = np.concatenate([(alpha * rgba[..., :3] + 127) // 255, alpha], axis=-1)
-    if turned_rad:
-        height, width = planes.shape[:2]
-        # cv2 turns counterclockwise in the picture for a positive angle; a heading is clockwise.
-        turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), np.degrees(turned_rad), 1)
-        planes = cv2.warpAffine(planes.astype(np.float32), turn, (width, height)).round().astype(np.int32)
-    return planes
+    films = [(name, path, flags) for name, path, _, flags in cases.films(args.generator, args.films) if name in GENERATED]
+    if args.footage:
+        clips = [json.loads((HERE / "labels" / f"{clip}.json").read_text())["clip"] for clip in CLIPS]
+        films += [(clip, args.footage / file, []) for clip, file in zip(CLIPS, clips)]
+    results = json.loads(RESULTS.read_text()) if args.only and RESULTS.exists() else {}
+    for name, film, flags in films:
+        if not args.only or name in args.only:
+            results[name] = measure(args.program, name, film, flags)
+            words = [f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in results[name].items()]
+            print(f"{name:28}", *words, flush=True)
+    RESULTS.write_text(json.dumps(results, indent=1) + "\n")
+    PAGE.write_text("\n".join(page(results)) + "\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -13,7 +13,7 @@ use crate::library::View;
 /// Time constant with which an individual is drawn to its boid.
 const PULL_S: f64 = 0.5;
 /// The correction of a step is at most this share of its length: below the quarter up to which shown and filmed speeds count as
-/// the same (`bench/motion.py`).
+/// the same (`bench/flocks.py`).
 const WARP: f64 = 0.2;
 /// A step of an animal that hovers may be short although the animal moves. There the same share of the mean speed around the
 /// frame is allowed, up to this speed. An animal at rest has no such speed, and is not moved.
@@ -25,7 +25,7 @@ const ASIDE_BL: f64 = 1.0;
 /// From above, the course to follow is the sum of the boid's direction, the way to the boid, at this weight for each body
 /// length ...
 const PURSUED_PER_BL: f64 = 1.0;
-/// ... and the way aside from the others, at this weight. Of .5 to 4, the least overlap in `bench/motion.py`.
+/// ... and the way aside from the others, at this weight. Of .5 to 4, the least overlap in `bench/flocks.py`.
 const EVADED: f64 = 2.0;
 /// Time constant with which headings follow that course. From above alone: from the side headings are filmed ones.
 const TURN_S: f64 = 0.25;
