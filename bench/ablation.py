@@ -55,7 +55,8 @@ def lay_out(rules):
         texts[rule["file"]] = text.replace(rule["old"], new).encode()
     texts["src/lib.rs"] += SWITCH.encode()
     for path in SOURCES.rglob("*.rs") if SOURCES.is_dir() else []:
-        if str(path.relative_to(SOURCES)) not in texts and "target" not in path.parts:
+        name = path.relative_to(SOURCES)
+        if str(name) not in texts and name.parts[0] != "target":
             path.unlink()
     for name, text in texts.items():
         path = SOURCES / name
