@@ -341,3 +341,49 @@ impl Surroundings {
 fn contrast(a: f64, b: f64) -> f64 {
     (a - b) / (a + b).max(1e-9)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random;
+    use crate::raster::ColorSpec;
+    use crate::raster::runs::components;
+
+    const SIZE: u32 = 80;
+
+    /// How much of a disc with a soft edge covers a pixel.
+    fn in_disc(x: u32, y: u32) -> f64 {
+        let distance_px = libm::hypot(f64::from(x) - 40.0, f64::from(y) - 40.0);
+        ((20.0 - distance_px) / 6.0).clamp(0.0, 1.0)
+    }
+
+    /// A scene of chips two pixels wide, between the given levels, without or with a smooth dark disc before it.
+    fn frame([darkest, brightest]: [f64; 2], has_disc: bool) -> Frame {
+        let mut picture = RgbImage::new(SIZE, SIZE);
+        for (y, x) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (y, x))) {
+            let chip = random::unit(3, &[u64::from(x / 2), u64::from(y / 2)]);
+            let level = darkest + (brightest - darkest) * chip;
+            let covered = if has_disc { in_disc(x, y) } else { 0.0 };
+            let level = covered * 40.0 + (1.0 - covered) * level;
+            picture.set_pixel(x, y, [level as u8; 3]);
+        }
+        let mut frame = Frame::new(SIZE, SIZE, ColorSpec::default());
+        frame.draw_rgb(&picture, Rect::of_size(SIZE, SIZE));
+        frame
+    }
+
+    #[test]
+    fn a_smooth_animal_is_no_ghost_however_rough_the_scene_behind_it() {
+        let mut mask = Mask::new(Rect::of_size(SIZE, SIZE));
+        for (at, bit) in (0..).zip(&mut mask.bits) {
+            *bit = u8::from(in_disc(at % SIZE, at / SIZE) > 0.3);
+        }
+        let disc = &components(&mask)[0];
+        for levels in [[180.0, 190.0], [60.0, 250.0]] {
+            let [empty, with_disc] = [false, true].map(|has_disc| frame(levels, has_disc));
+            let plate = |frame: &Frame| Plate::without_noise(frame.clone(), 12);
+            assert!(!is_ghost(&with_disc, &plate(&empty), disc), "{levels:?}");
+            assert!(is_ghost(&empty, &plate(&with_disc), disc), "{levels:?}");
+        }
+    }
+}
