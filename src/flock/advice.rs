@@ -1,11 +1,11 @@
-//! What would make a flock look better.
+//! Advice on a flock: too many animals for the tank, or a loop that is too short.
 
 use super::Flock;
 
 /// A loop whose headings are off their boids' by more than this in a tenth of what is shown is too short.
 const SHORT_LOOP_RAD: f64 = 0.35;
 
-/// One thing that would make a flock look better, as a sentence.
+/// One piece of advice, as a sentence.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Advice {
     /// There are more individuals than have room.

@@ -255,7 +255,7 @@ impl Params {
         }
     }
 
-    /// Individuals asked for, or at most so many where nothing is asked.
+    /// The number of individuals, or without one the greatest default.
     pub fn most_individuals(&self) -> u32 {
         self.count.unwrap_or(MOST_BY_DEFAULT)
     }

@@ -15,9 +15,9 @@ const MOVING_SHARE: f64 = 0.05;
 const BUSY_AREA: f64 = 0.15;
 /// ... in more than this share of the samples, the scene moves. A second animal must be seen as often.
 const OFTEN: f64 = 0.3;
-/// An animal that usually covers more than this share of the picture hides too much of the background. Of the films
-/// `large_animal` in `bench/cases.py` the smallest animal is measured rightly and the two larger ones are not
-/// (docs/ACCURACY.md); the limit is chosen between them. Bedding that moves all over the cage and is taken for the animal is
+/// An animal that usually covers more than this share of the picture hides too much of the background. A free
+/// choice: of the films `large_animal` in `bench/cases.py`, which come near it, one is measured wrongly
+/// (docs/ACCURACY.md). Bedding that moves all over the cage and is taken for the animal is
 /// larger, and is refused for the same reason.
 const LARGE: f64 = 0.15;
 /// A second component of this share of the animal's area may be a second animal.

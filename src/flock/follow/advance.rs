@@ -25,7 +25,7 @@ const ASIDE_BL: f64 = 1.0;
 /// From above, the course to follow is the sum of the boid's direction, the way to the boid, at this weight for each body
 /// length ...
 const PURSUED_PER_BL: f64 = 1.0;
-/// ... and the way aside from the others, at this weight. Of .5 to 4, the least overlap in `bench/flocks.py`.
+/// ... and the way aside from the others, at this weight. Both weights are free choices.
 const EVADED: f64 = 2.0;
 /// Time constant with which headings follow that course. From above alone: from the side headings are filmed ones.
 const TURN_S: f64 = 0.25;

@@ -77,7 +77,7 @@ mod tests {
         }
     }
 
-    /// How near two animals that steer as they are told come to each other, body lengths.
+    /// The least distance of two animals that steer along their `asides`, body lengths.
     fn nearest_bl(mut movers: [Mover; 2]) -> f64 {
         const STEP_S: f64 = 0.05;
         let mut nearest_bl = f64::INFINITY;

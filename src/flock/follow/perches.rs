@@ -1,5 +1,5 @@
-//! Animals seen from the side rest where the animal was seen to rest: a bird on a perch, a dog on the floor. Whoever comes to rest
-//! within a segment is led to the nearest such place, by corrections no larger than others are.
+//! Animals seen from the side rest where the animal was seen to rest: a bird on a perch, a dog on the floor. An animal that comes to
+//! rest within a segment is led to the nearest such place. The corrections are as small as those toward a boid.
 
 use crate::flock::motion::FrameMotion;
 use crate::flock::placement::Stage;
@@ -16,14 +16,17 @@ const SAME_BL: f64 = 0.1;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Perches(Vec<[f64; 2]>);
 
-/// The way from before a frame to the next rest, if there is one: its vector and its length, pixels, and the length of the
-/// frame's own step.
+/// The way to the next rest of the same segment, if there is one.
 pub(super) type Way = Option<ToRest>;
 
+/// The way from the position before a frame to the next rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct ToRest {
+    /// Its vector.
     way_px: [f64; 2],
+    /// The length along the way.
     length_px: f64,
+    /// The length of the frame's own step.
     step_px: f64,
 }
 
@@ -97,8 +100,8 @@ impl Perches {
 }
 
 impl ToRest {
-    /// What to add to the frame's step in order to come to rest on the perch nearest to the end of the way, pixels; others are
-    /// kept clear of. Longer steps are corrected by more.
+    /// The correction of the frame's step, pixels. The sum of all corrections leads from the end of the way to the nearest perch
+    /// that is clear of `others`. Longer steps are corrected by more.
     pub(super) fn correction(
         &self,
         place_px: [f64; 2],

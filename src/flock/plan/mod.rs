@@ -65,7 +65,7 @@ impl Found {
     }
 }
 
-/// What plans of one library and one set of parameters have in common: the trellis and the costs of states and jumps.
+/// The trellis and the costs of states and jumps, for all plans of one library and one set of parameters.
 pub struct Model {
     /// What may follow what.
     pub trellis: Trellis,

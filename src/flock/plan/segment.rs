@@ -1,4 +1,4 @@
-//! What a plan of a segment depends on besides its own frames.
+//! Costs of a segment's plan that come from outside the segment: from frames shown before it and from the future.
 //!
 //! It continues from the state shown last, which may have to play on before the next jump. States shown in the last three
 //! seconds cost more. Its last state adds a future cost F(s) = min over successors of (jump's cost + 0.995 F(s')) (Schoedl et
@@ -13,7 +13,7 @@ const DISCOUNT: f64 = 0.995;
 /// Rounds in which the future cost settles; what has not by then is told a little too low.
 const MOST_ROUNDS: usize = 256;
 
-/// What an individual has shown before a segment.
+/// The states that an individual has shown before a segment.
 #[derive(Clone, Debug, Default)]
 pub struct Standing {
     /// States, oldest first; at least those of the time in which a repeat costs.

@@ -57,7 +57,7 @@ pub struct Summary {
     pub frames: u32,
     /// The seed of everything random.
     pub seed: u64,
-    /// What would make it look better; empty for a flock that has room.
+    /// Advice on the flock; empty if there is none.
     #[serde(default)]
     pub advice: Vec<Advice>,
 }

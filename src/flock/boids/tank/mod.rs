@@ -10,8 +10,8 @@ use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// The side of the square that a boid needs to keep the usual distances.
 const ROOM_BL: f64 = 1.2;
-/// The side of the square that an animal seen from above needs so that it seldom lies on another: of four mice in the
-/// round arena of `bench/flocks.py` half a percent of the area does.
+/// The side of the square that an animal seen from above needs so that it seldom lies on another. A free choice;
+/// docs/FLOCKS.md has the overlap of flocks of that size.
 const ROAM_BL: f64 = 1.6;
 /// The share of an even distance that boids can keep while they swim: told to keep more, a crowd is pushed about. In
 /// depth they get past each other more easily than in a plane.
