@@ -39,6 +39,7 @@ BARS = {
     "cuts_above_natural": ("jumps whose step is above the natural 99th percentile, faded", lambda v: v == 0, "{:.1%}", ALL),
     "overlap": ("area of bodies that lie on each other", lambda v: v < .01, "{:.1%}", TOP),
     "halo": ("alpha more than 2.5 px outside the contour", lambda v: v < .01, "{:.1%}", TOP),
+    "stray": ("changed pixels of the film outside of every animal and shadow", lambda v: v < .03, "{:.1%}", ALL),
     "polarization": ("polarization", lambda v: True, "{:.2f}", ALL),
     "playable": ("share of uncut frames that can be played", lambda v: True, "{:.0%}", ALL),
     "individuals": ("animals that have room, at most 20", lambda v: True, "{:.0f}", ALL),
@@ -165,6 +166,23 @@ def halo(alphas):
     return statistics.median(shares) if shares else None
 
 
+def stray(film, truth, background):
+    """Of the pixels of every 10th frame that differ from the background by more than 12 levels: those more than 2 px outside of
+    every label of an animal or a shadow."""
+    video, t, n_changed, n_stray = cv2.VideoCapture(str(film)), 0, 0, 0
+    background = cv2.imread(str(background)).astype(np.int16)
+    while (read := video.read())[0]:
+        if t % 10 == 0:
+            name = f"{t:06}.png"
+            labels = [cv2.imread(str(truth / kind / name), cv2.IMREAD_UNCHANGED) for kind in ("masks", "shadows")]
+            shown = sum((label > 0).astype(np.uint8) for label in labels if label is not None) > 0
+            away = cv2.distanceTransform((~shown).astype(np.uint8), cv2.DIST_L2, 5)
+            changed = np.abs(read[1].astype(np.int16) - background).max(axis=-1) > 12
+            n_changed, n_stray = n_changed + int(changed.sum()), n_stray + int((changed & (away > 2)).sum())
+        t += 1
+    return n_stray / max(n_changed, 1)
+
+
 def cuts_above_natural(flock, sprites, poses):
     """Share of the jumps around which some step between drawn frames is above the 99th percentile of the film's steps."""
     top = poses["view"] == "top"
@@ -209,11 +227,13 @@ def measure(program, name, film, flags):
         sprites = sprites_of(folder / "sprites", poses)
         for seed in SEEDS:
             plan = folder / "flock.json"
-            done = run("flock", library, "-o", folder / "flock.png", "--plan", plan, "--frames", N_FRAMES, "--seed", seed)
+            film, truth = folder / "flock.mp4", folder / "truth"
+            done = run("flock", library, "-o", film, "--plan", plan, "--ground-truth", truth, "--frames", N_FRAMES, "--seed", seed)
             if done.returncode:
                 return {"refused": code(done)}
             flock = json.loads(plan.read_text())
-            figures.append(motion(flock, poses, component) | {"cuts_above_natural": cuts_above_natural(flock, sprites, poses)}
+            figures.append(motion(flock, poses, component) | {"cuts_above_natural": cuts_above_natural(flock, sprites, poses),
+                                                         "stray": stray(film, truth, library / "background.png")}
                            | ({"overlap": overlap(flock, poses)} if poses["view"] == "top" else {}))
     means = {key: statistics.mean(one[key] for one in figures) for key in figures[0]}
     return {"view": poses["view"], **means, "halo": halo([sprite[..., 3] for sprite in sprites if sprite is not None]), "playable": len(uncut & set(component)) / max(len(uncut), 1)}

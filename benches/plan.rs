@@ -139,6 +139,7 @@ fn made_library(n_frames: u32) -> Library {
         background: RgbImage::new(640, 480),
         occluders: None,
         sprites: Sprites::missing(96, 64, n_frames as usize),
+        shadow: None,
         clip_frames: 8,
         epsilon: EPSILON,
         natural_step: EPSILON / 2,

@@ -17,6 +17,7 @@ pub mod matte;
 pub mod moments;
 pub mod occluders;
 pub mod read_ahead;
+pub mod shadow;
 pub mod sprite;
 pub mod track;
 
@@ -93,6 +94,10 @@ pub fn analyze(
             sprite::align(&track, view, scales, is_in_light)
         }
     };
+    let length_px = (view == View::Top)
+        .then(|| stats::length_px(&poses))
+        .flatten();
+    let shadow = length_px.and_then(|px| shadow::measure(&track, &plate.rgb, px));
     let foreign = || track.frames.iter().filter(|t| t.plate_idx.is_none());
     let n_foreign_frames = foreign().count();
     let first_foreign_s = foreign().next().map(|t| t.time_s);
@@ -111,6 +116,7 @@ pub fn analyze(
         background: plate.rgb,
         occluders,
         sprites,
+        shadow,
         clip_frames: connections.clip_frames,
         epsilon: connections.epsilon,
         natural_step: connections.natural_step,

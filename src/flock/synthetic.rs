@@ -51,6 +51,7 @@ pub(crate) fn library(view: View) -> Library {
         background: water(),
         occluders: None,
         sprites,
+        shadow: None,
         clip_frames: CLIP_FRAMES,
         epsilon: 1000,
         natural_step: 500,

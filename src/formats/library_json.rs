@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
-use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Transition};
+use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Shadow, Transition};
 
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/library@1";
@@ -34,6 +34,8 @@ pub struct Summary {
     pub matte_center_px: Vec<Option<[f64; 2]>>,
     /// Whether something is known to stand before the animal: occluders.png.
     pub occluders: bool,
+    /// The shadow that the animal casts.
+    pub shadow: Option<Shadow>,
     /// f.
     pub clip_frames: usize,
     /// Clips nearer than this are alike.
@@ -63,6 +65,7 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
             .map(|idx| library.sprites.matte(idx).map(|matte| matte.center_px))
             .collect(),
         occluders: library.occluders.is_some(),
+        shadow: library.shadow.as_ref().map(ShadowFile::of),
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
         natural_step: library.natural_step,
@@ -90,6 +93,7 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
         sprite_scale: file.sprite_scale,
         matte_center_px: file.matte_center_px,
         occluders: file.occluders,
+        shadow: file.shadow.map(ShadowFile::into_shadow),
         clip_frames: file.clip_frames,
         epsilon: file.epsilon,
         natural_step: file.natural_step,
@@ -127,6 +131,9 @@ struct LibraryFile {
     /// Absent in files of before.
     #[serde(default)]
     occluders: bool,
+    /// Absent in files of before.
+    #[serde(default)]
+    shadow: Option<ShadowFile>,
     clip_frames: usize,
     epsilon: u64,
     natural_step: u64,
@@ -135,6 +142,32 @@ struct LibraryFile {
     playback: Vec<JumpFile>,
     component: Vec<u32>,
     patches: Vec<PatchFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct ShadowFile {
+    darkness: f64,
+    offset_bl: [f64; 2],
+    blur_bl: f64,
+}
+
+impl ShadowFile {
+    fn of(shadow: &Shadow) -> ShadowFile {
+        let round = |value| super::poses_json::round(value, 4);
+        ShadowFile {
+            darkness: round(shadow.darkness),
+            offset_bl: shadow.offset_bl.map(round),
+            blur_bl: round(shadow.blur_bl),
+        }
+    }
+
+    fn into_shadow(self) -> Shadow {
+        Shadow {
+            darkness: self.darkness,
+            offset_bl: self.offset_bl,
+            blur_bl: self.blur_bl,
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]

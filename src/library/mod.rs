@@ -25,6 +25,8 @@ pub struct Library {
     pub occluders: Option<RgbaImage>,
     /// The animal cut out of every frame in which it was found.
     pub sprites: Sprites,
+    /// The shadow that it casts, seen from above; `None` where it casts none, or is seen from the side.
+    pub shadow: Option<Shadow>,
     /// f: how many sprites a clip holds.
     pub clip_frames: usize,
     /// Clips nearer than this (strictly) are alike.
@@ -39,6 +41,17 @@ pub struct Library {
     pub patches: Vec<Patch>,
     /// What is worth knowing about the above.
     pub stats: LibraryStats,
+}
+
+/// The shadow of an animal on the floor below it: its outline, shifted and blurred.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shadow {
+    /// The share of the light that it takes in its midst, 0..=1.
+    pub darkness: f64,
+    /// How far from the animal it lies in the picture, x right and y down, body lengths.
+    pub offset_bl: [f64; 2],
+    /// Standard deviation of the Gaussian that blurs it, body lengths.
+    pub blur_bl: f64,
 }
 
 /// Something that moved besides the animal.

@@ -1,7 +1,6 @@
 //! What the animal casts on things much darker than its ground, as its mirror image in a dark wall: it stays behind.
 //! A few levels less are a large share of the little light there, and would be a dark patch on anything lighter.
 
-use super::smooth;
 use super::solid::Coat;
 use crate::analysis::scene::plate::Plate;
 use crate::geometry::Rect;
@@ -9,9 +8,9 @@ use crate::order::percentile;
 use crate::raster::Mask;
 use crate::raster::runs::{Component, components};
 
-/// Relative to the ground: of what is cast on darker things nothing goes with the animal, on lighter ones all. A wall
-/// in which an image was seen (mouse in a round arena) has a third of the floor's light.
-const DARKER: [f32; 2] = [0.5, 0.8];
+/// A thing is dark that has less than this share of the ground's light. A wall in which an image was seen (mouse in a round
+/// arena) has a third of the floor's.
+const DARK: f32 = 0.65;
 /// So much light, the sum of R, G and B, is nothing: no thing is darker than black.
 const BLACK: f32 = 48.0;
 /// It may stand half on dark things: its ground is the lighter quarter of what is behind it.
@@ -46,10 +45,9 @@ impl Ground<'_> {
         }
     }
 
-    /// How much of what is cast on a place of the frame goes with the animal: 0 to 1.
-    pub(super) fn share_at(&self, x: u32, y: u32) -> f32 {
-        let relative = (brightness(self.plate, x, y) + BLACK) / (self.brightness + BLACK);
-        smooth((relative - DARKER[0]) / (DARKER[1] - DARKER[0]))
+    /// Whether a place of the frame shows something much darker than the ground.
+    fn is_dark(&self, x: u32, y: u32) -> bool {
+        brightness(self.plate, x, y) + BLACK < DARK * (self.brightness + BLACK)
     }
 
     /// What of a mask lies on the ground, and not on darker things.
@@ -58,7 +56,7 @@ impl Ground<'_> {
         let mut on_ground = mask.clone();
         for (k, bit) in on_ground.bits.iter_mut().enumerate() {
             let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
-            *bit &= u8::from(self.share_at(x, y) >= 0.5);
+            *bit &= u8::from(!self.is_dark(x, y));
         }
         on_ground
     }
@@ -93,8 +91,8 @@ impl Ground<'_> {
     /// hidden: it is small, mostly of the coat's color, only dark things lie between, and it is no part of `images`.
     pub(super) fn clear_images(&self, solid: &mut Mask, images: &Mask, coat: &Coat) {
         let (rect, width) = (solid.rect, solid.width());
-        let share =
-            |k: usize| self.share_at(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
+        let is_dark =
+            |k: usize| self.is_dark(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
         let mut pieces = components(solid);
         pieces.sort_by_key(|piece| std::cmp::Reverse(piece.area));
         let is_apart = pieces.len() > 1;
@@ -103,13 +101,13 @@ impl Ground<'_> {
         };
         let mut passable = solid.clone();
         for (k, bit) in passable.bits.iter_mut().enumerate() {
-            *bit |= u8::from(share(k) < 0.5);
+            *bit |= u8::from(is_dark(k));
         }
         let reached = (components(&passable).iter().map(|part| part.mask(rect)))
             .find(|part| part.bits[numbers(body, rect)[0]] == 1);
         for piece in &pieces[1..] {
             let pixels = numbers(piece, rect);
-            let on_ground: f32 = pixels.iter().map(|&k| share(k)).sum();
+            let n_dark = pixels.iter().filter(|&&k| is_dark(k)).count() as u64;
             let n_own = pixels.iter().filter(|&&k| coat.matches(k)).count() as u64;
             let is_reached = reached
                 .as_ref()
@@ -117,7 +115,7 @@ impl Ground<'_> {
             let is_image = pixels.iter().any(|&k| images.bits[k] == 1);
             let is_limb =
                 !is_image && LIMB * piece.area < body.area && is_reached && 2 * n_own >= piece.area;
-            if 2.0 * on_ground < piece.area as f32 && !is_limb {
+            if 2 * n_dark > piece.area && !is_limb {
                 pixels.iter().for_each(|&k| solid.bits[k] = 0);
             }
         }

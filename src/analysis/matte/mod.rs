@@ -3,9 +3,9 @@
 //!
 //! Inside the silhouette alpha is 1; in a band around its outline alpha is how far the pixel lies
 //! from the plate toward the animal's color nearby, and the color is what remains when the plate's
-//! share is taken away. What is only shadow is black with the share of light that it takes. Computed
-//! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame,
-//! but for what is cast on things much darker than the ground (`cast`), and for the faintest rim of shadows.
+//! share is taken away. A shadow is no part of it: it would be turned with the body (`shadow` measures it). Computed
+//! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame
+//! but for shadows and mirror images (`cast`).
 
 mod cast;
 mod given;
@@ -64,7 +64,6 @@ pub fn pull(
         solid: &solid,
         inside: &inside,
         closed: &closed,
-        ground,
         coat: &coat,
         nearest_inside: nearest_set(&inside, &outer),
         nearest_solid: nearest_set(&solid, &outer),
@@ -144,23 +143,12 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
 const TRACE: f32 = 0.04;
 /// A gap of up to twice as many pixels, as where a wire goes across the animal, is narrow.
 const GAP_PX: u32 = 2;
-/// Between these differences, as parts of the least that counts, a shadow fades in: it goes on where the silhouette
-/// ends, and its faint rim would show as an edge.
-const FADED: [f32; 2] = [0.5, 2.0];
-
-/// 0 to 1 without a corner.
-fn smooth(share: f32) -> f32 {
-    let share = share.clamp(0.0, 1.0);
-    share * share * (3.0 - 2.0 * share)
-}
-
 /// What a pixel near the animal may have a share of.
-#[derive(Default)]
 struct Nearby {
     /// The animal's color there.
-    animal: Option<[f32; 3]>,
-    /// Nothing but less light, of which this share goes with the animal: 0 to 1.
-    shadow: Option<f32>,
+    color: [f32; 3],
+    /// Whether the pixel looks like the background with less light.
+    is_shadow: bool,
 }
 
 struct Puller<'a> {
@@ -173,7 +161,6 @@ struct Puller<'a> {
     inside: &'a Mask,
     /// The solid part with its narrow gaps.
     closed: &'a Mask,
-    ground: Ground<'a>,
     coat: &'a Coat<'a>,
     /// For each pixel an inside pixel near it.
     nearest_inside: Vec<u32>,
@@ -202,29 +189,30 @@ impl Puller<'_> {
 
     /// A pixel of the band: straight color and alpha.
     fn band_pixel(&self, k: usize) -> [u8; 4] {
-        let nearby = self.nearby(k);
-        let animal = nearby.animal.map_or(0.0, |color| {
-            let most = nearby.shadow.map_or(1.0, |_| self.blurred_solid(k));
-            let alpha = self.toward(color, k).unwrap_or_else(|| self.alike(k));
-            alpha.min(most)
-        });
-        let shadow = nearby
-            .shadow
-            .map_or(0.0, |share| share * self.toward([0.0; 3], k).unwrap_or(0.0));
-        let alpha = f32::max(animal, shadow);
-        let level = (alpha * 255.0 + 0.5) as u8;
-        if level == 0 || (alpha < TRACE && nearby.animal.is_some()) {
+        let Some(Nearby { color, is_shadow }) = self.nearby(k) else {
+            return [0; 4];
+        };
+        let most = if is_shadow {
+            self.blurred_solid(k)
+        } else {
+            1.0
+        };
+        let alpha = self
+            .toward(color, k)
+            .unwrap_or_else(|| self.alike(k))
+            .min(most);
+        if alpha < TRACE {
             return [0; 4];
         }
-        let color = match nearby.animal {
-            Some(color) if nearby.shadow.is_none() && alpha <= 0.2 => color,
-            _ => {
+        let color = match !is_shadow && alpha <= 0.2 {
+            true => color,
+            false => {
                 let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
                 [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
             }
         };
         let [r, g, b] = color.map(|c| (c + 0.5) as u8);
-        [r, g, b, level]
+        [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
     /// How far a pixel lies from the plate toward a color, 0 to 1, where the color stands out from the plate.
@@ -249,29 +237,23 @@ impl Puller<'_> {
         (3.0 * self.plate.sigma[self.place(k)]).powi(2)
     }
 
-    /// What a band pixel may have a share of. What looks like a shadow may be one near the animal too, but not in a
-    /// narrow gap of it, and is nothing else beyond the band around what is solid.
-    fn nearby(&self, k: usize) -> Nearby {
+    /// What a band pixel may have a share of; `None` beyond the band around what is solid. What looks like a shadow may be
+    /// one near the animal too, but not in a narrow gap of it.
+    fn nearby(&self, k: usize) -> Option<Nearby> {
         let band = self.band_px as usize;
-        let mut nearby = Nearby::default();
         let solid = self.nearest_solid[k];
-        if solid == NOWHERE {
-            return nearby;
+        if solid == NOWHERE || self.steps(k, solid as usize) > band {
+            return None;
         }
-        let is_near = self.steps(k, solid as usize) <= band;
-        if !is_near || (self.closed.bits[k] == 0 && self.coat.is_shadow(k)) {
-            let fade = if is_near { 1.0 } else { self.fade(k) };
-            nearby.shadow = Some(fade * self.least_share(k, solid as usize));
-        }
-        if is_near {
-            let inside = self.nearest_inside[k];
-            nearby.animal =
-                match inside != NOWHERE && self.steps(k, inside as usize) <= 2 * band + 1 {
-                    true => Some(self.mean_inside(inside as usize)),
-                    false => self.starkest(solid as usize),
-                };
-        }
-        nearby
+        let inside = self.nearest_inside[k];
+        let color = match inside != NOWHERE && self.steps(k, inside as usize) <= 2 * band + 1 {
+            true => self.mean_inside(inside as usize),
+            false => self.starkest(solid as usize)?,
+        };
+        Some(Nearby {
+            color,
+            is_shadow: self.closed.bits[k] == 0 && self.coat.is_shadow(k),
+        })
     }
 
     /// How many steps it is from one pixel to another (8-connected).
@@ -279,30 +261,6 @@ impl Puller<'_> {
         let width = self.mask.width();
         let along_x = (from % width).abs_diff(to % width);
         along_x.max((from / width).abs_diff(to / width))
-    }
-
-    /// How far a shadow has faded in, 0 to 1.
-    fn fade(&self, k: usize) -> f32 {
-        let weak = self.plate.weak_threshold(self.place(k));
-        let beyond = f32::from(self.difference.levels[k]) / f32::from(weak.max(1)) - FADED[0];
-        smooth(beyond / (FADED[1] - FADED[0]))
-    }
-
-    /// How much of what is cast on a pixel goes with the animal: as little as on the way to it from what is solid, for
-    /// beyond the edge of its ground it is cast on something else.
-    fn least_share(&self, k: usize, solid: usize) -> f32 {
-        let (rect, width) = (self.mask.rect, self.mask.width());
-        let (from, to) = ([k % width, k / width], [solid % width, solid / width]);
-        let n_steps = self.steps(k, solid);
-        let between = |axis: usize, step: usize| {
-            (from[axis] * (n_steps - step) + to[axis] * step + n_steps / 2) / n_steps
-        };
-        (0..n_steps)
-            .map(|step| {
-                let (x, y) = (between(0, step) as u32, between(1, step) as u32);
-                self.ground.share_at(rect.x + x, rect.y + y)
-            })
-            .fold(1.0, f32::min)
     }
 
     /// Mean color of the inside pixels of a 3 x 3 neighborhood whose middle is one.

@@ -72,6 +72,7 @@ impl Sausage {
             upright_px: f64::from(rect.h),
             box_px: rect,
             cut: false,
+            around: None,
         };
         (sighting, image)
     }

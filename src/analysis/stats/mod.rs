@@ -36,7 +36,8 @@ pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
     }
 }
 
-fn length_px(poses: &Poses) -> Option<f64> {
+/// Length of the animal in the image when seen at length (80th percentile), pixels; `None` where it was never seen whole.
+pub fn length_px(poses: &Poses) -> Option<f64> {
     let axes: Vec<Option<pose::Axes>> = poses
         .frames
         .iter()

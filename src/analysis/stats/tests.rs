@@ -51,6 +51,7 @@ fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
         background: RgbImage::new(400, 100),
         occluders: None,
         sprites: Sprites::missing(8, 8, 300),
+        shadow: None,
         clip_frames: 8,
         epsilon: 10,
         natural_step: 5,

@@ -39,6 +39,8 @@ const MOST_CANDIDATES: usize = 3;
 const MERGED: f64 = 1.2;
 /// Cost of taking a part of a component for the animal instead of the whole.
 const PART_COST: f64 = 2.0;
+/// What is around the animal is kept of every so many frames: a few dozen pictures show a shadow well enough.
+const AROUND_EVERY: usize = 8;
 /// Something of this share of the subject's area that moves besides it is worth a word.
 const LEAST_OTHER: f64 = 0.2;
 
@@ -187,6 +189,7 @@ fn look(
         plate: placed.plate,
         light: &placed.light,
         ignored: &ignored,
+        keeps_around: !scene.is_masked && frame_idx.is_multiple_of(AROUND_EVERY),
     };
     let mut candidates = Vec::with_capacity(described.len());
     for (component, look, cost) in described {

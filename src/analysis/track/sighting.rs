@@ -6,7 +6,7 @@ use crate::analysis::matte;
 use crate::analysis::moments::{self, Moments};
 use crate::analysis::scene::light::Light;
 use crate::analysis::scene::plate::Plate;
-use crate::analysis::subject;
+use crate::analysis::{silhouette, subject};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask, RgbaImage};
@@ -39,7 +39,21 @@ pub struct Sighting {
     pub box_px: Rect,
     /// The silhouette touches the border of the frame or of a box that is not looked at.
     pub cut: bool,
+    /// The frame around the animal, in some frames.
+    pub around: Option<Around>,
 }
+
+/// A part of a frame that was put aside, in the light of the plate: RGB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Around {
+    /// Where it lies in the frame.
+    pub rect: Rect,
+    /// Where its pixels are put aside.
+    pub at: u64,
+}
+
+/// Room on every side of the animal, as a share of the diagonal of its box: a shadow is looked for there.
+const ROOM: f64 = 0.3;
 
 impl Sighting {
     /// What a matte that lies at `rect` tells by itself: neither where it is put aside, nor how sure it is, its
@@ -69,6 +83,7 @@ impl Sighting {
             upright_px: extent_px(quarter),
             box_px: rect,
             cut: false,
+            around: None,
         })
     }
 }
@@ -91,6 +106,8 @@ pub struct View<'a> {
     pub light: &'a Light,
     /// Boxes that are not looked at.
     pub ignored: &'a [Rect],
+    /// Whether what is around the animal is put aside too.
+    pub keeps_around: bool,
 }
 
 impl View<'_> {
@@ -103,12 +120,24 @@ impl View<'_> {
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
+        let cut = self.cuts(rect);
+        let room_px = (self.keeps_around && !cut).then_some((ROOM * length_px).ceil() as u32);
         Ok(Some(Sighting {
             at: scratch.put(&matte.image.pixels)?,
             box_px: rect,
-            cut: self.cuts(rect),
+            cut,
+            around: room_px
+                .map(|px| self.around(rect, px, scratch))
+                .transpose()?,
             ..measured
         }))
+    }
+
+    fn around(&self, rect: Rect, room_px: u32, scratch: &dyn Scratch) -> Result<Around, Full> {
+        let rect = rect.inflated(room_px, self.frame.width, self.frame.height);
+        let seen = silhouette::difference(self.frame, self.plate, self.light, rect).rgb;
+        let at = scratch.put(&seen.pixels)?;
+        Ok(Around { rect, at })
     }
 
     /// Whether a box reaches the border of what is looked at.

@@ -3,7 +3,6 @@
 
 use super::morph::bend;
 use super::params::Cut;
-use super::shadow::Floor;
 use super::stock::Stock;
 use super::truth::{Drawn, Whole};
 use super::view::View;
@@ -93,11 +92,6 @@ impl Painter {
         let frame = who.individual.source_frame[t];
         let sprite = (stage.stock).take(stage.sprites, frame, place.scale, &mut self.packed);
         canvas.draw_under(&sprite, &place, cover, stage.cpu)
-    }
-
-    /// Draws the shadows of all in place of them.
-    pub(super) fn shade(&mut self, floor: &Floor, view: &View, all: &[Appearance]) {
-        floor.draw(all, view, &mut self.layer);
     }
 
     /// What was painted last, as the ground truth needs it; the layer is used up.

@@ -13,7 +13,7 @@ mod front; // what stands before all
 mod layer; // one individual in one frame
 mod morph; // two sprites bent to each other at a jump
 pub mod params;
-mod shadow; // on the floor
+mod shadow; // below all
 mod stock; // sprites ready to be drawn
 pub mod truth; // what of whom can be seen
 mod view; // from pixels of the footage to those of the film
@@ -26,7 +26,7 @@ use self::draw_ahead::draw_ahead;
 use self::front::Front;
 use self::layer::{Appearance, Haze, Painter, Stage};
 use self::params::Background;
-use self::shadow::Floor;
+use self::shadow::{Shade, Shadows};
 use self::stock::Stock;
 use self::truth::{Drawn, FrameTruth};
 use self::view::View;
@@ -46,7 +46,7 @@ pub struct Compositor<'a> {
     with_truth: bool,
     backdrop: Backdrop,
     haze: Option<Haze>,
-    floor: Option<Floor>,
+    shadows: Option<Shadows>,
     stock: Stock,
     cpu: Level,
     n_frames: usize,
@@ -86,6 +86,7 @@ struct Desk {
     /// The boxes of everyone, where color is to go beyond edges.
     boxes: Vec<Rect>,
     painter: Painter,
+    shade: Shade,
     drawn: Vec<Drawn>,
 }
 
@@ -101,7 +102,6 @@ impl<'a> Compositor<'a> {
             other => other,
         };
         let form = Form::Planar(ColorSpec::default());
-        let floor = || Floor::of(library, flock, render.shadow);
         Compositor {
             library,
             flock,
@@ -113,7 +113,7 @@ impl<'a> Compositor<'a> {
                 left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
                 color: opaque(backdrop::mean(&library.background)),
             }),
-            floor: (render.shadow > 0.0).then(floor),
+            shadows: Shadows::of(library, flock),
             stock: Stock::default(),
             cpu: Level::detect(),
             n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
@@ -167,16 +167,20 @@ impl<'a> Compositor<'a> {
     pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
         let mut desk = self.take_desk();
         desk.drawn.clear();
+        if self.shadows.is_some() {
+            desk.shade.begin(self.view.size_px);
+        }
         let order = self.near_to_far(frame_idx);
         for who in &order {
             self.draw(who, &mut desk);
         }
-        if let Some(floor) = &self.floor {
-            desk.painter.shade(floor, &self.view, &order);
+        if self.shadows.is_some() {
+            desk.shade.layer(&mut desk.painter.layer);
             desk.put(self.cpu);
         }
         if self.with_truth {
-            shot.truth = FrameTruth::of(&desk.drawn, self.view.size_px, self.left(shot));
+            let shade = self.shadows.as_ref().map(|_| desk.shade.alpha());
+            shot.truth = FrameTruth::of(&desk.drawn, shade, self.view.size_px, self.left(shot));
         }
         self.develop(&mut desk, shot);
         self.desks
@@ -256,6 +260,7 @@ impl<'a> Compositor<'a> {
             cover: Cover::none(self.view.size_px),
             boxes: Vec::new(),
             painter: Painter::default(),
+            shade: Shade::default(),
             drawn: Vec::new(),
         })
     }
@@ -290,11 +295,19 @@ impl<'a> Compositor<'a> {
 
     fn draw(&self, who: &Appearance, desk: &mut Desk) {
         let stage = self.stage();
-        if self.with_truth {
-            // It asks for everyone whole.
+        let outlines = self.shadows.as_ref().is_some_and(Shadows::are_outlines);
+        if self.with_truth || outlines {
+            // Both ask for everyone whole.
             desk.painter.paint(&stage, who, None);
             desk.put(self.cpu);
+        }
+        if let Some(shadows) = &self.shadows {
+            shadows.add(who, &desk.painter.layer, &self.view, &mut desk.shade);
+        }
+        if self.with_truth {
             desk.drawn.push(desk.painter.drawn(&stage, who));
+        }
+        if self.with_truth || outlines {
             return;
         }
         let Desk {

@@ -19,8 +19,9 @@ pub struct Render {
     pub cut: Cut,
     /// How much of what is a body length farther is lost in haze, 0..=1; 0 = clear.
     pub haze_per_bl: f64,
-    /// How dark the shadow of everyone on the floor is, 0..=1; 0 = none.
-    pub shadow: f64,
+    /// How dark the shadow of everyone on the floor is, 0..=1; 0 = none, null = as it was filmed from above, and none from
+    /// the side.
+    pub shadow: Option<f64>,
     /// Files to make besides video.mp4.
     pub formats: Vec<Format>,
     /// Whether to make overlay.mp4: where everyone's boid is and where it heads (O's figure 10).
@@ -81,7 +82,7 @@ impl Default for Render {
             background: Background::Plate,
             cut: Cut::Fade,
             haze_per_bl: 0.0,
-            shadow: 0.0,
+            shadow: None,
             formats: vec![Format::Poster],
             overlay: false,
             ground_truth: true,
@@ -106,7 +107,7 @@ impl Render {
         }
         for (name, value) in [
             ("render.haze_per_bl", self.haze_per_bl),
-            ("render.shadow", self.shadow),
+            ("render.shadow", self.shadow.unwrap_or(0.0)),
         ] {
             if !(0.0..=1.0).contains(&value) {
                 return Err(format!("{name} must lie in 0..=1: {value}"));
@@ -189,7 +190,7 @@ mod tests {
         };
         assert_eq!(long.check(), Ok(()));
         let dark = Render {
-            shadow: f64::NAN,
+            shadow: Some(f64::NAN),
             ..Render::default()
         };
         assert!(dark.check().unwrap_err().contains("render.shadow"));

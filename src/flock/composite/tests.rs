@@ -276,7 +276,7 @@ fn shadow_and_haze_change_the_picture_and_not_the_truth() {
         let library = synthetic::library(view);
         let mut flock = flock(&library, "school");
         let plain = shots(&library, &flock);
-        flock.params.render.shadow = 0.6;
+        flock.params.render.shadow = Some(0.6);
         flock.params.render.haze_per_bl = 0.3;
         for individual in &mut flock.individuals {
             for place in &mut individual.boid.position_px {
@@ -289,7 +289,12 @@ fn shadow_and_haze_change_the_picture_and_not_the_truth() {
             pairs.filter(|(a, b)| **b + 10 < **a).count()
         };
         for (plain, other) in plain.iter().zip(&other) {
-            assert!(plain.truth == other.truth);
+            assert!(
+                plain.truth.labels == other.truth.labels && plain.truth.seen == other.truth.seen
+            );
+            assert!(
+                plain.truth.shadow.is_empty() && other.truth.shadow.iter().any(|&share| share > 80)
+            );
             assert!(darker(plain, other) > 300);
         }
     }

@@ -22,6 +22,9 @@ pub struct FrameTruth {
     pub labels: Vec<u16>,
     /// Everyone, by id.
     pub seen: Vec<Seen>,
+    /// By pixel: the share of its light that shadows take where they can be seen, 0 to 255; empty in a film without
+    /// shadows.
+    pub shadow: Vec<u8>,
 }
 
 /// One individual in one frame. Boxes are [x, y, width, height].
@@ -67,19 +70,30 @@ pub(super) struct Whole {
 }
 
 impl FrameTruth {
-    /// The truth of everyone drawn, near to far; ids are 0..n, each once. `left` is what stands before them all
-    /// leaves of each pixel.
-    pub(super) fn of(drawn: &[Drawn], size_px: [u32; 2], mut left: Vec<u16>) -> FrameTruth {
+    /// The truth of everyone drawn, near to far; ids are 0..n, each once. `shade` is below them, in 16384ths; `left` is
+    /// what stands before them all leaves of each pixel.
+    pub(super) fn of(
+        drawn: &[Drawn],
+        shade: Option<&[u16]>,
+        size_px: [u32; 2],
+        mut left: Vec<u16>,
+    ) -> FrameTruth {
         let n_pixels = size_px[0] as usize * size_px[1] as usize;
         let mut truth = FrameTruth {
             size_px,
             labels: vec![0; n_pixels],
             seen: vec![Seen::default(); drawn.len()],
+            shadow: Vec::new(),
         };
         // Each takes of it what those farther do not have.
         for drawn in drawn {
             truth.seen[drawn.id as usize] = truth.look(drawn, &mut left);
         }
+        let visible = |(&shade, &left): (&u16, &u16)| {
+            ((u32::from(shade) * u32::from(left) / ONE * 255 + HALF) / ONE) as u8
+        };
+        let shaded = shade.map(|shade| shade.iter().zip(&left).map(visible).collect());
+        truth.shadow = shaded.unwrap_or_default();
         truth
     }
 
@@ -195,7 +209,7 @@ mod tests {
     fn the_nearer_hides_the_farther_by_its_alpha() {
         let far = layer(1, rect(0, 0, 4, 2), ONE as u16);
         let near = layer(0, rect(2, 0, 4, 2), 3 * ONE as u16 / 4);
-        let truth = FrameTruth::of(&[near, far], [8, 2], clear(16));
+        let truth = FrameTruth::of(&[near, far], None, [8, 2], clear(16));
         assert_eq!(truth.labels[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
         // Half of the far one is covered by three quarters.
         assert!((truth.seen[1].visibility - 0.625).abs() < 1e-4);
@@ -213,14 +227,17 @@ mod tests {
         let box_px = rect(0, 0, 1, 1);
         let far = layer(0, box_px, ONE as u16);
         let near = layer(1, box_px, HALF as u16);
-        assert_eq!(FrameTruth::of(&[near, far], [1, 1], clear(1)).labels, [2]);
+        assert_eq!(
+            FrameTruth::of(&[near, far], None, [1, 1], clear(1)).labels,
+            [2]
+        );
     }
 
     #[test]
     fn whoever_is_wholly_hidden_has_no_label_but_an_extent() {
         let far = layer(0, rect(1, 0, 2, 1), ONE as u16);
         let near = layer(1, rect(0, 0, 4, 1), ONE as u16);
-        let hidden = &FrameTruth::of(&[near, far], [4, 1], clear(4)).seen[0];
+        let hidden = &FrameTruth::of(&[near, far], None, [4, 1], clear(4)).seen[0];
         assert_eq!((hidden.visible_box, hidden.visible_area), (None, 0));
         assert_eq!(
             (hidden.amodal_box, hidden.visibility),
@@ -232,7 +249,7 @@ mod tests {
     fn a_wire_before_all_has_no_label_and_takes_of_what_can_be_seen() {
         let bird = layer(0, rect(0, 0, 4, 1), ONE as u16);
         let left = vec![ONE as u16, 0, ONE as u16 / 4, 3 * ONE as u16 / 4];
-        let truth = FrameTruth::of(&[bird], [4, 1], left);
+        let truth = FrameTruth::of(&[bird], None, [4, 1], left);
         assert_eq!(truth.labels, [1, 0, 0, 1]);
         let seen = &truth.seen[0];
         assert_eq!((seen.visible_area, seen.amodal_area), (2, 4));
@@ -253,7 +270,7 @@ mod tests {
                 .zip(&layers)
                 .map(|(id, &(x, y, w, h, alpha))| layer(id, rect(x, y, w, h), alpha))
                 .collect();
-            let truth = FrameTruth::of(&drawn, [12, 12], clear(144));
+            let truth = FrameTruth::of(&drawn, None, [12, 12], clear(144));
             for at in 0..144u32 {
                 let (x, y) = (at % 12, at / 12);
                 let mut through = 1.0;

@@ -46,6 +46,8 @@ masks/NNNNNN.png  labels, 16-bit gray: id + 1 of the individual that makes up at
                   something known to stand before them (wires of a cage: the library's occluders.png) is in the film.
                   A film without background has no such thing; of two films this is of the opaque one. Frames
                   from 000000.
+shadows/NNNNNN.png  8-bit gray: the share of its light that the shadows of all take of a pixel, 255 = all of it, where no
+                  animal covers it. Only in a film with shadows; labels take no notice of them.
 coco.json         COCO instances. One annotation for each individual and frame in which it has a label:
                   segmentation (compressed run lengths, as pycocotools decodes them), bbox and area are of what is
                   visible; amodal_segmentation is of the whole animal within the picture, amodal_bbox and

@@ -19,7 +19,7 @@ use self::archive::Archive;
 use super::library_json::{self, FootageSummary, Summary};
 use super::{picture, poses_json};
 use crate::analysis::Params;
-use crate::library::{Library, Sprites};
+use crate::library::{Library, Shadow, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
@@ -168,6 +168,7 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
             summary.sprite_scale,
             scratch,
         ),
+        shadow: summary.shadow,
         clip_frames: summary.clip_frames,
         epsilon: summary.epsilon,
         natural_step: summary.natural_step,
@@ -216,6 +217,14 @@ fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
             "library.json must name a size for the sprite of every frame",
         ));
     }
+    let is_shadow = |shadow: &Shadow| {
+        (0.0..=1.0).contains(&shadow.darkness)
+            && shadow.offset_bl.iter().all(|bl| bl.abs() <= 1.0)
+            && (0.0..=1.0).contains(&shadow.blur_bl)
+    };
+    if !summary.shadow.as_ref().is_none_or(is_shadow) {
+        return Err(Error::Mismatch("library.json names an impossible shadow"));
+    }
     let mut sides_px = summary.sprite_size_px.iter();
     match sides_px.all(|side| (1..=MOST_SIDE_PX).contains(side)) {
         true => Ok(()),
@@ -255,6 +264,11 @@ mod tests {
             background: RgbImage::new(16, 12),
             occluders: Some(wire()),
             sprites,
+            shadow: Some(Shadow {
+                darkness: 0.25,
+                offset_bl: [0.125, -0.0625],
+                blur_bl: 0.0625,
+            }),
             clip_frames: 2,
             epsilon: 77,
             natural_step: 38,

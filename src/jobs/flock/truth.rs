@@ -14,6 +14,10 @@ use crate::formats::ground_truth::coco::Coco;
 use crate::formats::ground_truth::{FilmShape, README, frame_name, mot, tracks};
 use crate::formats::picture;
 
+/// Folders of pictures, one a frame.
+const MASKS: &str = "masks";
+const SHADOWS: &str = "shadows";
+
 /// A ground truth in the making.
 pub struct TruthFolder {
     folder: PathBuf,
@@ -21,12 +25,14 @@ pub struct TruthFolder {
     coco: Coco<BufWriter<File>>,
     mot: BufWriter<File>,
     tracks: BufWriter<File>,
+    /// Pictures of shadows written.
+    n_shadows: usize,
 }
 
 impl TruthFolder {
     /// Begins in a folder, which is made if need be.
     pub fn create(folder: &Path, film: FilmShape) -> io::Result<TruthFolder> {
-        fs::create_dir_all(folder.join("masks"))?;
+        fs::create_dir_all(folder.join(MASKS))?;
         fs::create_dir_all(folder.join("gt"))?;
         let file =
             |name: &str| Ok::<_, io::Error>(BufWriter::new(File::create(folder.join(name))?));
@@ -40,6 +46,7 @@ impl TruthFolder {
             coco: Coco::begin(file("coco.json")?, &film)?,
             mot: file("gt/gt.txt")?,
             tracks,
+            n_shadows: 0,
         })
     }
 
@@ -47,7 +54,14 @@ impl TruthFolder {
     pub fn add(&mut self, flock: &Flock, frame_idx: usize, truth: &FrameTruth) -> io::Result<()> {
         let [width, height] = truth.size_px;
         let mask = picture::write_labels(width, height, &truth.labels);
-        fs::write(self.folder.join("masks").join(frame_name(frame_idx)), mask)?;
+        fs::write(self.folder.join(MASKS).join(frame_name(frame_idx)), mask)?;
+        if !truth.shadow.is_empty() {
+            let shadow = picture::write_gray(width, height, &truth.shadow);
+            let folder = self.folder.join(SHADOWS);
+            fs::create_dir_all(&folder)?;
+            fs::write(folder.join(frame_name(frame_idx)), shadow)?;
+            self.n_shadows = frame_idx + 1;
+        }
         self.coco.add(flock, frame_idx, truth)?;
         mot::write_frame(&mut self.mot, flock, frame_idx, truth)?;
         tracks::write_frame(&mut self.tracks, (flock, &self.film), frame_idx, truth)
@@ -55,7 +69,8 @@ impl TruthFolder {
 
     /// Ends every file.
     pub fn finish(mut self) -> io::Result<()> {
-        remove_frames(&self.folder.join("masks"), self.film.n_frames)?;
+        remove_frames(&self.folder.join(MASKS), self.film.n_frames)?;
+        remove_frames(&self.folder.join(SHADOWS), self.n_shadows)?;
         self.coco.end()?;
         self.mot.flush()?;
         self.tracks.flush()

@@ -1,0 +1,379 @@
+//! The shadow of an animal seen from above: how dark it is, how soft, and to which side the light casts it.
+//!
+//! On the floor beside the animal the background B has lost a share of its light, the same for all colors: the frame shows
+//! I = B (1 - d m), where m is the animal's alpha, shifted to the side away from the light and blurred. Shift and blur are
+//! those of a small set that explain most of B - I over many frames, and d is the least-squares solution for them:
+//! d = sum(B m (B - I)) / sum((B m)^2). Pixels that the animal has a share of say nothing about its shadow.
+
+use super::track::sighting::{Around, Sighting};
+use super::track::{Track, Tracked};
+use crate::library::Shadow;
+use crate::order::median;
+use crate::raster::{RgbImage, RgbaImage};
+
+/// Places of the animal that are looked at lie so far apart ...
+const APART_BL: f64 = 0.5;
+/// ... at most so many: more change the third digit ...
+const MOST_PLACES: usize = 100;
+/// ... and at least so many: at fewer a shadow cannot be told from other things beside the animal.
+const LEAST_PLACES: usize = 4;
+/// Compared are means over cells, of which so many are a body length: a shadow has no finer detail.
+const CELLS_PER_BL: f64 = 32.0;
+/// Shifts that are tried: so many cells to each side.
+const MOST_SHIFT: i32 = 8;
+/// Blurs that are tried: standard deviations in cells.
+const BLURS: [f64; 4] = [1.0, 2.0, 3.0, 4.5];
+/// A cell of which the animal has a larger share, or one beside such a cell, shows the animal.
+const CLEAR: f32 = 0.02;
+/// Farther cells, of so many, show more of other things than of the shadow.
+const NEAR_CELLS: usize = 8;
+/// A cell that has a smaller share of the light behind the animal is not on the same ground.
+const LEAST_LIGHT: f32 = 0.65;
+/// A shadow takes so much of the light, or it is none: less is noise, or the animal's blurred edge.
+const LEAST_DARKNESS: f64 = 0.05;
+/// So much of what differs around the animal is explained by the shadow, or something else is there.
+const LEAST_EXPLAINED: f64 = 0.25;
+
+/// Measures the shadow that an animal of a length casts before the main plate, whose colors are `background`; `None` where
+/// it casts none that can be told from noise.
+pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<Shadow> {
+    let places = places(track, length_px);
+    if places.len() < LEAST_PLACES {
+        return None;
+    }
+    let mut fit = Fit::default();
+    for (sighting, around) in places {
+        let mut pixels = RgbImage::new(around.rect.w, around.rect.h);
+        track.scratch.get(around.at, &mut pixels.pixels);
+        let view = View {
+            sighting,
+            around,
+            seen: &pixels,
+            matte: &track.image(sighting),
+            background,
+        };
+        fit.add(&view.cells((length_px / CELLS_PER_BL).max(1.0)));
+    }
+    fit.solved().map(|mut shadow| {
+        let cell_bl = (length_px / CELLS_PER_BL).max(1.0) / length_px;
+        shadow.offset_bl = shadow.offset_bl.map(|cells| cells * cell_bl);
+        shadow.blur_bl *= cell_bl;
+        shadow
+    })
+}
+
+/// What is around the animal at places that lie apart: a shadow follows it everywhere, its mirror image in a wall, or
+/// bedding that it moved, does not.
+fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Around)> {
+    let mut places: Vec<(&Sighting, Around)> = Vec::new();
+    for seen in track.frames.iter().filter_map(Tracked::before_main_plate) {
+        let [x, y] = seen.moments.centroid_px;
+        let is_apart = |(other, _): &(&Sighting, Around)| {
+            let [u, v] = other.moments.centroid_px;
+            libm::hypot(x - u, y - v) >= APART_BL * length_px
+        };
+        if let Some(around) = seen.around
+            && places.len() < MOST_PLACES
+            && places.iter().all(is_apart)
+        {
+            places.push((seen, around));
+        }
+    }
+    places
+}
+
+/// One frame around the animal.
+struct View<'a> {
+    sighting: &'a Sighting,
+    around: Around,
+    seen: &'a RgbImage,
+    matte: &'a RgbaImage,
+    background: &'a RgbImage,
+}
+
+/// The same in cells, by rows.
+#[derive(Default)]
+struct Cells {
+    width: usize,
+    height: usize,
+    /// The animal's share, 0 to 1.
+    alpha: Vec<f32>,
+    /// How bright the background is, levels.
+    back: Vec<f32>,
+    /// How much darker the frame is, levels: by the color that lost the smallest share, for a shadow takes of all.
+    lost: Vec<f32>,
+}
+
+impl View<'_> {
+    fn cells(&self, cell_px: f64) -> Cells {
+        let rect = self.around.rect;
+        let n_cells = |px: u32| (f64::from(px) / cell_px).ceil() as usize;
+        let (width, height) = (n_cells(rect.w), n_cells(rect.h));
+        let mut sums = vec![[0.0f32; 8]; width * height];
+        for (y, x) in (0..rect.h).flat_map(|y| (0..rect.w).map(move |x| (y, x))) {
+            let cell = |px: u32| ((f64::from(px) + 0.5) / cell_px) as usize;
+            let sum = &mut sums[cell(y) * width + cell(x)];
+            let back = self.background.pixel(rect.x + x, rect.y + y);
+            let seen = self.seen.pixel(x, y);
+            for c in 0..3 {
+                sum[c] += f32::from(back[c]);
+                sum[3 + c] += f32::from(seen[c]);
+            }
+            sum[6] += self.alpha(rect.x + x, rect.y + y);
+            sum[7] += 1.0;
+        }
+        let mut cells = Cells {
+            width,
+            height,
+            ..Cells::default()
+        };
+        for sum in sums {
+            let lost = (0..3).map(|c| 1.0 - sum[3 + c] / sum[c].max(1.0));
+            let back = (sum[0] + sum[1] + sum[2]) / (3.0 * sum[7].max(1.0));
+            cells.alpha.push(sum[6] / sum[7].max(1.0));
+            cells.back.push(back);
+            cells.lost.push(back * lost.fold(1.0, f32::min));
+        }
+        cells
+    }
+
+    fn alpha(&self, x: u32, y: u32) -> f32 {
+        let rect = self.sighting.rect;
+        match rect.contains(x, y) {
+            true => f32::from(self.matte.pixel(x - rect.x, y - rect.y)[3]) / 255.0,
+            false => 0.0,
+        }
+    }
+}
+
+/// The sums of the least-squares solutions, for every blur and shift. What a place has lost of its light, squared, is 1 in
+/// all, lest the places with a mirror image decide.
+struct Fit {
+    sums: Vec<[f64; 2]>,
+    n_places: f64,
+}
+
+impl Default for Fit {
+    fn default() -> Fit {
+        Fit {
+            sums: vec![[0.0; 2]; BLURS.len() * shifts().count()],
+            n_places: 0.0,
+        }
+    }
+}
+
+fn shifts() -> impl Iterator<Item = [i32; 2]> + Clone {
+    let along = || -MOST_SHIFT..=MOST_SHIFT;
+    along().flat_map(move |dy| along().map(move |dx| [dx, dy]))
+}
+
+impl Fit {
+    fn add(&mut self, cells: &Cells) {
+        let beside = cells.beside();
+        let at = |[x, y]: [i32; 2]| y as usize * cells.width + x as usize;
+        let squared = |&xy: &[i32; 2]| f64::from(cells.lost[at(xy)]).powi(2);
+        let weight = 1.0 / beside.iter().map(squared).sum::<f64>().max(1.0);
+        self.n_places += 1.0;
+        let mut sums = self.sums.iter_mut();
+        for sigma in BLURS {
+            let blurred = cells.blurred(sigma);
+            for ([dx, dy], sum) in shifts().zip(&mut sums) {
+                for &[x, y] in &beside {
+                    let from = [x - dx, y - dy];
+                    let is_in = (0..cells.width as i32).contains(&from[0])
+                        && (0..cells.height as i32).contains(&from[1]);
+                    if is_in {
+                        let shade = f64::from(cells.back[at([x, y])] * blurred[at(from)]);
+                        sum[0] += weight * shade * f64::from(cells.lost[at([x, y])]);
+                        sum[1] += weight * shade * shade;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The shadow that explains most, its offset and blur in cells.
+    fn solved(&self) -> Option<Shadow> {
+        let places = BLURS
+            .iter()
+            .flat_map(|blur| shifts().map(move |shift| (*blur, shift)));
+        let explained = |[along, squared]: [f64; 2]| along.max(0.0).powi(2) / squared.max(1e-9);
+        let ((blur_bl, shift), best) = (places.zip(&self.sums))
+            .max_by(|(_, a), (_, b)| explained(**a).total_cmp(&explained(**b)))?;
+        let darkness = (best[0] / best[1].max(1e-9)).min(1.0);
+        let is_one =
+            darkness >= LEAST_DARKNESS && explained(*best) >= LEAST_EXPLAINED * self.n_places;
+        is_one.then(|| Shadow {
+            darkness,
+            offset_bl: shift.map(f64::from),
+            blur_bl,
+        })
+    }
+}
+
+impl Cells {
+    /// The cells beside the animal that show nothing of it and are not much darker than what is behind it, in columns and
+    /// rows: a dark wall shows its mirror image, which is no shadow.
+    fn beside(&self) -> Vec<[i32; 2]> {
+        let shows = |k: usize| self.alpha[k] > CLEAR;
+        let behind = median(
+            (0..self.alpha.len())
+                .filter(|&k| shows(k))
+                .map(|k| f64::from(self.back[k])),
+        );
+        let least = LEAST_LIGHT * behind.unwrap_or(0.0) as f32;
+        let is_near = |k: usize, reach: usize| {
+            let (x, y) = (k % self.width, k / self.width);
+            let columns = x.saturating_sub(reach)..(x + reach + 1).min(self.width);
+            let rows = y.saturating_sub(reach)..(y + reach + 1).min(self.height);
+            let mut all = rows.flat_map(|y| columns.clone().map(move |x| (x, y)));
+            all.any(|(x, y)| shows(y * self.width + x))
+        };
+        (0..self.alpha.len())
+            .filter(|&k| self.back[k] >= least && is_near(k, NEAR_CELLS) && !is_near(k, 1))
+            .map(|k| [(k % self.width) as i32, (k / self.width) as i32])
+            .collect()
+    }
+
+    /// Alpha blurred by a Gaussian.
+    fn blurred(&self, sigma: f64) -> Vec<f32> {
+        let reach = (3.0 * sigma).ceil() as i32;
+        let weight = |k: i32| libm::exp(-f64::from(k * k) / (2.0 * sigma * sigma)) as f32;
+        let weights: Vec<f32> = (-reach..=reach).map(weight).collect();
+        let total: f32 = weights.iter().sum();
+        let pass = |from: &[f32], step: [i32; 2]| {
+            let (width, height) = (self.width as i32, self.height as i32);
+            let mut result = Vec::with_capacity(from.len());
+            for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+                let of = |(k, weight): (i32, &f32)| {
+                    let (x, y) = (x + step[0] * k, y + step[1] * k);
+                    let is_in = (0..width).contains(&x) && (0..height).contains(&y);
+                    if is_in {
+                        weight * from[(y * width + x) as usize]
+                    } else {
+                        0.0
+                    }
+                };
+                result.push((-reach..).zip(&weights).map(of).sum::<f32>() / total);
+            }
+            result
+        };
+        pass(&pass(&self.alpha, [1, 0]), [0, 1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::geometry::Rect;
+    use crate::scratch::{InMemory, Scratch};
+
+    const PAPER: u8 = 180;
+    const LENGTH: u32 = 60;
+
+    /// How much of a pixel a body of 60 x 24 pixels covers whose middle is there.
+    fn body(x: f64, y: f64) -> f64 {
+        let away = libm::hypot(x / 30.0, y / 12.0);
+        ((1.0 - away) * 12.0 + 0.5).clamp(0.0, 1.0)
+    }
+
+    /// A dark animal at several places, and what `cast` leaves of the light at a place relative to its middle.
+    fn track(cast: impl Fn(f64, f64) -> f64) -> (Track, RgbImage) {
+        let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
+        let background = picture([240, 160], |_, _| PAPER);
+        let rect = |x: u32, y: u32, [w, h]: [u32; 2]| Rect {
+            x: x - w / 2,
+            y: y - h / 2,
+            w,
+            h,
+        };
+        let frames = (0..5).map(|k| {
+            let (cx, cy) = (70 + 20 * k, 60 + 8 * k);
+            let [own, around] = [rect(cx, cy, [64, 28]), rect(cx, cy, [120, 90])];
+            let place = |rect: Rect, x: u32, y: u32| {
+                let off = |at: u32, first: u32, c: u32| f64::from(first + at) + 0.5 - f64::from(c);
+                (off(x, rect.x, cx), off(y, rect.y, cy))
+            };
+            let mut matte = RgbaImage::new(own.w, own.h);
+            for (y, x) in (0..own.h).flat_map(|y| (0..own.w).map(move |x| (y, x))) {
+                let (u, v) = place(own, x, y);
+                matte.set_pixel(x, y, [20, 20, 20, (255.0 * body(u, v)) as u8]);
+            }
+            let seen = picture([around.w, around.h], |x, y| {
+                let (u, v) = place(around, x, y);
+                let floor = f64::from(PAPER) * cast(u, v);
+                (floor + body(u, v) * (20.0 - floor)) as u8
+            });
+            let measured = Sighting::measured(own, &matte).expect("it is opaque");
+            let put = |bytes: &[u8]| scratch.put(bytes).expect("memory has room");
+            let sighting = Sighting {
+                at: put(&matte.pixels),
+                around: Some(Around {
+                    rect: around,
+                    at: put(&seen.pixels),
+                }),
+                ..measured
+            };
+            Tracked {
+                time_s: f64::from(k),
+                plate_idx: Some(0),
+                sighting: Some(sighting),
+            }
+        });
+        let frames = frames.collect();
+        (
+            Track {
+                frames,
+                movers: Vec::new(),
+                scratch: Arc::clone(&scratch),
+            },
+            background,
+        )
+    }
+
+    fn picture([width, height]: [u32; 2], shade: impl Fn(u32, u32) -> u8) -> RgbImage {
+        let pixels = (0..width * height).flat_map(|k| [shade(k % width, k / width); 3]);
+        RgbImage {
+            width,
+            height,
+            pixels: pixels.collect(),
+        }
+    }
+
+    fn measured(cast: impl Fn(f64, f64) -> f64) -> Option<Shadow> {
+        let (track, background) = track(cast);
+        measure(&track, &background, f64::from(LENGTH))
+    }
+
+    #[test]
+    fn a_shadow_is_measured_as_it_was_cast() {
+        // The mean of the body over 11 x 11 pixels, 9 px to the right and 6 up.
+        let soft = |x: f64, y: f64| {
+            let at = |k: i32| f64::from(k);
+            let all = (-5..6)
+                .flat_map(|dy| (-5..6).map(move |dx| body(x - 9.0 + at(dx), y + 6.0 + at(dy))));
+            all.sum::<f64>() / 121.0
+        };
+        let shadow = measured(|x, y| 1.0 - 0.4 * soft(x, y)).expect("it is plain");
+        assert!((shadow.darkness - 0.4).abs() < 0.04, "{shadow:?}");
+        let [x, y] = shadow.offset_bl;
+        assert!(
+            (x - 0.15).abs() < 0.035 && (y + 0.1).abs() < 0.035,
+            "{shadow:?}"
+        );
+        // Boxes of 11 have a deviation of 3.2 px.
+        assert!((shadow.blur_bl - 3.2 / 60.0).abs() < 0.02, "{shadow:?}");
+    }
+
+    #[test]
+    fn light_around_the_animal_and_a_thing_far_off_are_no_shadow() {
+        assert_eq!(measured(|_, _| 1.0), None);
+        assert_eq!(
+            measured(|x, y| if libm::hypot(x, y) < 36.0 { 1.1 } else { 1.0 }),
+            None
+        );
+        assert_eq!(measured(|x, _| if x > 48.0 { 0.4 } else { 1.0 }), None);
+    }
+}

@@ -1,0 +1,185 @@
+//! Shadows seen from the side: flat ellipses on the floor, which lies under the lowest place where anybody of the flock swims,
+//! farther up in the picture the farther it is, and paler the higher the animal swims.
+
+use super::Shade;
+use crate::flock::Flock;
+use crate::flock::boids::tank::Tank;
+use crate::flock::composite::layer::Appearance;
+use crate::flock::composite::view::View;
+use crate::flock::individual::Individual;
+use crate::flock::lens::Lens;
+use crate::flock::motion::motion_of;
+use crate::geometry::Rect;
+use crate::library::Library;
+use crate::order::median;
+use crate::raster::resample::ONE;
+
+/// A shadow has faded out so high above the floor.
+const HEIGHT_BL: f64 = 6.0;
+/// Half the length and the width of a shadow.
+const HALF_LENGTH_BL: f64 = 0.6;
+const HALF_WIDTH_BL: f64 = 0.26;
+/// A shadow is at least so high, from its middle.
+const LEAST_HALF_BL: f64 = 0.1;
+/// An animal that points at the camera is as wide as this share of its length.
+const LEAST_ACROSS: f64 = 0.4;
+
+/// A floor that is seen from the side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Floor {
+    lens: Lens,
+    /// The depth of the tank's front and the height of the floor, body lengths from the camera, down.
+    front_bl: f64,
+    floor_bl: f64,
+}
+
+/// A shadow in the picture: its middle, its half axes, and which share of the darkness asked for it has.
+pub(super) struct Ellipse {
+    center: [f64; 2],
+    half: [f64; 2],
+    share: f64,
+}
+
+impl Floor {
+    /// Under the lowest place of anybody at any time.
+    pub(super) fn of(library: &Library, flock: &Flock) -> Floor {
+        let lens = Lens::of(library, &flock.params);
+        let tank = Tank::of(library, &lens, &motion_of(library, &lens), &flock.params);
+        let mut floor = Floor {
+            lens,
+            front_bl: tank.corners[0][2],
+            floor_bl: f64::NEG_INFINITY,
+        };
+        let heights = library
+            .poses
+            .frames
+            .iter()
+            .filter_map(|pose| pose.height_px);
+        let height_bl = median(heights).unwrap_or(0.0) / flock.length_px;
+        let lowest = flock.individuals.iter().flat_map(|individual| {
+            (0..individual.centroid_px.len()).map(|t| floor.place(individual, t)[1])
+        });
+        floor.floor_bl = lowest.fold(f64::NEG_INFINITY, f64::max) + height_bl / 2.0;
+        floor
+    }
+
+    /// The shadow of an individual.
+    pub(super) fn shadow(&self, who: &Appearance, view: &View) -> Ellipse {
+        let (individual, t) = (who.individual, who.frame_idx);
+        let [x, y, depth_bl] = self.place(individual, t);
+        let length = self.lens.px_per_bl(depth_bl) * view.scale;
+        let across = libm::fabs(libm::cos(individual.heading_rad[t])).max(LEAST_ACROSS);
+        let high = (HALF_WIDTH_BL * self.floor_bl / depth_bl.max(1.0)).max(LEAST_HALF_BL);
+        let left = 1.0 - (self.floor_bl - y) / HEIGHT_BL;
+        let center = self.lens.picture_px([x, self.floor_bl, depth_bl]);
+        Ellipse {
+            center: view.point(center),
+            half: [HALF_LENGTH_BL * across, high].map(|bl| bl * length),
+            share: left.clamp(0.0, 1.0),
+        }
+    }
+
+    /// Where one is drawn, in the tank.
+    fn place(&self, individual: &Individual, t: usize) -> [f64; 3] {
+        let behind_px = individual.boid.position_px[t][2];
+        let depth_bl = match self.lens.is_flat() {
+            true => 0.0,
+            false => self.front_bl + behind_px / self.lens.length_px,
+        };
+        self.lens.place_bl(individual.centroid_px[t], depth_bl)
+    }
+}
+
+impl Ellipse {
+    /// Draws it, as dark as asked for in its middle, softer toward its rim.
+    pub(super) fn draw(&self, darkness: f64, shade: &mut Shade) {
+        let [left, right] = [-1.0, 1.0].map(|side| self.center[0] + side * self.half[0]);
+        let [top, bottom] = [-1.0, 1.0].map(|side| self.center[1] + side * self.half[1]);
+        let [width, height] = shade.size_px;
+        let rect = Rect::clipped(
+            left.floor() as i64,
+            top.floor() as i64,
+            right.ceil() as i64,
+            bottom.ceil() as i64,
+            width,
+            height,
+        );
+        if rect.is_empty() {
+            return;
+        }
+        shade.reach(rect);
+        for (y, x) in
+            (rect.y..rect.bottom()).flat_map(|y| (rect.x..rect.right()).map(move |x| (y, x)))
+        {
+            let u = (f64::from(x) + 0.5 - self.center[0]) / self.half[0];
+            let v = (f64::from(y) + 0.5 - self.center[1]) / self.half[1];
+            let inside = (1.0 - u * u - v * v).max(0.0);
+            let alpha = darkness * self.share * inside * inside * f64::from(ONE);
+            shade.darken(x, y, alpha.round() as u16);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::{Params, plan_flock, synthetic};
+    use crate::library;
+    use crate::progress::Silent;
+
+    #[test]
+    fn an_ellipse_is_darkest_in_its_middle() {
+        let mut ellipse = Ellipse {
+            center: [20.5, 15.5],
+            half: [10.0, 4.0],
+            share: 1.0,
+        };
+        let mut shade = Shade::default();
+        shade.begin([40, 30]);
+        ellipse.draw(0.5, &mut shade);
+        let alpha = |x: usize, y: usize| shade.alpha()[y * 40 + x];
+        assert_eq!(alpha(20, 15), ONE as u16 / 2);
+        assert!(alpha(27, 15) > 0 && alpha(27, 15) < alpha(23, 15));
+        assert_eq!(alpha(20, 21), 0);
+        ellipse.center = [-50.0, 15.0];
+        shade.begin([40, 30]);
+        ellipse.draw(0.5, &mut shade);
+        assert!(shade.rect.is_empty());
+    }
+
+    #[test]
+    fn from_the_side_the_floor_lies_below_everybody_and_the_nearer_the_lower() {
+        let library = synthetic::library(library::View::Side);
+        let params = Params {
+            count: Some(12),
+            frames: 60,
+            ..Params::default()
+        };
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        let floor = Floor::of(&library, &flock);
+        let view = View::fitted(flock.image_size_px, flock.image_size_px);
+        let mut shadows = Vec::new();
+        for individual in &flock.individuals {
+            let frame_idx = 30;
+            let shadow = floor.shadow(
+                &Appearance {
+                    individual,
+                    frame_idx,
+                    fade: None,
+                },
+                &view,
+            );
+            let [x, y] = individual.centroid_px[frame_idx];
+            assert!(shadow.center[1] > y && (shadow.center[0] - x).abs() < 1e-6);
+            assert!(shadow.share > 0.0 && shadow.share < 1.0);
+            let depth_px = individual.boid.position_px[frame_idx][2];
+            shadows.push((depth_px, shadow.center[1]));
+        }
+        shadows.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        assert!(
+            shadows.is_sorted_by(|near, far| near.1 >= far.1),
+            "{shadows:?}"
+        );
+        assert!(shadows[0].1 > shadows[11].1 + 1.0);
+    }
+}
