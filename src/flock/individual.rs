@@ -78,14 +78,10 @@ pub struct PlanCost {
     pub transition: f64,
     /// Looking like a neighbor of smaller id.
     pub crowd: f64,
-    /// Frames shown again too soon.
+    /// Jumps back to what was just seen.
     pub repetition: f64,
     /// No plan costs less, crowd or not.
     pub lower_bound: f64,
-    /// Among those that it looks out for, no plan costs less than the total less this.
-    pub gap: f64,
-    /// The plan is the cheapest of all, not just of those tried: its gap is 0.
-    pub exact: bool,
 }
 
 impl BoidTrack {

@@ -75,8 +75,8 @@ pub struct Matching {
     pub wx: f64,
     /// Cost of looking like a neighbor, radians for each at no distance.
     pub w_c: f64,
-    /// Cost of each frame that an individual shows again within 3 s, radians; 0 = no matter, and every plan is the
-    /// cheapest.
+    /// Cost of each frame that a jump goes back, radians, where it goes back by less than 1.3 s: it shows again what was just
+    /// seen.
     pub w_p: f64,
     /// Frames of a segment, 2..=2000; null = three seconds. With `position: film` a flock is simulated, planned and placed one
     /// segment at a time, and boids begin each segment at the positions of their animals.
@@ -151,8 +151,8 @@ impl Default for Matching {
             rho_deg: 10.0,
             w_v: 0.3,
             wx: 1.2,
-            w_c: 0.45,
-            w_p: 0.0,
+            w_c: 0.6,
+            w_p: 0.3,
             segment_frames: None,
         }
     }

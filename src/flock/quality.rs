@@ -1,5 +1,7 @@
 //! How good a flock is: the measures of ALGORITHMS.md 9 that need no pixels.
 
+use std::collections::HashMap;
+
 use rayon::prelude::*;
 
 use super::boids::measures::Order;
@@ -7,7 +9,6 @@ use super::boids::vector::angle_between;
 use super::individual::{Individual, rounded};
 use super::params::{MatchBy, Params};
 use super::placement::is_jump;
-use super::plan::memory::Memory;
 use crate::geometry::wrap_rad;
 use crate::library::Library;
 use crate::order::percentile;
@@ -15,6 +16,8 @@ use crate::order::percentile;
 /// Two neighbors this near that show frames this near in the footage are clones.
 const CLONE_BL: f64 = 4.0;
 const CLONE_S: f64 = 0.3;
+/// What was shown less long ago is shown again.
+const REPEAT_S: f64 = 3.0;
 /// Slip is measured on steps of at least this share of a body length a second.
 const MOVING_BL_PER_S: f64 = 0.1;
 
@@ -184,12 +187,17 @@ fn jumps_per_100_frames(individuals: &[Individual]) -> f64 {
     100.0 * n_jumps as f64 / n_frames.max(1) as f64
 }
 
+/// Frames that show, on the same side, what the individual showed less than `REPEAT_S` before.
 fn repeats_per_100_frames(individuals: &[Individual], fps: f64) -> f64 {
-    let memory = Memory::new(1.0, fps);
+    let span = (REPEAT_S * fps).round() as usize;
     let repeats = |individual: &Individual| {
-        let n_frames = individual.source_frame.len();
-        let states: Vec<(u32, bool)> = (0..n_frames).map(|t| shown(individual, t)).collect();
-        memory.repeats(&states).len()
+        let mut last = HashMap::new();
+        let frames = 0..individual.source_frame.len();
+        let is_repeat = |&t: &usize| {
+            let before = last.insert(shown(individual, t), t);
+            before.is_some_and(|before| t - before < span)
+        };
+        frames.filter(is_repeat).count()
     };
     let n_frames: usize = individuals.iter().map(|i| i.source_frame.len()).sum();
     let n_repeats: usize = individuals.iter().map(repeats).sum();

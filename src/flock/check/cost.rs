@@ -22,8 +22,8 @@ const ROUNDING_TURNS: f64 = 0.02;
 /// Nearer in the footage than this looks the same (ALGORITHMS.md 6, crowd).
 const LOOKALIKE_S: f64 = 0.3;
 
-/// Shown again sooner than this is a repeat (ALGORITHMS.md 6, repetition).
-const REPEAT_S: f64 = 3.0;
+/// A jump back by less costs for what it shows again.
+const RETURN_S: f64 = 1.3;
 
 /// What everything costs.
 pub(super) struct Ledger<'a> {
@@ -52,17 +52,11 @@ pub(super) struct Bill {
     lookalikes: Vec<Vec<Lookalike>>,
     /// Cost of the jump to each frame, turns; 0 without a jump. The last entry is the jump from the end of a loop to its start.
     jumps: Vec<u64>,
-    /// Cost of the plan without its repeats, turns.
-    total: u64,
-    /// Cost of its repeats, turns.
-    pub(super) repetition: u64,
+    /// Cost of the plan, turns.
+    pub(super) total: u64,
 }
 
 impl Bill {
-    pub(super) fn total(&self) -> u64 {
-        self.total + self.repetition
-    }
-
     /// Cost of the jump to a frame, turns; 0 without a jump.
     pub(super) fn jump_at(&self, t: usize) -> u64 {
         self.jumps.get(t).copied().unwrap_or(0)
@@ -83,7 +77,7 @@ impl<'a> Ledger<'a> {
         let trellis = Trellis::new(
             &library.playback.without_dead_ends(params.mirror, dwell),
             params.mirror,
-            |distance| weights.of_jump(distance, library.epsilon),
+            |jump| weights.of_jump(jump),
         );
         let future = future_costs(&trellis, dwell);
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
@@ -122,7 +116,6 @@ impl<'a> Ledger<'a> {
             lookalikes: self.lookalikes(id),
             jumps: vec![0; self.plans[id].len() + 1],
             total: 0,
-            repetition: self.repetition(id),
         };
         let (mut heading, mut speed, mut crowd, mut total) = (0, 0, 0, 0);
         for jump in jumps {
@@ -140,15 +133,16 @@ impl<'a> Ledger<'a> {
             total += price;
         }
         bill.total = total;
-        let transition = jumps.iter().map(|jump| jump.cost).sum();
+        let jumps_cost: u64 = jumps.iter().map(|jump| jump.cost).sum();
+        let repetition: u64 = jumps.iter().map(|jump| self.repetition(jump)).sum();
         let said = &self.flock.individuals[id].cost;
         for (part, said, found) in [
             ("cost.heading", said.heading, heading),
             ("cost.speed", said.speed, speed),
-            ("cost.transition", said.transition, transition),
+            ("cost.transition", said.transition, jumps_cost - repetition),
             ("cost.crowd", said.crowd, crowd),
-            ("cost.repetition", said.repetition, bill.repetition),
-            ("cost.total", said.total, total + bill.repetition),
+            ("cost.repetition", said.repetition, repetition),
+            ("cost.total", said.total, total),
         ] {
             let said = whole(id, part, said)?;
             if said != found {
@@ -173,22 +167,17 @@ impl<'a> Ledger<'a> {
         self.segments.windows(2).flat_map(of).collect()
     }
 
-    /// Every frame that shows what was shown less than 3 s before costs `w_p`.
-    fn repetition(&self, id: usize) -> u64 {
-        let plan = &self.plans[id];
-        let span = (REPEAT_S * self.flock.fps).round() as usize;
-        let is_repeat = |&t: &usize| plan[t.saturating_sub(span - 1)..t].contains(&plan[t]);
-        let n_repeats = (0..plan.len()).filter(is_repeat).count() as u64;
-        n_repeats * self.repeat_cost()
-    }
-
-    fn repeat_cost(&self) -> u64 {
-        (self.flock.params.matching.w_p * Turns::PER_RAD).round() as u64
-    }
-
-    /// By how much the file says that a plan may be cheaper.
-    pub(super) fn gap(&self, id: usize) -> Result<u64, Violation> {
-        whole(id, "cost.gap", self.flock.individuals[id].cost.gap)
+    /// A jump back by less than 1.3 s costs `w_p` for every frame that it goes back, at most 65535 turns.
+    fn repetition(&self, jump: &Taken) -> u64 {
+        let [from, to] = jump.ends;
+        let n_again = (f64::from(from.0) + 1.0 - f64::from(to.0)).max(0.0);
+        let is_return = from.1 == to.1 && n_again <= (RETURN_S * self.flock.fps).round();
+        let turns = self.flock.params.matching.w_p * Turns::PER_RAD * n_again;
+        if is_return {
+            turns.round().min(65535.0) as u64
+        } else {
+            0
+        }
     }
 
     /// What the file says no plan costs less than, crowd or not.
@@ -200,39 +189,15 @@ impl<'a> Ledger<'a> {
         )
     }
 
-    pub(super) fn is_exact(&self, id: usize) -> bool {
-        self.flock.individuals[id].cost.exact
-    }
-
-    /// Cost of showing each state of the graph at frame `t` of the segment that begins at frame `first`, turns. `in_flock` adds
-    /// the costs of look-alikes and of repeating what was shown before the segment.
-    pub(super) fn row(
-        &self,
-        graph: &Graph,
-        (id, bill): (usize, &Bill),
-        (first, t): (usize, usize),
-        in_flock: bool,
-    ) -> Vec<u64> {
+    /// Cost of showing each state of the graph at frame `t`, turns. `in_flock` adds the costs of look-alikes.
+    pub(super) fn row(&self, graph: &Graph, bill: &Bill, t: usize, in_flock: bool) -> Vec<u64> {
         let mut crowd = vec![0; self.names.len()];
         if in_flock {
             for near in &bill.lookalikes[t] {
                 self.add_lookalike(graph, near, &mut crowd);
             }
         }
-        let span = (REPEAT_S * self.flock.fps).round() as usize;
-        let from = (t + 1).saturating_sub(span).min(first);
-        let shown = match in_flock && self.repeat_cost() > 0 {
-            true => &self.plans[id][from..first],
-            false => &[],
-        };
-        let price = |(&name, crowd)| {
-            let repeat = if shown.contains(&name) {
-                self.repeat_cost()
-            } else {
-                0
-            };
-            self.price(bill.wanted[t], name, crowd) + repeat
-        };
+        let price = |(&name, crowd)| self.price(bill.wanted[t], name, crowd);
         self.names.iter().zip(crowd).map(price).collect()
     }
 

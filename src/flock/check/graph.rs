@@ -69,7 +69,7 @@ impl Graph {
             for &side in sides {
                 let ends = at(jump.from, side).zip(at(jump.to, side != jump.mirrored));
                 if let Some(ends) = ends {
-                    let cost = u64::from(weights.of_jump(jump.cost, library.epsilon));
+                    let cost = u64::from(weights.of_jump(jump));
                     let least = costs.entry(ends).or_insert(cost);
                     *least = cost.min(*least);
                 }

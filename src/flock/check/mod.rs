@@ -36,8 +36,6 @@ pub struct Report {
     pub n_frames: usize,
     /// Jumps in all plans.
     pub n_jumps: usize,
-    /// Plans that claim to be the cheapest of all, and are.
-    pub n_exact: usize,
     /// Edges looked at to prove it.
     pub n_edges: u64,
 }
@@ -93,7 +91,6 @@ fn individual(
         n_individuals: 1,
         n_frames: states.len(),
         n_jumps: jumps.len(),
-        n_exact: usize::from(ledger.is_exact(id)),
         n_edges,
     })
 }
@@ -103,7 +100,6 @@ impl Report {
         self.n_individuals += other.n_individuals;
         self.n_frames += other.n_frames;
         self.n_jumps += other.n_jumps;
-        self.n_exact += other.n_exact;
         self.n_edges += other.n_edges;
     }
 }

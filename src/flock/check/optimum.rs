@@ -17,8 +17,7 @@ const NEVER: u64 = u64::MAX / 4;
 /// W at one frame: `[k - 1][state]`.
 type Column = Vec<Vec<u64>>;
 
-/// Checks that the plan of every segment is the cheapest, if they claim so, and that its lower bound is one. Returns how
-/// many edges were looked at.
+/// Checks that the plan of every segment is the cheapest, and that its lower bound is one. Returns how many edges were looked at.
 pub(super) fn check(
     graph: &Graph,
     ledger: &Ledger<'_>,
@@ -35,7 +34,7 @@ pub(super) fn check(
     };
     let since_start = if ends.is_some() { 1 } else { ledger.dwell };
     let since = since_jump(graph, (since_start, ledger.dwell), states);
-    let (mut cheapest, mut alone, mut expected) = (0, 0, 0);
+    let mut alone = 0;
     for segment in ledger.segments.windows(2) {
         let (first, end) = (segment[0], segment[1]);
         let part = Part {
@@ -45,27 +44,14 @@ pub(super) fn check(
             ends,
             future: (end < states.len()).then_some(&ledger.future[..]),
         };
-        cheapest += search.check(&part, ledger, bill, (states, &since))?;
-        expected += part.beyond(states[end - 1]);
+        search.check(&part, ledger, bill, (states, &since))?;
         let open = Part {
             ends: None,
             future: None,
             ..part
         };
-        let row = |t: usize| ledger.row(graph, (id, bill), (first, t), false);
+        let row = |t: usize| ledger.row(graph, bill, t, false);
         alone += search.cheapest(&open, row, |_, _, _| {})?;
-    }
-    let gap = ledger.gap(id)?;
-    if ledger.is_exact(id) != (gap == 0) {
-        return Err(Violation::Exact { id, gap });
-    }
-    let found = bill.total() + expected;
-    if found > cheapest + gap {
-        return Err(Violation::Gap {
-            id,
-            said: gap,
-            found: found - cheapest,
-        });
     }
     let said = ledger.lower_bound(id)?;
     match said > alone {
@@ -118,18 +104,17 @@ impl Part<'_> {
 }
 
 impl Search<'_> {
-    /// Checks that the plan of a segment is the cheapest, if it claims so. Returns the least cost of a plan of the segment, with
-    /// the future cost of its last state.
+    /// Checks that the plan of a segment is the cheapest.
     fn check(
         &mut self,
         part: &Part<'_>,
         ledger: &Ledger<'_>,
         bill: &Bill,
         (states, since): (&[usize], &[usize]),
-    ) -> Result<u64, Violation> {
+    ) -> Result<(), Violation> {
         let (first, end, id) = (part.first, part.end, self.id);
         let graph = self.graph;
-        let row = |t: usize| ledger.row(graph, (id, bill), (first, t), true);
+        let row = |t: usize| ledger.row(graph, bill, t, true);
         // For each frame: the least cost from there to the end, and the cost of the state shown.
         let mut at_best = vec![0; end - first];
         let mut shown = vec![0; end - first];
@@ -149,14 +134,14 @@ impl Search<'_> {
                 spent += bill.jump_at(t + 1);
             }
         }
-        match left_at.filter(|_| ledger.is_exact(id)) {
+        match left_at {
             Some(t) => Err(Violation::Suboptimal {
                 id,
                 t,
                 cost: spent + part.beyond(states[end - 1]),
                 cheapest: least,
             }),
-            None => Ok(least),
+            None => Ok(()),
         }
     }
 

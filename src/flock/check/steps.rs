@@ -9,6 +9,8 @@ use crate::flock::{Flock, Individual};
 pub(super) struct Taken {
     /// The output frame jumped to.
     pub(super) t: usize,
+    /// The frame and mirror side before it and there.
+    pub(super) ends: [(u32, bool); 2],
     /// Turns.
     pub(super) cost: u64,
 }
@@ -87,7 +89,8 @@ pub(super) fn jumps(
         if graph.next[before] == Some(state) {
             continue;
         }
-        let [(from, from_side), (to, side)] = [before, state].map(|state| graph.shown()[state]);
+        let ends = [before, state].map(|state| graph.shown()[state]);
+        let [(from, from_side), (to, side)] = ends;
         let cost = graph
             .jump_cost(before, state)
             .ok_or(Violation::IllegalStep {
@@ -107,7 +110,7 @@ pub(super) fn jumps(
                 dwell,
             });
         }
-        jumps.push(Taken { t, cost });
+        jumps.push(Taken { t, ends, cost });
     }
     Ok(jumps)
 }

@@ -126,30 +126,6 @@ pub enum Violation {
         /// The cheapest plan's cost, turns.
         cheapest: u64,
     },
-    /// A plan whose gap is 0 is the cheapest, and no other is.
-    #[error(
-        "individual {id}: cost.exact {} where cost.gap says {:.6} rad",
-        if *.gap == 0 { "is not told" } else { "is told" }, rad(*.gap)
-    )]
-    Exact {
-        /// Whose.
-        id: usize,
-        /// What the file says, turns.
-        gap: u64,
-    },
-    /// A plan further below may exist than the file says.
-    #[error(
-        "individual {id}: cost.gap says {:.6} rad, yet the plan costs {:.6} rad more than the cheapest without repetition",
-        rad(*.said), rad(*.found)
-    )]
-    Gap {
-        /// Whose.
-        id: usize,
-        /// What the file says, turns.
-        said: u64,
-        /// What the plan costs above the bound, turns.
-        found: u64,
-    },
     /// A plan cheaper than the bound exists, crowd aside.
     #[error(
         "individual {id}: cost.lower_bound says {:.6} rad, yet a plan of {:.6} rad is possible",
@@ -190,8 +166,6 @@ impl Violation {
             Violation::NotWhole { .. } => "cost_not_whole",
             Violation::Cost { .. } => "wrong_cost",
             Violation::Suboptimal { .. } => "not_cheapest",
-            Violation::Exact { .. } => "wrong_exact",
-            Violation::Gap { .. } => "wrong_gap",
             Violation::LowerBound { .. } => "wrong_lower_bound",
             Violation::Certificate { .. } => "certificate_fails",
         }

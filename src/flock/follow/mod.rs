@@ -116,7 +116,7 @@ impl Flock {
         };
         let goes_on = |id: usize| {
             let standing = &self.standings[id];
-            let state = standing.state().ok_or(Error::NoTransitions)?;
+            let state = standing.state.ok_or(Error::NoTransitions)?;
             let key = [id as u64, segment[0] as u64];
             Ok(natural.states((state, standing.held), n_frames, key))
         };
@@ -135,7 +135,6 @@ impl Flock {
         plans: Vec<Plan>,
     ) {
         self.standings.resize(plans.len(), Standing::default());
-        let kept = (model.dwell, model.n_remembered());
         let shown: Vec<Vec<(u32, bool)>> =
             plans.iter().map(|plan| model.shown(&plan.states)).collect();
         let before: Vec<Option<Before>> = (self.plans.iter().zip(&self.advanced))
@@ -150,7 +149,7 @@ impl Flock {
             .collect();
         let advanced = stage.advance(&shown, boids, &before, perches);
         for (id, (plan, advanced)) in plans.into_iter().zip(advanced).enumerate() {
-            self.standings[id].go_on(&plan.states, kept);
+            self.standings[id].go_on(&plan.states, model.dwell);
             self.advanced[id].append(advanced);
             self.plans[id].append(plan);
         }

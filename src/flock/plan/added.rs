@@ -1,5 +1,4 @@
-//! What is added to the costs of some states at the frames of a block (ALGORITHMS.md 6): by the crowd, and
-//! for what was repeated.
+//! What is added to the costs of some states at the frames of a block by the crowd (ALGORITHMS.md 6).
 //!
 //! It is added to states in a row, so only where it begins and where it ends is noted; the sums are taken
 //! as the stations are filled in. Who plays on moves such a row by a state a frame.

@@ -9,10 +9,10 @@
 
 use std::iter;
 
+use super::Planner;
 use super::cost::Feature;
 use super::rows::Alone;
-use super::viterbi::{Block, FRAMES, Film, Rows};
-use super::{Found, Planner};
+use super::viterbi::{Block, FRAMES, Film, Path, Rows};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
@@ -115,13 +115,13 @@ impl Planner<'_> {
     /// cannot begin as in its open plan, all those are tried, the cheapest first.
     pub(super) fn firsts(
         &self,
-        open: &[Found],
+        open: &[Path],
         wanted: &[Vec<Feature>],
         heirs: &[u32],
         progress: &dyn Progress,
     ) -> Result<Vec<u32>, Error> {
         let mut firsts = vec![None; heirs.len()];
-        for (leader, found) in open.iter().enumerate() {
+        for (leader, path) in open.iter().enumerate() {
             if firsts[leader].is_some() {
                 continue;
             }
@@ -133,7 +133,7 @@ impl Planner<'_> {
                 false => self.circle(first, &of_circle),
             };
             let others = || self.beginnings(&wanted[leader]).into_iter();
-            let circle = led_back(found.path.states[0])
+            let circle = led_back(path.states[0])
                 .or_else(|| others().find_map(led_back))
                 .ok_or_else(|| self.no_circle(progress))?;
             for (id, first) in ids.into_iter().zip(circle) {

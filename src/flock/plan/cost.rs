@@ -11,7 +11,7 @@ use crate::flock::motion::FrameMotion;
 use crate::flock::params::{MatchBy, Matching};
 use crate::geometry::angle::mirrored_rad;
 use crate::geometry::{Turns, wrap_rad};
-use crate::library::{Library, View};
+use crate::library::{Jump, Library, View};
 
 /// Every cost of a state at a frame stays below.
 pub const CEILING: u32 = 1 << 17;
@@ -21,6 +21,8 @@ const UNIT: f64 = 16384.0;
 
 /// Turn rates are compared over this time.
 const TURN_SPAN_S: f64 = 0.25;
+/// A jump back over less time shows again what was just seen; of longer loops a viewer is not aware.
+const RETURN_S: f64 = 1.3;
 
 /// What is compared: of a state, or wanted by a boid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +46,11 @@ pub struct Weights {
     pub(super) speed: u32,
     pub(super) rho_turns: u16,
     jump_turns: f64,
+    epsilon: u64,
+    /// Turns for every frame that a jump goes back.
+    again_turns: f64,
+    /// A jump back over more frames costs nothing for them.
+    most_again: u32,
     view: View,
     pub(super) by: MatchBy,
     /// Weight of what leads along the line of sight.
@@ -72,6 +79,9 @@ impl Weights {
                 _ => Turns::from_rad(matching.rho_deg.to_radians()).0,
             },
             jump_turns: matching.wx * Turns::PER_RAD,
+            epsilon: library.epsilon,
+            again_turns: matching.w_p * Turns::PER_RAD,
+            most_again: (RETURN_S * library.poses.fps).round() as u32,
             view,
             by,
             away: matching.w_d as f32,
@@ -84,10 +94,24 @@ impl Weights {
         }
     }
 
-    /// What a jump between clips at distance `distance` costs, turns below 2^16.
-    pub fn of_jump(&self, distance: u64, epsilon: u64) -> u32 {
-        let share = distance as f64 / epsilon.max(1) as f64;
-        (self.jump_turns * share).round().min(65535.0) as u32
+    /// What a jump costs, turns.
+    pub fn of_jump(&self, jump: &Jump) -> u32 {
+        let share = jump.cost as f64 / self.epsilon.max(1) as f64;
+        let transition = (self.jump_turns * share).round().min(65535.0) as u32;
+        transition + self.of_return(jump)
+    }
+
+    /// The part of it that a jump costs for showing again what was just seen, turns below 2^16. On the other mirror side it is
+    /// not taken for the same.
+    pub fn of_return(&self, jump: &Jump) -> u32 {
+        let n_again = (jump.from + 1).saturating_sub(jump.to);
+        let is_return = !jump.mirrored && n_again <= self.most_again;
+        let turns = self.again_turns * f64::from(n_again);
+        if is_return {
+            turns.round().min(65535.0) as u32
+        } else {
+            0
+        }
     }
 
     /// What showing `state` costs who wants `wanted`, turns, without the ceiling: heading (with

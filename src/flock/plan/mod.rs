@@ -10,7 +10,6 @@ mod fill;
 pub mod landings;
 #[cfg(target_arch = "x86_64")]
 mod lanes;
-pub mod memory;
 mod round;
 mod rows;
 pub mod segment;
@@ -23,7 +22,6 @@ use rayon::prelude::*;
 use self::circle::Ends;
 use self::cost::{CEILING, Feature, Weights};
 use self::crowd::{Crowd, Places, Settled};
-use self::memory::Memory;
 use self::round::Round;
 use self::segment::{Standing, future_costs};
 pub use self::spent::{Plan, Spent};
@@ -34,36 +32,8 @@ use super::individual::BoidTrack;
 use super::motion::FrameMotion;
 use super::params::Params;
 use crate::cpu::Level;
-use crate::library::Library;
+use crate::library::{Jump, Library};
 use crate::progress::Progress;
-
-/// The best path found for one individual.
-#[derive(Clone, Debug)]
-struct Found {
-    /// Its cost counts no repetition; in a loop its last state is the first of whom it becomes.
-    path: Path,
-    /// What its repeats cost, turns.
-    repetition: u32,
-    /// Future cost of its last state, turns.
-    beyond: u32,
-    /// A lower bound of the cost of any path, repetition and future cost included, turns.
-    least: u32,
-}
-
-impl Found {
-    fn cost(&self) -> u32 {
-        self.path.cost + self.repetition + self.beyond
-    }
-
-    /// Becomes another where that costs less.
-    fn keep_cheaper(&mut self, other: &Found) {
-        if other.cost() < self.cost() {
-            self.path = other.path.clone();
-            self.repetition = other.repetition;
-            self.beyond = other.beyond;
-        }
-    }
-}
 
 /// The trellis and the costs of states and jumps, for all plans of one library and one set of parameters.
 pub struct Model {
@@ -77,7 +47,6 @@ pub struct Model {
     /// By state.
     features: Vec<Feature>,
     crowd: Crowd,
-    memory: Memory,
     /// The states that look like each state.
     alike: Vec<[u32; 2]>,
     fps: f64,
@@ -93,9 +62,7 @@ impl Model {
             .map_or(library.clip_frames, |frames| frames as usize)
             .max(1);
         let playback = library.playback.without_dead_ends(params.mirror, dwell);
-        let trellis = Trellis::new(&playback, params.mirror, |distance| {
-            weights.of_jump(distance, library.epsilon)
-        });
+        let trellis = Trellis::new(&playback, params.mirror, |jump| weights.of_jump(jump));
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let crowd = Crowd::new(params.matching.w_c, fps, length_px);
@@ -103,7 +70,6 @@ impl Model {
             features: weights.features(&trellis, motion),
             alike: crowd.alike(&trellis),
             crowd,
-            memory: Memory::new(params.matching.w_p, fps),
             future: future_costs(&trellis, dwell),
             dwell,
             trellis,
@@ -121,15 +87,24 @@ impl Model {
             .collect()
     }
 
+    /// What the jump from a state to another costs for showing again what was just seen, turns.
+    fn return_cost(&self, from: u32, to: u32) -> u32 {
+        let ends = [from, to].map(|state| self.trellis.shown(state as usize));
+        let [Some((from, from_side)), Some((to, side))] = ends else {
+            return 0;
+        };
+        self.weights.of_return(&Jump {
+            from,
+            to,
+            cost: 0,
+            mirrored: from_side != side,
+        })
+    }
+
     /// The heading cost of a state at the first frame of a boid's track, turns.
     pub fn heading_cost(&self, boid: &BoidTrack, state: usize) -> u32 {
         let wanted = self.weights.wanted(boid, self.fps)[0];
         self.weights.of_state(wanted, self.features[state])[0]
-    }
-
-    /// Number of the last states shown on which the costs of later frames depend.
-    pub fn n_remembered(&self) -> usize {
-        self.memory.span_frames
     }
 }
 
@@ -220,7 +195,7 @@ impl<'a> Planner<'a> {
         );
         let (paths, bounds) = (paths?, bounds?);
         Ok((paths.par_iter().enumerate())
-            .map(|(id, found)| self.costed(found, &wanted[id], bounds[id]))
+            .map(|(id, path)| self.costed(path, &wanted[id], bounds[id]))
             .collect())
     }
 
@@ -230,7 +205,7 @@ impl<'a> Planner<'a> {
         wanted: &[Vec<Feature>],
         settled: &mut Settled,
         progress: &dyn Progress,
-    ) -> Result<Vec<Found>, Error> {
+    ) -> Result<Vec<Path>, Error> {
         let mut paths = Vec::with_capacity(wanted.len());
         while paths.len() < wanted.len() {
             if progress.cancelled() {
@@ -241,8 +216,8 @@ impl<'a> Planner<'a> {
             let alike = |id: &usize| self.model.crowd.n_watched(*id) == n_watched;
             let end = first + (first..wanted.len()).take_while(alike).count();
             let round = self.round(wanted, first, end).paths(settled)?;
-            for found in &round {
-                settled.push(self.film_of(&found.path), &self.model.alike);
+            for path in &round {
+                settled.push(self.film_of(path), &self.model.alike);
             }
             paths.extend(round);
         }
@@ -270,8 +245,8 @@ impl<'a> Planner<'a> {
 
     /// The plan with its cost in parts, summed anew from the states; what is left of the path's cost is
     /// the crowd's.
-    fn costed(&self, found: &Found, wanted: &[Feature], lower_bound: u32) -> Plan {
-        let (path, n_before) = (&found.path, self.n_before());
+    fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
+        let n_before = self.n_before();
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
         let states = &self.film_of(path)[n_before..];
         for (&wanted, &state) in wanted[n_before..].iter().zip(states) {
@@ -281,52 +256,26 @@ impl<'a> Planner<'a> {
             speed += u64::from(s);
             alone += self.model.weights.total(wanted, feature);
         }
-        let transition = self.transition_cost(path);
+        let [jumps, repetition] = self.jump_costs(path);
         Plan {
             states: states.to_vec(),
             cost: Spent {
                 heading,
                 speed,
-                transition: u64::from(transition),
-                crowd: u64::from(path.cost - alone - transition),
-                repetition: u64::from(found.repetition),
-                total: u64::from(path.cost + found.repetition),
+                transition: u64::from(jumps - repetition),
+                crowd: u64::from(path.cost - alone - jumps),
+                repetition: u64::from(repetition),
+                total: u64::from(path.cost),
                 lower_bound: u64::from(lower_bound),
-                gap: u64::from(found.cost() - found.least),
             },
         }
     }
 
-    /// The costs of the cheapest path, whose `path.cost` counts the future cost and repeats of what was shown before the
-    /// segment, but not repeats within it.
-    fn found(&self, id: usize, (wanted, settled): (&[Feature], &Settled), path: Path) -> Found {
-        let least = path.cost;
-        let states = self.film_of(&path);
-        let last = states[states.len() - 1] as usize;
-        let future = self.model.future[last].filter(|_| !self.is_last);
-        let before = match self.standings.get(id) {
-            Some(standing) => &standing.shown[..standing.shown.len() - 1],
-            None => &[],
-        };
-        Found {
-            repetition: self
-                .model
-                .memory
-                .cost_after(before, states, self.n_before()),
-            beyond: future.unwrap_or(0),
-            least,
-            path: Path {
-                cost: self.cost_among(id, wanted, settled, &path),
-                states: path.states,
-            },
-        }
-    }
-
-    /// What a path costs among those settled, its repeats aside, turns.
+    /// What a path costs among those settled, without the future cost of its last state, turns.
     fn cost_among(&self, id: usize, wanted: &[Feature], settled: &Settled, path: &Path) -> u32 {
         let model = self.model;
         let n_watched = model.crowd.n_watched(id);
-        let mut cost = self.transition_cost(path);
+        let [mut cost, _] = self.jump_costs(path);
         for (t, &state) in self.film_of(path).iter().enumerate().skip(self.n_before()) {
             let places = &self.places[t];
             let of_one = |other: usize| {
@@ -346,13 +295,16 @@ impl<'a> Planner<'a> {
         &path.states[..self.places.len()]
     }
 
-    /// What a path's jumps cost, turns, with that after the last frame of a loop.
-    fn transition_cost(&self, path: &Path) -> u32 {
+    /// What a path's jumps cost, turns, with that after the last frame of a loop; and the part of it for showing again what was
+    /// just seen.
+    fn jump_costs(&self, path: &Path) -> [u32; 2] {
         let steps = path.states.windows(2);
         let jumps = steps.filter(|step| step[1] != step[0] + 1);
-        jumps
-            .map(|step| self.model.trellis.jump_cost(step[0], step[1]))
-            .sum()
+        let costs = jumps.map(|step| {
+            let cost = self.model.trellis.jump_cost(step[0], step[1]);
+            [cost, self.model.return_cost(step[0], step[1])]
+        });
+        costs.fold([0; 2], |sum, cost| [sum[0] + cost[0], sum[1] + cost[1]])
     }
 }
 

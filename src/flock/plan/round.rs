@@ -3,14 +3,13 @@
 
 use rayon::prelude::*;
 
+use super::Planner;
 use super::circle::{Asked, Closed, FORBIDDEN, Then};
 use super::cost::Feature;
 use super::crowd::Settled;
-use super::memory::N_REPLANS;
 use super::rows::{Alone, InCrowd};
 use super::segment::Begun;
-use super::viterbi::Film;
-use super::{Found, Planner};
+use super::viterbi::{Film, Path};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
@@ -24,8 +23,8 @@ pub(super) struct Round<'a> {
 }
 
 impl Round<'_> {
-    /// The cheapest path of each among those settled, or the best found where the cheapest repeats.
-    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Found>, Error> {
+    /// The cheapest path of each among those settled.
+    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Path>, Error> {
         let wanted = self.wanted.par_iter().enumerate();
         wanted
             .map(|(idx, wanted)| self.in_crowd(self.first + idx, wanted, settled))
@@ -65,56 +64,29 @@ impl Round<'_> {
         let standing = self.planner.standings.get(id);
         Begun {
             rows,
-            from: standing.and_then(|standing| Some((standing.state()?, standing.held))),
-            repeats: None,
+            from: standing.and_then(|standing| Some((standing.state?, standing.held))),
             n_frames: self.planner.places.len(),
             future: None,
         }
     }
 
-    fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Found, Error> {
+    fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Path, Error> {
         let planner = self.planner;
-        let (model, memory) = (planner.model, planner.model.memory);
-        let n_frames = planner.places.len();
-        let (film, ends) = (planner.film(), planner.ends.get(id).copied());
-        let shown = planner.standings.get(id).filter(|_| memory.cost > 0);
-        let repeated = shown.map(|s| memory.repeated_until(&s.shown, model.trellis.n_states()));
+        let ends = planner.ends.get(id);
         let rows = InCrowd::new(planner, settled, id, wanted);
-        let found = |rows: InCrowd<'_>| {
-            let costs = Begun {
-                repeats: repeated.as_deref().map(|until| (until, memory.cost)),
-                future: (!planner.is_last).then_some(&model.future[..]),
-                ..self.begun(id, self.closed(id, rows))
-            };
-            let path = film.cheapest_path(&costs)?;
-            let is_closed = ends.is_none_or(|ends| ends.holds(&path.states));
-            let is_open = path.cost < FORBIDDEN;
-            Some((
-                planner.found(id, (wanted, settled), path),
-                is_closed && is_open,
-            ))
+        let costs = Begun {
+            future: (!planner.is_last).then_some(&planner.model.future[..]),
+            ..self.begun(id, self.closed(id, rows))
         };
-        let (mut last, holds) = found(rows.clone()).ok_or(Error::NoTransitions)?;
-        if !holds {
-            return Err(match ends {
-                Some(_) => Error::LoopDoesNotClose(n_frames),
-                None => Error::NoTransitions,
-            });
+        let path = (planner.film().cheapest_path(&costs)).ok_or(Error::NoTransitions)?;
+        let is_closed = ends.is_none_or(|ends| ends.holds(&path.states));
+        match (is_closed && path.cost < FORBIDDEN, ends) {
+            (true, _) => Ok(Path {
+                cost: planner.cost_among(id, wanted, settled, &path),
+                states: path.states,
+            }),
+            (false, Some(_)) => Err(Error::LoopDoesNotClose(planner.places.len())),
+            (false, None) => Err(Error::NoTransitions),
         }
-        let mut best = last.clone();
-        let mut raised = memory.nothing_raised(n_frames);
-        for _ in 0..N_REPLANS {
-            let states = planner.film_of(&last.path);
-            if memory.cost == 0 || memory.repeats(states).is_empty() {
-                break;
-            }
-            memory.raise(&mut raised, states);
-            let holds;
-            (last, holds) = found(rows.clone().raised(&raised)).ok_or(Error::NoTransitions)?;
-            if holds {
-                best.keep_cheaper(&last);
-            }
-        }
-        Ok(best)
     }
 }

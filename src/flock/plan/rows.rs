@@ -7,7 +7,6 @@ use super::Planner;
 use super::added::Added;
 use super::cost::Feature;
 use super::crowd::Settled;
-use super::memory::Raised;
 use super::viterbi::{Block, FRAMES, Moments, Rows};
 
 /// So many others are looked at together: what is known of them stays in the nearest cache.
@@ -36,8 +35,6 @@ pub(super) struct InCrowd<'a> {
     alone: Alone<'a>,
     settled: &'a Settled,
     id: usize,
-    /// What is dearer for having been repeated.
-    raised: Option<&'a Raised>,
     added: Added,
 }
 
@@ -52,16 +49,7 @@ impl<'a> InCrowd<'a> {
             alone: Alone { planner, wanted },
             settled,
             id,
-            raised: None,
             added: Added::new(planner.model.trellis.n_states()),
-        }
-    }
-
-    /// The same with what it has repeated made dearer.
-    pub(super) fn raised(self, raised: &'a Raised) -> InCrowd<'a> {
-        InCrowd {
-            raised: Some(raised),
-            ..self
         }
     }
 
@@ -73,14 +61,6 @@ impl<'a> InCrowd<'a> {
         let n_watched = planner.model.crowd.n_watched(self.id);
         for first in (0..n_watched).step_by(TOGETHER) {
             self.gather_some(&moments, first..n_watched.min(first + TOGETHER));
-        }
-        if let Some(raised) = self.raised {
-            for moment in moments.range.clone() {
-                for &state in raised.at(moments.frame(moment)) {
-                    let states = [state, state + 1];
-                    self.added.add(states, moment, &[raised.cost]);
-                }
-            }
         }
     }
 

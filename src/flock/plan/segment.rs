@@ -1,8 +1,8 @@
 //! Costs of a segment's plan that come from outside the segment: from frames shown before it and from the future.
 //!
-//! It continues from the state shown last, which may have to play on before the next jump. States shown in the last three
-//! seconds cost more. Its last state adds a future cost F(s) = min over successors of (jump's cost + 0.995 F(s')) (Schoedl et
-//! al., Video Textures, 2000). With these the plan of the segment is found exactly.
+//! It continues from the state shown last, which may have to play on before the next jump. Its last state adds a future cost
+//! F(s) = min over successors of (jump's cost + 0.995 F(s')) (Schoedl et al., Video Textures, 2000). With these the plan of
+//! the segment is found exactly.
 
 use super::circle::FORBIDDEN;
 use super::trellis::Trellis;
@@ -13,22 +13,20 @@ const DISCOUNT: f64 = 0.995;
 /// Rounds in which the future cost settles; what has not by then is told a little too low.
 const MOST_ROUNDS: usize = 256;
 
-/// The states that an individual has shown before a segment.
-#[derive(Clone, Debug, Default)]
+/// What an individual has shown before a segment.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Standing {
-    /// States, oldest first; at least those of the time in which a repeat costs.
-    pub shown: Vec<u32>,
+    /// The state shown last; `None` before the first segment.
+    pub state: Option<u32>,
     /// Frames that it must play on before it may jump.
     pub held: usize,
 }
 
 impl Standing {
-    /// Appends `states`. At most `n_kept` states are kept; two jumps are at least `dwell` frames apart. As elsewhere a flock may
-    /// begin in the middle of a run.
-    pub fn go_on(&mut self, states: &[u32], (dwell, n_kept): (usize, usize)) {
-        let is_first = self.shown.is_empty();
-        let before = self.shown.last().copied();
-        let followed: Vec<u32> = before.into_iter().chain(states.iter().copied()).collect();
+    /// Goes on with `states`. Two jumps are at least `dwell` frames apart; a flock may begin in the middle of a run.
+    pub fn go_on(&mut self, states: &[u32], dwell: usize) {
+        let is_first = self.state.is_none();
+        let followed: Vec<u32> = (self.state.into_iter().chain(states.iter().copied())).collect();
         let steps = followed.windows(2).rev();
         let since = steps.take_while(|step| step[1] == step[0] + 1).count();
         let has_jumped = since + 1 < followed.len();
@@ -37,14 +35,7 @@ impl Standing {
             (false, true) => 0,
             (false, false) => self.held.saturating_sub(states.len()),
         };
-        self.shown.extend(states);
-        let n_forgotten = self.shown.len().saturating_sub(n_kept.max(1));
-        self.shown.drain(..n_forgotten);
-    }
-
-    /// The state shown last.
-    pub fn state(&self) -> Option<u32> {
-        self.shown.last().copied()
+        self.state = followed.last().copied();
     }
 }
 
@@ -55,8 +46,6 @@ pub(super) struct Begun<'a, R> {
     pub(super) rows: R,
     /// The state shown last before the segment, and for how many frames it must play on.
     pub(super) from: Option<(u32, usize)>,
-    /// By state the first frame at which showing it is no repeat of what was shown before the segment; and the cost of a repeat.
-    pub(super) repeats: Option<(&'a [u16], u32)>,
     pub(super) n_frames: usize,
     /// Future cost by state, turns; `None` for the last segment.
     pub(super) future: Option<&'a [Option<u32>]>,
@@ -66,14 +55,6 @@ impl<R: Rows> Rows for Begun<'_, R> {
     #[inline(always)]
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         self.rows.fill(block, first, out);
-        if let Some((until, cost)) = self.repeats {
-            for (station, out) in (first..).zip(&mut *out) {
-                let until = usize::from(until[block.state(station)]);
-                for (out, &t) in out.iter_mut().zip(&block.times) {
-                    *out += if t < until { cost } else { 0 };
-                }
-            }
-        }
         for (lane, &t) in block.times.iter().enumerate() {
             // Where it stands, and where it has gone on to: between them there is but one way.
             let only = |(state, held): (u32, usize)| match held.min(self.n_frames - 1) {
@@ -149,23 +130,23 @@ mod tests {
             jumps: vec![jump(20, 2, 50), jump(39, 0, 7)],
             component: (0..40).collect(),
         };
-        Trellis::new(&playback, false, |d| d as u32)
+        Trellis::new(&playback, false, |jump| jump.cost as u32)
     }
 
     #[test]
     fn who_has_jumped_must_play_on_and_remembers_what_it_showed_last() {
         let mut standing = Standing::default();
-        standing.go_on(&[5, 6, 7], (4, 100));
+        standing.go_on(&[5, 6, 7], 4);
         assert_eq!(
-            (standing.state(), standing.held),
+            (standing.state, standing.held),
             (Some(7), 0),
             "it began in a run"
         );
-        standing.go_on(&[20, 21], (4, 100));
-        assert_eq!((standing.state(), standing.held), (Some(21), 2));
-        standing.go_on(&[22], (4, 3));
-        assert_eq!((&standing.shown[..], standing.held), (&[20, 21, 22][..], 1));
-        standing.go_on(&[23, 24, 25], (4, 3));
+        standing.go_on(&[20, 21], 4);
+        assert_eq!((standing.state, standing.held), (Some(21), 2));
+        standing.go_on(&[22], 4);
+        assert_eq!((standing.state, standing.held), (Some(22), 1));
+        standing.go_on(&[23, 24, 25], 4);
         assert_eq!(standing.held, 0);
     }
 

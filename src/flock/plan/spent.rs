@@ -32,7 +32,6 @@ pub struct Spent {
     pub(super) repetition: u64,
     pub(super) total: u64,
     pub(super) lower_bound: u64,
-    pub(super) gap: u64,
 }
 
 impl AddAssign for Spent {
@@ -44,7 +43,6 @@ impl AddAssign for Spent {
         self.repetition += other.repetition;
         self.total += other.total;
         self.lower_bound += other.lower_bound;
-        self.gap += other.gap;
     }
 }
 
@@ -60,8 +58,6 @@ impl Spent {
             crowd: rad(self.crowd),
             repetition: rad(self.repetition),
             lower_bound: rad(self.lower_bound),
-            gap: rad(self.gap),
-            exact: self.gap == 0,
         }
     }
 }

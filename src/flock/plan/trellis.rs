@@ -5,7 +5,7 @@
 //! nothing ever leaves a barrier.
 
 use super::landings::{Landings, Way};
-use crate::library::Playback;
+use crate::library::{Jump, Playback};
 
 /// Stands for the frame of a barrier.
 const NO_FRAME: u32 = u32::MAX;
@@ -34,8 +34,8 @@ pub struct Trellis {
 
 impl Trellis {
     /// The trellis of a playback graph. `mirror` makes both sides of every frame states; `cost_of`
-    /// turns a jump's D into the plan's unit.
-    pub fn new(playback: &Playback, mirror: bool, cost_of: impl Fn(u64) -> u32) -> Trellis {
+    /// says what a jump costs, turns.
+    pub fn new(playback: &Playback, mirror: bool, cost_of: impl Fn(&Jump) -> u32) -> Trellis {
         let mut trellis = Trellis {
             frames: Vec::new(),
             mirrored: Vec::new(),
@@ -60,7 +60,7 @@ impl Trellis {
                 let source = trellis.state(jump.from, side);
                 let target = trellis.state(jump.to, side != jump.mirrored);
                 if let (Some(source), Some(target)) = (source, target) {
-                    jumps.push((target, source, cost_of(jump.cost)));
+                    jumps.push((target, source, cost_of(jump)));
                 }
             }
         }
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn every_frame_leads_to_its_state_and_back() {
-        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        let trellis = Trellis::new(&playback(), true, |jump| jump.cost as u32);
         for side in [false, true] {
             for frame in 0..20 {
                 let state = trellis.state(frame, side);
@@ -254,14 +254,14 @@ mod tests {
             }
         }
         assert_eq!(
-            Trellis::new(&playback(), false, |d| d as u32).state(4, true),
+            Trellis::new(&playback(), false, |jump| jump.cost as u32).state(4, true),
             None
         );
     }
 
     #[test]
     fn a_mirrored_jump_changes_sides_and_others_keep_them() {
-        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        let trellis = Trellis::new(&playback(), true, |jump| jump.cost as u32);
         let at = |frame, side| {
             trellis
                 .state(frame, side)
@@ -277,7 +277,7 @@ mod tests {
 
     #[test]
     fn runs_end_at_gaps_and_at_sides() {
-        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        let trellis = Trellis::new(&playback(), true, |jump| jump.cost as u32);
         let at = |frame| trellis.state(frame, false).expect("a frame") as usize;
         assert!(trellis.continues(at(4), 2));
         assert!(!trellis.continues(at(4), 3));
@@ -286,9 +286,9 @@ mod tests {
             component: vec![0, 2],
             ..playback()
         };
-        let trellis = Trellis::new(&gap_of_one, false, |d| d as u32);
+        let trellis = Trellis::new(&gap_of_one, false, |jump| jump.cost as u32);
         assert!(!trellis.continues(1, 2), "a barrier stands between");
-        let trellis = Trellis::new(&playback(), true, |d| d as u32);
+        let trellis = Trellis::new(&playback(), true, |jump| jump.cost as u32);
         assert!(!trellis.continues(at(12), 2));
     }
 }

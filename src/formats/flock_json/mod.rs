@@ -135,9 +135,7 @@ struct CostFile {
     #[serde(default)]
     repetition: f64,
     lower_bound: f64,
-    /// Absent in files of before.
-    #[serde(default)]
-    gap: f64,
+    /// Every plan is the cheapest of its segments: true.
     exact: bool,
 }
 
@@ -224,8 +222,7 @@ impl CostFile {
             crowd: cost.crowd,
             repetition: cost.repetition,
             lower_bound: cost.lower_bound,
-            gap: cost.gap,
-            exact: cost.exact,
+            exact: true,
         }
     }
 
@@ -238,8 +235,6 @@ impl CostFile {
             crowd: self.crowd,
             repetition: self.repetition,
             lower_bound: self.lower_bound,
-            gap: self.gap,
-            exact: self.exact,
         }
     }
 }

@@ -20,7 +20,7 @@ struct Case {
 
 impl Case {
     fn trellis(&self) -> Trellis {
-        Trellis::new(&self.playback, self.mirror, |d| d as u32)
+        Trellis::new(&self.playback, self.mirror, |jump| jump.cost as u32)
     }
 
     /// What showing a state costs.
