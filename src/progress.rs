@@ -17,3 +17,14 @@ pub struct Silent;
 impl Progress for Silent {
     fn report(&self, _stage: &'static str, _fraction: f64) {}
 }
+
+/// Nobody listens to a trial run, but whoever may cancel the computation cancels it.
+pub struct Quiet<'a>(pub &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn report(&self, _stage: &'static str, _fraction: f64) {}
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}

@@ -6,6 +6,7 @@ pub mod boids;
 pub mod check;
 pub mod composite;
 mod course;
+mod density;
 pub mod error;
 mod follow;
 pub mod individual;
@@ -39,7 +40,7 @@ use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
 use self::placement::{Placed, Stage};
 use self::plan::{Model, Plan, Planner};
 use crate::library::Library;
-use crate::progress::Progress;
+use crate::progress::{Progress, Quiet};
 
 /// A simulated, planned and placed group: all but its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,44 +106,63 @@ pub fn plan_flock(
     );
     let params = &params;
     let calibration = Calibration::of(library, &motion, lens.is_flat()).in_tank(&tank);
-    let boids = Boids::at_random(params, &calibration, (&lens, &tank), library.poses.fps);
+    let fps = library.poses.fps;
     let model = Model::new(library, &motion, params);
-    let stage = Stage {
-        library,
-        motion: &motion,
-        params,
-        lens: &lens,
-        tank: &tank,
-        calibration: &calibration,
-    };
-    let (course, plans, placed) = match params.position {
-        Position::Film => follow::play(boids, (&model, &stage), progress)?,
-        Position::Leash | Position::Boid | Position::Papers => {
-            whole(boids, (&model, &stage), progress)?
+    let play = |params: &Params, progress: &dyn Progress| {
+        let boids = Boids::at_random(params, &calibration, (&lens, &tank), fps);
+        let stage = Stage {
+            library,
+            motion: &motion,
+            params,
+            lens: &lens,
+            tank: &tank,
+            calibration: &calibration,
+        };
+        match params.position {
+            Position::Film => follow::play(boids, (&model, &stage), progress),
+            Position::Leash | Position::Boid | Position::Papers => {
+                whole(boids, (&model, &stage), progress)
+            }
         }
     };
+    let spaced = density::spaced(params, fps, |params| {
+        let (.., placed) = play(params, &Quiet(progress))?;
+        let places_px = placed.iter().map(|one| &one.centroid_px[..]);
+        Ok(density::spacing_bl(places_px, lens.length_px))
+    })?;
+    let (course, plans, placed) = play(&spaced, progress)?;
     let individuals = individuals(&model, &course, &plans, placed);
     Ok(Flock {
-        fps: library.poses.fps,
+        fps,
         image_size_px: library.poses.image_size_px,
         length_px: lens.length_px,
         space: Space::of(&lens, &tank),
-        stats: Stats {
-            room_for: tank.room_for(),
-            overlap_bl: rounded(tank.overlap_bl(individuals.len()), 4),
-            ..quality::measure(
-                &individuals,
-                &course.orders,
-                library,
-                params,
-                lens.length_px,
-            )
-        },
+        stats: measured(&individuals, &course.orders, (library, params), &tank),
         orders: course.orders,
         params: params.clone(),
         predator_px: course.predator_px,
         individuals,
     })
+}
+
+/// How good a flock is.
+fn measured(
+    individuals: &[Individual],
+    orders: &[Order],
+    (library, params): (&Library, &Params),
+    tank: &Tank,
+) -> Stats {
+    let length_px = Lens::of(library, params).length_px;
+    let crowding = density::crowding(individuals, library, length_px);
+    let places_px = individuals.iter().map(|one| &one.centroid_px[..]);
+    Stats {
+        room_for: tank.room_for(),
+        spacing_bl: density::spacing_bl(places_px, length_px),
+        crossings_per_min: crowding.crossings_per_min,
+        visible_share: crowding.visible_share,
+        overlap_bl: rounded(tank.overlap_bl(individuals.len()), 4),
+        ..quality::measure(individuals, orders, library, params, length_px)
+    }
 }
 
 /// Simulates a whole film, then plans and places it: tracks, plans and places by id.

@@ -21,6 +21,9 @@ pub struct Params {
     pub seed: u64,
     /// How the boids steer.
     pub rules: Rules,
+    /// Wanted mean distance to the nearest other in the picture, body lengths, 0.2..=10, as far as there is room: the radii of
+    /// separation are scaled until the animals keep it. null = as the rules say.
+    pub spacing_bl: Option<f64>,
     /// The last frame plays into the first, so that the film repeats without a seam. Frames 30..=5000 then, and
     /// no `position: papers`.
     #[serde(rename = "loop")]
@@ -166,6 +169,7 @@ impl Default for Params {
             seed: 1,
             is_loop: false,
             rules: Rules::default(),
+            spacing_bl: None,
             matching: Matching::default(),
             dwell_frames: None,
             fade_frames: 4,
@@ -269,6 +273,9 @@ impl Params {
             return Err(format!(
                 "count times frames must be at most {MOST_SHOWN}: {n_shown}"
             ));
+        }
+        if let Some(spacing_bl) = self.spacing_bl {
+            within("spacing_bl", spacing_bl, 0.2, 10.0)?;
         }
         if self.is_loop {
             within("frames of a loop", f64::from(self.frames), 30.0, 5000.0)?;

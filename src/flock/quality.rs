@@ -52,6 +52,12 @@ pub struct Stats {
     pub milling: f64,
     /// Mean over the frames, body lengths.
     pub nearest_neighbor_bl: f64,
+    /// Mean distance in the picture from an individual to the nearest other, body lengths; 0 for one alone.
+    pub spacing_bl: f64,
+    /// Times a minute that two come nearer to each other in the picture than half a body length.
+    pub crossings_per_min: f64,
+    /// The share of an animal that no nearer one covers, mean over animals and frames, 0..=1.
+    pub visible_share: f64,
     /// Share of those that have another within 3 body lengths; mean over the frames.
     pub neighbor_share: f64,
     /// Groups of boids within 4 body lengths of one another; mean over the frames.
@@ -98,6 +104,9 @@ pub fn measure(
         polarization: mean(|order| order.polarization),
         milling: mean(|order| order.milling),
         nearest_neighbor_bl: mean(|order| order.nearest_bl),
+        spacing_bl: 0.0,
+        crossings_per_min: 0.0,
+        visible_share: 0.0,
         neighbor_share: mean(|order| order.neighbor_share),
         groups: mean(|order| f64::from(order.n_groups)),
         overlap_bl: 0.0,
@@ -124,6 +133,9 @@ impl Stats {
             polarization: r(self.polarization),
             milling: r(self.milling),
             nearest_neighbor_bl: r(self.nearest_neighbor_bl),
+            spacing_bl: r(self.spacing_bl),
+            crossings_per_min: r(self.crossings_per_min),
+            visible_share: r(self.visible_share),
             neighbor_share: r(self.neighbor_share),
             groups: r(self.groups),
             overlap_bl: r(self.overlap_bl),

@@ -27,6 +27,9 @@ pub struct Args {
     /// Individuals, 1 to 2000. By default as many as there is room for, at most 20.
     #[arg(long)]
     count: Option<u32>,
+    /// Wanted mean distance to the nearest other in the picture, body lengths, 0.2 to 10.
+    #[arg(long, value_name = "BL")]
+    spacing: Option<f64>,
     /// Frames, 1 to 10000.
     #[arg(long)]
     frames: Option<u32>,
@@ -56,7 +59,7 @@ pub struct Args {
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
     /// Film this plan, a flock.json of the same library, instead of making one.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "frames", "seed", "preset", "rules", "match_by", "matching"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "spacing", "frames", "seed", "preset", "rules", "match_by", "matching"])]
     from: Option<PathBuf>,
 }
 
@@ -156,6 +159,7 @@ impl Args {
             ("loop", self.is_loop.then_some(Value::Bool(true))),
             ("preset", self.preset.clone().map(Value::from)),
             ("count", self.count.map(Value::from)),
+            ("spacing_bl", self.spacing.map(Value::from)),
             ("frames", self.frames.map(Value::from)),
             ("seed", self.seed.map(Value::from)),
         ];

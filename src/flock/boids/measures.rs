@@ -52,6 +52,21 @@ pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64)
     }
 }
 
+/// The mean distance to the nearest other, body lengths; 0 for one alone.
+pub fn nearest_bl(positions: &[Vec3]) -> f64 {
+    match positions.len() {
+        0 | 1 => 0.0,
+        n => {
+            Row::of(positions)
+                .nearest_bl2()
+                .into_iter()
+                .map(f64::sqrt)
+                .sum::<f64>()
+                / n as f64
+        }
+    }
+}
+
 /// How far all point one way: 0 to 1.
 pub fn polarization(velocities: &[Vec3]) -> f64 {
     norm(sum(velocities.iter().map(|&v| unit(v)))) / velocities.len() as f64

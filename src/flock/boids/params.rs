@@ -25,6 +25,8 @@ pub struct Rules {
     pub circling: f64,
     /// Neighbors nearer than this push apart.
     pub separation_bl: f64,
+    /// Neighbors nearer than this in the picture push apart in the picture, however far one is behind the other; 0 = none.
+    pub picture_separation_bl: f64,
     /// Neighbors nearer than this are aligned with.
     pub alignment_bl: f64,
     /// Neighbors nearer than this attract.
@@ -127,6 +129,7 @@ impl Default for Rules {
             wander: 0.25,
             circling: 0.0,
             separation_bl: 1.0,
+            picture_separation_bl: 0.0,
             alignment_bl: 3.0,
             cohesion_bl: 6.0,
             view_deg: 300.0,
@@ -153,6 +156,7 @@ impl Rules {
         match &self.zones {
             Some(zones) => zones.radii_bl()[2],
             None => (self.separation_bl)
+                .max(self.picture_separation_bl)
                 .max(self.alignment_bl)
                 .max(self.cohesion_bl),
         }
@@ -171,6 +175,7 @@ impl Rules {
         });
         let own = [
             &mut rules.separation_bl,
+            &mut rules.picture_separation_bl,
             &mut rules.alignment_bl,
             &mut rules.cohesion_bl,
         ];

@@ -27,6 +27,12 @@ pub(super) struct StatsFile {
     nearest_neighbor_bl: f64,
     /// This and what follows: absent in files of before; 0 and empty then.
     #[serde(default)]
+    spacing_bl: f64,
+    #[serde(default)]
+    crossings_per_min: f64,
+    #[serde(default)]
+    visible_share: f64,
+    #[serde(default)]
     neighbor_share: f64,
     #[serde(default)]
     groups: f64,
@@ -68,6 +74,9 @@ impl StatsFile {
             polarization: stats.polarization,
             milling: stats.milling,
             nearest_neighbor_bl: stats.nearest_neighbor_bl,
+            spacing_bl: stats.spacing_bl,
+            crossings_per_min: stats.crossings_per_min,
+            visible_share: stats.visible_share,
             neighbor_share: stats.neighbor_share,
             groups: stats.groups,
             overlap_bl: stats.overlap_bl,
@@ -97,6 +106,9 @@ impl StatsFile {
             polarization: self.polarization,
             milling: self.milling,
             nearest_neighbor_bl: self.nearest_neighbor_bl,
+            spacing_bl: self.spacing_bl,
+            crossings_per_min: self.crossings_per_min,
+            visible_share: self.visible_share,
             neighbor_share: self.neighbor_share,
             groups: self.groups,
             overlap_bl: self.overlap_bl,

@@ -56,7 +56,24 @@ impl<L: Lanes> Seen<L> {
                 seen.apart = add_scaled(seen.apart, -strength, neighbor.offset);
             }
         }
+        if rules.picture_separation_bl > 0.0 {
+            seen.part_in_picture(neighbors, rules.picture_separation_bl);
+        }
         seen
+    }
+
+    /// Adds (p_i - p_j)/|.| (1 - |.|/r), in the plane of the picture, over those nearer than r there, seen or not.
+    #[inline(always)]
+    fn part_in_picture(&mut self, neighbors: &[Neighbor<L>], radius_bl: f64) {
+        let nothing = L::splat(0.0);
+        for neighbor in neighbors {
+            let [x, y, _] = neighbor.offset;
+            let distance = (x * x + y * y).sqrt();
+            let is_near = L::and(neighbor.is_there(), distance.less(L::splat(radius_bl)));
+            let strength = L::splat(1.0) / distance.max(L::splat(0.05)) - L::splat(1.0 / radius_bl);
+            let strength = L::select(is_near, strength, nothing);
+            self.apart = add_scaled(self.apart, -strength, [x, y, nothing]);
+        }
     }
 
     /// mean p_j - p_i over those nearer than r_c, in r_c.

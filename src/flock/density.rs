@@ -1,0 +1,293 @@
+//! How densely a flock is packed: radii of the rules with which animals keep the wanted distance in the picture, and measures
+//! of how they cross and cover one another there.
+
+use std::collections::HashSet;
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+
+use super::boids::measures::nearest_bl;
+use super::error::Error;
+use super::individual::{Individual, rounded};
+use super::params::Params;
+use crate::library::Library;
+
+/// The radii of separation are corrected so many times.
+const N_ROUNDS: usize = 5;
+/// A round that comes no nearer to the wanted spacing by this share of it is the last: the tank has no room for more.
+const NEAR_ENOUGH: f64 = 0.03;
+/// The radii of separation grow and shrink at most by this factor.
+const MOST_CHANGE: f64 = 8.0;
+/// At first, animals part in the picture within so many times the wanted spacing.
+const IN_PICTURE: f64 = 1.5;
+/// The spacing is measured over the first seconds of a film.
+const TRIAL_S: f64 = 4.0;
+
+/// The parameters with radii of separation such that the mean distance to the nearest other in the picture is `params.spacing_bl`, as far as
+/// the tank has room for that. `spacing_of` makes a flock and measures it.
+pub(super) fn spaced(
+    params: &Params,
+    fps: f64,
+    spacing_of: impl Fn(&Params) -> Result<f64, Error>,
+) -> Result<Params, Error> {
+    let Some(wanted_bl) = params.spacing_bl.filter(|_| params.most_individuals() > 1) else {
+        return Ok(params.clone());
+    };
+    let trial_frames = match params.is_loop {
+        true => params.frames,
+        false => params.frames.min((TRIAL_S * fps).ceil() as u32),
+    };
+    let mut share = 1.0;
+    let mut best = (params.rules.clone(), f64::INFINITY);
+    for _ in 0..N_ROUNDS {
+        let mut rules = params.rules.clone();
+        rules.separation_bl *= share;
+        rules.picture_separation_bl = IN_PICTURE * wanted_bl * share;
+        if let Some(zones) = &mut rules.zones {
+            zones.repulsion_bl *= share;
+        }
+        let trial = Params {
+            rules: rules.clone(),
+            frames: trial_frames,
+            ..params.clone()
+        };
+        let off = libm::log(spacing_of(&trial)?.max(1e-3) / wanted_bl);
+        if off.abs() > best.1 - NEAR_ENOUGH {
+            break;
+        }
+        best = (rules, off.abs());
+        share = (share * libm::exp(-off)).clamp(1.0 / MOST_CHANGE, MOST_CHANGE);
+    }
+    Ok(Params {
+        rules: best.0,
+        ..params.clone()
+    })
+}
+
+/// The mean distance to the nearest other in the picture, body lengths, over all frames; 0 for one alone.
+pub(super) fn spacing_bl<'a>(
+    places_px: impl Iterator<Item = &'a [[f64; 2]]> + Clone,
+    length_px: f64,
+) -> f64 {
+    let n_frames = places_px.clone().next().map_or(0, <[_]>::len);
+    let of_frame = |t: usize| {
+        let places = places_px
+            .clone()
+            .map(|all| [all[t][0] / length_px, all[t][1] / length_px, 0.0]);
+        nearest_bl(&places.collect::<Vec<_>>())
+    };
+    let mean = (0..n_frames).map(of_frame).sum::<f64>() / n_frames.max(1) as f64;
+    rounded(mean, 4)
+}
+
+/// How often animals cross one another and how much of them can be seen.
+pub(super) struct Crowding {
+    /// Times a minute that two come nearer to each other in the picture than half a body length.
+    pub(super) crossings_per_min: f64,
+    /// The share of an animal that no nearer one covers, mean over animals and frames, 0..=1; of bodies that are ellipses.
+    pub(super) visible_share: f64,
+}
+
+/// Centroids so near have crossed.
+const CROSSED_BL: f64 = 0.5;
+/// What is covered is looked at in one of so many frames.
+const LOOK_EVERY: usize = 5;
+
+/// The crowding of a flock of `library`'s animal, whose length is given.
+pub(super) fn crowding(individuals: &[Individual], library: &Library, length_px: f64) -> Crowding {
+    let n_frames = individuals.first().map_or(0, |one| one.centroid_px.len());
+    let crossed = |t: usize| -> HashSet<(usize, usize)> {
+        let places: Vec<[f64; 2]> = individuals.iter().map(|one| one.centroid_px[t]).collect();
+        pairs_within(&places, CROSSED_BL * length_px)
+            .into_iter()
+            .collect()
+    };
+    let n_crossings: usize = (1..n_frames)
+        .into_par_iter()
+        .map(|t| crossed(t).difference(&crossed(t - 1)).count())
+        .sum();
+    let looked_at: Vec<usize> = (0..n_frames).step_by(LOOK_EVERY).collect();
+    let visible: f64 = looked_at
+        .par_iter()
+        .map(|&t| {
+            let bodies: Vec<Body> = individuals
+                .iter()
+                .map(|one| Body::of(one, t, library))
+                .collect();
+            visible_share(&bodies)
+        })
+        .collect::<Vec<_>>()
+        .iter()
+        .sum();
+    let minutes = n_frames as f64 / library.poses.fps / 60.0;
+    Crowding {
+        crossings_per_min: rounded(n_crossings as f64 / minutes.max(1e-9), 4),
+        visible_share: rounded(visible / looked_at.len().max(1) as f64, 4),
+    }
+}
+
+/// The pairs of places that are nearer to each other than `reach_px`.
+fn pairs_within(places: &[[f64; 2]], reach_px: f64) -> Vec<(usize, usize)> {
+    let mut by_x: Vec<usize> = (0..places.len()).collect();
+    by_x.sort_by(|&a, &b| places[a][0].total_cmp(&places[b][0]));
+    let mut pairs = Vec::new();
+    for (k, &a) in by_x.iter().enumerate() {
+        let near = by_x[k + 1..]
+            .iter()
+            .take_while(|&&b| places[b][0] - places[a][0] < reach_px);
+        for &b in near {
+            let [dx, dy] = [0, 1].map(|axis| places[a][axis] - places[b][axis]);
+            if libm::hypot(dx, dy) < reach_px {
+                pairs.push((a.min(b), a.max(b)));
+            }
+        }
+    }
+    pairs
+}
+
+/// An animal in one frame, as an ellipse of its length and area.
+#[derive(Clone, Copy)]
+struct Body {
+    center_px: [f64; 2],
+    cos_sin: [f64; 2],
+    half_px: [f64; 2],
+    depth: f64,
+}
+
+impl Body {
+    fn of(one: &Individual, t: usize, library: &Library) -> Body {
+        let pose = &library.poses.frames[one.source_frame[t] as usize];
+        let half_length = pose.length_px.unwrap_or(1.0).max(1.0) / 2.0;
+        let half_height = pose.area_px.unwrap_or(1.0).max(1.0) / (PI * half_length);
+        let angle = one.heading_rad[t];
+        Body {
+            center_px: one.centroid_px[t],
+            cos_sin: [libm::cos(angle), libm::sin(angle)],
+            half_px: [half_length, half_height].map(|px| px * one.scale[t]),
+            depth: one.boid.position_px[t][2],
+        }
+    }
+
+    /// The place in the picture that lies at a place of the unit disk.
+    fn at(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let [along, across] = [u * self.half_px[0], v * self.half_px[1]];
+        let [cos, sin] = self.cos_sin;
+        [
+            self.center_px[0] + along * cos - across * sin,
+            self.center_px[1] + along * sin + across * cos,
+        ]
+    }
+
+    fn covers(&self, [x, y]: [f64; 2]) -> bool {
+        let [dx, dy] = [x - self.center_px[0], y - self.center_px[1]];
+        let [cos, sin] = self.cos_sin;
+        let along = (dx * cos + dy * sin) / self.half_px[0];
+        let across = (dy * cos - dx * sin) / self.half_px[1];
+        along * along + across * across <= 1.0
+    }
+}
+
+/// The mean share of bodies that no nearer one covers, by points of a spiral on each.
+fn visible_share(bodies: &[Body]) -> f64 {
+    const N_POINTS: usize = 24;
+    /// The golden angle spreads points evenly over a disk.
+    const GOLDEN_RAD: f64 = 2.399_963;
+    let place = |k: usize| {
+        let (radius, angle) = (
+            ((k as f64 + 0.5) / N_POINTS as f64).sqrt(),
+            GOLDEN_RAD * k as f64,
+        );
+        [radius * libm::cos(angle), radius * libm::sin(angle)]
+    };
+    let reach_px = 2.0
+        * bodies
+            .iter()
+            .map(|body| body.half_px[0].max(body.half_px[1]))
+            .fold(0.0, f64::max);
+    let centers: Vec<[f64; 2]> = bodies.iter().map(|body| body.center_px).collect();
+    let mut nearer: Vec<Vec<&Body>> = vec![Vec::new(); bodies.len()];
+    for (a, b) in pairs_within(&centers, reach_px) {
+        // As they are drawn: of two at one depth the one of greater id is nearer.
+        let (near, far) = if bodies[a].depth < bodies[b].depth {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        nearer[far].push(&bodies[near]);
+    }
+    let visible = |(body, nearer): (&Body, &Vec<&Body>)| {
+        let is_seen = |k: &usize| !nearer.iter().any(|other| other.covers(body.at(place(*k))));
+        (0..N_POINTS).filter(is_seen).count()
+    };
+    let n_seen: usize = bodies.iter().zip(&nearer).map(visible).sum();
+    n_seen as f64 / (N_POINTS * bodies.len().max(1)) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::params::TankExtent;
+    use crate::flock::{plan_flock, synthetic};
+    use crate::library::View;
+    use crate::progress::Silent;
+
+    #[test]
+    fn flocks_are_as_dense_as_wanted_where_there_is_room() {
+        let library = synthetic::library(View::Side);
+        let stats = |spacing_bl, count| {
+            let params = Params {
+                count: Some(count),
+                frames: 60,
+                spacing_bl,
+                tank: TankExtent::Picture,
+                ..Params::default()
+            };
+            plan_flock(&library, &params, &Silent)
+                .expect("a good library")
+                .stats
+        };
+        let usual = stats(None, 8);
+        let wanted = 1.5 * usual.spacing_bl;
+        let sparse = stats(Some(wanted), 8);
+        assert!(
+            (sparse.spacing_bl / wanted - 1.0).abs() < 0.2,
+            "{} instead of {wanted}",
+            sparse.spacing_bl
+        );
+        assert!(sparse.visible_share >= usual.visible_share);
+        assert!(sparse.crossings_per_min <= usual.crossings_per_min);
+        // Twelve in the tank cannot keep ten body lengths, but do what they can.
+        assert!(stats(Some(10.0), 12).spacing_bl >= stats(None, 12).spacing_bl);
+    }
+
+    #[test]
+    fn of_two_bodies_half_over_each_other_the_farther_is_half_seen() {
+        let body = |x, depth| Body {
+            center_px: [x, 0.0],
+            cos_sin: [1.0, 0.0],
+            half_px: [10.0, 4.0],
+            depth,
+        };
+        assert_eq!(visible_share(&[body(0.0, 0.0), body(21.0, 1.0)]), 1.0);
+        assert_eq!(visible_share(&[body(0.0, 0.0), body(0.0, 1.0)]), 0.5);
+        // Of ellipses 2/3 of a half length apart 0.58 of each lies in the other.
+        let share = visible_share(&[body(0.0, 0.0), body(6.67, 1.0)]);
+        assert!((share - 0.71).abs() < 0.04, "{share}");
+    }
+
+    #[test]
+    fn pairs_are_those_of_all_comparisons() {
+        let places: Vec<[f64; 2]> = (0..60)
+            .map(|k| [f64::from(k * 37 % 101), f64::from(k * 53 % 97)])
+            .collect();
+        let mut pairs = pairs_within(&places, 15.0);
+        pairs.sort_unstable();
+        let mut expected = Vec::new();
+        for (a, b) in (0..60).flat_map(|a| (a + 1..60).map(move |b| (a, b))) {
+            if libm::hypot(places[a][0] - places[b][0], places[a][1] - places[b][1]) < 15.0 {
+                expected.push((a, b));
+            }
+        }
+        assert_eq!(pairs, expected);
+    }
+}
