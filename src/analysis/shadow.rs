@@ -282,7 +282,7 @@ mod tests {
     /// A dark animal at several places, and what `cast` leaves of the light at a place relative to its middle.
     fn track(cast: impl Fn(f64, f64) -> f64) -> (Track, RgbImage) {
         let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
-        let background = picture([240, 160], |_, _| PAPER);
+        let background = picture([300, 160], |_, _| PAPER);
         let rect = |x: u32, y: u32, [w, h]: [u32; 2]| Rect {
             x: x - w / 2,
             y: y - h / 2,
@@ -290,7 +290,7 @@ mod tests {
             h,
         };
         let frames = (0..5).map(|k| {
-            let (cx, cy) = (70 + 20 * k, 60 + 8 * k);
+            let (cx, cy) = (70 + 35 * k, 60 + 8 * k);
             let [own, around] = [rect(cx, cy, [64, 28]), rect(cx, cy, [120, 90])];
             let place = |rect: Rect, x: u32, y: u32| {
                 let off = |at: u32, first: u32, c: u32| f64::from(first + at) + 0.5 - f64::from(c);
