@@ -13,9 +13,9 @@ use super::composite::params::Render;
 #[schema(as = FlockParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Individuals, 1..=2000; null = as many as there is room for, 2 to 20.
+    /// Individuals, 1..=10000; null = as many as there is room for, 2 to 20.
     pub count: Option<u32>,
-    /// Frames of the film, 1..=10000; times the individuals at most 4,000,000.
+    /// Frames of the film, 1..=1000000, or 1..=10000 unless `position` is `film`; times the individuals at most 4,000,000.
     pub frames: u32,
     /// Everything random follows from it.
     pub seed: u64,
@@ -266,8 +266,12 @@ impl Params {
 
     /// Checks every range; the sentence says which parameter is out of which range.
     pub fn check(&self) -> Result<(), String> {
-        within("count", f64::from(self.most_individuals()), 1.0, 2000.0)?;
-        within("frames", f64::from(self.frames), 1.0, 10_000.0)?;
+        within("count", f64::from(self.most_individuals()), 1.0, 10_000.0)?;
+        let (most, what) = match self.position {
+            Position::Film => (1e6, "frames"),
+            _ => (1e4, "frames without position film"),
+        };
+        within(what, f64::from(self.frames), 1.0, most)?;
         let n_shown = u64::from(self.most_individuals()) * u64::from(self.frames);
         if n_shown > MOST_SHOWN {
             return Err(format!(
@@ -353,7 +357,7 @@ mod tests {
             count: Some(0),
             ..Params::default()
         };
-        assert_eq!(no_one.check(), Err("count must lie in 1..=2000: 0".into()));
+        assert_eq!(no_one.check(), Err("count must lie in 1..=10000: 0".into()));
         let of = |count, frames| Params {
             count: Some(count),
             frames,
@@ -361,6 +365,13 @@ mod tests {
         };
         assert_eq!(of(2000, 2000).check(), Ok(()));
         assert_eq!(of(400, 10_000).check(), Ok(()));
+        assert_eq!(of(20, 200_000).check(), Ok(()));
+        let whole = Params {
+            position: Position::Leash,
+            ..of(20, 200_000)
+        };
+        let sentence = "frames without position film must lie in 1..=10000: 200000";
+        assert_eq!(whole.check(), Err(sentence.into()));
         let crowd = of(2000, 10_000).check();
         let sentence = "count times frames must be at most 4000000: 20000000";
         assert_eq!(crowd, Err(sentence.into()));

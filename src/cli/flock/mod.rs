@@ -24,13 +24,13 @@ pub struct Args {
     library: PathBuf,
     #[command(flatten)]
     outputs: Outputs,
-    /// Individuals, 1 to 2000. By default as many as there is room for, at most 20.
+    /// Individuals, 1 to 10000. By default as many as there is room for, at most 20.
     #[arg(long)]
     count: Option<u32>,
     /// Wanted mean distance to the nearest other in the picture, body lengths, 0.2 to 10.
     #[arg(long, value_name = "BL")]
     spacing: Option<f64>,
-    /// Frames, 1 to 10000.
+    /// Frames, 1 to 1000000; times the individuals at most 4000000.
     #[arg(long)]
     frames: Option<u32>,
     /// Everything random follows from it.
