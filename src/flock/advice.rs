@@ -10,8 +10,8 @@ const SHORT_LOOP_RAD: f64 = 0.35;
 pub enum Advice {
     /// There are more individuals than have room.
     #[error(
-        "there is room for about {room_for} animals, and there are {count}, so some lie over others: make a flock of fewer, or \
-         film from farther away"
+        "there is room for about {room_for} of the {count} animals: some lie over others, or rest where the filmed animal never \
+         rested; make a flock of fewer, or film from farther away"
     )]
     LittleRoom {
         /// How many have room.
@@ -83,7 +83,7 @@ mod tests {
             panic!("{told:?}");
         };
         assert!(
-            room.contains("room for about 2 animals, and there are 3"),
+            room.contains("room for about 2 of the 3 animals"),
             "{room}"
         );
         assert!(

@@ -33,6 +33,8 @@ use self::boids::Boids;
 use self::boids::calibration::Calibration;
 use self::boids::tank::Tank;
 use self::course::Course;
+use self::follow::company::CLEAR_BL;
+use self::follow::perches::Perches;
 use self::individual::rounded;
 use self::lens::Lens;
 use self::motion::motion_of;
@@ -99,11 +101,10 @@ pub fn plan_flock(
     let mut params = told(params, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::of(library, &lens, &motion, &params);
-    params.count = Some(
-        params
-            .count
-            .unwrap_or(tank.room_for().clamp(2, MOST_BY_DEFAULT)),
-    );
+    let perches = Perches::of(library, &motion, &lens);
+    let to_rest = perches.room_for(CLEAR_BL * lens.length_px);
+    let room_for = tank.room_for().min(to_rest.unwrap_or(u32::MAX));
+    params.count = params.count.or(Some(room_for.clamp(2, MOST_BY_DEFAULT)));
     let params = &params;
     let calibration = Calibration::of(library, &motion, lens.is_flat()).in_tank(&tank);
     let fps = library.poses.fps;
@@ -137,7 +138,10 @@ pub fn plan_flock(
         image_size_px: library.poses.image_size_px,
         length_px: lens.length_px,
         space: Space::of(&lens, &tank),
-        stats: measured(&individuals, &course.orders, (library, params), &tank),
+        stats: Stats {
+            room_for,
+            ..measured(&individuals, &course.orders, (library, params), &tank)
+        },
         orders: course.orders,
         params: params.clone(),
         predator_px: course.predator_px,
@@ -156,7 +160,6 @@ fn measured(
     let crowding = density::crowding(individuals, library, length_px);
     let places_px = individuals.iter().map(|one| &one.centroid_px[..]);
     Stats {
-        room_for: tank.room_for(),
         spacing_bl: density::spacing_bl(places_px, length_px),
         crossings_per_min: crowding.crossings_per_min,
         visible_share: crowding.visible_share,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 /// How far ahead collisions are predicted. A free choice: about the time in which a mouse turns aside.
 const AHEAD_S: f64 = 0.6;
 /// Centroids nearer than this are avoided. A free choice between the width and the length of a body.
-pub(super) const CLEAR_BL: f64 = 0.8;
+pub(in crate::flock) const CLEAR_BL: f64 = 0.8;
 
 /// Position and velocity of an animal seen from above.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

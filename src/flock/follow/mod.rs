@@ -6,9 +6,9 @@
 //! (`advance`).
 
 mod advance;
-mod company;
+pub(super) mod company;
 mod natural;
-mod perches;
+pub(super) mod perches;
 
 use rayon::prelude::*;
 
@@ -63,7 +63,7 @@ pub(super) fn play(
         advanced: vec![Advanced::default(); n],
         standings: Vec::new(),
     };
-    let perches = Perches::of(stage);
+    let perches = Perches::of(stage.library, stage.motion, stage.lens);
     let ends = segments(n_frames, params.matching.segment_frames, fps);
     for segment in ends.windows(2) {
         let (first, end) = (segment[0], segment[1]);

@@ -1,9 +1,9 @@
 //! Animals seen from the side rest where the animal was seen to rest: a bird on a perch, a dog on the floor. An animal that comes to
 //! rest within a segment is led to the nearest such place. The corrections are as small as those toward a boid.
 
+use crate::flock::lens::Lens;
 use crate::flock::motion::FrameMotion;
-use crate::flock::placement::Stage;
-use crate::library::View;
+use crate::library::{Library, View};
 
 /// An animal slower than this rests, body lengths a second.
 const REST_BL_PER_S: f64 = 0.1;
@@ -12,9 +12,14 @@ pub(super) const REST_S: f64 = 0.7;
 /// Places of rest nearer to each other than this are one.
 const SAME_BL: f64 = 0.1;
 
-/// Places in the picture at which the animal rested, pixels; none from above, where the whole floor is one.
+/// Where the animal rested.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Perches(Vec<[f64; 2]>);
+pub(in crate::flock) struct Perches {
+    /// Places in the picture, pixels; none from above, where the whole floor is one.
+    places_px: Vec<[f64; 2]>,
+    /// The share of the film for which it rested.
+    rest_share: f64,
+}
 
 /// The way to the next rest of the same segment, if there is one.
 pub(super) type Way = Option<ToRest>;
@@ -59,28 +64,44 @@ pub(super) fn ways(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Way> {
 }
 
 impl Perches {
-    pub(super) fn of(stage: &Stage) -> Perches {
-        let mut places: Vec<[f64; 2]> = Vec::new();
-        if stage.library.poses.view == View::Top {
-            return Perches(places);
+    /// Those of a library's animal, in a picture of which `lens` knows the scale.
+    pub(in crate::flock) fn of(library: &Library, motion: &[FrameMotion], lens: &Lens) -> Perches {
+        let mut perches = Perches::default();
+        let poses = &library.poses;
+        if poses.view == View::Top {
+            return perches;
         }
-        let same_px = SAME_BL * stage.lens.length_px;
-        let n_rest = (REST_S * stage.library.poses.fps).ceil() as usize;
-        let frames: Vec<usize> = (0..stage.motion.len()).collect();
-        let is_at_rest = |frame: &usize| {
-            rests(&stage.motion[*frame]) && stage.library.poses.frames[*frame].heading_rad.is_some()
-        };
+        let same_px = SAME_BL * lens.length_px;
+        let n_rest = (REST_S * poses.fps).ceil() as usize;
+        let frames: Vec<usize> = (0..motion.len()).collect();
+        let is_known = |frame: &usize| poses.frames[*frame].heading_rad.is_some();
+        let is_at_rest = |frame: &usize| rests(&motion[*frame]) && is_known(frame);
+        let mut n_rested = 0;
         let runs = frames.chunk_by(|a, b| is_at_rest(a) && is_at_rest(b));
         for frame in runs.filter(|run| run.len() >= n_rest).flatten() {
-            let Some([x, y]) = stage.library.poses.frames[*frame].centroid_px else {
+            let Some(place) = poses.frames[*frame].centroid_px else {
                 continue;
             };
-            let is_known = |place: &[f64; 2]| libm::hypot(place[0] - x, place[1] - y) < same_px;
-            if !places.iter().any(is_known) {
-                places.push([x, y]);
+            n_rested += 1;
+            if (perches.places_px.iter()).all(|known| gap(known, &place) >= same_px) {
+                perches.places_px.push(place);
             }
         }
-        Perches(places)
+        let n_known = frames.iter().filter(|frame| is_known(frame)).count();
+        perches.rest_share = f64::from(n_rested) / n_known.max(1) as f64;
+        perches
+    }
+
+    /// How many animals have a place where they rest, `clear_px` apart, when each rests for as much of the time as the filmed one;
+    /// `None` for an animal that was not seen to rest.
+    pub(in crate::flock) fn room_for(&self, clear_px: f64) -> Option<u32> {
+        let mut clear: Vec<[f64; 2]> = Vec::new();
+        for place in &self.places_px {
+            if clear.iter().all(|other| gap(other, place) >= clear_px) {
+                clear.push(*place);
+            }
+        }
+        (self.rest_share > 0.0).then(|| (clear.len() as f64 / self.rest_share).ceil() as u32)
     }
 
     /// The nearest place that is clear of others by `clear_px`.
@@ -90,13 +111,16 @@ impl Perches {
         others: &[[f64; 2]],
         clear_px: f64,
     ) -> Option<[f64; 2]> {
-        let gap = |a: &[f64; 2], b: &[f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]);
         let is_clear = |place: &&[f64; 2]| others.iter().all(|other| gap(place, other) >= clear_px);
-        let clear = self.0.iter().filter(is_clear);
+        let clear = self.places_px.iter().filter(is_clear);
         clear
             .min_by(|a, b| gap(a, &from_px).total_cmp(&gap(b, &from_px)))
             .copied()
     }
+}
+
+fn gap(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
 impl ToRest {
@@ -146,11 +170,25 @@ mod tests {
 
     #[test]
     fn whoever_comes_to_rest_comes_to_a_perch_that_is_free() {
-        let perches = Perches(vec![[46.0, 6.0], [58.0, -4.0], [0.0, 50.0]]);
+        let perches = Perches {
+            places_px: vec![[46.0, 6.0], [58.0, -4.0], [0.0, 50.0]],
+            rest_share: 0.5,
+        };
         let near = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]) < 1e-6;
         assert!(near(landed(&perches, &[]), [46.0, 6.0]));
         assert!(near(landed(&perches, &[[44.0, 6.0]]), [58.0, -4.0]));
         assert!(near(landed(&Perches::default(), &[]), [50.0, 0.0]));
+    }
+
+    #[test]
+    fn who_rests_half_of_the_time_shares_its_places_with_as_many_again() {
+        let perches = Perches {
+            places_px: vec![[46.0, 6.0], [58.0, -4.0], [0.0, 50.0]],
+            rest_share: 0.5,
+        };
+        assert_eq!(perches.room_for(10.0), Some(6));
+        assert_eq!(perches.room_for(20.0), Some(4));
+        assert_eq!(Perches::default().room_for(10.0), None);
     }
 
     #[test]
