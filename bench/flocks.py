@@ -174,8 +174,8 @@ def stray(film, truth, background):
     while (read := video.read())[0]:
         if t % 10 == 0:
             name = f"{t:06}.png"
-            labels = [cv2.imread(str(truth / kind / name), cv2.IMREAD_UNCHANGED) for kind in ("masks", "shadows")]
-            shown = sum((label > 0).astype(np.uint8) for label in labels if label is not None) > 0
+            files = [truth / kind / name for kind in ("masks", "shadows") if (truth / kind / name).exists()]
+            shown = sum((cv2.imread(str(file), cv2.IMREAD_UNCHANGED) > 0).astype(np.uint8) for file in files) > 0
             away = cv2.distanceTransform((~shown).astype(np.uint8), cv2.DIST_L2, 5)
             changed = np.abs(read[1].astype(np.int16) - background).max(axis=-1) > 12
             n_changed, n_stray = n_changed + int(changed.sum()), n_stray + int((changed & (away > 2)).sum())
