@@ -11,27 +11,28 @@ use crate::library::Shadow;
 use crate::order::median;
 use crate::raster::{RgbImage, RgbaImage};
 
-/// Places of the animal that are looked at lie so far apart ...
+/// Least distance between two places of the animal that are used. A free choice.
 const APART_BL: f64 = 0.5;
-/// ... at most so many: more change the third digit ...
+/// Most places used; a bound on the time that the fit takes.
 const MOST_PLACES: usize = 100;
-/// ... and at least so many: at fewer a shadow cannot be told from other things beside the animal.
+/// Fewest places used. At fewer a mirror image or moved bedding beside the animal could be taken for a shadow.
 const LEAST_PLACES: usize = 4;
-/// Compared are means over cells, of which so many are a body length: a shadow has no finer detail.
+/// Cells to a body length. Frame and background are compared by the means of square cells, since shadows are soft.
 const CELLS_PER_BL: f64 = 32.0;
-/// Shifts that are tried: so many cells to each side.
+/// The largest shift that is tried in each direction, cells.
 const MOST_SHIFT: i32 = 8;
-/// Blurs that are tried: standard deviations in cells.
+/// The blurs that are tried: standard deviations of a Gaussian, cells.
 const BLURS: [f64; 4] = [1.0, 2.0, 3.0, 4.5];
-/// A cell of which the animal has a larger share, or one beside such a cell, shows the animal.
+/// Cells of which the animal has a larger share, and their neighbors, are left out: they show the animal.
 const CLEAR: f32 = 0.02;
-/// Farther cells, of so many, show more of other things than of the shadow.
+/// Cells farther from the animal than this are left out: they show other things.
 const NEAR_CELLS: usize = 8;
-/// A cell that has a smaller share of the light behind the animal is not on the same ground.
+/// Cells whose background has a smaller share of the brightness behind the animal are left out: they are not on the same floor.
 const LEAST_LIGHT: f32 = 0.65;
-/// A shadow takes so much of the light, or it is none: less is noise, or the animal's blurred edge.
+/// Least darkness of a shadow; less is noise or the blurred edge of the animal.
 const LEAST_DARKNESS: f64 = 0.05;
-/// So much of what differs around the animal is explained by the shadow, or something else is there.
+/// Least share of the squared differences around the animal that the shadow explains. Of the clips in docs/FLOCKS.md the round
+/// arena has more; the others have less.
 const LEAST_EXPLAINED: f64 = 0.25;
 
 /// Measures the shadow that an animal of a length casts before the main plate, whose colors are `background`; `None` where
@@ -41,6 +42,7 @@ pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<S
     if places.len() < LEAST_PLACES {
         return None;
     }
+    let cell_px = (length_px / CELLS_PER_BL).max(1.0);
     let mut fit = Fit::default();
     for (sighting, around) in places {
         let mut pixels = RgbImage::new(around.rect.w, around.rect.h);
@@ -52,18 +54,13 @@ pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<S
             matte: &track.image(sighting),
             background,
         };
-        fit.add(&view.cells((length_px / CELLS_PER_BL).max(1.0)));
+        fit.add(&view.cells(cell_px));
     }
-    fit.solved().map(|mut shadow| {
-        let cell_bl = (length_px / CELLS_PER_BL).max(1.0) / length_px;
-        shadow.offset_bl = shadow.offset_bl.map(|cells| cells * cell_bl);
-        shadow.blur_bl *= cell_bl;
-        shadow
-    })
+    fit.solved(cell_px / length_px)
 }
 
-/// What is around the animal at places that lie apart: a shadow follows it everywhere, its mirror image in a wall, or
-/// bedding that it moved, does not.
+/// Frames in which the animal is at places far from each other. A shadow follows the animal to all of them; a mirror image in
+/// a wall and moved bedding do not.
 fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Around)> {
     let mut places: Vec<(&Sighting, Around)> = Vec::new();
     for seen in track.frames.iter().filter_map(Tracked::before_main_plate) {
@@ -192,21 +189,21 @@ impl Fit {
         }
     }
 
-    /// The shadow that explains most, its offset and blur in cells.
-    fn solved(&self) -> Option<Shadow> {
+    /// The shadow that explains most; cells are `cell_bl` body lengths wide.
+    fn solved(&self, cell_bl: f64) -> Option<Shadow> {
         let places = BLURS
             .iter()
             .flat_map(|blur| shifts().map(move |shift| (*blur, shift)));
         let explained = |[along, squared]: [f64; 2]| along.max(0.0).powi(2) / squared.max(1e-9);
-        let ((blur_bl, shift), best) = (places.zip(&self.sums))
+        let ((blur, shift), best) = (places.zip(&self.sums))
             .max_by(|(_, a), (_, b)| explained(**a).total_cmp(&explained(**b)))?;
         let darkness = (best[0] / best[1].max(1e-9)).min(1.0);
         let is_one =
             darkness >= LEAST_DARKNESS && explained(*best) >= LEAST_EXPLAINED * self.n_places;
         is_one.then(|| Shadow {
             darkness,
-            offset_bl: shift.map(f64::from),
-            blur_bl,
+            offset_bl: shift.map(|cells| f64::from(cells) * cell_bl),
+            blur_bl: blur * cell_bl,
         })
     }
 }

@@ -82,10 +82,7 @@ mod tests {
         let [("little_room", room), ("short_loop", short)] = &told[..] else {
             panic!("{told:?}");
         };
-        assert!(
-            room.contains("room for about 2 of the 3 animals"),
-            "{room}"
-        );
+        assert!(room.contains("room for about 2 of the 3 animals"), "{room}");
         assert!(
             short.contains("loop of 1.3 s") && short.contains(" 57 degrees"),
             "{short}"

@@ -12,15 +12,15 @@ use super::individual::{Individual, rounded};
 use super::params::Params;
 use crate::library::Library;
 
-/// The radii of separation are corrected so many times.
+/// Most corrections of the radii of separation.
 const N_ROUNDS: usize = 5;
-/// A round that comes no nearer to the wanted spacing by this share of it is the last: the tank has no room for more.
+/// Least gain of a correction, as a share of the wanted spacing; after a smaller gain the corrections end.
 const NEAR_ENOUGH: f64 = 0.03;
-/// The radii of separation grow and shrink at most by this factor.
+/// Largest factor by which the radii of separation grow or shrink.
 const MOST_CHANGE: f64 = 8.0;
-/// At first, animals part in the picture within so many times the wanted spacing.
+/// Radius of separation in the picture before the first correction, in wanted spacings.
 const IN_PICTURE: f64 = 1.5;
-/// The spacing is measured over the first seconds of a film.
+/// Length of the film over which the spacing is measured.
 const TRIAL_S: f64 = 4.0;
 
 /// The parameters with radii of separation such that the mean distance to the nearest other in the picture is `params.spacing_bl`, as far as
@@ -88,9 +88,9 @@ pub(super) struct Crowding {
     pub(super) visible_share: f64,
 }
 
-/// Centroids so near have crossed.
+/// Two animals cross when their centroids come nearer than this.
 const CROSSED_BL: f64 = 0.5;
-/// What is covered is looked at in one of so many frames.
+/// The visible share is measured in one of this many frames.
 const LOOK_EVERY: usize = 5;
 
 /// The crowding of a flock of `library`'s animal, whose length is given.

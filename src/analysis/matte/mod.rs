@@ -143,7 +143,7 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
 const TRACE: f32 = 0.04;
 /// A gap of up to twice as many pixels, as where a wire goes across the animal, is narrow.
 const GAP_PX: u32 = 2;
-/// What a pixel near the animal may have a share of.
+/// The animal near a pixel of the band.
 struct Nearby {
     /// The animal's color there.
     color: [f32; 3],
@@ -237,8 +237,8 @@ impl Puller<'_> {
         (3.0 * self.plate.sigma[self.place(k)]).powi(2)
     }
 
-    /// What a band pixel may have a share of; `None` beyond the band around what is solid. What looks like a shadow may be
-    /// one near the animal too, but not in a narrow gap of it.
+    /// The color of the animal near a pixel of the band; `None` outside of the band. In narrow gaps of the animal no pixel counts
+    /// as shadow.
     fn nearby(&self, k: usize) -> Option<Nearby> {
         let band = self.band_px as usize;
         let solid = self.nearest_solid[k];

@@ -39,7 +39,7 @@ const MOST_CANDIDATES: usize = 3;
 const MERGED: f64 = 1.2;
 /// Cost of taking a part of a component for the animal instead of the whole.
 const PART_COST: f64 = 2.0;
-/// What is around the animal is kept of every so many frames: a few dozen pictures show a shadow well enough.
+/// The surroundings of the animal are kept of one in this many frames: a bound on the memory that they take.
 const AROUND_EVERY: usize = 8;
 /// Something of this share of the subject's area that moves besides it is worth a word.
 const LEAST_OTHER: f64 = 0.2;

@@ -14,12 +14,12 @@ use crate::library::Library;
 use crate::order::median;
 use crate::raster::resample::ONE;
 
-/// A shadow has faded out so high above the floor.
+/// Height above the floor at which an animal casts no shadow any more.
 const HEIGHT_BL: f64 = 6.0;
 /// Half the length and the width of a shadow.
 const HALF_LENGTH_BL: f64 = 0.6;
 const HALF_WIDTH_BL: f64 = 0.26;
-/// A shadow is at least so high, from its middle.
+/// Least half height of a shadow.
 const LEAST_HALF_BL: f64 = 0.1;
 /// An animal that points at the camera is as wide as this share of its length.
 const LEAST_ACROSS: f64 = 0.4;

@@ -23,7 +23,7 @@ const USUAL: library::Shadow = library::Shadow {
 /// As many means over a box are nearly a Gaussian.
 const N_MEANS: usize = 3;
 
-/// What is known of the shadows of a flock.
+/// The shadows of a flock: their darkness and shape.
 pub(super) struct Shadows {
     darkness: f64,
     cast: Cast,
