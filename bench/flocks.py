@@ -40,6 +40,7 @@ BARS = {
     "overlap": ("area of bodies that lie on each other", lambda v: v < .01, "{:.1%}", TOP),
     "halo": ("alpha more than 2.5 px outside the contour", lambda v: v < .01, "{:.1%}", TOP),
     "stray": ("changed pixels of the film outside of every animal and shadow", lambda v: v < .03, "{:.1%}", ALL),
+    "blobs": ("separate bodies of 20 at 1.5 BL from each other, mean", lambda v: v > 16, "{:.1f}", SIDE),
     "polarization": ("polarization", lambda v: True, "{:.2f}", ALL),
     "playable": ("share of uncut frames that can be played", lambda v: True, "{:.0%}", ALL),
     "individuals": ("animals that have room, at most 20", lambda v: True, "{:.0f}", ALL),
@@ -183,6 +184,21 @@ def stray(film, truth, background):
     return n_stray / max(n_changed, 1)
 
 
+def blobs(run, library, folder, poses):
+    """Mean number of connected components of what differs from the background by more than 12 levels, each with at least 30 % of
+    one animal's area, over a film of 20 animals at 1.5 body lengths from each other."""
+    film = folder / "blobs.mp4"
+    run("flock", library, "-o", film, "--count", 20, "--spacing", 1.5, "--frames", 200)
+    background = cv2.imread(str(library / "background.png")).astype(np.int16)
+    least_px = .3 * statistics.median(pose["area_px"] for pose in poses["frames"] if pose["area_px"])
+    video, counts = cv2.VideoCapture(str(film)), []
+    while (read := video.read())[0]:
+        changed = (np.abs(read[1].astype(np.int16) - background).max(axis=-1) > 12).astype(np.uint8)
+        stats = cv2.connectedComponentsWithStats(changed, connectivity=8)[2]
+        counts.append(int((stats[1:, cv2.CC_STAT_AREA] >= least_px).sum()))
+    return statistics.mean(counts)
+
+
 def cuts_above_natural(flock, sprites, poses):
     """Share of the jumps around which some step between drawn frames is above the 99th percentile of the film's steps."""
     top = poses["view"] == "top"
@@ -235,7 +251,8 @@ def measure(program, name, film, flags):
             figures.append(motion(flock, poses, component) | {"cuts_above_natural": cuts_above_natural(flock, sprites, poses),
                                                          "stray": stray(film, truth, library / "background.png")}
                            | ({"overlap": overlap(flock, poses)} if poses["view"] == "top" else {}))
-    means = {key: statistics.mean(one[key] for one in figures) for key in figures[0]}
+        dense = {"blobs": blobs(run, library, folder, poses)} if poses["view"] == "side" else {}
+    means = {key: statistics.mean(one[key] for one in figures) for key in figures[0]} | dense
     return {"view": poses["view"], **means, "halo": halo([sprite[..., 3] for sprite in sprites if sprite is not None]), "playable": len(uncut & set(component)) / max(len(uncut), 1)}
 
 

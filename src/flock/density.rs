@@ -237,7 +237,7 @@ mod tests {
         let stats = |spacing_bl, count| {
             let params = Params {
                 count: Some(count),
-                frames: 60,
+                frames: 240,
                 spacing_bl,
                 tank: TankExtent::Picture,
                 ..Params::default()
@@ -246,9 +246,9 @@ mod tests {
                 .expect("a good library")
                 .stats
         };
-        let usual = stats(None, 8);
+        let usual = stats(None, 5);
         let wanted = 1.5 * usual.spacing_bl;
-        let sparse = stats(Some(wanted), 8);
+        let sparse = stats(Some(wanted), 5);
         assert!(
             (sparse.spacing_bl / wanted - 1.0).abs() < 0.2,
             "{} instead of {wanted}",

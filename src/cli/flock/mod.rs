@@ -3,6 +3,8 @@
 
 mod outputs; // the flags about the film
 
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -77,7 +79,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             .map_err(|error| Error::work(error.code(), &error))?,
     };
     if let Some(path) = &args.plan {
-        std::fs::write(path, flock_json::write(&flock))
+        write_plan(&flock, path)
             .map_err(Error::io(format!("writing the plan: {}", path.display())))?;
     }
     if let Some(path) = &args.plan_picture {
@@ -99,6 +101,12 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     film.make(&targets, args.outputs.ground_truth.as_deref())
         .map_err(|error| Error::work(error.code(), &error))?;
     Ok(Some(summary(&args, &flock, began.elapsed())))
+}
+
+fn write_plan(flock: &Flock, path: &Path) -> io::Result<()> {
+    let mut file = BufWriter::new(File::create(path)?);
+    flock_json::write_to(flock, &mut file)?;
+    file.flush()
 }
 
 fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {

@@ -47,21 +47,23 @@ impl Advanced {
     }
 }
 
-/// Where a boid is and points.
+/// Where a boid is and points, and the size of its animal.
 #[derive(Clone, Copy, Debug)]
 struct Goal {
     centroid_px: [f64; 2],
     behind_px: f64,
     heading_rad: f64,
+    size: f64,
 }
 
 impl Goal {
-    fn of(boid: &BoidTrack, t: usize) -> Goal {
+    fn of(boid: &BoidTrack, t: usize, size: f64) -> Goal {
         let [x, y, behind_px] = boid.position_px[t];
         Goal {
             centroid_px: [x, y],
             behind_px,
             heading_rad: boid.heading_rad[t],
+            size,
         }
     }
 
@@ -97,7 +99,12 @@ impl Stage<'_> {
             })
             .collect();
         let ways = |(id, one): (usize, &Advanced)| {
-            self.ways_to_rest(&shown[id], &one.heading_rad, &boids[id], before[id])
+            self.ways_to_rest(
+                (&shown[id], self.size(id)),
+                &one.heading_rad,
+                &boids[id],
+                before[id],
+            )
         };
         let ways: Vec<Vec<Way>> = advanced.par_iter().enumerate().map(ways).collect();
         let seats = self.seats(shown, boids, before, perches);
@@ -117,7 +124,7 @@ impl Stage<'_> {
                 .for_each(|(id, ((one, last), aside))| {
                     let state = shown[id][t];
                     let seat = seats[id].filter(|_| t == 0);
-                    let goal = Goal::of(&boids[id], t).or_at(seat);
+                    let goal = Goal::of(&boids[id], t, self.size(id)).or_at(seat);
                     if is_flat {
                         one.heading_rad
                             .push(self.carried_heading(state, goal, *last, aside));
@@ -179,8 +186,8 @@ impl Stage<'_> {
                 .map(|px| rounded(px, 2));
         };
         let fps = self.library.poses.fps;
-        let scale = self.scale(state.0, depth_bl);
-        let step = self.shown_step_px(before.state, (state, heading_rad), depth_bl);
+        let scale = self.scale(state.0, depth_bl, goal.size);
+        let step = self.shown_step_px(before.state, (state, heading_rad), (depth_bl, goal.size));
         let pull = 1.0 - libm::exp(-1.0 / (PULL_S * fps));
         let wanted = [0, 1].map(|axis| {
             goal.centroid_px[axis] - before.centroid_px[axis] - step[axis]
@@ -201,20 +208,20 @@ impl Stage<'_> {
         &self,
         before: (u32, bool),
         (state, heading_rad): ((u32, bool), f64),
-        depth_bl: f64,
+        (depth_bl, size): (f64, f64),
     ) -> [f64; 2] {
         let turn = self.rotation(state, heading_rad);
         turned(
             self.filmed_step_px(before, state),
             turn,
-            self.scale(state.0, depth_bl),
+            self.scale(state.0, depth_bl, size),
         )
     }
 
     /// From the side, the way that is left to the next rest, by frame; none from above.
     fn ways_to_rest(
         &self,
-        shown: &[(u32, bool)],
+        (shown, size): (&[(u32, bool)], f64),
         heading_rad: &[f64],
         boid: &BoidTrack,
         before: Option<Before>,
@@ -225,7 +232,7 @@ impl Stage<'_> {
             .map(|((&state, &heading_rad), place)| {
                 let depth_bl = self.depth_bl(place[2]);
                 let step = last.map_or([0.0; 2], |before| {
-                    self.shown_step_px(before, (state, heading_rad), depth_bl)
+                    self.shown_step_px(before, (state, heading_rad), (depth_bl, size))
                 });
                 last = Some(state);
                 (perches::rests(&self.motion[state.0 as usize]), step)
@@ -249,7 +256,7 @@ impl Stage<'_> {
         (0..shown.len())
             .map(|id| {
                 let &(frame, _) = shown[id].first().filter(|_| before[id].is_none())?;
-                let goal = Goal::of(&boids[id], 0).centroid_px;
+                let goal = Goal::of(&boids[id], 0, self.size(id)).centroid_px;
                 let seat = perches::rests(&self.motion[frame as usize])
                     .then(|| perches.nearest(goal, &taken, CLEAR_BL * self.lens.length_px))??;
                 taken.push(seat);
@@ -384,7 +391,8 @@ mod tests {
             for t in 1..shown.len() {
                 let [from, to] = [t - 1, t].map(|t| advanced.centroid_px[t]);
                 let [dx, dy] = stage.filmed_step_px(shown[t - 1], shown[t]);
-                let filmed_px = stage.scale(shown[t].0, stage.depth_bl(0.0)) * dx.hypot(dy);
+                let filmed_px =
+                    stage.scale(shown[t].0, stage.depth_bl(0.0), stage.size(0)) * dx.hypot(dy);
                 let step_px = (to[0] - from[0]).hypot(to[1] - from[1]);
                 let gap_px = (step_px - filmed_px).abs();
                 assert!(

@@ -87,9 +87,14 @@ pub(super) fn play(
     }
     let placed = (flock.advanced.into_par_iter().zip(&flock.plans))
         .zip(&flock.course.tracks)
-        .map(|((one, plan), boid)| {
+        .enumerate()
+        .map(|(id, ((one, plan), boid))| {
             let shown = model.shown(&plan.states);
-            stage.with_fades(&shown, boid, (one.heading_rad, one.centroid_px))
+            stage.with_fades(
+                (&shown, stage.size(id)),
+                boid,
+                (one.heading_rad, one.centroid_px),
+            )
         })
         .collect();
     Ok((flock.course, flock.plans, placed))

@@ -6,6 +6,8 @@
 mod space; // where boids may be, and how that is seen
 mod stats; // how good the flock is, and how it moves frame by frame
 
+use std::io::{self, Write};
+
 use serde::{Deserialize, Serialize};
 
 use self::space::SpaceFile;
@@ -15,8 +17,15 @@ use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 /// The schema's name and version.
 pub const SCHEMA: &str = "flockreel/flock@1";
 
-/// The flock as JSON, one line an individual.
+/// Returns the flock as JSON, one line for each individual.
 pub fn write(flock: &Flock) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    write_to(flock, &mut bytes).expect("memory takes all bytes");
+    bytes
+}
+
+/// Writes the flock as JSON, one number at a time: a long film has hundreds of megabytes of them. `out` should be buffered.
+pub fn write_to(flock: &Flock, out: &mut impl Write) -> io::Result<()> {
     let file = FlockFile {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
@@ -31,18 +40,13 @@ pub fn write(flock: &Flock) -> Vec<u8> {
         individuals: (), // written line by line below
     };
     let head = serde_json::to_string(&file).expect("plain values serialise");
-    let mut bytes = head
-        .strip_suffix("null}")
-        .expect("individuals come last")
-        .as_bytes()
-        .to_vec();
+    let head = head.strip_suffix("null}").expect("individuals come last");
+    out.write_all(head.as_bytes())?;
     for (idx, individual) in flock.individuals.iter().enumerate() {
-        bytes.extend(if idx == 0 { &b"[\n"[..] } else { b",\n" });
-        serde_json::to_writer(&mut bytes, &IndividualFile::of(individual))
-            .expect("plain values serialise");
+        out.write_all(if idx == 0 { b"[\n" } else { b",\n" })?;
+        serde_json::to_writer(&mut *out, &IndividualFile::of(individual))?;
     }
-    bytes.extend(b"\n]}\n");
-    bytes
+    out.write_all(b"\n]}\n")
 }
 
 /// Reads what `write` wrote.

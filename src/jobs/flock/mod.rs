@@ -7,6 +7,8 @@ mod sink; // where frames go
 pub mod truth; // the ground truth as a folder and as one file
 
 use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -82,7 +84,9 @@ impl Input {
         let library = library_dir::read(files.path(), attempt.scratch())?.library;
         let flock = plan_flock(&library, &self.params, attempt.listener)?;
         let folder = attempt.folder();
-        std::fs::write(folder.join("flock.json"), flock_json::write(&flock))?;
+        let mut file = BufWriter::new(File::create(folder.join("flock.json"))?);
+        flock_json::write_to(&flock, &mut file)?;
+        file.flush()?;
         std::fs::write(folder.join("plan.svg"), svg::plan(&flock))?;
         render(attempt, &library, &flock)?;
         let summary = Summary {

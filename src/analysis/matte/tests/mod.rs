@@ -258,3 +258,27 @@ fn on_black_nothing_is_a_shadow() {
         assert_eq!(drawn.pixel(x, y), [0; 4], "{x}, {y}");
     }
 }
+
+fn gray(_: u32, _: u32) -> u8 {
+    100
+}
+
+/// A light body with a tail that fills half of the pixels of a row, and a quarter of those beside it.
+fn with_a_thin_tail(x: u32, y: u32) -> u8 {
+    let along = (60..90).contains(&x);
+    match (away([x, y], BODY), along, y) {
+        (0, ..) => 240,
+        (_, true, 31) => 170,
+        (_, true, 32) => 135,
+        _ => gray(x, y),
+    }
+}
+
+#[test]
+fn a_thin_tail_has_the_color_of_the_body_behind_which_the_floor_shows() {
+    let drawn = drawn_on(gray, with_a_thin_tail);
+    for x in 70..88 {
+        assert_eq!(drawn.pixel(x, 31), [240, 240, 240, 128], "{x}");
+        assert!((drawn.over(100, [x, 32]) - 135.0).abs() < 2.0, "{x}");
+    }
+}
