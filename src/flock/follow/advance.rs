@@ -99,12 +99,8 @@ impl Stage<'_> {
             })
             .collect();
         let ways = |(id, one): (usize, &Advanced)| {
-            self.ways_to_rest(
-                (&shown[id], self.size(id)),
-                &one.heading_rad,
-                &boids[id],
-                before[id],
-            )
+            let shown = (&shown[id][..], self.size(id));
+            self.ways_to_rest(shown, &one.heading_rad, &boids[id], before[id])
         };
         let ways: Vec<Vec<Way>> = advanced.par_iter().enumerate().map(ways).collect();
         let seats = self.seats(shown, boids, before, perches);
