@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
+use super::set::Set;
 use super::{Error, Listener, Summary};
 use crate::analysis::{self, Params};
 use crate::cpu;
@@ -85,9 +86,8 @@ pub struct Args {
     /// Start from a preset: papers.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
-    /// Any parameter of an analysis by its name in the API, as JSON: --set threshold=25.
-    #[arg(long = "set", value_name = "NAME=JSON")]
-    set: Vec<String>,
+    #[command(flatten)]
+    set: Set,
 }
 
 /// Analyses the video and writes the library.
@@ -213,16 +213,7 @@ fn params_of(args: &Args) -> Result<Params, Error> {
         animal.map(|(length, height)| json!({"length_m": length, "height_m": height})),
     );
     put("camera", args.camera.as_deref().map(read_json).transpose()?);
-    for setting in &args.set {
-        let (name, value) = setting
-            .split_once('=')
-            .ok_or_else(|| Error::Usage(format!("--set takes NAME=JSON: {setting}")))?;
-        // A bare word is a string.
-        put(
-            name,
-            Some(serde_json::from_str(value).unwrap_or_else(|_| json!(value))),
-        );
-    }
+    args.set.apply(&mut wanted)?;
     params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
 }
 

@@ -3,11 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Map, Value, json};
 
+use super::set::Set;
 use super::{Error, Listener, Summary};
-use crate::fish::{self, Film, Motion, Palette, Params, side_by_side};
-use crate::formats::glb;
+use crate::fish::{self, Film, Motion, Params, side_by_side};
+use crate::formats::{glb, params};
 use crate::library::Library;
 use crate::media::{self, Tool, VideoFormat, VideoWriter};
 use crate::progress::Progress;
@@ -29,8 +30,10 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// Its coat: goldfish, silver or bronze.
-    #[arg(long, default_value = "goldfish")]
-    palette: String,
+    #[arg(long)]
+    palette: Option<String>,
+    #[command(flatten)]
+    set: Set,
 }
 
 /// Makes the virtual fish.
@@ -65,26 +68,13 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 fn params_of(args: &Args) -> Result<Params, Error> {
-    let palette = match args.palette.as_str() {
-        "goldfish" => Palette::Goldfish,
-        "silver" => Palette::Silver,
-        "bronze" => Palette::Bronze,
-        other => {
-            return Err(Error::Usage(format!(
-                "palette is goldfish, silver or bronze: {other}"
-            )));
-        }
-    };
-    let preset = match args.preset.as_deref() {
-        None | Some("default") => Params::default(),
-        Some("papers") => Params::papers(),
-        Some(other) => {
-            return Err(Error::Usage(format!(
-                "preset is default or papers: {other}"
-            )));
-        }
-    };
-    Ok(Params { palette, ..preset })
+    let given = [("palette", &args.palette), ("preset", &args.preset)];
+    let mut overrides: Map<String, Value> = given
+        .into_iter()
+        .filter_map(|(name, value)| Some((name.to_owned(), json!(value.as_ref()?))))
+        .collect();
+    args.set.apply(&mut overrides)?;
+    params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 
 fn write_video(library: &Library, motion: Motion, args: &Args) -> Result<(), Error> {

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, Value, json};
 
 use self::outputs::Outputs;
+use super::set::Set;
 use super::{Error, Listener, Summary};
 use crate::flock::advice::Advice;
 use crate::flock::{Flock, Params, plan_flock};
@@ -48,12 +49,8 @@ pub struct Args {
     /// Rules to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.
     #[arg(long, value_name = "JSON")]
     rules: Option<String>,
-    /// What frames and boids are matched by: heading (the default), direction (in space) or position.
-    #[arg(long = "match", value_name = "BY")]
-    match_by: Option<String>,
-    /// Weights of the plan to override, as JSON: '{"wx": 2.0, "w_p": 0.05}'.
-    #[arg(long, value_name = "JSON")]
-    matching: Option<String>,
+    #[command(flatten)]
+    set: Set,
     /// Write the plan, flock.json, here.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
@@ -61,7 +58,7 @@ pub struct Args {
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
     /// Film this plan, a flock.json of the same library, instead of making one.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "spacing", "frames", "seed", "preset", "rules", "match_by", "matching"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "spacing", "frames", "seed", "preset", "rules", "set"])]
     from: Option<PathBuf>,
 }
 
@@ -144,22 +141,10 @@ impl Args {
     /// The preset with what was given besides.
     fn params(&self) -> Result<Params, Error> {
         let mut overrides = Map::new();
-        let json = |flag: &str, text: &String| {
-            serde_json::from_str(text)
-                .map_err(|cause| Error::Usage(format!("{flag} is not JSON: {cause}")))
-        };
         if let Some(text) = &self.rules {
-            overrides.insert("rules".into(), json("--rules", text)?);
-        }
-        let mut matching = match &self.matching {
-            Some(text) => json("--matching", text)?,
-            None => json!({}),
-        };
-        if let (Some(by), Some(matching)) = (&self.match_by, matching.as_object_mut()) {
-            matching.insert("by".into(), by.as_str().into());
-        }
-        if matching != json!({}) {
-            overrides.insert("matching".into(), matching);
+            let rules = serde_json::from_str(text)
+                .map_err(|cause| Error::Usage(format!("--rules is not JSON: {cause}")))?;
+            overrides.insert("rules".into(), rules);
         }
         let render = Value::Object(self.outputs.overrides());
         overrides.insert("render".into(), render);
@@ -174,6 +159,7 @@ impl Args {
         for (name, value) in given {
             overrides.extend(value.map(|value| (name.to_owned(), value)));
         }
+        self.set.apply(&mut overrides)?;
         params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
     }
 }

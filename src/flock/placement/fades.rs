@@ -1,0 +1,104 @@
+//! Cross-fades at jumps: a second sprite that shows the continuation of the old run, or the beginning of the new one.
+
+use super::{Placed, Stage, is_jump};
+use crate::flock::individual::{BoidTrack, Fade, rounded};
+
+/// What fades are made of: what is shown when, pointing where, at which depth and size.
+pub(super) struct Way<'a> {
+    pub(super) shown: &'a [(u32, bool)],
+    pub(super) heading_rad: &'a [f64],
+    pub(super) depth_bl: &'a [f64],
+    pub(super) size: f64,
+}
+
+impl Stage<'_> {
+    /// The fades of all individuals, those at the end going on in their heirs.
+    pub(super) fn fades_across(
+        &self,
+        shown: &[&[(u32, bool)]],
+        boids: &[BoidTrack],
+        heirs: &[u32],
+        placed: &[Placed],
+    ) -> Vec<Vec<Fade>> {
+        let mut fades: Vec<Vec<Fade>> = vec![Vec::new(); shown.len()];
+        for (id, &heir) in heirs.iter().enumerate() {
+            let (heir, n_frames) = (heir as usize, shown[id].len());
+            let across = self.fades(
+                &Way {
+                    shown: &[shown[id], shown[heir]].concat(),
+                    heading_rad: &[id, heir].map(|id| &placed[id].heading_rad[..]).concat(),
+                    depth_bl: &[id, heir].map(|id| self.depths_bl(&boids[id])).concat(),
+                    size: 1.0,
+                },
+                n_frames,
+            );
+            for mut fade in across {
+                let rest = fade.split_off(n_frames);
+                fades[heir].extend(rest);
+                if !fade.weight.is_empty() {
+                    fades[id].push(fade);
+                }
+            }
+        }
+        for fades in &mut fades {
+            fades.sort_by_key(|fade| fade.start);
+        }
+        fades
+    }
+
+    /// The fades at the jumps up to frame `n_frames`, the one after the last.
+    pub(super) fn fades(&self, way: &Way, n_frames: usize) -> Vec<Fade> {
+        let shown = way.shown;
+        let jumps: Vec<usize> = (1..shown.len())
+            .filter(|&t| is_jump(shown[t - 1], shown[t]))
+            .collect();
+        let mut fades = Vec::new();
+        let within = jumps.iter().take_while(|&&t| t <= n_frames);
+        for (k, &t) in within.enumerate() {
+            let before = if k > 0 { t - jumps[k - 1] } else { t };
+            let after = jumps.get(k + 1).copied().unwrap_or(shown.len()) - t;
+            let half = (self.params.fade_frames as usize / 2)
+                .min(before / 2)
+                .min(after / 2);
+            if half > 0 {
+                let halves = self.fade(way, t, half);
+                fades.extend(halves.into_iter().flatten());
+            }
+        }
+        fades
+    }
+
+    /// The `half` frames before the jump at `t`, under which comes what follows, and the `half`
+    /// after it, under which goes what was; `None` when the footage lacks one of them.
+    fn fade(&self, way: &Way, t: usize, half: usize) -> Option<[Fade; 2]> {
+        let (old, new) = (way.shown[t - 1], way.shown[t]);
+        let mut sides: [Fade; 2] = [(t - half, new.1), (t, old.1)].map(|(start, mirrored)| Fade {
+            start: start as u32,
+            source_frame: Vec::new(),
+            mirrored,
+            rotation_rad: Vec::new(),
+            scale: Vec::new(),
+            weight: Vec::new(),
+        });
+        for u in t - half..t + half {
+            let share = ((u + half - t) as f64 + 0.5) / (2 * half) as f64;
+            let coming = share * share * (3.0 - 2.0 * share);
+            let (side, frame, mirrored, weight) = match u < t {
+                true => (0, new.0.checked_sub((t - u) as u32)?, new.1, coming),
+                false => (1, old.0 + (u - t + 1) as u32, old.1, 1.0 - coming),
+            };
+            let sprites = &self.library.sprites;
+            if frame as usize >= sprites.n_frames() || !sprites.is_present(frame as usize) {
+                return None;
+            }
+            let rotation = self.rotation((frame, mirrored), way.heading_rad[u]);
+            sides[side].source_frame.push(frame);
+            sides[side].rotation_rad.push(rounded(rotation, 5));
+            sides[side]
+                .scale
+                .push(self.scale(frame, way.depth_bl[u], way.size));
+            sides[side].weight.push(rounded(weight, 4));
+        }
+        Some(sides)
+    }
+}
