@@ -1,7 +1,8 @@
-//! How fast boids swim (ALGORITHMS.md 7 and 9), for `bench/boids.py`.
+//! Measures the time of a boid simulation step, for `bench/boids.py` (docs/explanation/algorithms.md, "Boids"
+//! and "Quality measures").
 //!
-//! Arguments: COUNT STEPS. A school in a flat tank with room for all, one step to a frame, on one thread and on
-//! all. Prints one line of JSON with the seconds of a step.
+//! Arguments: COUNT STEPS. Simulates a school in a flat tank, on one thread and on all. Prints one line of
+//! JSON with the seconds per step.
 
 use std::time::Instant;
 
@@ -11,7 +12,7 @@ use flockreel::flock::boids::calibration::Calibration;
 use flockreel::flock::boids::tank::Tank;
 use flockreel::flock::lens::Lens;
 
-/// Square body lengths to a boid.
+/// Area of the tank per boid, square body lengths.
 const ROOM_BL2: f64 = 1.5;
 
 fn main() {
@@ -19,7 +20,7 @@ fn main() {
         .filter(|argument| argument != "--bench")
         .collect();
     let [count, steps] = &arguments[..] else {
-        // `cargo test --benches` runs this without arguments.
+        // `cargo test --benches` runs this program without arguments.
         return println!("arguments: COUNT STEPS");
     };
     let count: u32 = count.parse().expect("a number");
@@ -32,7 +33,7 @@ fn main() {
     );
 }
 
-/// Seconds of a step: the least of three times `steps`.
+/// Returns the seconds per step: the fastest of three runs of `steps` steps.
 fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
     let params = Params {
         count: Some(count),

@@ -1,8 +1,9 @@
-//! How fast the distance engine is (ALGORITHMS.md 5 and 9), for `bench/distance.py`.
+//! Measures the speed of the distance engine, for `bench/distance.py`
+//! (docs/explanation/algorithms.md, "Distances" and "Quality measures").
 //!
-//! Reads raw RGBA sprites from a file, times the engine alone for one thread and for all, measures
-//! this machine's own psadbw peak in the same run, and writes d and D as .npy to be compared.
-//! Arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR. Prints one line of JSON.
+//! Arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR. Reads raw RGBA sprites from a file and times the
+//! engine on one thread and on all. Measures the psadbw peak of this machine in the same run. Writes d and D
+//! as .npy files for comparison. Prints one line of JSON.
 #![expect(
     unsafe_code,
     reason = "the bare instruction is timed by inline assembly"
@@ -28,7 +29,7 @@ fn main() {
         .filter(|a| a != "--bench")
         .collect();
     let [path, width, height, clip_frames, out] = &arguments[..] else {
-        // `cargo test --benches` runs this without arguments.
+        // `cargo test --benches` runs this program without arguments.
         return println!("arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR");
     };
     let size = [width, height].map(|text| text.parse().expect("a number of pixels"));
@@ -70,7 +71,7 @@ fn read(path: &Path, [width, height]: [u32; 2]) -> (Sprites, Poses) {
     (sprites, still([width, height], n_frames))
 }
 
-/// Nothing known of any frame.
+/// Returns poses without any measurement.
 fn still(image_size_px: [u32; 2], n_frames: usize) -> Poses {
     Poses {
         tail_beat: None,
@@ -94,9 +95,10 @@ fn distances(pixels: &ComparedSprites, clip_frames: usize) -> Distances<'_> {
     }
 }
 
-/// Medians over fifteen turns, of one core: gigabytes a second where no byte is blank, so that all are compared
-/// (1200 sprites of 96 x 64); this machine's peak just before and just after, for other programs take their share
-/// of both; and the first by the second.
+/// Returns medians over fifteen runs on one core: engine speed (GB/s), psadbw peak (GB/s), and their ratio.
+///
+/// The sprites (1200 of 96 x 64) have no blank bytes, so that all are compared. The peak is measured before
+/// and after each run, because other programs slow both.
 fn share_of_peak(clip_frames: usize) -> [f64; 3] {
     let (n_frames, size) = (1200, [96, 64]);
     let scratch = Arc::new(InMemory::default());
@@ -134,7 +136,7 @@ fn share_of_peak(clip_frames: usize) -> [f64; 3] {
     })
 }
 
-/// The best of fifteen runs, seconds.
+/// Returns the fastest of fifteen runs, seconds.
 fn time(pixels: &ComparedSprites, clip_frames: usize, n_threads: usize) -> f64 {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(n_threads)
@@ -152,25 +154,27 @@ fn time(pixels: &ComparedSprites, clip_frames: usize, n_threads: usize) -> f64 {
     (0..15).map(|_| run()).fold(f64::INFINITY, f64::min)
 }
 
-/// Bytes a second of psadbw at the width that the engine uses, each followed by its addition, from
-/// registers alone: no kernel that sums absolute differences can be faster. NaN on other machines.
+/// Returns the peak throughput of psadbw followed by its addition, from registers only, GB/s.
+///
+/// The vector width is that of the engine. No kernel for sums of absolute differences can be faster. Returns
+/// NaN without AVX2.
 fn peak_gb_per_s() -> f64 {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         const ROUNDS: u64 = 20_000_000;
         let start = Instant::now();
-        // SAFETY: AVX2 is there; only registers that are declared are touched.
+        // SAFETY: AVX2 is available, and only declared registers change.
         unsafe { sad_and_add_8(ROUNDS) };
         return (ROUNDS * 8 * 32) as f64 / start.elapsed().as_secs_f64() / 1e9;
     }
     f64::NAN
 }
 
-/// `rounds` times eight psadbw of 32 bytes, with eight additions.
+/// Executes eight psadbw of 32 bytes and eight additions, `rounds` times.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 unsafe fn sad_and_add_8(rounds: u64) {
-    // SAFETY: no memory is touched, and every register that changes is declared.
+    // SAFETY: no memory is accessed, and every changed register is declared.
     unsafe {
         std::arch::asm!(
             "2:",

@@ -1,9 +1,10 @@
-//! How fast plans are made (ALGORITHMS.md 6 and 9), for `bench/plan.py`.
+//! Measures the time of planning, for `bench/plan.py` (docs/explanation/algorithms.md, "Planning" and
+//! "Quality measures").
 //!
-//! Arguments: COUNT FRAMES RUNS [--one-side] [--of=N] [LIBRARY_DIR]. With one side nobody is mirrored. Without
-//! a folder the library is made here: N frames, 1200 if it is not said, of an animal that turns to and fro, with
-//! about five jumps for three frames, half of them mirrored. The boids are simulated once; the plan alone is
-//! timed, on one thread and on all. Prints one line of JSON.
+//! Arguments: COUNT FRAMES RUNS [--one-side] [--of=N] [LIBRARY_DIR]. `--one-side` disables mirroring. Without
+//! a folder the benchmark generates a library of N frames, by default 1200. It has about five jumps per three
+//! frames, half of them mirrored. The boids are simulated once. Only the planning is timed, on one thread and
+//! on all. Prints one line of JSON.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +29,7 @@ fn main() {
     let n_frames = n_frames.map_or(1200, |n| n.parse().expect("a number"));
     let mirror = !flags.iter().any(|flag| flag == "--one-side");
     let [count, frames, runs, folder @ ..] = &arguments[..] else {
-        // `cargo test --benches` runs this without arguments.
+        // `cargo test --benches` runs this program without arguments.
         return println!("arguments: COUNT FRAMES RUNS [--one-side] [--of=N] [LIBRARY_DIR]");
     };
     let number = |text: &String| text.parse().expect("a number");
@@ -67,7 +68,7 @@ fn main() {
     );
 }
 
-/// The least time of some runs, seconds.
+/// Returns the time of the fastest run, seconds.
 fn time(
     library: &Library,
     boids: &[BoidTrack],
@@ -97,7 +98,7 @@ fn time(
 const LENGTH_PX: f64 = 80.0;
 const EPSILON: u64 = 1000;
 
-/// An animal that swims to and fro, and jumps between places where it points alike.
+/// Returns a library of an animal that swims to and fro and can jump between moments of similar heading.
 fn made_library(n_frames: u32) -> Library {
     let wave = |frame: u32, period: f64| (f64::from(frame) / period).sin();
     let heading = |frame: u32| {

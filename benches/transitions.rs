@@ -1,9 +1,9 @@
-//! How fast transitions are found, and how that grows with the footage (ALGORITHMS.md 5 and 9), for
-//! `bench/transitions.py`. Prints one line of JSON.
+//! Measures the time of the search for transitions, for `bench/transitions.py`
+//! (docs/explanation/algorithms.md, "Transitions and playback" and "Quality measures").
 //!
-//! `LIBRARY_DIR`: the library's own sprites; all distances against the search for transitions below its
-//! epsilon, on one thread and on all. `N`: so many sprites drawn by code; the search for transitions from end to end, exact or, with
-//! `approximate` after it, so.
+//! With `LIBRARY_DIR`, uses the sprites of that library. Compares the time for all distances with the time
+//! for the transitions below its epsilon, on one thread and on all. With `N [approximate]`, draws N sprites
+//! and times the whole search, exact or approximate. Prints one line of JSON.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -65,18 +65,18 @@ fn pruned_against_all(folder: &Path) {
     );
 }
 
-/// Seconds, of the plain side and of both.
+/// Times in seconds, unmirrored only and with both sides.
 #[derive(Default)]
 struct Times {
-    /// For all distances.
+    /// Time for all distances.
     all_s: [f64; 2],
-    /// For the transitions, from the steps to the playback graph.
+    /// Time for the transitions, from the natural steps to the playback graph.
     search_s: [f64; 2],
     n_candidates: u64,
     n_transitions: usize,
 }
 
-/// The best of seven runs each.
+/// Returns the fastest of seven runs each.
 fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads: usize) -> Times {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(n_threads)
@@ -110,7 +110,7 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
                 pool.install(all).expect("nobody cancels");
             }
         });
-        // The library's own epsilon: one search, whatever rung of kappa it was found on.
+        // With a fixed epsilon, one search runs, whatever kappa the library used.
         let params = Params {
             epsilon: Some(library.epsilon),
             mirror: k == 1,
@@ -128,7 +128,7 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
     times
 }
 
-/// Draws sprites of 96 x 64 and finds their transitions; times only the latter.
+/// Draws sprites of 96 x 64 pixels and times the search for their transitions only.
 fn from_end_to_end(n_frames: usize, approximate: bool) {
     let swim = Swim::new(n_frames);
     let scratch = Arc::new(Spill::into(&std::env::temp_dir()));
@@ -159,7 +159,7 @@ fn from_end_to_end(n_frames: usize, approximate: bool) {
     );
 }
 
-/// Most memory that this process ever held, MB; 0 where the system does not say.
+/// Returns the peak memory of this process, MB; 0 where the system does not report it.
 fn peak_mb() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -167,9 +167,9 @@ fn peak_mb() -> u64 {
     kb.unwrap_or(0) / 1024
 }
 
-/// A fish that turns now this way, now that, and beats its tail; seen from the side.
+/// A fish in side view that turns to and fro and beats its tail.
 struct Swim {
-    /// Per frame: yaw, pitch, phase of the tail beat, radians.
+    /// Yaw, pitch and phase of the tail beat per frame, radians.
     moments: Vec<[f64; 3]>,
 }
 
@@ -210,7 +210,8 @@ impl Swim {
         }
     }
 
-    /// An orange spindle with a dark eye, as long as it is turned, its tail bent; a little noise.
+    /// Draws an orange spindle with a dark eye, foreshortened by the yaw, with a bent tail and a little
+    /// noise.
     fn draw(&self, frame_idx: usize, rgba: &mut [u8]) {
         let [yaw, pitch, phase] = self.moments[frame_idx];
         let (along, away) = (libm::cos(yaw), libm::sin(yaw));

@@ -1,32 +1,33 @@
-//! Every stable error code: its name, one line of meaning, one of advice. The same in the API, on the command
-//! line, in the database and in the docs. A code is never renamed and never means something else.
+//! All stable error codes, each with a one-sentence meaning and advice. The same codes appear in the API, on
+//! the command line, in the database and in the documentation. A code is never renamed and never changes its
+//! meaning.
 
 macro_rules! codes {
     ($($variant:ident $name:literal $meaning:literal $advice:literal)*) => {
-        /// A stable reason; see [`Code::meaning`] for each one's sense.
+        /// A stable error code. [`Code::meaning`] explains it and [`Code::advice`] says what to do.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Code { $(#[doc = $meaning] $variant,)* }
 
         impl Code {
-            /// Every code, in the order of this file.
+            /// All codes, in the order of this file.
             pub const ALL: &'static [Code] = &[$(Code::$variant,)*];
 
-            /// The stable name, in snake case.
+            /// Returns the stable name, in snake case.
             pub fn name(self) -> &'static str {
                 match self { $(Code::$variant => $name,)* }
             }
 
-            /// What it means, one sentence for people.
+            /// Returns the meaning, one sentence for users.
             pub fn meaning(self) -> &'static str {
                 match self { $(Code::$variant => $meaning,)* }
             }
 
-            /// What to do about it, a sentence for whoever met it.
+            /// Returns the advice to the user who got the error.
             pub fn advice(self) -> &'static str {
                 match self { $(Code::$variant => $advice,)* }
             }
 
-            /// The code of a name, if there is one.
+            /// Returns the code with the given name; `None` if there is none.
             pub fn from_name(name: &str) -> Option<Code> {
                 match name { $($name => Some(Code::$variant),)* _ => None }
             }
@@ -35,7 +36,7 @@ macro_rules! codes {
 }
 
 codes! {
-    // The file (RELIABILITY.md, the gate).
+    // Input files (docs/explanation/promises.md, "Bad input").
     NotAVideo "not_a_video" "The file is not a video that can be read."
         "Send the film itself, as MP4, MOV, 3GP, MKV, WebM, AVI, MPEG, MPEG-TS, ASF, WMV, FLV, OGV, H.264 or H.265, not a \
          playlist. Pictures are measured as a zip of numbered PNG, JPEG, BMP or TIFF files, as one TIFF of several \
@@ -76,7 +77,7 @@ codes! {
          back, tell whoever runs the service."
     StorageFull "storage_full" "There is no room left to store the result."
         "Delete what is no longer needed, or ask whoever runs the service for room; then try again."
-    // The analysis (ALGORITHMS.md 2.9).
+    // Analysis (docs/explanation/algorithms.md, "Refused footage").
     NothingMoves "nothing_moves" "Nothing moves before the background."
         "Film an animal that moves about, before a background that it stands out from; or give a picture of the scene \
          without it, for example with `--background empty.png`."
@@ -108,10 +109,10 @@ codes! {
         "Film from nearer by, or with more pixels."
     BackgroundSizeDiffers "background_size_differs" "The background image has another size than the footage."
         "Send a background of the film's own width and height, or none."
-    // The flock.
+    // Flocks.
     NoTransitions "no_transitions" "The library has too few moments that look alike: film longer."
         "Film longer, so that the animal comes by the same places and poses again."
-    // Anything.
+    // All jobs and uploads.
     InputFailed "input_failed" "The job whose result this one needs ended without a result."
         "Look at that job's own error, mend it there, and ask again."
     CrashedWorker "crashed_worker" "The work crashed its worker twice and is not tried again."
@@ -122,7 +123,7 @@ codes! {
         "The sentence names what is wrong; the API's description has every range and default."
     Cancelled "cancelled" "The work was cancelled."
         "Ask again if it is wanted after all."
-    // The door.
+    // The API.
     NotFound "not_found" "There is nothing at this address."
         "Check the id: it may have been deleted, or belong to somebody else."
     NotReady "not_ready" "The result is not there yet: its job has not finished."

@@ -1,5 +1,5 @@
-//! Every setting of the service: its default, its flag, its environment variable
-//! (STYLE.md, "a setting"). The README's table follows from this file.
+//! All settings of the service: default, command-line flag and environment variable of each. The README
+//! documents every variable; `tests/it/tidy` checks that.
 
 use std::net::SocketAddr;
 use std::num::NonZeroUsize;
@@ -8,38 +8,38 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
-/// How the service runs. Flags win over environment variables, those over defaults.
+/// Settings of the service. Flags override environment variables, which override defaults.
 #[derive(Args, Clone, Debug)]
 pub struct Config {
-    /// Where to listen. Off loopback the service needs authentication.
+    /// Address and port to listen on. An address other than loopback requires authentication.
     #[arg(long, env = "FLOCKREEL_BIND", default_value = "127.0.0.1:8080")]
     pub bind: SocketAddr,
-    /// Who needs a token: `auto` demands one off loopback, `required` from everybody.
+    /// Which requests need a token: `auto` all if the address is not loopback, `required` always all.
     #[arg(long, env = "FLOCKREEL_AUTH", default_value = "auto")]
     pub auth: Auth,
-    /// Where rows and files are kept.
+    /// Locations of the database and the files.
     #[command(flatten)]
     pub storage: Storage,
-    /// Who runs the jobs.
+    /// The workers that run jobs.
     #[command(flatten)]
     pub crew: Crew,
-    /// Do not fill an empty data folder with a sample.
+    /// Do not add sample data to an empty data folder.
     #[arg(long, env = "FLOCKREEL_NO_SAMPLE")]
     pub no_sample: bool,
-    /// Requests a second that each owner of a token may make, four seconds' at once; 0 for any number.
+    /// Requests per second allowed to each token owner, with bursts of 4 times as many; 0 sets no limit.
     #[arg(long, env = "FLOCKREEL_RATE", default_value_t = 200, value_name = "N")]
     pub rate: u32,
-    /// How many jobs of everybody may be queued or running at once.
+    /// Maximum number of jobs of all users that may be queued or running at once.
     #[arg(long, env = "FLOCKREEL_MAX_QUEUED", default_value_t = 10_000, value_name = "N",
         value_parser = clap::value_parser!(i64).range(0..))]
     pub max_queued: i64,
-    /// Who watches.
+    /// Monitoring.
     #[command(flatten)]
     pub watch: Watch,
-    /// The largest upload, bytes.
+    /// Maximum size of an upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,
-    /// Room on the disk that uploads leave free, bytes, so that results and deletions still fit.
+    /// Disk space that uploads must leave free, bytes, so that results and deletions still fit.
     #[arg(
         long,
         env = "FLOCKREEL_DISK_RESERVE_BYTES",
@@ -49,12 +49,12 @@ pub struct Config {
     pub disk_reserve_bytes: u64,
 }
 
-/// How media tools are found and enclosed: the same for every command that reads or writes films.
+/// Settings of the media tools, for every command that reads or writes video.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Media tools")]
 pub struct Media {
-    /// The walls around ffmpeg: `auto` uses all that this machine has, `strict` does nothing unless it has
-    /// them all, `off` leaves plain limits alone.
+    /// Isolation of ffmpeg: `auto` uses every protection that this machine has, `strict` requires them all,
+    /// `off` applies only resource limits.
     #[arg(
         long,
         global = true,
@@ -63,29 +63,29 @@ pub struct Media {
         value_name = "MODE"
     )]
     pub sandbox: Sandbox,
-    /// The ffmpeg to use, instead of the first on the PATH.
+    /// The ffmpeg program to use instead of the first on the PATH.
     #[arg(long, global = true, env = "FLOCKREEL_FFMPEG", value_name = "FILE")]
     pub ffmpeg: Option<PathBuf>,
-    /// The ffprobe to use, instead of the first on the PATH.
+    /// The ffprobe program to use instead of the first on the PATH.
     #[arg(long, global = true, env = "FLOCKREEL_FFPROBE", value_name = "FILE")]
     pub ffprobe: Option<PathBuf>,
 }
 
-/// How much of the sandbox must be there (RELIABILITY.md, the gate).
+/// How much of the sandbox is required (docs/explanation/promises.md, "Sandbox").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Sandbox {
-    /// Plain limits alone.
+    /// Only resource limits.
     Off,
-    /// What this machine has; what it lacks is said.
+    /// All protections that this machine has; missing ones are reported.
     Auto,
-    /// All of it, or nothing is started.
+    /// All protections; without them no media tool is started.
     Strict,
 }
 
-/// Where rows and files are kept.
+/// Locations of the database and the files.
 #[derive(Args, Clone, Debug)]
 pub struct Storage {
-    /// The folder of this machine for what is under way; for the database and all files too, unless they are elsewhere.
+    /// Local folder for work in progress, and for the database and all files unless they are elsewhere.
     #[arg(
         long,
         global = true,
@@ -94,7 +94,8 @@ pub struct Storage {
         value_name = "DIR"
     )]
     pub data: PathBuf,
-    /// The database, made if absent: sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME; a file in the data folder unless given.
+    /// Database, created if absent: sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME. Default: a file in the
+    /// data folder.
     #[arg(
         long,
         global = true,
@@ -103,18 +104,19 @@ pub struct Storage {
         value_name = "URL"
     )]
     pub database: Option<Database>,
-    /// The files: a folder, or s3://BUCKET/PREFIX with the usual AWS_* variables; in the data folder unless given.
+    /// Stored files: a folder, or s3://BUCKET/PREFIX with the usual AWS_* variables. Default: the data
+    /// folder.
     #[arg(long, global = true, env = "FLOCKREEL_STORE", value_name = "DIR|URL")]
     pub store: Option<Files>,
 }
 
-/// Who runs the jobs of a process.
+/// The workers of a process.
 #[derive(Args, Clone, Debug)]
 pub struct Crew {
-    /// How many jobs run at once; the cores are shared among them.
+    /// Number of jobs that run at once. They share the processor cores.
     #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
     pub workers: NonZeroUsize,
-    /// How long one job may take, seconds; then it fails with `time_limit`.
+    /// Time limit of one job, seconds. A job that exceeds it fails with `time_limit`.
     #[arg(
         long,
         env = "FLOCKREEL_JOB_TIME_S",
@@ -124,85 +126,86 @@ pub struct Crew {
     pub job_time_s: u64,
 }
 
-/// How a process is watched from outside.
+/// Monitoring of a process.
 #[derive(Args, Clone, Debug)]
 pub struct Watch {
-    /// Another address, where /metrics alone is answered, to whoever reaches it.
+    /// Second address, which serves only /metrics and needs no token.
     #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
     pub metrics_bind: Option<SocketAddr>,
 }
 
-/// Where the rows are.
+/// Location of the database.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Database {
-    /// In a file that the processes of one machine share.
+    /// A file, shared by the processes of one machine.
     Sqlite(PathBuf),
-    /// On a server that any number of machines share, by its address.
+    /// A PostgreSQL server, given by its URL, shared by any number of machines.
     Postgres(String),
 }
 
-/// Where the files are.
+/// Location of the stored files.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Files {
-    /// In a folder of this machine.
+    /// A local folder.
     Folder(PathBuf),
-    /// In a bucket of an S3-compatible store.
+    /// A bucket of an S3-compatible object store.
     Bucket {
-        /// The bucket.
+        /// Name of the bucket.
         name: String,
-        /// What the names of all our files in it begin with; may be empty.
+        /// Prefix of the names of all our objects in it; may be empty.
         prefix: String,
     },
 }
 
-/// Who needs a token (RELIABILITY.md, S6).
+/// Which requests need a token (docs/explanation/promises.md, "Owners are isolated").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Auth {
-    /// Whoever comes from beyond this machine.
+    /// All, if the server listens on an address other than loopback; otherwise none.
     Auto,
-    /// Everybody.
+    /// All.
     Required,
 }
 
 impl Config {
-    /// The usual reserve on the disk.
+    /// Default disk reserve, bytes. Free choice.
     pub const DISK_RESERVE_BYTES: u64 = 1 << 30;
 
-    /// What of a reserve jobs leave free, bytes: uploads leave all of it, results may use the rest.
+    /// Returns the part of the reserve that jobs leave free, bytes. Uploads leave all of the reserve; results
+    /// of jobs may use the rest.
     pub fn least_room_bytes(reserve_bytes: u64) -> u64 {
         reserve_bytes / 8
     }
 
-    /// Whether a request without a token is refused.
+    /// Returns whether requests without a token are refused.
     pub fn demands_tokens(&self) -> bool {
         self.auth == Auth::Required || !self.bind.ip().is_loopback()
     }
 }
 
 impl Crew {
-    /// The usual budget of a job: an hour of footage takes a few hours on a small machine.
+    /// Default time limit of a job, seconds. An hour of footage takes a few hours on a small machine.
     pub const JOB_TIME_S: u64 = 6 * 3600;
 
-    /// Threads that one worker may use, at least 1: the cores divided by the workers.
+    /// Returns the number of threads that one worker may use: cores divided by workers, at least 1.
     pub fn threads_per_worker(&self) -> usize {
         threads_per_worker(self.workers)
     }
 }
 
-/// Threads that each of so many workers may use, at least 1.
+/// Returns the number of threads that each of `workers` workers may use, at least 1.
 pub fn threads_per_worker(workers: NonZeroUsize) -> usize {
     (cores() / workers).max(1)
 }
 
 impl Storage {
-    /// Where the rows are.
+    /// Returns the location of the database.
     pub fn database(&self) -> Database {
         let in_folder = || Database::Sqlite(self.data.join("flockreel.db"));
         self.database.clone().unwrap_or_else(in_folder)
     }
 }
 
-/// All in one folder.
+/// Keeps the database and all files in one folder.
 impl<P: AsRef<Path> + ?Sized> From<&P> for Storage {
     fn from(data: &P) -> Storage {
         Storage {
@@ -250,7 +253,7 @@ impl FromStr for Files {
     }
 }
 
-/// Without what may be a password.
+/// Hides the URL of a server, which may hold a password.
 impl std::fmt::Debug for Database {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -260,12 +263,13 @@ impl std::fmt::Debug for Database {
     }
 }
 
-/// One worker for every two cores: an analysis keeps two busy (decoder and tracking).
+/// Returns the default number of workers: one for every two cores, at least 1. An analysis keeps two cores
+/// busy (decoder and tracking).
 pub fn default_workers() -> NonZeroUsize {
     NonZeroUsize::new(cores() / 2).unwrap_or(NonZeroUsize::MIN)
 }
 
-/// Cores that this process may use, at least 1.
+/// Returns the number of cores that this process may use, at least 1.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }

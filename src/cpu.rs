@@ -1,11 +1,10 @@
-//! Which vector instructions to use: what this machine has, or what a setting forces.
-//!
-//! Kernels take the level as an argument; no global state decides (STYLE.md, habit 9).
+//! Vector instruction sets: detection on this machine. Kernels take the level as an argument, so that tests
+//! can choose it; no global state decides.
 
-/// A set of vector instructions for which kernels exist, from the plainest up.
+/// A vector instruction set for which kernels exist, in increasing order of capability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// Plain Rust: the definition of every kernel.
+    /// Plain Rust. It defines the result of every kernel.
     Scalar,
     /// x86-64 with AVX2.
     Avx2,
@@ -16,12 +15,12 @@ pub enum Level {
 }
 
 impl Level {
-    /// The best level that this machine has.
+    /// Returns the most capable level of this machine.
     pub fn detect() -> Level {
         *Level::available().last().unwrap_or(&Level::Scalar)
     }
 
-    /// Every level that this machine has, the plainest first.
+    /// Returns all levels of this machine, the least capable first.
     pub fn available() -> Vec<Level> {
         #[cfg_attr(
             not(any(target_arch = "x86_64", target_arch = "aarch64")),
@@ -42,7 +41,7 @@ impl Level {
         levels
     }
 
-    /// The name used in settings and logs.
+    /// Returns the name used in reports.
     pub fn name(self) -> &'static str {
         match self {
             Level::Scalar => "scalar",

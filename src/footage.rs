@@ -1,46 +1,48 @@
-//! What the algorithms ask of a video. Implemented by `media` (an ffmpeg child), by the virtual
-//! camera of `fish`, and by small pictures in tests.
+//! The interface through which algorithms read a video. `media` implements it with ffmpeg, `fish` with its
+//! virtual camera, and tests with small generated pictures.
 
 use std::ops::{ControlFlow, Range};
 
 use crate::code::Code;
 use crate::raster::{ColorSpec, Frame, GivenMask};
 
-/// What is known of a footage before its frames are read.
+/// Properties of a video that are known before its frames are read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootageFormat {
-    /// Columns, in square pixels.
+    /// Number of columns, in square pixels.
     pub width: u32,
-    /// Rows, in square pixels.
+    /// Number of rows, in square pixels.
     pub height: u32,
-    /// The constant rate at which frames are given, > 0.
+    /// Constant frame rate of the stream, frames per second, > 0.
     pub fps: f64,
-    /// How many frames there seem to be; the stream itself decides.
+    /// Estimated number of frames. The stream may hold more or fewer.
     pub n_frames_hint: usize,
-    /// How YUV values are to be read.
+    /// Conversion of YUV values to RGB.
     pub color: ColorSpec,
 }
 
 /// A video that can be read from its start any number of times.
 pub trait FrameSource: Send + Sync {
-    /// Size, rate and colors: the same for every frame.
+    /// Returns size, rate and colors, which hold for every frame.
     fn format(&self) -> FootageFormat;
 
     /// Starts reading at the first frame.
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError>;
 
-    /// Shows `n` frames spread evenly over the video, in order: the k-th is the one in the middle of
-    /// the k-th of `n` equal parts. Fewer when the video is shorter than it seemed; stops early when
-    /// `visit` breaks. A source that can skip frames faster than it reads them does.
+    /// Calls `visit` with `n` frames spread evenly over the video, in order. The k-th is the middle frame of
+    /// the k-th of `n` equal parts (see [`spread_idx`]).
+    ///
+    /// Yields fewer frames if the video is shorter than estimated, and stops early when `visit` breaks.
+    /// Sources that can skip frames faster than they read them override this method.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         spread_by_reading(self, n, visit)
     }
 }
 
-/// Looks at a frame and says whether to go on.
+/// Receives a frame and returns whether to continue.
 pub type Visit<'a> = dyn FnMut(&Frame) -> ControlFlow<()> + 'a;
 
-/// [`FrameSource::spread`] by reading every frame up to the last one wanted.
+/// Implements [`FrameSource::spread`] by reading every frame up to the last one needed.
 pub fn spread_by_reading<S: FrameSource + ?Sized>(
     source: &S,
     n: usize,
@@ -61,8 +63,8 @@ pub fn spread_by_reading<S: FrameSource + ?Sized>(
     Ok(())
 }
 
-/// The middles of `n` equal parts of `n_frames` frames, rising and different; all frames when there
-/// are fewer than `n`.
+/// Returns the middle indices of `n` equal parts of `n_frames` frames, strictly increasing. Returns all
+/// indices if there are fewer than `n` frames.
 ///
 /// ```
 /// assert_eq!(flockreel::footage::spread_idx(10, 2), [2, 7]);
@@ -73,21 +75,22 @@ pub fn spread_idx(n_frames: usize, n: usize) -> Vec<usize> {
     (0..n).map(|k| (2 * k + 1) * n_frames / (2 * n)).collect()
 }
 
-/// A part of a video, as a video of its own: its frames and times are counted from where it begins.
+/// A part of a video, as a video of its own: its frames and times count from the start of the part.
 pub struct Part<'a> {
     source: &'a dyn FrameSource,
-    /// The frames of the source that it holds.
+    /// Frame indices in the source.
     frames: Range<usize>,
 }
 
 impl<'a> Part<'a> {
-    /// The frames from `from_s` up to `to_s`, seconds from the first frame of `source`; all where neither is set.
+    /// Selects the frames from `from_s` up to `to_s`, seconds from the first frame of `source`. `None` leaves
+    /// that end open.
     pub fn of(source: &'a dyn FrameSource, from_s: Option<f64>, to_s: Option<f64>) -> Part<'a> {
         let format = source.format();
-        // Saturates: an end beyond every film is the film's end.
+        // The cast saturates: a time beyond the end of the video selects its end.
         let idx = |time_s: f64| (time_s * format.fps).round() as usize;
         let first = from_s.map_or(0, idx);
-        // Without an end the stream decides, which may be longer than it seemed.
+        // Without `to_s` the stream decides: it may be longer than estimated.
         let end = to_s.map_or(usize::MAX, idx);
         Part {
             source,
@@ -123,12 +126,12 @@ impl FrameSource for Part<'_> {
     }
 }
 
-/// One reading of a part.
+/// A reader of one part.
 struct PartStream<'a> {
     stream: Box<dyn FrameStream + 'a>,
     frames: Range<usize>,
     n_read: usize,
-    /// Time of its first frame in the source.
+    /// Time of the first frame of the part in the source, seconds.
     start_s: f64,
 }
 
@@ -150,18 +153,18 @@ impl FrameStream for PartStream<'_> {
     }
 }
 
-/// A video each frame of which comes with the mask that another video has for it: its luma says how much of each pixel
-/// is the animal.
+/// A video combined with a second video of masks, one for each frame. The luma of the mask is the alpha of
+/// the animal in each pixel.
 pub struct Masked<'a> {
     video: &'a dyn FrameSource,
     masks: &'a dyn FrameSource,
     is_mixed: bool,
 }
 
-/// A video and its masks are of different sizes or lengths.
+/// A video and its masks differ in picture size or number of frames.
 #[derive(Debug, thiserror::Error)]
 pub enum MasksDiffer {
-    /// Their pictures are of different sizes.
+    /// The picture sizes differ.
     #[error("the masks are of {masks:?} pixels, the footage of {footage:?}")]
     Size {
         /// Width and height of the masks.
@@ -172,13 +175,13 @@ pub enum MasksDiffer {
     /// There are fewer masks than frames.
     #[error("there are {n_masks} masks for more frames: one for each frame is needed")]
     TooFew {
-        /// How many masks there are.
+        /// Number of masks.
         n_masks: usize,
     },
     /// There are more masks than frames.
     #[error("there are more masks than the {n_frames} frames: one for each frame is needed")]
     TooMany {
-        /// How many frames there are.
+        /// Number of frames.
         n_frames: usize,
     },
 }
@@ -193,7 +196,7 @@ impl From<MasksDiffer> for SourceError {
 }
 
 impl<'a> Masked<'a> {
-    /// `is_mixed`: see [`GivenMask`]. Fails where the sizes of the pictures differ.
+    /// Combines a video with its masks; [`GivenMask`] explains `is_mixed`. Fails if the picture sizes differ.
     pub fn of(
         video: &'a dyn FrameSource,
         masks: &'a dyn FrameSource,
@@ -231,13 +234,13 @@ impl FrameSource for Masked<'_> {
         }))
     }
 
-    // A decoder that skips frames may give others of the masks than of the video.
+    // A decoder that skips frames may choose different frames of the masks than of the video.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         spread_by_reading(self, n, visit)
     }
 }
 
-/// One reading of a video with its masks.
+/// A reader of a video with its masks.
 struct MaskedStream<'a> {
     video: Box<dyn FrameStream + 'a>,
     masks: Box<dyn FrameStream + 'a>,
@@ -278,20 +281,20 @@ impl FrameStream for MaskedStream<'_> {
     }
 }
 
-/// The frames of a video, in order, at a constant rate.
+/// A reader of the frames of a video, in order, at a constant rate.
 pub trait FrameStream {
-    /// Reads the next frame into `frame` (made the right size) and returns the true time, seconds
-    /// from the first frame, of the picture taken; `None` after the last.
+    /// Reads the next frame into `frame`, which is resized as needed. Returns the true time of that frame in
+    /// the file, seconds from the first frame; `None` after the last.
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError>;
 }
 
-/// Reading a video failed: the code for people's programs, the cause for the log.
+/// A failure to read a video: a stable code for the client, a cause for the log.
 #[derive(Debug, thiserror::Error)]
 #[error("{cause}")]
 pub struct SourceError {
     /// The stable code.
     pub code: Code,
-    /// What went wrong, with its own sources.
+    /// The underlying error.
     #[source]
     pub cause: Box<dyn std::error::Error + Send + Sync>,
 }

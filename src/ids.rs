@@ -1,4 +1,4 @@
-//! Identifiers of stored things: UUIDv7, one type each, so that none is taken for another.
+//! Identifiers of stored objects: UUIDv7, each kind with a type of its own so that kinds cannot be mixed up.
 
 use serde::{Deserialize, Serialize};
 use uuid::Uuid;
@@ -28,12 +28,12 @@ macro_rules! id {
 id! {
     /// An uploaded video.
     FootageId
-    /// What one analysis yields.
+    /// The result of one analysis.
     LibraryId
-    /// One simulated, planned and rendered group.
+    /// One simulated, planned and rendered flock.
     FlockId
     /// One virtual fish.
     FishId
-    /// One unit of queued work.
+    /// One job of the queue.
     JobId
 }

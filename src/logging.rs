@@ -1,6 +1,6 @@
-//! Log lines on stderr that never cost an answer. Lines go through a bounded queue to one thread, and only that
-//! thread waits for stderr. Lines that find the queue full, or a stderr that takes no more bytes, are dropped and
-//! counted: a dead or stalled reader of stderr must not stop the service.
+//! Log lines on stderr, written without ever delaying a response. A bounded queue passes the lines to one
+//! thread, and only that thread waits for stderr. Lines are dropped and counted if the queue is full or
+//! stderr takes no more bytes. A dead or stalled reader of stderr must not stop the service.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::{self, ErrorKind, IsTerminal, Write};
@@ -14,31 +14,31 @@ use rustix::io::Errno;
 use tracing_appender::non_blocking::{NonBlocking, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
 
-/// Lines that wait for stderr at most: a few megabytes, seconds of a busy service.
+/// Maximum number of lines that wait for stderr: a few megabytes, or seconds of a busy service.
 const MAX_QUEUED_LINES: usize = 8192;
-/// The largest piece that a pipe with free room takes without blocking, bytes (PIPE_BUF of Linux).
+/// Largest write that a pipe with free space takes without blocking, bytes (PIPE_BUF of Linux).
 const PIECE_BYTES: usize = 4096;
-/// How often the thread that waits for stderr looks whether the process ends. Below the 100 ms that
-/// `WorkerGuard` waits for a place in a full queue.
+/// Interval at which the writer thread checks whether the process is ending. It must be less than the 100 ms
+/// that `WorkerGuard` waits for space in a full queue.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long a process that ends waits for a stderr that takes no bytes.
+/// Time that an ending process waits for a stderr that takes no bytes. Free choice.
 const LAST_WAIT: Duration = Duration::from_millis(50);
 
 static QUEUE: OnceLock<NonBlocking> = OnceLock::new();
-/// Lines that stderr did not take.
+/// Number of lines that stderr did not take.
 static N_UNWRITTEN: AtomicU64 = AtomicU64::new(0);
 static ENDS: AtomicBool = AtomicBool::new(false);
 
-/// How log lines are written.
+/// Format of log lines.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum LogFormat {
-    /// Lines for people.
+    /// Plain text for people.
     Text,
-    /// A JSON object a line, with the ids of the request and the job that it belongs to.
+    /// One JSON object per line, with the ids of the request and the job.
     Json,
 }
 
-/// The running log. Writes the queued lines when dropped, within about a second.
+/// The running log. Dropping it writes the queued lines, within about a second.
 #[must_use]
 #[derive(Debug)]
 pub struct Log {
@@ -51,7 +51,7 @@ impl Drop for Log {
     }
 }
 
-/// Starts the log of the process, once. `filter` is in the syntax of `tracing_subscriber::EnvFilter`.
+/// Starts the log of the process. Call it once. `filter` has the syntax of `tracing_subscriber::EnvFilter`.
 pub fn start(filter: &str, format: LogFormat) -> Log {
     let (queue, writer) = NonBlockingBuilder::default()
         .lossy(true)
@@ -76,8 +76,8 @@ pub fn start(filter: &str, format: LogFormat) -> Log {
     Log { _writer: writer }
 }
 
-/// Has panics logged as other events are. The default hook writes to stderr itself, and a stalled reader would
-/// block the panicking thread.
+/// Logs panics like other events. The default hook writes to stderr directly, so a stalled reader would block
+/// the panicking thread.
 pub fn log_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let message = panic.payload_as_str().unwrap_or("no message");
@@ -90,8 +90,8 @@ pub fn log_panics() {
     }));
 }
 
-/// Writes one line to stderr, in order with the log lines once the log has started. Failure is ignored: there is
-/// nowhere left to report it.
+/// Writes one line to stderr, in order with the log lines once the log has started. Errors are ignored,
+/// because there is nowhere left to report them.
 pub fn say(line: &str) {
     let line = format!("{line}\n");
     match QUEUE.get() {
@@ -108,16 +108,16 @@ pub fn n_lost_lines() -> u64 {
     unqueued as u64 + N_UNWRITTEN.load(Ordering::Relaxed)
 }
 
-/// Stderr for the thread that may wait for it. It goes without the lock of the standard library, which a blocked
-/// write would hold against all other threads.
+/// Stderr for the writer thread, which may block. It bypasses the lock of the standard library, because a
+/// blocked write would hold that lock against all other threads.
 struct Stderr {
     /// Whether stderr took nothing since the process began to end.
     is_stuck: bool,
 }
 
 impl Stderr {
-    /// Returns once a piece can be written without blocking, or cannot be written at all. Fails with
-    /// [`ErrorKind::TimedOut`] if the process ends and stderr takes nothing.
+    /// Waits until a write would not block, or until it would fail. Returns [`ErrorKind::TimedOut`] if the
+    /// process ends and stderr takes nothing.
     fn wait(&mut self) -> io::Result<()> {
         let (stderr, mut end) = (io::stderr(), None);
         let look_ns = match self.is_stuck {

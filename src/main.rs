@@ -1,4 +1,5 @@
-//! The program: arguments, logging, one command, exit code (DESIGN.md, Command line).
+//! The program: passes the command-line arguments to `cli` and returns the exit code
+//! (docs/reference/command-line.md).
 
 use std::process::ExitCode;
 

@@ -1,12 +1,13 @@
-//! Order statistics: what a tenth of wrong values cannot move.
+//! Order statistics: percentile and median, which a small share of outliers barely moves.
 
-/// The value below which a share (0..=1) of the values lies: the nearest rank; `None` of nothing.
+/// Returns the value at rank `share` (0..=1) of the values by the nearest-rank method; `None` if there are
+/// none. Reorders `values`.
 pub fn percentile(values: &mut [f64], share: f64) -> Option<f64> {
     let rank = (share * values.len().saturating_sub(1) as f64).round() as usize;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
 }
 
-/// The middle value; `None` of nothing.
+/// Returns the median; `None` if there are no values.
 pub fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     percentile(&mut values.collect::<Vec<f64>>(), 0.5)
 }

@@ -1,24 +1,25 @@
-//! How far a computation is, and whether it should go on. Algorithms report, doors listen.
+//! Progress and cancellation of a computation. Algorithms report through this trait; jobs and commands
+//! implement it.
 
-/// Listens to a computation. Called often and from any thread: implementations must be cheap.
+/// Receives progress reports. Called often and from any thread, so implementations must be cheap.
 pub trait Progress: Sync {
-    /// The stage under way (a plain word such as `tracking`) and how much of that stage is done, 0..=1.
+    /// Reports the current stage (a plain word such as `tracking`) and the share of that stage done, 0..=1.
     fn report(&self, stage: &'static str, fraction: f64);
 
-    /// True once the computation should stop at the next convenient point.
+    /// Returns true once the computation should stop at the next convenient point.
     fn cancelled(&self) -> bool {
         false
     }
 }
 
-/// Nobody listens, nobody cancels.
+/// Ignores all reports and never cancels.
 pub struct Silent;
 
 impl Progress for Silent {
     fn report(&self, _stage: &'static str, _fraction: f64) {}
 }
 
-/// Nobody listens to a trial run, but whoever may cancel the computation cancels it.
+/// Ignores the reports of a trial run but passes on cancellation.
 pub struct Quiet<'a>(pub &'a dyn Progress);
 
 impl Progress for Quiet<'_> {

@@ -1,11 +1,12 @@
-//! Counter-based random numbers: (seed, id, step) -> number, with no state to share or to order, so
-//! that the same bytes come out for any number of threads (ALGORITHMS.md 7).
+//! Counter-based random numbers: each number is a hash of (seed, key words such as id and step).
 //!
-//! The mixing function is SplitMix64's finaliser (Steele, Lea & Flood 2014), applied once per word.
+//! There is no generator state, so results do not depend on the order of calls or on the number of threads
+//! (docs/explanation/algorithms.md, "Boids"). The mixing function is the finalizer of SplitMix64 (Steele, Lea
+//! & Flood 2014), applied once for each word.
 
 use std::f64::consts::TAU;
 
-/// 64 random bits that depend on the seed and on every word of the key.
+/// Returns 64 random bits that depend on the seed and on every word of the key.
 pub fn bits(seed: u64, key: &[u64]) -> u64 {
     key.iter()
         .fold(mix(seed ^ 0x9e37_79b9_7f4a_7c15), |state, &word| {
@@ -13,12 +14,12 @@ pub fn bits(seed: u64, key: &[u64]) -> u64 {
         })
 }
 
-/// A number in [0, 1).
+/// Returns a uniform random number in [0, 1).
 pub fn unit(seed: u64, key: &[u64]) -> f64 {
     (bits(seed, key) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// A number of the standard normal distribution (Box and Muller's cosine half).
+/// Returns a random number of the standard normal distribution (Box-Muller transform, cosine branch).
 pub fn normal(seed: u64, key: &[u64]) -> f64 {
     let word = bits(seed, key);
     let radius_from = ((word >> 11) as f64 + 0.5) / (1u64 << 53) as f64;
@@ -26,23 +27,25 @@ pub fn normal(seed: u64, key: &[u64]) -> f64 {
     libm::sqrt(-2.0 * libm::log(radius_from)) * libm::cos(TAU * angle_from)
 }
 
-/// The numbers whose keys begin alike, that beginning worked out.
+/// A prepared sequence of random numbers: the hash of the seed and of a key prefix that they share.
 #[derive(Clone, Copy, Debug)]
 pub struct Row(u64);
 
-/// The numbers whose keys are `key` and one word more.
+/// Returns the sequence of random numbers whose keys are `key` followed by one more word.
 pub fn row(seed: u64, key: &[u64]) -> Row {
     Row(bits(seed, key))
 }
 
 impl Row {
-    /// As `bits` with that word behind the key.
+    /// Returns the same bits as the function `bits` with `word` appended to the key.
     pub fn bits(self, word: u64) -> u64 {
         mix(self.0 ^ mix(word.wrapping_add(0x9e37_79b9_7f4a_7c15)))
     }
 
-    /// A number of mean 0 and variance 1, at most 3.5 either way: the sum of four even ones (Irwin and Hall). For
-    /// what adds up many of them, which is then as normal as can be, at a tenth of the time of `normal`.
+    /// Returns an approximately normal number: mean 0, variance 1, at most 3.5 in magnitude.
+    ///
+    /// The value is the sum of four uniform numbers (Irwin-Hall distribution). It takes a tenth of the time
+    /// of `normal`. Use it where many numbers are summed: the sum is then normal (central limit theorem).
     pub fn bell(self, word: u64) -> f64 {
         let bits = self.bits(word);
         let sum: u64 = (0..4).map(|k| bits >> (16 * k) & 0xffff).sum();

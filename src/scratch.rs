@@ -1,8 +1,7 @@
-//! Bytes put aside while something is computed: what a long footage has too much of to hold in memory,
-//! mattes above all (ALGORITHMS.md 5, at any size).
+//! Temporary storage for intermediate data that a long footage makes too large for memory, above all mattes.
 //!
-//! The algorithms know only that they can put bytes aside and have them back; `store` has the one that
-//! goes to a file.
+//! The algorithms know only the trait [`Scratch`]. `store` implements it with a file; [`InMemory`] serves
+//! tests and small data.
 
 use std::fmt::Debug;
 use std::io;
@@ -10,24 +9,24 @@ use std::sync::{PoisonError, RwLock};
 
 use crate::code::Code;
 
-/// A place where bytes are put aside, by any thread.
+/// A temporary storage for bytes. It may be used from any thread.
 pub trait Scratch: Debug + Send + Sync {
-    /// Puts bytes aside and says where.
+    /// Appends bytes and returns their offset.
     fn put(&self, bytes: &[u8]) -> Result<u64, Full>;
 
-    /// Fills `bytes` with those that lie at `at`.
+    /// Reads the bytes at offset `at` into `bytes`.
     ///
-    /// Panics when they cannot be had back: what the system took and lost cannot be gone on from.
+    /// Panics if reading fails: the computation cannot continue without the data.
     fn get(&self, at: u64, bytes: &mut [u8]);
 }
 
-/// No more bytes can be put aside.
+/// The storage cannot take more bytes.
 #[derive(Debug, thiserror::Error)]
 #[error("the animal's pictures could not be put aside: {0}")]
 pub struct Full(#[from] io::Error);
 
 impl Full {
-    /// The stable code.
+    /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self.0.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Code::StorageFull,
@@ -36,7 +35,7 @@ impl Full {
     }
 }
 
-/// All in memory: for what is known to be small.
+/// Keeps all bytes in memory, for data known to be small.
 #[derive(Debug, Default)]
 pub struct InMemory(RwLock<Vec<u8>>);
 

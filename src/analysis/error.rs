@@ -1,4 +1,4 @@
-//! Why an analysis ends without a library.
+//! Reasons for which an analysis ends without a library.
 
 use super::params::AnimalAtParam;
 use crate::code::Code;
@@ -6,109 +6,109 @@ use crate::footage::SourceError;
 use crate::geometry::Rect;
 use crate::scratch::Full;
 
-/// The reasons, one variant each (ALGORITHMS.md 2.9).
+/// A reason for which the analysis fails (docs/explanation/algorithms.md, "Refused footage").
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The footage could not be read.
+    /// The footage cannot be read.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// Fewer frames than a library needs.
+    /// The footage has too few frames.
     #[error("there are {n_frames} frames to measure, at least {least} are needed")]
     TooFewFrames {
-        /// Frames found.
+        /// Number of frames found.
         n_frames: usize,
-        /// Frames needed.
+        /// Minimum number of frames.
         least: usize,
     },
-    /// The given background is of another size.
+    /// The given background differs in size from the footage.
     #[error("the background image is {found:?} pixels, the footage {wanted:?}")]
     BackgroundSizeDiffers {
-        /// Size of the image.
+        /// Width and height of the background, pixels.
         found: [u32; 2],
-        /// Size of the footage.
+        /// Width and height of the footage, pixels.
         wanted: [u32; 2],
     },
-    /// Nothing that moves is where the animal was said to be.
+    /// Nothing moves at the point that `animal_at` gives.
     #[error(
         "nothing that moves is at {},{} in frame {}",
         .0.point[0], .0.point[1], .0.frame
     )]
     NothingAtPoint(AnimalAtParam),
-    /// The masks that came with the footage show no animal.
+    /// The masks uploaded with the footage show no animal.
     #[error(
         "the masks show no animal: none has a white place of {} pixels",
         super::subject::LEAST_AREA_PX
     )]
     MasksEmpty,
-    /// No component large enough in enough frames.
+    /// No component is large enough in enough frames.
     #[error("nothing moves before the background")]
     NothingMoves,
-    /// Much of the picture changes all the time.
+    /// Much of the image changes throughout the footage.
     #[error("the background moves throughout the film, from {at_s:.1} s on")]
     BackgroundNotStatic {
-        /// When it begins, seconds.
+        /// Start of the change, seconds.
         at_s: f64,
-        /// What moved then besides the animal, where it is known, pixels.
+        /// Box around the changes besides the animal, pixels; `None` when unknown.
         box_px: Option<Rect>,
     },
-    /// The camera stands at no place long enough.
+    /// The camera never stays in one position long enough.
     #[error("the camera moves from {at_s:.1} s on")]
     CameraMoves {
-        /// When it begins, seconds.
+        /// Start of the motion, seconds.
         at_s: f64,
     },
-    /// The light changes all the time.
+    /// The light changes throughout the footage.
     #[error("the light keeps changing from {at_s:.1} s on")]
     LightChanges {
-        /// When it begins, seconds.
+        /// Start of the change, seconds.
         at_s: f64,
     },
-    /// The film shows several scenes, none of them long enough.
+    /// The footage shows several scenes, none of them long enough.
     #[error("the film cuts to another scene at {at_s:.1} s")]
     SceneChanges {
-        /// When the first one ends, seconds.
+        /// End of the first scene, seconds.
         at_s: f64,
     },
-    /// The animal leaves too little of the scene.
+    /// The animal covers too much of the image.
     #[error("the animal covers {:.0} % of the picture, at most 35 % can be measured", 100.0 * share)]
     AnimalTooLarge {
-        /// Share of the picture, 0..=1.
+        /// Share of the image that the animal covers, 0..=1.
         share: f64,
-        /// A frame in which it is as large.
+        /// A frame in which the animal covers that share.
         frame: usize,
-        /// Where it is in that frame, pixels.
+        /// Box around the animal in that frame, pixels.
         box_px: Rect,
     },
-    /// Two components of comparable area, each persistent.
+    /// Two components of similar area persist through the footage.
     #[error(
         "more than one animal moves in the footage: in frame {frame} one is at {} and another at {}",
         center(&boxes_px[0]), center(&boxes_px[1])
     )]
     SeveralAnimals {
-        /// A frame that shows two.
+        /// A frame that shows both.
         frame: usize,
-        /// Where they are in that frame, pixels.
+        /// Boxes around the two in that frame, pixels.
         boxes_px: [Rect; 2],
     },
-    /// The animal's pictures found no room.
+    /// The temporary storage for the mattes is full.
     #[error(transparent)]
     Full(#[from] Full),
-    /// Somebody cancelled.
+    /// The analysis was cancelled.
     #[error("the analysis was cancelled")]
     Cancelled,
 }
 
-/// Where a film shows why it was refused.
+/// The frames and boxes that show why a footage was refused.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
-    /// The frame that shows it; or one before a change and one after it. They rise.
+    /// Frame numbers, ascending: one frame that shows the reason, or one before a change and one at it.
     pub frames: Vec<usize>,
-    /// What to look at in the last of them, pixels.
+    /// Boxes to look at in the last of the frames, pixels.
     pub boxes_px: Vec<Rect>,
 }
 
 impl Error {
-    /// Where a film of `fps` frames a second shows the reason; `None` where no frame does.
+    /// Returns the evidence at a frame rate of `fps`, or `None` if no frame shows the reason.
     pub fn evidence(&self, fps: f64) -> Option<Evidence> {
         let at = |at_s: f64| (at_s * fps).round() as usize;
         let (frames, boxes_px) = match *self {
@@ -131,7 +131,7 @@ impl Error {
         Some(Evidence { frames, boxes_px })
     }
 
-    /// The stable code.
+    /// Returns the stable error code.
     pub fn code(&self) -> Code {
         match self {
             Error::Source(error) => error.code,
@@ -152,7 +152,7 @@ impl Error {
     }
 }
 
-/// The middle of a box as X,Y, the way `--animal-at` takes it.
+/// Returns the center of a box as X,Y, the format of `--animal-at`.
 fn center(rect: &Rect) -> String {
     format!("{},{}", rect.x + rect.w / 2, rect.y + rect.h / 2)
 }

@@ -1,18 +1,18 @@
-//! Footage to library: what the animal did in every frame, and which moments look alike
-//! (ALGORITHMS.md 2 to 5).
+//! Turns a footage into a library: the pose of the animal in every frame, and the transitions between similar
+//! moments.
 //!
-//! [`analyze`] is the whole way of the data; the modules follow in its order.
+//! [`analyze`] runs all stages. The modules below follow its order.
 
 pub mod params;
 
 pub mod error;
 
-// What the scene looks like, where a frame differs from it, and what the animal looks like.
+// The scene, its difference from each frame, and the appearance of the animal.
 pub mod scene;
 pub mod silhouette;
 pub mod subject;
 
-// The animal followed and cut out.
+// Tracking and cutting out the animal.
 pub mod matte;
 pub mod moments;
 pub mod occluders;
@@ -21,12 +21,12 @@ pub mod shadow;
 pub mod sprite;
 pub mod track;
 
-// What it did.
+// The pose of the animal.
 pub mod direction;
 pub mod midline;
 pub mod pose;
 
-// Which moments look alike.
+// Similar moments.
 pub mod distance;
 pub mod playback;
 pub mod stats;
@@ -45,18 +45,17 @@ use crate::progress::Progress;
 use crate::raster::RgbImage;
 use crate::scratch::Scratch;
 
-/// Fewer frames than these are no footage of an animal that moves.
+/// Minimum number of frames in a footage. Free choice.
 pub const LEAST_FRAMES: usize = 16;
 
-/// Analyses a footage: the scene without the animal, the animal's pose in every frame, its sprites,
-/// and which of its moments may follow which.
+/// Analyses a footage and returns its library: background, poses, sprites, transitions.
 ///
-/// `background` is a picture of the empty scene, if there is one; the animal's pictures are put aside in
-/// `scratch`, where the library finds them. The same footage and parameters
-/// give the same library on any machine and any number of threads.
+/// `background` is an image of the empty scene, if one exists. The sprites are stored in `scratch`, where the
+/// library reads them. The result depends only on the footage, the background and the parameters, not on the
+/// machine or the number of threads.
 ///
-/// Fails with a reason of ALGORITHMS.md 2.9 when the footage cannot become a library, and with
-/// `Cancelled` soon after `progress` says so.
+/// Fails if the footage cannot become a library (docs/explanation/algorithms.md, "Refused footage"), and with
+/// `Cancelled` soon after `progress` reports it.
 pub fn analyze(
     source: &dyn FrameSource,
     background: Option<&RgbImage>,

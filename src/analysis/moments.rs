@@ -1,33 +1,36 @@
-//! Moments of a silhouette: centroid, axes, elongation, skew (N 5.3, eqs 2 to 6, corrected).
+//! Moments of a silhouette: centroid, axes, elongation and skew.
 //!
-//! The weight f(X, Y) is alpha over the silhouette alone, never the box around it: outside the
-//! animal there is only noise. Pixel centres lie at +0.5.
+//! Formulas: Nakajima et al., section 5.3, equations 2 to 6, corrected. The weight f(X, Y) is alpha. It is 0
+//! outside the silhouette, where the box contains noise. Pixel centers lie at +0.5. See
+//! docs/explanation/algorithms.md, "Pose".
 
 use crate::geometry::Rect;
 use crate::raster::Mask;
 
-/// Below this ratio of the eigenvalues no axis is meant.
+/// Least ratio of the eigenvalues for an axis; rounder silhouettes have none. Free choice.
 const ROUND: f64 = 1.05;
 
-/// What the moments of one silhouette say.
+/// Moments of one silhouette.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moments {
-    /// Sum of the weights, in pixels: M00.
+    /// Sum of the weights M00, pixels.
     pub area_px: f64,
-    /// N (2).
+    /// Centroid (Nakajima et al., equation 2), pixels of the frame.
     pub centroid_px: [f64; 2],
-    /// Second central moments over the area: xx, xy, yy, square pixels; a pixel's own 1 / 12 included.
+    /// Second central moments over the area: xx, xy, yy, square pixels. A pixel's own moment of 1 / 12 is
+    /// included.
     pub covariance_px2: [f64; 3],
-    /// The major axis, in (-pi/2, pi/2]: 0.5 atan2(2 mu11, mu20 - mu02), N (4) corrected. `None`
-    /// when the silhouette is round.
+    /// Major axis, in (-pi/2, pi/2]; `None` when the silhouette is round.
+    ///
+    /// It is 0.5 atan2(2 mu11, mu20 - mu02): Nakajima et al., equation 4, corrected.
     pub major_rad: Option<f64>,
-    /// The larger eigenvalue of the second moments over the smaller one, >= 1.
+    /// Ratio of the larger to the smaller eigenvalue of the second moments, at least 1.
     pub eigenvalue_ratio: f64,
-    /// Third standardised moment along the major axis and along the axis a quarter turn on from it.
+    /// Third standardized moment along the major axis, and along the axis a quarter turn further.
     pub skew: [f64; 2],
 }
 
-/// The moments of weights 0..=255 over a box; `None` when all are zero.
+/// Returns the moments of weights 0..=255 over a box; `None` when all are zero.
 ///
 /// ```
 /// use flockreel::analysis::moments::moments;
@@ -91,7 +94,7 @@ pub fn moments(rect: Rect, weights: &[u8]) -> Option<Moments> {
     })
 }
 
-/// How far the mask reaches along a direction, pixels; 0 for an empty mask.
+/// Returns the extent of the mask along a direction, pixels; 0 for an empty mask.
 pub fn extent_px(mask: &Mask, direction_rad: f64) -> f64 {
     let (c, s) = (libm::cos(direction_rad), libm::sin(direction_rad));
     let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -101,7 +104,7 @@ pub fn extent_px(mask: &Mask, direction_rad: f64) -> f64 {
         least = least.min(along);
         most = most.max(along);
     }
-    // From the first pixel's far side to the last one's: a pixel is |c| + |s| wide at most, 1 at least.
+    // Adds one pixel, because pixel centers were compared. On a diagonal, a pixel is up to 1.41 wide.
     if most >= least {
         most - least + 1.0
     } else {
@@ -115,7 +118,7 @@ mod tests {
 
     use super::*;
 
-    /// An ellipse of half axes 20 and 8, turned by `angle`, heavier toward +axis.
+    /// An ellipse with half axes 20 and 8, turned by `angle`, heavier toward +axis.
     fn ellipse(angle: f64) -> (Rect, Vec<u8>) {
         let rect = Rect {
             x: 100,
@@ -156,7 +159,7 @@ mod tests {
 
     #[test]
     fn skew_is_negative_where_the_thick_end_is_ahead() {
-        // The thick end holds the mass, so the long thin tail of the distribution points backward.
+        // The thick end contains the mass, so the long tail of the distribution points backward.
         let (rect, weights) = ellipse(0.0);
         assert!(moments(rect, &weights).expect("not empty").skew[0] < -0.05);
     }

@@ -1,23 +1,23 @@
-//! The playback graph: which frame may follow which, without ever running into a dead end
-//! (ALGORITHMS.md 5, playback rule and pruning; O 3.3, whose claim that patches can always be
-//! joined is false).
+//! Builds the playback graph: the successors of each frame, restricted so that playback never ends
+//! (docs/explanation/algorithms.md, "Transitions and playback"). Okabe et al., section 3.3, claim that
+//! patches can always be joined. That claim is false.
 //!
-//! States are (frame, mirror side). A frame is followed by the next one when both can be shown, and
-//! by what its jumps lead to. Clips match frame by frame, so a jump lies in their middle: the pair
-//! (i, j) with h = f div 2 lets i + h - 1 be followed by j + h, and j + h - 1 by i + h.
+//! The states are pairs of frame and mirror side. A frame is followed by the next frame if both can be shown,
+//! and by the targets of its jumps. Similar clips match frame by frame, so a jump lies in the middle of the
+//! clips. A pair (i, j) with h = f div 2 gives the jumps from i + h - 1 to j + h and from j + h - 1 to i + h.
 //!
-//! The graph looks the same from either side, so the largest strongly connected component either
-//! holds both sides of all its frames or is one of two twins over the same frames. In both cases
-//! its frames alone say all: any edge between two of them stays inside the component or its twin.
+//! The graph is symmetric under mirroring. The largest strongly connected component therefore contains both
+//! sides of all its frames, or it has a mirrored twin with the same frames. In both cases its frames describe
+//! it fully: any edge between two of them stays inside the component or its twin.
 
 use std::collections::BTreeSet;
 
 use crate::library::{Jump, Patch, Playback, Transition};
 
-/// The jumps that transitions allow, and the largest component in which playback never ends.
+/// Returns the jumps that the transitions allow, and the largest component in which playback never ends.
 ///
-/// `shown` says which frames can be shown. Of components with equally many frames the one with the
-/// smallest frame is kept; a frame that cannot come back to itself is no component.
+/// `shown` is true for each frame that can be shown. Ties between components go to the one with the smallest
+/// frame. A frame without a path back to itself is not a component.
 pub fn playback(transitions: &[Transition], shown: &[bool], clip_frames: usize) -> Playback {
     let mut jumps: Vec<Jump> = transitions
         .iter()
@@ -33,11 +33,11 @@ pub fn playback(transitions: &[Transition], shown: &[bool], clip_frames: usize) 
     Playback { jumps, component }
 }
 
-/// The maximal runs of component frames without a jump's end inside, and which may follow which.
+/// Returns the patches: maximal runs of component frames without a jump inside, each with its successors.
 ///
-/// A run ends after a frame from which a jump leads away, before a frame to which one leads, and
-/// where the component has a gap. Playback can leave a patch only at its end and enter it only at
-/// its start, so `next` says all.
+/// A run ends after a frame from which a jump leaves and before a frame at which a jump arrives. It also ends
+/// at a gap in the component. Playback leaves a patch only at its end and enters it only at its start, so
+/// `next` lists all successors.
 pub fn patches(playback: &Playback) -> Vec<Patch> {
     let leaves: BTreeSet<u32> = playback.jumps.iter().map(|jump| jump.from).collect();
     let enters: BTreeSet<u32> = playback.jumps.iter().map(|jump| jump.to).collect();
@@ -93,7 +93,7 @@ fn is_shown(shown: &[bool], frame: u32) -> bool {
     shown.get(frame as usize).copied().unwrap_or(false)
 }
 
-/// Successors of the states 2 * frame + side.
+/// Successors of the states. State 2 * frame + side is a frame on one mirror side.
 struct Graph {
     first: Vec<u32>,
     targets: Vec<u32>,
@@ -129,7 +129,7 @@ impl Graph {
     }
 }
 
-/// The frames of the strongly connected component with the most frames, rising.
+/// Returns the frames of the strongly connected component with the most frames, ascending.
 fn largest_component(graph: &Graph, n_frames: usize) -> Vec<u32> {
     let mut best: Vec<u32> = Vec::new();
     for component in strong_components(graph, 2 * n_frames as u32) {
@@ -148,7 +148,7 @@ fn largest_component(graph: &Graph, n_frames: usize) -> Vec<u32> {
     best
 }
 
-/// Every strongly connected component (Tarjan 1972), with a stack of its own in place of recursion.
+/// Returns every strongly connected component (Tarjan 1972), with an explicit stack instead of recursion.
 fn strong_components(graph: &Graph, n_states: u32) -> Vec<Vec<u32>> {
     const UNSEEN: u32 = u32::MAX;
     let mut order = vec![UNSEEN; n_states as usize];
@@ -193,7 +193,7 @@ fn strong_components(graph: &Graph, n_states: u32) -> Vec<Vec<u32>> {
     components
 }
 
-/// Takes the states from the top of the stack down to `root`.
+/// Pops the states from the top of the stack down to `root`.
 fn pop_component(stack: &mut Vec<u32>, on_stack: &mut [bool], root: u32) -> Vec<u32> {
     let at = stack.iter().rposition(|&state| state == root);
     let component = stack.split_off(at.expect("a root lies on the stack"));
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn clips_are_joined_in_their_middle() {
         let playback = playback(&[alike(2, 10, false, 7)], &[true; 20], 4);
-        // h = 2: frame 3 stands where 11 does, 4 where 12 does. Only the way back closes a loop.
+        // h = 2: frame 3 jumps to 12, and frame 11 to 4. Only the jump back closes a loop.
         assert_eq!(playback.component, (4..=11).collect::<Vec<u32>>());
         assert_eq!(playback.jumps, [jump(11, 4, 7)]);
     }
@@ -242,7 +242,7 @@ mod tests {
             &[true; 9],
             1,
         );
-        // (0, 6) gives 5 -> 0; there is no frame before 0 to leave from.
+        // The pair (0, 6) gives 5 -> 0 only: no frame comes before 0.
         assert_eq!(found.jumps, [jump(0, 5, 3), jump(4, 1, 3), jump(5, 0, 3)]);
     }
 
@@ -250,7 +250,8 @@ mod tests {
     fn frames_after_the_last_transition_and_before_the_first_are_left_out() {
         let pairs = [alike(5, 10, false, 1), alike(20, 25, false, 1)];
         let found = playback(&pairs, &[true; 30], 1);
-        // O's claim fails: from 20 on there is no way back below it. Equal loops: the earlier one.
+        // The claim of Okabe et al. fails: no path leads back from 20 to a frame below. The earlier of two
+        // equally long loops is kept.
         assert_eq!(found.component, [5, 6, 7, 8, 9]);
     }
 
@@ -278,7 +279,7 @@ mod tests {
             .into_iter()
             .map(|patch| (patch.frames, patch.next))
             .collect();
-        // Jumps: 0 -> 7, 6 -> 1, 3 -> 10, 9 -> 4; frames 1..=9 come back, 10 does not, nor does 0.
+        // Jumps: 0 -> 7, 6 -> 1, 3 -> 10, 9 -> 4. Frames 0 and 10 are not on a cycle, frames 1..=9 are.
         assert_eq!(found.component, (1..=9).collect::<Vec<u32>>());
         assert_eq!(found.jumps, [jump(6, 1, 1), jump(9, 4, 1)]);
         assert_eq!(
@@ -287,7 +288,7 @@ mod tests {
         );
     }
 
-    /// Up to 14 frames, some missing, up to 6 pairs of clips of up to 4 frames.
+    /// Generates up to 13 frames, some missing, and up to 5 pairs of clips of up to 4 frames.
     fn footage() -> impl Strategy<Value = (Vec<bool>, Vec<Transition>, usize)> {
         (2usize..14, 1usize..5).prop_flat_map(|(n, f)| {
             let pair = (0..n as u32, 0..n as u32, any::<bool>(), 1u64..9)
@@ -297,7 +298,7 @@ mod tests {
         })
     }
 
-    /// The states after (frame, side), from the definition.
+    /// Returns the successors of (frame, side), from the definition.
     fn after(state: (u32, bool), jumps: &[Jump], shown: &[bool]) -> Vec<(u32, bool)> {
         let (frame, side) = state;
         let on = is_shown(shown, frame) && is_shown(shown, frame + 1);
@@ -307,7 +308,7 @@ mod tests {
         states
     }
 
-    /// Frames of the largest set of states that all reach each other, by plain search.
+    /// Returns the frames of the largest set of mutually reachable states, by brute-force search.
     fn component_by_force(transitions: &[Transition], shown: &[bool], f: usize) -> Vec<u32> {
         let jumps: Vec<Jump> = transitions.iter().flat_map(|t| jumps_of(t, f)).collect();
         let jumps: Vec<Jump> = jumps

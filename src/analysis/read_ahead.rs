@@ -1,8 +1,8 @@
-//! Frames read ahead on a thread of their own, so that decoding and measuring go on at the same time
-//! (ALGORITHMS.md 3: the decoder is the slowest part, so it must never wait).
+//! Reads frames ahead on a separate thread, so that decoding and measuring overlap. Decoding is the slowest
+//! stage and must never wait.
 //!
-//! The ring is bounded in bytes. Reading starts before the plate is known: the first frames are there
-//! when tracking begins. Memory goes round: who has looked at a batch gives it back.
+//! The queue is bounded in bytes. Reading starts before the background is known, so the first frames are
+//! ready when tracking begins. Consumers return the memory of each batch for reuse.
 
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread;
@@ -10,37 +10,37 @@ use std::thread;
 use crate::footage::{FrameSource, SourceError};
 use crate::raster::Frame;
 
-/// Bytes of frames that may wait, about; at least two batches of one frame.
+/// Approximate size of the queue, bytes. It holds at least two batches. Free choice.
 const RING_BYTES: usize = 128 << 20;
-/// Bytes of a batch, about.
+/// Approximate size of a batch, bytes. Free choice.
 const BATCH_BYTES: usize = 4 << 20;
-/// Most frames of a batch.
+/// Largest number of frames in a batch. Free choice.
 const BATCH_FRAMES: usize = 16;
 
-/// A frame and the true time of its picture, seconds from the first frame.
+/// The true time of a frame, seconds from the first frame, and the frame.
 pub type Timed = (f64, Frame);
 
-/// The frames of a footage, a batch at a time.
+/// The frames of a footage in batches.
 pub struct Batches {
     ready: Receiver<Result<Vec<Timed>, SourceError>>,
     used: Sender<Vec<Timed>>,
 }
 
 impl Batches {
-    /// The next frames, in order, at least one; `None` after the last.
+    /// Returns the next batch, in order and not empty; `None` after the last.
     pub fn next_batch(&self) -> Result<Option<Vec<Timed>>, SourceError> {
-        // A reader that is gone has read all there is.
+        // A closed channel means that the reader has finished.
         self.ready.recv().ok().transpose()
     }
 
-    /// Gives the memory of a batch back to the reader.
+    /// Returns the memory of a batch to the reader.
     pub fn give_back(&self, batch: Vec<Timed>) {
-        // A reader that is done needs none.
+        // A finished reader needs no memory, so a failure is ignored.
         self.used.send(batch).ok();
     }
 }
 
-/// Calls `work` while a thread reads the footage from its start.
+/// Calls `work` while a separate thread reads the footage from its start.
 pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> R) -> R {
     let format = source.format();
     let n_bytes = Frame::n_bytes(format.width, format.height).max(1);
@@ -51,7 +51,7 @@ pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> 
     thread::scope(|scope| {
         scope.spawn(move || {
             if let Err(error) = read(source, n_frames, &send, &free) {
-                // Whoever does not listen any more has an error of its own.
+                // A consumer that no longer listens has its own error.
                 send.send(Err(error)).ok();
             }
         });
@@ -59,7 +59,7 @@ pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> 
     })
 }
 
-/// Reads until the footage ends or nobody wants more.
+/// Reads until the footage ends or the consumer stops.
 fn read(
     source: &dyn FrameSource,
     n_frames: usize,
@@ -93,7 +93,7 @@ mod tests {
     use crate::footage::{FootageFormat, FrameStream};
     use crate::raster::ColorSpec;
 
-    /// Frames that hold their number, then a failure if there is to be one.
+    /// Frames that contain their own number, followed by a failure if `fails` is set.
     struct Numbers {
         n_frames: u8,
         fails: bool,

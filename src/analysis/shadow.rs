@@ -1,9 +1,10 @@
-//! The shadow of an animal seen from above: how dark it is, how soft, and to which side the light casts it.
+//! Measures the shadow of an animal seen from above: darkness, blur and offset.
 //!
-//! On the floor beside the animal the background B has lost a share of its light, the same for all colors: the frame shows
-//! I = B (1 - d m), where m is the animal's alpha, shifted to the side away from the light and blurred. Shift and blur are
-//! those of a small set that explain most of B - I over many frames, and d is the least-squares solution for them:
-//! d = sum(B m (B - I)) / sum((B m)^2). Pixels that the animal has a share of say nothing about its shadow.
+//! On the floor beside the animal, the background B loses the same share of light in all colors. The frame
+//! shows I = B (1 - d m), where m is the animal's alpha, shifted away from the light and blurred. Shift and
+//! blur are the pair, of a small set, that explains most of B - I over many frames. The darkness d is the
+//! least-squares solution d = sum(B m (B - I)) / sum((B m)^2). Pixels that show the animal are left out. See
+//! docs/explanation/algorithms.md, "Shadows".
 
 use super::track::sighting::{Around, Sighting};
 use super::track::{Track, Tracked};
@@ -11,32 +12,36 @@ use crate::library::Shadow;
 use crate::order::median;
 use crate::raster::{RgbImage, RgbaImage};
 
-/// Least distance between two places of the animal that are used. A free choice.
+/// Least distance between two places of the animal that are used, body lengths. Free choice.
 const APART_BL: f64 = 0.5;
-/// Most places used; a bound on the time that the fit takes.
+/// Greatest number of places used. Free choice: it bounds the time.
 const MOST_PLACES: usize = 100;
-/// Fewest places used. At fewer a mirror image or moved bedding beside the animal could be taken for a shadow.
+/// Least number of places. With fewer, a mirror image or moved bedding could be mistaken for a shadow. Free
+/// choice.
 const LEAST_PLACES: usize = 4;
-/// Cells to a body length. Frame and background are compared by the means of square cells, since shadows are soft.
+/// Square cells per body length. Cell means suffice, because shadows are soft. Free choice.
 const CELLS_PER_BL: f64 = 32.0;
-/// The largest shift that is tried in each direction, cells.
+/// Greatest shift tried in each direction, cells. Free choice.
 const MOST_SHIFT: i32 = 8;
-/// The blurs that are tried: standard deviations of a Gaussian, cells.
+/// Blurs tried: standard deviations of a Gaussian, cells. Free choice.
 const BLURS: [f64; 4] = [1.0, 2.0, 3.0, 4.5];
-/// Cells of which the animal has a larger share, and their neighbors, are left out: they show the animal.
+/// Greatest share of a cell that the animal may cover; other cells and their neighbors are left out. Free
+/// choice.
 const CLEAR: f32 = 0.02;
-/// Cells farther from the animal than this are left out: they show other things.
+/// Greatest distance of a cell from the animal, cells; farther ones may show other things. Free choice.
 const NEAR_CELLS: usize = 8;
-/// Cells whose background has a smaller share of the brightness behind the animal are left out: they are not on the same floor.
+/// Least brightness of a cell's background, as a share of that behind the animal. Darker cells are not on the
+/// same floor. Free choice.
 const LEAST_LIGHT: f32 = 0.65;
-/// Least darkness of a shadow; less is noise or the blurred edge of the animal.
+/// Least darkness of a shadow, 0..=1. Free choice: less is noise or the blurred edge of the animal.
 const LEAST_DARKNESS: f64 = 0.05;
-/// Least share of the squared differences around the animal that the shadow explains. Of the clips in docs/FLOCKS.md the round
-/// arena has more; the others have less.
+/// Least share of the squared differences around the animal that the shadow explains. Of the clips in
+/// docs/measurements.md, only the round arena exceeds it.
 const LEAST_EXPLAINED: f64 = 0.25;
 
-/// Measures the shadow that an animal of a length casts before the main plate, whose colors are `background`; `None` where
-/// it casts none that can be told from noise.
+/// Returns the shadow of an animal of length `length_px` in front of the main background.
+///
+/// `background` is the image of that background. Returns `None` when no shadow can be told from noise.
 pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<Shadow> {
     let places = places(track, length_px);
     if places.len() < LEAST_PLACES {
@@ -59,8 +64,9 @@ pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<S
     fit.solved(cell_px / length_px)
 }
 
-/// Frames in which the animal is at places far from each other. A shadow follows the animal to all of them; a mirror image in
-/// a wall and moved bedding do not.
+/// Returns frames in which the animal is at distant places.
+///
+/// A shadow follows the animal to all of them. A mirror image in a wall and moved bedding do not.
 fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Around)> {
     let mut places: Vec<(&Sighting, Around)> = Vec::new();
     for seen in track.frames.iter().filter_map(Tracked::before_main_plate) {
@@ -79,7 +85,7 @@ fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Around)> {
     places
 }
 
-/// One frame around the animal.
+/// The surroundings of the animal in one frame.
 struct View<'a> {
     sighting: &'a Sighting,
     around: Around,
@@ -88,16 +94,17 @@ struct View<'a> {
     background: &'a RgbImage,
 }
 
-/// The same in cells, by rows.
+/// The surroundings of the animal in cells, row by row.
 #[derive(Default)]
 struct Cells {
     width: usize,
     height: usize,
-    /// The animal's share, 0 to 1.
+    /// Share of the cell that the animal covers, 0..=1.
     alpha: Vec<f32>,
-    /// How bright the background is, levels.
+    /// Mean brightness of the background, levels of 255.
     back: Vec<f32>,
-    /// How much darker the frame is, levels: by the color that lost the smallest share, for a shadow takes of all.
+    /// Loss of brightness in the frame, levels of 255. The color with the smallest loss counts, as a shadow
+    /// dims all.
     lost: Vec<f32>,
 }
 
@@ -143,8 +150,10 @@ impl View<'_> {
     }
 }
 
-/// The sums of the least-squares solutions, for every blur and shift. What a place has lost of its light, squared, is 1 in
-/// all, lest the places with a mirror image decide.
+/// Sums of the least-squares solutions for every blur and shift.
+///
+/// The sum of the squared losses is scaled to 1 for each place. Otherwise, places with a mirror image would
+/// dominate.
 struct Fit {
     sums: Vec<[f64; 2]>,
     n_places: f64,
@@ -189,7 +198,7 @@ impl Fit {
         }
     }
 
-    /// The shadow that explains most; cells are `cell_bl` body lengths wide.
+    /// Returns the shadow that explains most; cells are `cell_bl` body lengths wide.
     fn solved(&self, cell_bl: f64) -> Option<Shadow> {
         let places = BLURS
             .iter()
@@ -209,8 +218,10 @@ impl Fit {
 }
 
 impl Cells {
-    /// The cells beside the animal that show nothing of it and are not much darker than what is behind it, in columns and
-    /// rows: a dark wall shows its mirror image, which is no shadow.
+    /// Returns column and row of the cells beside the animal that show its floor.
+    ///
+    /// Cells much darker than the background behind the animal are left out: a dark wall shows a mirror
+    /// image.
     fn beside(&self) -> Vec<[i32; 2]> {
         let shows = |k: usize| self.alpha[k] > CLEAR;
         let behind = median(
@@ -232,7 +243,7 @@ impl Cells {
             .collect()
     }
 
-    /// Alpha blurred by a Gaussian.
+    /// Returns alpha after a Gaussian blur of `sigma` cells.
     fn blurred(&self, sigma: f64) -> Vec<f32> {
         let reach = (3.0 * sigma).ceil() as i32;
         let weight = |k: i32| libm::exp(-f64::from(k * k) / (2.0 * sigma * sigma)) as f32;
@@ -270,13 +281,14 @@ mod tests {
     const PAPER: u8 = 180;
     const LENGTH: u32 = 60;
 
-    /// How much of a pixel a body of 60 x 24 pixels covers whose middle is there.
+    /// Returns the share of a pixel covered by a body of 60 x 24 pixels centered at the origin.
     fn body(x: f64, y: f64) -> f64 {
         let away = libm::hypot(x / 30.0, y / 12.0);
         ((1.0 - away) * 12.0 + 0.5).clamp(0.0, 1.0)
     }
 
-    /// A dark animal at several places, and what `cast` leaves of the light at a place relative to its middle.
+    /// Returns the track of a dark animal at several places; `cast` is the share of light left around its
+    /// center.
     fn track(cast: impl Fn(f64, f64) -> f64) -> (Track, RgbImage) {
         let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
         let background = picture([300, 160], |_, _| PAPER);
@@ -346,7 +358,7 @@ mod tests {
 
     #[test]
     fn a_shadow_is_measured_as_it_was_cast() {
-        // The mean of the body over 11 x 11 pixels, 9 px to the right and 6 up.
+        // Mean of the body over 11 x 11 pixels, 9 px to the right and 6 px up.
         let soft = |x: f64, y: f64| {
             let at = |k: i32| f64::from(k);
             let all = (-5..6)
@@ -360,7 +372,7 @@ mod tests {
             (x - 0.15).abs() < 0.035 && (y + 0.1).abs() < 0.035,
             "{shadow:?}"
         );
-        // Boxes of 11 have a deviation of 3.2 px.
+        // A box of 11 has a standard deviation of 3.2 px.
         assert!((shadow.blur_bl - 3.2 / 60.0).abs() < 0.02, "{shadow:?}");
     }
 

@@ -1,4 +1,6 @@
-//! Mattes made into sprites: one size, the centroid at the middle (O 3.1; ALGORITHMS.md 5).
+//! Sprites from mattes: all of one size, with the centroid at the center (Okabe et al., section 3.1).
+//!
+//! See docs/explanation/algorithms.md, "Sprites".
 
 use std::sync::Arc;
 
@@ -7,20 +9,22 @@ use super::track::{Track, Tracked};
 use crate::library::{Matte, Poses, Sprites, View};
 use crate::order::median;
 
-/// Room around the largest silhouette.
+/// Margin added to the width and height of the largest silhouette, pixels. Free choice.
 const MARGIN_PX: f64 = 4.0;
-/// An animal of a smaller median area is too small to be looked at.
+/// Least median area of an animal for sprites, pixels. Free choice.
 const LEAST_AREA_PX: f64 = 24.0;
-/// Sides are multiples of this.
+/// The sides of a sprite are multiples of this, pixels. Free choice.
 const MULTIPLE: u32 = 8;
 
-/// Sprites of one height: never enlarged by more, nor reduced by more.
+/// Smallest and greatest scale of a sprite. Free choice.
 const SCALES: [f64; 2] = [0.25, 1.5];
-/// A height is the median over so much time: fins open and close.
+/// Span of the running median of the height, seconds: fins open and close. Free choice.
 const HEIGHT_SPAN_S: f64 = 0.5;
 
-/// The size of every frame's sprite relative to the frame at which the animal has its median height; by its depth
-/// where that was measured. To 5 decimals, as files hold them.
+/// Returns each frame's scale, relative to the frame with the animal's median height, rounded to 5 decimals.
+///
+/// Where depths were measured, the apparent depth decides instead of the height. Frames without a value get
+/// 1.
 pub fn scales(poses: &Poses) -> Vec<f64> {
     let frames = &poses.frames;
     let reach = (HEIGHT_SPAN_S * poses.fps / 2.0).round() as usize;
@@ -32,7 +36,7 @@ pub fn scales(poses: &Poses) -> Vec<f64> {
         let z_m = frames[frame].position_m?[2];
         Some(poses.camera?.apparent_from_true_depth_m(z_m))
     };
-    // What grows as the animal gets smaller in the picture.
+    // A quantity that grows as the animal appears smaller.
     let is_deep = frames.iter().any(|pose| pose.position_m.is_some());
     let farness: Vec<Option<f64>> = (0..frames.len())
         .map(|frame| match is_deep {
@@ -48,10 +52,11 @@ pub fn scales(poses: &Poses) -> Vec<f64> {
     farness.iter().map(scale).collect()
 }
 
-/// The sprites of a track, of the size filmed or of `scales`: its mattes, each with its centroid. The box holds the
-/// largest extent from the centroid over the frames in which the animal is not cut off; from above it is a square
-/// that holds the animal at any turn. `is_in_light` says which plates were filmed in the light of the background; in any
-/// other the animal has other colors, and no sprites.
+/// Returns the sprites of a track, in the filmed size or scaled by `scales`.
+///
+/// The common box holds the largest extent from the centroid over the uncut frames. In top view it is a
+/// square that holds the animal at any rotation. `is_in_light` returns whether a background has the light of
+/// the main one. In another light the animal has other colors, so those frames have no sprites.
 pub fn align(
     track: &Track,
     view: View,
@@ -81,7 +86,7 @@ fn matte(sighting: &Sighting) -> Matte {
     }
 }
 
-/// Whether the animal covers, in the median, fewer pixels than are worth looking at.
+/// Returns whether the animal's median area is too small for sprites.
 pub fn is_too_small(track: &[Tracked]) -> bool {
     let sightings = track.iter().filter_map(|t| t.sighting.as_ref());
     let mut areas_px: Vec<f64> = sightings.map(|s| s.moments.area_px).collect();
@@ -91,7 +96,7 @@ pub fn is_too_small(track: &[Tracked]) -> bool {
         .is_some_and(|&area_px| area_px < LEAST_AREA_PX)
 }
 
-/// The sprites of an animal that none are cut of: all missing.
+/// Returns missing sprites for all frames, for an animal that is too small.
 pub fn none(n_frames: usize) -> Sprites {
     Sprites::missing(MULTIPLE, MULTIPLE, n_frames)
 }
@@ -114,7 +119,7 @@ fn common_size(track: &[Tracked], view: View, scale: &dyn Fn(usize) -> f64) -> [
             })
     };
     let whole = reach(&mut all().filter(|seen| !seen.0));
-    // An animal that is never seen whole has sprites all the same.
+    // An animal that is cut in all frames has sprites too.
     let [x, y, radius] = if whole[2] > 0.0 {
         whole
     } else {
@@ -136,7 +141,7 @@ mod tests {
     fn poses(frames: Vec<Pose>) -> Poses {
         Poses {
             tail_beat: None,
-            // So slow that every frame is looked at by itself.
+            // At 1 frame per second, the running median has one frame.
             fps: 1.0,
             image_size_px: [640, 480],
             view: View::Side,

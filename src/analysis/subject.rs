@@ -1,45 +1,46 @@
-//! Which thing is the animal: its size and color, learned from frames of the whole film.
+//! Learns which moving thing is the animal: its size and color, from frames of the whole film.
 //!
-//! Every component of every sample is described by its [`Look`]. The [`Subject`] is the look that explains the most
-//! samples as one body, seen once in each, that moves about, stands out and does not come in across the border. A hand
-//! that lets the animal go, an arm, a plant, a shadow or a mirror image explains fewer samples, or stays at its
-//! place. Afterwards the subject scores every candidate of every frame.
+//! Each component of each sample frame is described by its [`Look`]. The [`Subject`] is the look that
+//! explains the most samples as one body. It occurs once per frame, moves about, differs clearly from the
+//! background and stays off the border. A hand, a plant, a shadow or a mirror image explains fewer samples or
+//! stays in place. The subject then scores the candidates of every frame.
 
 use crate::geometry::Rect;
 use crate::order;
 use crate::raster::RgbImage;
 use crate::raster::runs::Component;
 
-/// Bins of a color channel.
+/// Histogram bins of a color channel. Free choice.
 const N_BINS: usize = 16;
-/// Pixels of a component that are looked at, at most.
+/// Greatest number of pixels sampled from a component. Free choice: it bounds the time.
 const MOST_PX: u64 = 2048;
-/// Spread of the color of one animal from frame to frame, levels of 255: its sides, its shade.
+/// Standard deviation of one animal's color between frames, levels of 255. Free choice.
 const COLOR_SPREAD: f64 = 14.0;
-/// Spread of the logarithm of its area: turned toward the camera a fish covers a third.
+/// Standard deviation of log area between frames: a fish turned toward the camera covers a third. Free
+/// choice.
 const AREA_SPREAD: f64 = 0.45;
-/// How much a small area counts against what the border of the picture cuts.
+/// Weight of the area's cost for a small component that the border may have cut. Free choice.
 const CUT_WEIGHT: f64 = 0.15;
-/// A look within this cost of the subject's is taken for it (two standard deviations).
+/// Cost below which a look fits the subject: two standard deviations, squared.
 pub const FITS: f64 = 4.0;
-/// Components of each sample that are tried as the subject.
+/// Number of components per sample that are tried as the subject. Free choice.
 const SEEDS_EACH: usize = 3;
-/// Components smaller than this are noise, pixels.
+/// Least area of a component, pixels; smaller ones are noise. Free choice.
 pub const LEAST_AREA_PX: u64 = 12;
 
-/// Cumulative histograms of R, G and B, each from 0 to 1.
+/// Cumulative histograms of R, G and B, each rising to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Color([[f32; N_BINS]; 3]);
 
 impl Color {
-    /// The color of the pixels that `pixels` gives.
+    /// Returns the color histogram of RGB pixels.
     pub fn of<'a>(pixels: impl Iterator<Item = &'a [u8]>) -> Color {
         let mut counts = [[0.0f32; N_BINS]; 3];
         let mut n = 0.0;
         for rgb in pixels {
             n += 1.0;
             for (counts, &value) in counts.iter_mut().zip(rgb) {
-                // A value counts for the two bins around it, so that a level more moves little.
+                // A value counts for the two nearest bins, so that a change of one level changes little.
                 let at = f32::from(value) * (N_BINS - 1) as f32 / 255.0;
                 let low = at as usize;
                 counts[low] += 1.0 - (at - low as f32);
@@ -56,7 +57,7 @@ impl Color {
         Color(counts)
     }
 
-    /// How far one color is from another, levels of 255: the earth mover's distance, the mean over the channels.
+    /// Returns the earth mover's distance of two colors, as the mean over the channels, levels of 255.
     pub fn distance(&self, other: &Color) -> f64 {
         let of = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {
             a.iter()
@@ -81,31 +82,31 @@ impl Color {
     }
 }
 
-/// What a component looks like.
+/// Measurements of one component: size, color and place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// Pixels.
+    /// Area, pixels.
     pub area_px: f64,
-    /// Its colors, in the light of the plate.
+    /// Color, in the light of the background.
     pub color: Color,
-    /// Mean difference from the plate, levels of 255.
+    /// Mean difference from the background, levels of 255.
     pub contrast: f64,
-    /// Bounding box.
+    /// Bounding box, pixels.
     pub box_px: Rect,
-    /// Middle of its pixels.
+    /// Mean of the pixel centers, pixels.
     pub centroid_px: [f64; 2],
-    /// Touches the border of the picture.
+    /// Whether the box touches the border of the picture.
     pub on_border: bool,
-    /// Looks like the plate, only darker.
+    /// Whether it has the background's color, but darker.
     pub is_shadow: bool,
-    /// The plate shows the thing, the frame does not.
+    /// Whether the thing is in the background and not in the frame.
     pub is_ghost: bool,
-    /// The light that the plate was filmed in.
+    /// Index of the light that the background was filmed in.
     pub light: usize,
 }
 
 impl Look {
-    /// The look of a component. `rgb` and `levels` (differences from the plate) are of the component's own box.
+    /// Measures a component. `rgb` and `levels` (differences from the background) cover the component's box.
     pub fn of(
         component: &Component,
         rgb: &RgbImage,
@@ -145,27 +146,28 @@ impl Look {
     }
 }
 
-/// Whether a box touches the border of a picture of the given size.
+/// Returns whether a box touches the border of a picture of the given size.
 pub fn touches_border(rect: Rect, [width, height]: [u32; 2]) -> bool {
     rect.x == 0 || rect.y == 0 || rect.right() == width || rect.bottom() == height
 }
 
-/// The animal as the whole film shows it.
+/// The animal's usual size, color and contrast in the film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subject {
-    /// Its usual color in each light, where it was seen in it.
+    /// Mean color for each light; `None` where the animal was not seen in it.
     colors: Vec<Option<Color>>,
-    /// 5th percentile, median and 95th percentile of its area, pixels.
+    /// 5th percentile, median and 95th percentile of the area, pixels.
     areas_px: [f64; 3],
-    /// Median diagonal of its box, pixels.
+    /// Median diagonal of the bounding box, pixels.
     pub diagonal_px: f64,
     /// Median contrast, levels of 255.
     pub contrast: f64,
 }
 
 impl Subject {
-    /// Learns the subject from the looks of samples; `None` when there are none. `at` is a sample and the component of it that
-    /// is known to be the animal.
+    /// Learns the subject from the looks of samples; returns `None` when there are none.
+    ///
+    /// `at` is a sample and the index of its component that is known to be the animal.
     pub fn learn(samples: &[Vec<Look>], at: Option<(usize, usize)>) -> Option<Subject> {
         let seed = match at {
             Some((sample, component)) => Subject::like(&samples[sample][component]),
@@ -178,7 +180,7 @@ impl Subject {
         Some(subject)
     }
 
-    /// The subject of a single look.
+    /// Returns the subject of a single look.
     fn like(look: &Look) -> Subject {
         Subject {
             colors: (0..=look.light)
@@ -190,12 +192,12 @@ impl Subject {
         }
     }
 
-    /// Median area, pixels.
+    /// Returns the median area, pixels.
     pub fn area_px(&self) -> f64 {
         self.areas_px[1]
     }
 
-    /// Whether a color is like the subject's in a look's light, and more so than the look's own.
+    /// Returns whether a color fits the subject in a look's light, and better than the look's own color.
     pub fn prefers(&self, color: &Color, look: &Look) -> bool {
         let usual = self.color_in(look.light);
         usual.is_some_and(|usual| {
@@ -208,25 +210,27 @@ impl Subject {
         self.colors.get(light)?.as_ref()
     }
 
-    /// How unlike the subject a look is: 0 for just as usual, 1 for one standard deviation of area or color. In a light in which the
-    /// subject was never seen, its area alone tells.
+    /// Returns the misfit of a look: 0 for a usual look, 1 for one standard deviation of area or color.
+    ///
+    /// Misfits of area and color are squared and added. In a light without a known color, only the area
+    /// counts.
     pub fn cost(&self, look: &Look) -> f64 {
         let usual = self.color_in(look.light);
         let color = usual.map_or(0.0, |usual| usual.distance(&look.color)) / COLOR_SPREAD;
         let area = self.area_cost(look.area_px);
-        // What the border cuts may be any part of the animal.
+        // The border may cut off any part of the animal.
         let is_part = look.on_border && look.area_px < self.area_px();
         (if is_part { CUT_WEIGHT * area } else { area }) + color * color
     }
 
-    /// The share of the cost that is for the area alone.
+    /// Returns the part of the cost that comes from the area: 0 between the 5th and 95th percentile.
     pub fn area_cost(&self, area_px: f64) -> f64 {
         let [low, _, high] = self.areas_px;
         let off = libm::log(area_px / area_px.clamp(low, high)) / AREA_SPREAD;
         off * off
     }
 
-    /// For each sample the component that is most like the subject and fits.
+    /// Returns for each sample the index of the cheapest component that fits; `None` when none fits.
     pub fn choices(&self, samples: &[Vec<Look>]) -> Vec<Option<usize>> {
         samples.iter().map(|looks| self.choice(looks)).collect()
     }
@@ -239,7 +243,7 @@ impl Subject {
         best.filter(|(_, cost)| *cost < FITS).map(|(k, _)| k)
     }
 
-    /// The subject as its choices among the samples show it.
+    /// Returns the subject measured from its own choices in the samples.
     fn refined(&self, samples: &[Vec<Look>]) -> Subject {
         let members = self.members(samples);
         if members.is_empty() {
@@ -270,8 +274,10 @@ impl Subject {
         chosen.filter_map(|(looks, k)| Some(&looks[k?])).collect()
     }
 
-    /// How well the subject explains the samples: more for each sample that shows it, for size, contrast and going places; less
-    /// for what comes in across the border or is a shadow.
+    /// Returns the score of the subject as an explanation of the samples.
+    ///
+    /// It grows with the number of fitting samples, area, contrast and number of places. It falls with the
+    /// share of looks on the border and of shadows.
     pub fn worth(&self, samples: &[Vec<Look>]) -> f64 {
         let members = self.members(samples);
         let n = members.len() as f64;
@@ -299,7 +305,7 @@ impl Subject {
     }
 }
 
-/// The look that explains the samples best as the subject's. The largest of each sample are tried.
+/// Returns the subject with the highest score, from the largest components of each sample.
 fn best_seed(samples: &[Vec<Look>]) -> Option<Subject> {
     let largest = |looks: &'_ Vec<Look>| {
         let mut real: Vec<usize> = (0..looks.len())
@@ -353,7 +359,7 @@ mod tests {
             .map(|k| match k {
                 0..8 => vec![look(SKIN, 90, 200, 0)],
                 8..12 => vec![look(SKIN, 90, 200, 0), look(ORANGE, 30, 20 + 10 * k, 0)],
-                // A plant that sways at its place.
+                // A plant that sways in place.
                 _ => vec![look(ORANGE, 30, 20 + 10 * k, 0), look(GRAY, 40, 500, 0)],
             })
             .collect();

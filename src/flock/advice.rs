@@ -1,39 +1,39 @@
-//! Advice on a flock: too many animals for the tank, or a loop that is too short.
+//! Advice on a finished flock: too many animals for the tank, or a loop that is too short.
 
 use super::Flock;
 
-/// A loop whose headings are off their boids' by more than this in a tenth of what is shown is too short.
+/// 90th percentile of the heading error above which a loop counts as too short, radians. Free choice.
 const SHORT_LOOP_RAD: f64 = 0.35;
 
-/// One piece of advice, as a sentence.
+/// Advice on a flock. Its text is a sentence for users.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Advice {
-    /// There are more individuals than have room.
+    /// The flock has more individuals than the tank has room for.
     #[error(
         "there is room for about {room_for} of the {count} animals: some lie over others, or rest where the filmed animal never \
          rested; make a flock of fewer, or film from farther away"
     )]
     LittleRoom {
-        /// How many have room.
+        /// Number of individuals that the tank has room for.
         room_for: u32,
-        /// How many there are.
+        /// Number of individuals.
         count: usize,
     },
-    /// The loop is shorter than the way back takes.
+    /// The loop is too short for the animals to return to where they started.
     #[error(
         "this loop of {length_s:.1} s is too short for the animals to come back to where they began: in a tenth of what is \
          shown they head {off_deg:.0} degrees or more off their way; ask for more frames"
     )]
     ShortLoop {
-        /// Seconds.
+        /// Length of the loop, seconds.
         length_s: f64,
-        /// The 90th percentile of the difference between headings shown and asked for, degrees.
+        /// 90th percentile of the difference between shown and requested headings, degrees.
         off_deg: f64,
     },
 }
 
 impl Advice {
-    /// All that applies to a flock.
+    /// Returns all advice that applies to a flock.
     pub fn all(flock: &Flock) -> Vec<Advice> {
         let (count, room_for) = (flock.individuals.len(), flock.stats.room_for);
         let is_full = room_for > 0 && count > room_for as usize;
@@ -47,7 +47,7 @@ impl Advice {
         little_room.into_iter().chain(short_loop).collect()
     }
 
-    /// Its stable name.
+    /// Returns the stable code.
     pub fn code(&self) -> &'static str {
         match self {
             Advice::LittleRoom { .. } => "little_room",

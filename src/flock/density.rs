@@ -1,5 +1,7 @@
-//! How densely a flock is packed: radii of the rules with which animals keep the wanted distance in the picture, and measures
-//! of how they cross and cover one another there.
+//! Density of a flock in the image.
+//!
+//! This module scales the separation radii until the animals keep the requested spacing. It also measures how
+//! often animals cross and how much they cover each other.
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
@@ -12,19 +14,24 @@ use super::individual::{Individual, rounded};
 use super::params::Params;
 use crate::library::Library;
 
-/// Most corrections of the radii of separation.
+/// Largest number of corrections of the separation radii. Free choice.
 const N_ROUNDS: usize = 5;
-/// Least gain of a correction, as a share of the wanted spacing; after a smaller gain the corrections end.
+/// Least improvement of a correction, in the logarithm of measured over requested spacing. A smaller
+/// improvement ends the corrections. Free choice.
 const NEAR_ENOUGH: f64 = 0.03;
-/// Largest factor by which the radii of separation grow or shrink.
+/// Largest factor by which the separation radii grow or shrink. Free choice.
 const MOST_CHANGE: f64 = 8.0;
-/// Radius of separation in the picture before the first correction, in wanted spacings.
+/// Separation radius in the image before the first correction, in requested spacings. Free choice.
 const IN_PICTURE: f64 = 1.5;
-/// Length of the film over which the spacing is measured.
+/// Length of the trial on which the spacing is measured, seconds. A loop is measured in full. Free choice.
 const TRIAL_S: f64 = 4.0;
 
-/// The parameters with radii of separation such that the mean distance to the nearest other in the picture is `params.spacing_bl`, as far as
-/// the tank has room for that. `spacing_of` makes a flock and measures it.
+/// Returns the parameters with separation radii scaled to reach the spacing `params.spacing_bl`, as far as
+/// the tank has room. Spacing is the mean distance to the nearest neighbor in the image.
+///
+/// Each round makes a trial flock with `spacing_of`, which returns its spacing in body lengths. The radii are
+/// then multiplied by requested over measured spacing. The best round counts. Without a requested spacing, or
+/// for a single animal, the parameters are returned unchanged.
 pub(super) fn spaced(
     params: &Params,
     fps: f64,
@@ -64,7 +71,8 @@ pub(super) fn spaced(
     })
 }
 
-/// The mean distance to the nearest other in the picture, body lengths, over all frames; 0 for one alone.
+/// Returns the distance to the nearest neighbor in the image, body lengths, mean over animals and frames.
+/// Returns 0 for a single animal.
 pub(super) fn spacing_bl<'a>(
     places_px: impl Iterator<Item = &'a [[f64; 2]]> + Clone,
     length_px: f64,
@@ -80,20 +88,21 @@ pub(super) fn spacing_bl<'a>(
     rounded(mean, 4)
 }
 
-/// How often animals cross one another and how much of them can be seen.
+/// Crossings and visibility of the animals of a flock.
 pub(super) struct Crowding {
-    /// Times a minute that two come nearer to each other in the picture than half a body length.
+    /// Number of times per minute that two animals come nearer than half a body length in the image.
     pub(super) crossings_per_min: f64,
-    /// The share of an animal that no nearer one covers, mean over animals and frames, 0..=1; of bodies that are ellipses.
+    /// Share of an animal that no nearer animal covers, mean over animals and frames, 0..=1. Bodies are
+    /// modeled as ellipses.
     pub(super) visible_share: f64,
 }
 
-/// Two animals cross when their centroids come nearer than this.
+/// Distance between centroids below which two animals cross, body lengths. Free choice.
 const CROSSED_BL: f64 = 0.5;
-/// The visible share is measured in one of this many frames.
+/// Interval at which the visible share is measured, frames. Free choice.
 const LOOK_EVERY: usize = 5;
 
-/// The crowding of a flock of `library`'s animal, whose length is given.
+/// Returns crossings and visibility of a flock of the animal of `library`. `length_px` is its body length.
 pub(super) fn crowding(individuals: &[Individual], library: &Library, length_px: f64) -> Crowding {
     let n_frames = individuals.first().map_or(0, |one| one.centroid_px.len());
     let crossed = |t: usize| -> HashSet<(usize, usize)> {
@@ -126,7 +135,7 @@ pub(super) fn crowding(individuals: &[Individual], library: &Library, length_px:
     }
 }
 
-/// The pairs of places that are nearer to each other than `reach_px`.
+/// Returns the pairs of positions nearer to each other than `reach_px`, the smaller index first.
 fn pairs_within(places: &[[f64; 2]], reach_px: f64) -> Vec<(usize, usize)> {
     let mut by_x: Vec<usize> = (0..places.len()).collect();
     by_x.sort_by(|&a, &b| places[a][0].total_cmp(&places[b][0]));
@@ -145,7 +154,7 @@ fn pairs_within(places: &[[f64; 2]], reach_px: f64) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// An animal in one frame, as an ellipse of its length and area.
+/// An animal in one frame: an ellipse with the length and the area of its silhouette.
 #[derive(Clone, Copy)]
 struct Body {
     center_px: [f64; 2],
@@ -168,7 +177,7 @@ impl Body {
         }
     }
 
-    /// The place in the picture that lies at a place of the unit disk.
+    /// Maps a point of the unit disk to the image, pixels.
     fn at(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [along, across] = [u * self.half_px[0], v * self.half_px[1]];
         let [cos, sin] = self.cos_sin;
@@ -187,10 +196,10 @@ impl Body {
     }
 }
 
-/// The mean share of bodies that no nearer one covers, by points of a spiral on each.
+/// Returns the mean share of the bodies that no nearer body covers, sampled at points of a spiral on each.
 fn visible_share(bodies: &[Body]) -> f64 {
     const N_POINTS: usize = 24;
-    /// The golden angle spreads points evenly over a disk.
+    /// Golden angle, radians. Points at multiples of it spread evenly over a disk.
     const GOLDEN_RAD: f64 = 2.399_963;
     let place = |k: usize| {
         let (radius, angle) = (
@@ -207,7 +216,7 @@ fn visible_share(bodies: &[Body]) -> f64 {
     let centers: Vec<[f64; 2]> = bodies.iter().map(|body| body.center_px).collect();
     let mut nearer: Vec<Vec<&Body>> = vec![Vec::new(); bodies.len()];
     for (a, b) in pairs_within(&centers, reach_px) {
-        // As they are drawn: of two at one depth the one of greater id is nearer.
+        // As in drawing: at equal depth the greater id is nearer.
         let (near, far) = if bodies[a].depth < bodies[b].depth {
             (a, b)
         } else {
@@ -256,7 +265,7 @@ mod tests {
         );
         assert!(sparse.visible_share >= usual.visible_share);
         assert!(sparse.crossings_per_min <= usual.crossings_per_min);
-        // Twelve in the tank cannot keep ten body lengths, but do what they can.
+        // Twelve animals have no room for ten body lengths, but their spacing does not shrink.
         assert!(stats(Some(10.0), 12).spacing_bl >= stats(None, 12).spacing_bl);
     }
 
@@ -270,7 +279,7 @@ mod tests {
         };
         assert_eq!(visible_share(&[body(0.0, 0.0), body(21.0, 1.0)]), 1.0);
         assert_eq!(visible_share(&[body(0.0, 0.0), body(0.0, 1.0)]), 0.5);
-        // Of ellipses 2/3 of a half length apart 0.58 of each lies in the other.
+        // Two ellipses whose centers are 2/3 of a half length apart share 0.58 of their area.
         let share = visible_share(&[body(0.0, 0.0), body(6.67, 1.0)]);
         assert!((share - 0.71).abs() < 0.04, "{share}");
     }

@@ -1,11 +1,11 @@
-//! Why a flock is not made.
+//! Reasons for which a flock is not made.
 
 use crate::code::Code;
 
-/// The reasons, one variant each.
+/// Reason for which a flock is not made.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Playback of the library would end: nothing leads back.
+    /// Playback of the library would end, because no jump leads back.
     #[error(
         "no two moments of the footage look alike enough to play on without an end; \
          film longer, and let the animal come back to the same poses"
@@ -17,21 +17,21 @@ pub enum Error {
          or analyze it again with sprites set to always"
     )]
     AnimalTooSmall,
-    /// The sentence says which parameter is out of which range.
+    /// A parameter is out of range. The text names the parameter and its range.
     #[error("{0}")]
     InvalidParams(String),
-    /// No plan of so many frames ends where its heir begins.
+    /// No plan of this number of frames leads back to the start of the loop.
     #[error(
         "no loop of {0} frames comes back to where it began with this footage; ask for another number of frames, best for more"
     )]
     LoopDoesNotClose(usize),
-    /// Somebody cancelled.
+    /// The job was cancelled.
     #[error("the flock was cancelled")]
     Cancelled,
 }
 
 impl Error {
-    /// The stable code.
+    /// Returns the stable error code.
     pub fn code(&self) -> Code {
         match self {
             Error::NoTransitions => Code::NoTransitions,

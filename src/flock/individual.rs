@@ -1,91 +1,96 @@
-//! The value that a flock is: per individual its boid, the frames of its plan, and where and how each
-//! is shown (DESIGN.md, flock.json). Numbers are rounded when they are made, so that the file holds
-//! exactly what was computed with.
+//! The individuals of a flock: for each one its boid, the source frames of its plan, and how each frame is
+//! shown (docs/reference/formats.md, "flock.json").
+//!
+//! Numbers are rounded when they are computed, so that the file holds exactly the numbers used.
 
 use std::ops::Range;
 
-/// One simulated animal with its sprites.
+/// One simulated animal with its sprites. Lists have one entry per output frame, except `fades`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Individual {
-    /// Its number, from 0.
+    /// Index, from 0.
     pub id: u32,
-    /// The source frame shown at each output frame.
+    /// Source frame shown.
     pub source_frame: Vec<u32>,
-    /// Whether that is shown left-right mirrored.
+    /// Whether the sprite is mirrored left to right.
     pub mirrored: Vec<bool>,
-    /// How far the sprite (mirrored first) is rotated, clockwise positive.
+    /// Rotation of the sprite after mirroring, radians, clockwise positive.
     pub rotation_rad: Vec<f64>,
-    /// Who shows the frame after its last, in a loop; that one's first frame is it.
+    /// In a loop, the id of the individual whose first frame follows the last frame. `None` outside loops.
     pub continues_as: Option<u32>,
-    /// The second sprites shown around jumps.
+    /// Second sprites shown around jumps.
     pub fades: Vec<Fade>,
-    /// Where the centroid is drawn.
+    /// Position at which the centroid is drawn, pixels.
     pub centroid_px: Vec<[f64; 2]>,
-    /// The direction of the head as shown.
+    /// Heading as shown, radians.
     pub heading_rad: Vec<f64>,
-    /// The direction in space as shown, a unit vector; only where the tank has depth.
+    /// Direction in space as shown, a unit vector. `None` if the tank has no depth.
     pub forward: Option<Vec<[f64; 3]>>,
     /// Size relative to the footage.
     pub scale: Vec<f64>,
-    /// Depth in the camera's frame; only with a camera.
+    /// Depth in the camera frame, metres. `None` if the scale in metres is unknown.
     pub depth_m: Option<Vec<f64>>,
-    /// The target that the plan was matched with.
+    /// Track of the boid that the plan is matched to.
     pub boid: BoidTrack,
-    /// What the plan costs.
+    /// Cost of the plan.
     pub cost: PlanCost,
 }
 
-/// Where a boid was and what it did.
+/// Track of a boid, with one entry per output frame.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct BoidTrack {
-    /// x, y in the picture, and z behind the front of the tank; all in pixels, z at the flock's body length.
+    /// x and y in the image, and z behind the front of the tank, pixels. For z, a body length has
+    /// `Flock::length_px` pixels at every depth.
     pub position_px: Vec<[f64; 3]>,
-    /// Direction of its motion in space, a unit vector; only where the tank has depth.
+    /// Direction of motion in space, a unit vector. `None` if the tank has no depth.
     pub forward: Option<Vec<[f64; 3]>>,
-    /// Direction of its motion in the picture.
+    /// Direction of motion in the image, radians.
     pub heading_rad: Vec<f64>,
-    /// Speed in the picture, body lengths a second.
+    /// Speed in the image, body lengths per second.
     pub speed_bl_per_s: Vec<f64>,
 }
 
-/// A second sprite shown for some frames around a jump: what was shown goes on under what comes.
+/// A second sprite around a jump. Before the jump it shows the frames that lead up to the new one, after it
+/// the frames that follow the old one. Lists have one entry per frame of the fade.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fade {
-    /// The first output frame concerned.
+    /// First output frame of the fade.
     pub start: u32,
-    /// The second sprite's source frame at each.
+    /// Source frame of the second sprite.
     pub source_frame: Vec<u32>,
     /// Whether the second sprite is mirrored.
     pub mirrored: bool,
-    /// Its rotation.
+    /// Rotation of the second sprite, radians.
     pub rotation_rad: Vec<f64>,
-    /// Its size relative to the footage.
+    /// Size of the second sprite relative to the footage.
     pub scale: Vec<f64>,
-    /// Its weight at each frame, 0..=1; the main sprite has the rest.
+    /// Weight of the second sprite, 0..=1. The main sprite has the rest.
     pub weight: Vec<f64>,
 }
 
-/// The plan's cost, radians: sums of integers times 2 pi / 65536, to 6 decimals (ALGORITHMS.md 6).
+/// Cost of a plan, radians. Each value is a sum of integers times 2 pi / 65536, rounded to 6 decimals
+/// (docs/explanation/algorithms.md, "Planning").
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PlanCost {
-    /// The sum of the five below.
+    /// Sum of the five costs below.
     pub total: f64,
-    /// Headings and rotations.
+    /// Cost of heading errors and rotations.
     pub heading: f64,
-    /// Speeds.
+    /// Cost of speed errors.
     pub speed: f64,
-    /// Jumps.
+    /// Cost of the distances of jumps.
     pub transition: f64,
-    /// Looking like a neighbor of smaller id.
+    /// Cost of showing nearly the same frame as a neighbor of smaller id.
     pub crowd: f64,
-    /// Jumps back to what was just seen.
+    /// Cost of jumps back to what was just shown.
     pub repetition: f64,
-    /// No plan costs less, crowd or not.
+    /// Lower bound of the total of any plan, with or without the crowd cost. For a flock planned in segments,
+    /// the sum of their bounds.
     pub lower_bound: f64,
 }
 
 impl BoidTrack {
-    /// The frames of a range alone.
+    /// Returns the part of the track within a range of frames.
     pub(super) fn part(&self, range: Range<usize>) -> BoidTrack {
         BoidTrack {
             position_px: self.position_px[range.clone()].to_vec(),
@@ -95,7 +100,7 @@ impl BoidTrack {
         }
     }
 
-    /// Goes on with another.
+    /// Appends a later track.
     pub(super) fn append(&mut self, later: BoidTrack) {
         self.position_px.extend(later.position_px);
         if let (Some(forward), Some(later)) = (&mut self.forward, later.forward) {
@@ -107,7 +112,8 @@ impl BoidTrack {
 }
 
 impl Fade {
-    /// Cuts off what comes from frame `n_frames` on, as that of an heir who begins there.
+    /// Splits off the part from frame `n_frames` on, or returns `None` if there is none. The part starts at
+    /// frame 0, because in a loop it belongs to the individual that follows.
     pub(super) fn split_off(&mut self, n_frames: usize) -> Option<Fade> {
         let at = n_frames.saturating_sub(self.start as usize);
         if at >= self.weight.len() {
@@ -125,7 +131,7 @@ impl Fade {
 }
 
 impl Individual {
-    /// Whether everything about it is there for every one of `n_frames` frames.
+    /// Returns whether all lists have an entry for each of `n_frames` frames and all fades lie within them.
     pub fn is_complete(&self, n_frames: usize) -> bool {
         let boid = &self.boid;
         let lengths = [
@@ -152,7 +158,7 @@ impl Individual {
     }
 }
 
-/// `value` to so many decimals, as files hold it.
+/// Rounds `value` to this number of decimals, as in files.
 pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
     // + 0.0 turns -0 into 0.

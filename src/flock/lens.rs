@@ -1,8 +1,9 @@
-//! How the tank is seen: from a place in body lengths to a point in the picture, and back to walls
-//! (N 5.1; ALGORITHMS.md 7 and 8).
+//! Projection of the tank: from positions in body lengths to pixels of the image, and back to walls. Sources:
+//! Nakajima et al., section 5.1; docs/explanation/algorithms.md, "Boids" and "Placement".
 //!
-//! In top view, and in a plane, a body length has the same size everywhere. In side view the camera
-//! is the given one, or a usual one before an animal whose size in the picture tells how far it is.
+//! In top view and in a flat tank the scale is the same everywhere. In side view the library's camera is
+//! used. Without one, a default camera is assumed, and the size of the animal in the image gives its
+//! distance.
 
 use super::boids::lanes::{Lanes, splat3};
 use super::boids::tank::Wall;
@@ -13,39 +14,41 @@ use crate::geometry::Camera;
 use crate::library::{Library, Poses, View};
 use crate::order::median;
 
-/// Focal length of a camera that nothing is known of, widths of its picture: it sees 53 degrees across.
+/// Focal length of the default camera, image widths: a field of view of 53 degrees across. Free choice.
 const USUAL_FOCAL_WIDTHS: f64 = 1.0;
-/// A silhouette's height is taken as the median over this much time: fins open and close.
+/// Span of the median over silhouette heights, seconds. The median removes the opening and closing of fins.
+/// Free choice.
 const HEIGHT_SPAN_S: f64 = 0.5;
-/// Motion across the picture and in depth are compared over this time. A free choice: posture changes within it.
+/// Time over which motion across the image and in depth are compared, seconds. Free choice. Posture changes
+/// within this time.
 const MOVED_IN_S: f64 = 0.5;
 
-/// From tank to picture. Places are body lengths: from the picture's corner where it is flat, from the
-/// camera's axis and center otherwise.
+/// Projection from the tank to the image. Positions are in body lengths. Their origin is the corner of the
+/// image for a flat lens, else the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
-    /// A body length (BL) at depth 0 when flat; the flock's measure in the picture in any case.
+    /// Body length (BL) of the flock in the image, pixels. A flat lens has this scale at every depth.
     pub length_px: f64,
     camera: Option<Pinhole>,
 }
 
-/// A camera with the body length as its unit.
+/// Pinhole camera with the body length as its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {
     /// Focal length, pixels.
     pub focal_px: f64,
-    /// Where its axis meets the picture.
+    /// Point where the optical axis meets the image, pixels.
     pub center_px: [f64; 2],
-    /// Distance of the front pane, behind which the medium begins.
+    /// Distance from the camera to the front pane, behind which the medium begins, body lengths.
     pub pane_bl: f64,
-    /// Refractive index of the medium; 1 = none.
+    /// Refractive index of the medium. 1 = no refraction.
     pub medium_index: f64,
-    /// Metres to the body length, where they are known.
+    /// Metres per body length. `None` if unknown.
     pub metres: Option<f64>,
 }
 
 impl Lens {
-    /// The lens of a library's picture; flat in top view and where no depth is wanted.
+    /// Returns the lens of a library. It is flat in top view, and if `depth_bl` is 0.
     pub fn of(library: &Library, params: &Params) -> Lens {
         let poses = &library.poses;
         let length_px = rounded(library.stats.length_px.unwrap_or(1.0).max(1.0), 2);
@@ -63,22 +66,22 @@ impl Lens {
         }
     }
 
-    /// One that shows every place at the same size.
+    /// Returns a flat lens. `length_px` is the size of a body length.
     pub fn flat(length_px: f64) -> Lens {
         Lens::with(length_px, None)
     }
 
-    /// One of a camera; without one, flat.
+    /// Returns a lens with a camera, or a flat lens for `None`.
     pub fn with(length_px: f64, camera: Option<Pinhole>) -> Lens {
         Lens { length_px, camera }
     }
 
-    /// Its camera; `None` when flat.
+    /// Returns the camera, or `None` for a flat lens.
     pub fn camera(&self) -> Option<&Pinhole> {
         self.camera.as_ref()
     }
 
-    /// The same with the digits that files hold.
+    /// Returns the lens with numbers rounded as in files.
     pub(super) fn rounded(&self) -> Lens {
         let rounded_camera = |camera: Pinhole| Pinhole {
             focal_px: rounded(camera.focal_px, 3),
@@ -90,19 +93,19 @@ impl Lens {
         Lens::with(self.length_px, self.camera.map(rounded_camera))
     }
 
-    /// Whether every place has the same size in the picture.
+    /// Returns whether the scale is the same at every depth.
     pub fn is_flat(&self) -> bool {
         self.camera.is_none()
     }
 
-    /// Where in the picture a place is, pixels.
+    /// Projects a position to the image, pixels.
     pub fn picture_px(&self, place: Vec3) -> [f64; 2] {
         let px = self.px_per_bl(place[2]);
         let center = self.camera.map_or([0.0; 2], |camera| camera.center_px);
         [center[0] + px * place[0], center[1] + px * place[1]]
     }
 
-    /// The place that is seen at a point of the picture, at a depth.
+    /// Returns the position at a given depth that is seen at a point of the image.
     pub fn place_bl(&self, point_px: [f64; 2], depth_bl: f64) -> Vec3 {
         let px = self.px_per_bl(depth_bl);
         let center = self.camera.map_or([0.0; 2], |camera| camera.center_px);
@@ -110,7 +113,7 @@ impl Lens {
         [x, y, depth_bl]
     }
 
-    /// The size of a body length at a depth, pixels.
+    /// Returns the size of a body length at a given depth, pixels.
     pub fn px_per_bl(&self, depth_bl: f64) -> f64 {
         match &self.camera {
             None => self.length_px,
@@ -118,7 +121,8 @@ impl Lens {
         }
     }
 
-    /// The velocity in the picture, body lengths (of `length_px`) a second, of what moves at `velocity`.
+    /// Projects the velocity of a boid at `place` to the image. The result is in body lengths of `length_px`
+    /// per second.
     pub fn picture_velocity(&self, place: Vec3, velocity: Vec3) -> [f64; 2] {
         let Some(camera) = &self.camera else {
             return [velocity[0], velocity[1]];
@@ -128,7 +132,8 @@ impl Lens {
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
     }
 
-    /// The line of sight, away from the camera: whoever moves along it stays at the same point of the picture. A unit vector.
+    /// Returns the direction of the line of sight at `place`, a unit vector away from the camera. Motion
+    /// along it does not change the position in the image.
     #[inline(always)]
     pub fn sight<L: Lanes>(&self, place: [L; 3]) -> [L; 3] {
         let away = splat3([0.0, 0.0, 1.0]);
@@ -136,8 +141,9 @@ impl Lens {
         unit([place[0] * receding, place[1] * receding, L::splat(1.0)])
     }
 
-    /// How fast one that otherwise moves at `velocity` must sink to be seen level, and how much faster or slower to be
-    /// seen at 45 degrees.
+    /// Returns two vertical speeds, positive downward, for a boid at `place` with the other components of
+    /// `velocity`. At the first its motion in the image is horizontal. The first plus or minus the second
+    /// gives motion at 45 degrees in the image.
     #[inline(always)]
     pub fn seen_level<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> [L; 2] {
         let receding = self.receding(place, velocity);
@@ -145,7 +151,7 @@ impl Lens {
         [place[1] * receding, across.abs()]
     }
 
-    /// As `Pinhole::receding`; nothing recedes when flat.
+    /// Returns `Pinhole::receding`, or 0 for a flat lens.
     #[inline(always)]
     fn receding<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> L {
         match &self.camera {
@@ -154,7 +160,8 @@ impl Lens {
         }
     }
 
-    /// The depth, body lengths from the camera, at which a body length has so many pixels; 0 when flat.
+    /// Returns the distance from the camera at which a body length has `px_per_bl` pixels, body lengths.
+    /// Returns 0 for a flat lens.
     pub fn depth_at_bl(&self, px_per_bl: f64) -> f64 {
         self.camera.map_or(0.0, |camera| {
             camera.pane_bl
@@ -162,13 +169,13 @@ impl Lens {
         })
     }
 
-    /// The metres of so many body lengths, where they are known.
+    /// Converts body lengths to metres. Returns `None` if the scale is unknown.
     pub fn metres(&self, bl: f64) -> Option<f64> {
         Some(self.camera?.metres? * bl)
     }
 
-    /// The wall, `margin_bl` within the tank, that is seen as the line `outward . p = offset_px`: `outward`
-    /// is a unit vector in the picture.
+    /// Returns the wall that is seen as the line `outward . p = offset_px`, moved into the tank by
+    /// `margin_bl`. `outward` is a unit vector in the image.
     pub fn wall(&self, outward: [f64; 2], offset_px: f64, margin_bl: f64) -> Wall {
         let Some(camera) = &self.camera else {
             return Wall {
@@ -176,7 +183,7 @@ impl Lens {
                 offset_bl: offset_px / self.length_px - margin_bl,
             };
         };
-        // outward . (x, y) <= slope (pane + (z - pane) / n): a plane, which need not meet the camera.
+        // outward . (x, y) <= slope (pane + (z - pane) / n): a plane, in general not through the camera.
         let [cx, cy] = camera.center_px;
         let slope = (offset_px - outward[0] * cx - outward[1] * cy) / camera.focal_px;
         let normal = [outward[0], outward[1], -slope / camera.medium_index];
@@ -217,15 +224,17 @@ impl Pinhole {
         (pane_bl + beyond_bl).max(L::splat(0.05))
     }
 
-    /// The share of its apparent depth that is gained a second by what moves at `velocity`.
+    /// Returns the growth rate of the apparent depth of a boid at `place` with `velocity`, as a share per
+    /// second.
     #[inline(always)]
     fn receding<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> L {
         velocity[2] / L::splat(self.medium_index) / self.apparent_bl(place[2])
     }
 }
 
-/// The depth of the animal in every frame, body lengths: from its position where that is known, from the height
-/// of its silhouette otherwise; 0 where neither is, and where the lens is flat.
+/// Returns the depth of the animal in each frame, body lengths. It comes from the measured position if the
+/// scale in metres is known, else from the height of the silhouette. It is 0 if neither is known, and for a
+/// flat lens.
 pub fn depths_bl(library: &Library, lens: &Lens) -> Vec<f64> {
     let frames = &library.poses.frames;
     if lens.is_flat() {
@@ -252,9 +261,11 @@ pub fn depths_bl(library: &Library, lens: &Lens) -> Vec<f64> {
     nearness.iter().map(depth).collect()
 }
 
-/// Which share of the changes of the silhouette's height comes from depth, 0..=1. An animal moves as much in depth as across the
-/// picture; when its height changes by more, as that of a bird that crouches and stretches on its perch, the rest is posture.
-/// `nearness` is the height over the usual one, by frame.
+/// Returns the share of the changes in silhouette height that comes from depth, 0..=1. `nearness` is the
+/// height over its median, by frame.
+///
+/// The animal is assumed to move as much in depth as across the image. If the height changes by more, the
+/// rest is posture, as in a bird that crouches and stretches on its perch.
 fn share_of_depth(poses: &Poses, nearness: &[Option<f64>], lens: &Lens) -> f64 {
     let span = ((MOVED_IN_S * poses.fps).round() as usize).max(1);
     let depth_bl = lens.depth_at_bl(lens.length_px);

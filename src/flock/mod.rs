@@ -1,5 +1,8 @@
-//! Library to flock: simulate boids, plan which real frames follow them best, place those frames in
-//! the picture, and composite them (O 4 and 5; ALGORITHMS.md 6 to 8).
+//! From library to flock (Okabe et al., sections 4 and 5). This module simulates boids, plans which source
+//! frames follow each boid best, places these frames in the image, and draws the video.
+//!
+//! `plan_flock` does everything but the drawing, which `composite` does. The algorithms are described in
+//! docs/explanation/algorithms.md, "Boids", "Planning", "Placement" and "Compositing".
 
 pub mod advice;
 pub mod boids;
@@ -44,32 +47,33 @@ use self::plan::{Model, Plan, Planner};
 use crate::library::Library;
 use crate::progress::{Progress, Quiet};
 
-/// A simulated, planned and placed group: all but its pixels.
+/// A simulated, planned and placed flock, without its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flock {
-    /// Frames a second, the footage's.
+    /// Frames per second, as in the footage.
     pub fps: f64,
-    /// Width and height of the film, the footage's.
+    /// Width and height of the image, pixels, as in the footage.
     pub image_size_px: [u32; 2],
-    /// A body length (BL) in the picture.
+    /// Body length (BL) in the image, pixels.
     pub length_px: f64,
-    /// Where its boids may be, and how that is seen.
+    /// Geometry of the tank and its projection to the image.
     pub space: Space,
-    /// What was asked for.
+    /// Parameters of the flock. `count` is filled in, and options that do not apply are replaced.
     pub params: Params,
-    /// By id.
+    /// Individuals by id.
     pub individuals: Vec<Individual>,
-    /// Where the predator was at every frame, as boids' positions are; empty without one.
+    /// Position of the predator at each frame, in the units of `BoidTrack::position_px`. Empty without a
+    /// predator.
     pub predator_px: Vec<[f64; 3]>,
-    /// How it moves as a whole, frame by frame.
+    /// Measures of collective order at each frame.
     pub orders: Vec<Order>,
-    /// How good it is.
+    /// Quality measures of the whole flock.
     pub stats: Stats,
 }
 
 impl Flock {
-    /// Whether it can be filmed with a library: every frame that it shows has its sprite there, and its
-    /// tracks are of one length.
+    /// Returns whether the flock can be drawn with `library`. Their image sizes must be equal, all source
+    /// frames must exist in the library, and all tracks must be complete.
     pub fn fits(&self, library: &Library) -> bool {
         let n_frames = self.params.frames as usize;
         let sprites = &library.sprites;
@@ -85,6 +89,9 @@ impl Flock {
 }
 
 /// Simulates, plans and places a flock of the library's animal.
+///
+/// Fails if a parameter is out of range or the job is cancelled. Also fails if the animal is too small for
+/// sprites, the library has no jumps, or a loop does not close.
 pub fn plan_flock(
     library: &Library,
     params: &Params,
@@ -149,7 +156,7 @@ pub fn plan_flock(
     })
 }
 
-/// How good a flock is.
+/// Returns the quality measures of a flock, all but `room_for`.
 fn measured(
     individuals: &[Individual],
     orders: &[Order],
@@ -168,7 +175,7 @@ fn measured(
     }
 }
 
-/// Simulates a whole film, then plans and places it: tracks, plans and places by id.
+/// Simulates the whole video, then plans and places it. Returns tracks, plans and placements by id.
 fn whole(
     boids: Boids,
     (model, stage): (&Model, &Stage),
@@ -193,7 +200,8 @@ fn whole(
     Ok((course, plans, placed))
 }
 
-/// The parameters as they can be met: without depth, directions are headings.
+/// Returns the parameters with options replaced that do not apply. A loop has one body size and uses `leash`
+/// instead of `film`. Without depth, headings are matched instead of directions.
 fn told(params: &Params, lens: &Lens) -> Params {
     let mut params = params.clone();
     if params.is_loop && params.position == Position::Film {

@@ -1,45 +1,48 @@
-//! How the animal itself moved at every frame of the footage: what boids are calibrated by and plans
-//! are matched with (ALGORITHMS.md 6 and 7).
+//! Motion of the filmed animal at each frame of the footage. Boids are calibrated by it and plans are matched
+//! to it (docs/explanation/algorithms.md, "Boids" and "Planning").
 
 use super::boids::vector::{Vec3, angle_between, unit};
 use super::lens::{Lens, depths_bl};
 use crate::geometry::wrap_rad;
 use crate::library::{Library, Pose, View};
 
-/// A speed in space is told where at least this share of the direction lies in the picture's plane.
+/// Least share of the direction in the image plane for which a speed in space is given. Free choice.
 const LEAST_LEVEL: f64 = 0.7;
-/// Least share of the direction in the picture's plane with which a speed in the picture is divided. An animal seen head-on also
-/// moves sideways, so the quotient would grow without bound. A free choice.
+/// Least share of the direction in the image plane by which a speed in the image is divided. Free choice. An
+/// animal seen head-on also moves sideways, so the quotient would otherwise grow without bound.
 const LEAST_SEEN: f64 = 0.5;
-/// Directions are compared over this time either way.
+/// Time before and after a frame over which directions are compared, seconds. Free choice.
 const TURN_SPAN_S: f64 = 0.1;
 
-/// The animal at a frame of the footage.
+/// Motion of the animal at one frame of the footage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameMotion {
-    /// Direction of the head, image axes.
+    /// Heading in the image, radians.
     pub heading_rad: f64,
-    /// How fast the heading changed.
+    /// Rate of change of the heading, radians per second.
     pub turn_rad_per_s: f64,
-    /// Speed of the centroid in the image, body lengths a second.
+    /// Speed of the centroid in the image, body lengths per second.
     pub speed_bl_per_s: f64,
-    /// Its velocity, image axes.
+    /// Velocity of the centroid in the image, body lengths per second.
     pub velocity_bl_per_s: [f64; 2],
-    /// Direction in space, a unit vector; away from the camera where the sign is not known.
+    /// Direction in space, a unit vector, or zeros if unknown. It points away from the camera if the sign is
+    /// unknown.
     pub forward: Vec3,
-    /// Distance from the camera, body lengths; 0 where the lens is flat.
+    /// Distance from the camera, body lengths; 0 for a flat lens.
     pub depth_bl: f64,
-    /// Body lengths in space to one of `length_px` in the picture, at its depth.
+    /// Body lengths in space per body length of `Lens::length_px` in the image, at the depth of the animal.
     pub nearer: f64,
-    /// Speed in space, body lengths a second, where enough of it is in the picture's plane.
+    /// Speed in space, body lengths per second. `None` if it is unknown or too little of the direction lies
+    /// in the image plane.
     pub pace_bl_per_s: Option<f64>,
-    /// How fast the direction in space changed, where it was found a tenth of a second before and after.
+    /// Rate of change of the direction in space, radians per second. `None` unless the direction is known
+    /// 0.1 s before and after the frame.
     pub swing_rad_per_s: Option<f64>,
 }
 
 impl FrameMotion {
-    /// Speed in space, body lengths a second: the speed in the picture over the share of the direction in the picture's plane,
-    /// at least `LEAST_SEEN`.
+    /// Returns the speed in space, body lengths per second. It is the speed in the image over the share of
+    /// the direction in the image plane, which counts as at least `LEAST_SEEN`.
     pub fn speed_in_space(&self) -> f64 {
         let [x, y, _] = self.forward;
         let level = x.hypot(y);
@@ -47,8 +50,8 @@ impl FrameMotion {
     }
 }
 
-/// The motion at every frame: central differences over two frames either way where the animal was
-/// found; zero speed and turn where its neighbors in time were not.
+/// Returns the motion at each frame of the footage. Derivatives in the image are central differences over two
+/// frames before and after, or over one. Speed and turn are 0 where the animal was not found on both sides.
 pub fn motion_of(library: &Library, lens: &Lens) -> Vec<FrameMotion> {
     let forwards: Vec<Option<Vec3>> = (library.poses.frames.iter())
         .map(|pose| forward(pose, library.poses.view, lens.length_px))
@@ -82,7 +85,7 @@ pub fn motion_of(library: &Library, lens: &Lens) -> Vec<FrameMotion> {
         .collect()
 }
 
-/// What the picture tells of a frame, where the animal was found before and after.
+/// Returns the motion in the image, or `None` if the animal was not found before and after the frame.
 fn in_picture(library: &Library, length_px: f64, frame: usize) -> Option<FrameMotion> {
     let poses = &library.poses;
     let at = |frame: usize| {
@@ -104,7 +107,8 @@ fn in_picture(library: &Library, length_px: f64, frame: usize) -> Option<FrameMo
     })
 }
 
-/// The direction in space: as measured, or from the heading and how much of the length is seen.
+/// Returns the direction in space: as measured, else from the heading and the visible share of the length.
+/// Returns `None` if neither is known.
 fn forward(pose: &Pose, view: View, length_px: f64) -> Option<Vec3> {
     let heading = pose.heading_rad?;
     let (cos, sin) = (libm::cos(heading), libm::sin(heading));

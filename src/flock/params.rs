@@ -1,6 +1,8 @@
-//! What a person may set about a flock. Defaults are those of ALGORITHMS.md 6 and 8, and of
-//! `boids/params.rs`;
-//! `papers` is O's plain objective.
+//! Parameters of a flock: defaults, ranges and presets (docs/explanation/algorithms.md, "Planning" and
+//! "Placement").
+//!
+//! The steering parameters are in `boids/params.rs`, those of the video in `composite/params.rs`. The preset
+//! `papers` reproduces the method of Okabe et al.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -8,110 +10,112 @@ use utoipa::ToSchema;
 pub use super::boids::params::{Goal, Obstacle, Predator, Rules, Zones};
 use super::composite::params::Render;
 
-/// Parameters of a flock; all have defaults.
+/// Parameters of a flock. All have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = FlockParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Individuals, 1..=10000; null = as many as there is room for, 2 to 20.
+    /// Number of individuals, 1..=10000. null = as many as the tank has room for, limited to 2..=20.
     pub count: Option<u32>,
-    /// Frames of the film, 1..=1000000, or 1..=10000 unless `position` is `film`; times the individuals at most 4,000,000.
+    /// Length of the video in frames: 1..=1000000 with `position: film`, else 1..=10000. `count` times
+    /// `frames` is at most 4,000,000.
     pub frames: u32,
-    /// Everything random follows from it.
+    /// Random seed. The same input, parameters and seed give the same flock.
     pub seed: u64,
-    /// How the boids steer.
+    /// Steering of the boids.
     pub rules: Rules,
-    /// Wanted mean distance to the nearest other in the picture, body lengths, 0.2..=10, as far as there is room: the radii of
-    /// separation are scaled until the animals keep it. null = as the rules say.
+    /// Target of the mean distance to the nearest neighbor in the image, body lengths, 0.2..=10. The
+    /// separation radii are scaled until the flock keeps it, as far as the tank has room. null = no target.
     pub spacing_bl: Option<f64>,
-    /// The last frame plays into the first, so that the film repeats without a seam. Frames 30..=5000 then, and
-    /// no `position: papers`.
+    /// Whether the last frame leads into the first, so that the video repeats without a seam. A loop has
+    /// 30..=5000 frames, excludes `position: papers`, and treats `position: film` as `leash`.
     #[serde(rename = "loop")]
     pub is_loop: bool,
-    /// How real frames are matched with boids.
+    /// Matching of source frames to boids.
     pub matching: Matching,
-    /// Least frames between two jumps, 1..=120; null = the clips' length, 1 = no least.
+    /// Minimum number of frames between two jumps, 1..=120. null = the clip length. 1 = no minimum.
     pub dwell_frames: Option<u32>,
-    /// Frames of the cross-fade at a jump, 0..=16, even; 0 = a hard cut.
+    /// Length of the cross-fade at a jump in frames, even, 0..=16. 0 = a hard cut.
     pub fade_frames: u32,
-    /// Whether an individual may be shown left-right mirrored.
+    /// Whether sprites may be shown mirrored left to right.
     pub mirror: bool,
-    /// Natural spread of body size: each individual is drawn at 1 - variation to 1 + variation times the size of the filmed
-    /// animal, 0..=0.3, and its steps are scaled alike. 0 = all have one size. Loops have none.
+    /// Spread of body size, 0..=0.3. At 0.05 each individual is drawn at a random scale of 0.95 to 1.05 times
+    /// the filmed size. With `position: film` its steps are scaled by the same factor. Loops always use 0.
     pub variation: f64,
-    /// What rule A is: repulsion, or O's wording.
+    /// Rule of separation: repulsion, or rule A of Okabe et al.
     pub separation: Separation,
     /// How an individual follows its boid.
     pub position: Position,
-    /// Whether boids at the rim may lead for a while (Hartman & Benes 2006).
+    /// Whether boids at the edge of the flock may lead it for 1 to 3 seconds (Hartman & Benes 2006).
     pub leaders: bool,
-    /// Where the flock may go.
+    /// Area in which the flock may swim.
     pub tank: TankExtent,
-    /// Where it is drawn to, at most 64.
+    /// Positions that attract the flock, at most 64.
     pub goals: Vec<Goal>,
-    /// What it swims round, at most 64.
+    /// Obstacles that the flock avoids, at most 64.
     pub obstacles: Vec<Obstacle>,
-    /// What it flees from.
+    /// Predator that the flock flees from. null = none.
     pub predator: Option<Predator>,
-    /// Depth of the tank in side view, body lengths, 0..=100; null = as deep as the animal was seen to be, 1 to 6.
-    /// Top view has none.
+    /// Depth of the tank in side view, body lengths, 0..=100. null = the range of depths of the filmed
+    /// animal, limited to 1..=6. 0 = boids move in the image plane. Top view ignores it.
     pub depth_bl: Option<f64>,
-    /// The film.
+    /// Drawing and encoding of the video.
     pub render: Render,
 }
 
-/// How real frames are matched with boids (ALGORITHMS.md 6). Weights 0..=4.
+/// Weights by which source frames are matched to boids, 0..=4 (docs/explanation/algorithms.md, "Planning").
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Matching {
-    /// What is matched.
+    /// Quantity that is matched.
     pub by: MatchBy,
-    /// Cost of a radian of heading (in top view: of a quarter second's turn) that stays wrong.
+    /// Weight of the heading error that rotation cannot correct, per radian. Top view instead compares how
+    /// far animal and boid turn in 0.25 s.
     pub w_h: f64,
-    /// Share of a difference along the line of sight that counts when directions are matched, 0..=1: 1 = the whole
-    /// angle in space. A wrong heading is seen at once, a wrong foreshortening hardly.
+    /// Weight of differences along the line of sight with `by: direction`, 0..=1. 1 = they count as much as
+    /// those in the image plane. A wrong foreshortening is harder to see than a wrong heading.
     pub w_d: f64,
-    /// Cost of a radian that rotating the sprite must make up for.
+    /// Weight of the rotation of a sprite in side view, per radian.
     pub w_r: f64,
-    /// How far a sprite may be rotated in side view, degrees, 0..=45.
+    /// Largest rotation of a sprite in side view, degrees, 0..=45. Top view allows any rotation.
     pub rho_deg: f64,
-    /// Cost of a unit of log speed.
+    /// Weight of the speed error: the difference of log speed between animal and boid.
     pub w_v: f64,
-    /// Cost of a jump at D = epsilon, radians.
+    /// Cost of a jump whose distance D equals epsilon, radians. The cost is proportional to D.
     pub wx: f64,
-    /// Cost of looking like a neighbor, radians for each at no distance.
+    /// Cost of showing nearly the same frame as a neighbor, radians at distance 0. The cost falls with
+    /// distance and adds up over neighbors.
     pub w_c: f64,
-    /// Cost of each frame that a jump goes back, radians, where it goes back by less than 1.3 s: it shows again what was just
-    /// seen.
+    /// Cost of a jump back by at most 1.3 s, radians for each frame that it goes back. Such a jump repeats
+    /// what was just shown.
     pub w_p: f64,
-    /// Frames of a segment, 2..=2000; null = three seconds. With `position: film` a flock is simulated, planned and placed one
-    /// segment at a time, and boids begin each segment at the positions of their animals.
+    /// Length of a segment in frames, 2..=2000. null = 3 s. With `position: film` a flock is simulated,
+    /// planned and placed segment by segment. Each boid starts a segment at the position of its animal.
     pub segment_frames: Option<u32>,
 }
 
-/// What real frames and boids are matched by.
+/// Quantity by which source frames are matched to boids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MatchBy {
-    /// O: where the animal points in the picture, and how fast it is. A wrong heading is seen at once.
+    /// Heading in the image and speed, as Okabe et al. propose. In top view, turn rate and speed.
     Heading,
-    /// The same, but where it points in space, at the expense of headings in the picture. Without depth headings are
-    /// matched. What stays wrong is the chord between two unit vectors; without a camera, away
-    /// from the viewer and toward are one.
+    /// Direction in space and speed. Headings in the image then match less well. The error is the chord
+    /// between two unit vectors. If the library has no directions in space, toward the viewer and away from
+    /// it count as equal. Without depth, `heading` is used instead.
     Direction,
-    /// Colqui et al. 2008: how the animal moved in the picture against how the boid moves, frame by
-    /// frame. `w_h` is then the cost of a body length a second each way; `w_r`, `rho_deg` and `w_v` play
-    /// no part in the plan.
+    /// Velocity in the image, frame by frame (Colqui et al. 2008). `w_h` is then the cost of a difference of
+    /// one body length per second along each image axis. The plan ignores `w_r`, `rho_deg` and `w_v`.
     Position,
 }
 
-/// What rule A is.
+/// Rule by which boids keep apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Separation {
-    /// Push apart.
+    /// Near boids push each other apart.
     Repulsion,
-    /// O 4, rule A: slow down when ahead, speed up when behind, align.
+    /// Rule A of Okabe et al., section 4: slow down when ahead of neighbors, speed up when behind, align.
     Papers,
 }
 
@@ -119,32 +123,34 @@ pub enum Separation {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Position {
-    /// By the steps that the animal took in the frames shown, each corrected toward the boid by a fifth of its length at
-    /// most. Boids take their speeds from the film. A loop is placed as with `leash`.
+    /// Moves by the filmed steps of the frames shown, each corrected toward the boid by at most a fifth of
+    /// its length. Boids take their speeds from the footage. A loop uses `leash` instead.
     Film,
-    /// Along its own heading at the boid's speed, drawn gently to the boid.
+    /// Moves at the speed of the boid along the shown heading. It is drawn gently to the boid and stays
+    /// within half a body length of it.
     Leash,
-    /// Where the boid is.
+    /// Takes the position of the boid.
     Boid,
-    /// O 5.2: the boid's speed along the shown heading, summed.
+    /// Moves at the speed of the boid along the shown heading (Okabe et al., section 5.2). Without correction
+    /// it may drift away from the boid.
     Papers,
 }
 
-/// Where the flock may go.
+/// Area in which the flock may swim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TankExtent {
-    /// Where the animal was seen. Farther out if there is no room for the flock: from above as far as what looks like
-    /// the floor there, from the side up to seven tenths of the picture.
+    /// The area in which the animal was seen. If the flock lacks room, the area grows. In top view it grows
+    /// as far as the background looks like the floor, in side view up to 70 % of the image.
     Seen,
-    /// The whole picture.
+    /// The whole image.
     Picture,
 }
 
-/// The most that individuals times frames may be: where everyone is in every frame is held in memory, and told in
-/// `flock.json`, with some hundreds of bytes each.
+/// Largest product of individuals and frames. Memory and `flock.json` hold some hundred bytes for each
+/// individual and frame.
 const MOST_SHOWN: u64 = 4_000_000;
-/// Individuals where nothing is asked, if there is room for them.
+/// Largest number of individuals when `count` is null. Free choice.
 pub(super) const MOST_BY_DEFAULT: u32 = 20;
 
 impl Default for Matching {
@@ -192,11 +198,11 @@ impl Default for Params {
 }
 
 impl Params {
-    /// The names that `preset` knows.
+    /// Names that `preset` accepts.
     pub const PRESETS: [&'static str; 6] =
         ["school", "swarm", "mill", "scatter", "zonal", "papers"];
 
-    /// The parameters of a named preset; `None` for an unknown name. `school` is the default.
+    /// Returns the parameters of a named preset, or `None` for an unknown name. `school` has all defaults.
     pub fn preset(name: &str) -> Option<Params> {
         let with_rules = |rules| Params {
             rules,
@@ -206,7 +212,7 @@ impl Params {
             "school" => Some(Params::default()),
             "swarm" => Some(with_rules(Rules {
                 alignment: 0.0,
-                // Who seeks the others more swims to and fro with them in a narrow tank.
+                // With more cohesion, boids in a narrow tank swim back and forth together.
                 cohesion: 0.4,
                 wander: 2.5,
                 ..Rules::default()
@@ -235,8 +241,8 @@ impl Params {
         }
     }
 
-    /// O's plain objective: headings only, no mirror, no rotation, hard cuts, its wording of rule A
-    /// and its sum of speeds as position, in the plane of the picture.
+    /// Returns the plain objective of Okabe et al.: heading error only, no mirroring, no rotation, hard cuts,
+    /// and rule A. Positions are sums of boid speeds in the image plane.
     pub fn papers() -> Params {
         Params {
             matching: Matching {
@@ -264,12 +270,12 @@ impl Params {
         }
     }
 
-    /// The number of individuals, or without one the greatest default.
+    /// Returns `count`, or the largest default number if `count` is null.
     pub fn most_individuals(&self) -> u32 {
         self.count.unwrap_or(MOST_BY_DEFAULT)
     }
 
-    /// Checks every range; the sentence says which parameter is out of which range.
+    /// Checks all ranges. The error message names the parameter, its range and its value.
     pub fn check(&self) -> Result<(), String> {
         within("count", f64::from(self.most_individuals()), 1.0, 10_000.0)?;
         let (most, what) = match self.position {

@@ -1,4 +1,4 @@
-//! How good a flock is: the measures of ALGORITHMS.md 9 that need no pixels.
+//! Quality measures of a flock that need no pixels (docs/explanation/algorithms.md, "Quality measures").
 
 use std::collections::HashMap;
 
@@ -13,64 +13,69 @@ use crate::geometry::wrap_rad;
 use crate::library::Library;
 use crate::order::percentile;
 
-/// Two neighbors this near that show frames this near in the footage are clones.
+/// Two individuals are clones if their boids are nearer than this, body lengths, and they show frames nearer
+/// in the footage than this, seconds. Free choices.
 const CLONE_BL: f64 = 4.0;
 const CLONE_S: f64 = 0.3;
-/// What was shown less long ago is shown again.
+/// Time within which a frame shown again counts as a repeat, seconds. Free choice.
 const REPEAT_S: f64 = 3.0;
-/// Slip is measured on steps of at least this share of a body length a second.
+/// Least speed of the steps on which slip is measured, body lengths per second. Free choice.
 const MOVING_BL_PER_S: f64 = 0.1;
 
-/// Measures of a whole flock.
+/// Quality measures of a whole flock.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Stats {
-    /// Median of |shown heading - boid's heading|, or of the angle between their directions in space where those were
-    /// matched; radians.
+    /// Median of |shown heading - heading of the boid|, radians. With `by: direction`, median angle between
+    /// the directions in space.
     pub heading_error_median_rad: f64,
-    /// Its 90th percentile.
+    /// 90th percentile of the same error, radians.
     pub heading_error_p90_rad: f64,
-    /// Jumps in 100 frames of one individual.
+    /// Jumps per 100 frames of one individual.
     pub jumps_per_100_frames: f64,
-    /// Frames in 100 that show what the same individual showed less than 3 s before.
+    /// Repeats per 100 frames: frames that the same individual showed less than 3 s before.
     pub repeats_per_100_frames: f64,
-    /// 95th percentile of the distance from individual to boid, body lengths.
+    /// 95th percentile of the distance from individual to boid in the image, body lengths.
     pub path_deviation_p95_bl: f64,
-    /// Median angle between the way moved and the shown heading, radians.
+    /// Median angle between displacement and shown heading, radians.
     pub slip_median_rad: f64,
-    /// Share of the pair-frames within 4 BL in which both show nearly the same source frame.
+    /// Share of clones among pairs of individuals within 4 BL, over all frames. Clones show frames less than
+    /// 0.3 s apart on the same mirror side.
     pub clone_share: f64,
-    /// How many can be shown at once without any two looking alike: frames of the component far
-    /// enough apart, on each side allowed. A larger flock has clones whatever the plan.
+    /// Largest number of individuals that can be shown at once without clones. It counts frames of the
+    /// component at least 0.3 s apart, on each allowed mirror side. A larger flock has clones with any plan.
     pub distinct_looks: u32,
-    /// How many the tank has room for; of a larger flock some lie over others. 0 = not known.
+    /// Number of individuals that the tank has room for. In a larger flock some overlap. 0 = unknown.
     pub room_for: u32,
     /// Share of the component's frames that are shown.
     pub variety: f64,
-    /// Mean over the frames.
+    /// Polarization, mean over the frames, 0..=1.
     pub polarization: f64,
-    /// Mean over the frames.
+    /// Milling, mean over the frames, 0..=1.
     pub milling: f64,
-    /// Mean over the frames, body lengths.
+    /// Distance from a boid to its nearest neighbor in space, mean over boids and frames, body lengths.
     pub nearest_neighbor_bl: f64,
-    /// Mean distance in the picture from an individual to the nearest other, body lengths; 0 for one alone.
+    /// Distance from an individual to its nearest neighbor in the image, mean over individuals and frames,
+    /// body lengths. 0 for a single animal.
     pub spacing_bl: f64,
-    /// Times a minute that two come nearer to each other in the picture than half a body length.
+    /// Number of times per minute that two animals come nearer than half a body length in the image.
     pub crossings_per_min: f64,
-    /// The share of an animal that no nearer one covers, mean over animals and frames, 0..=1.
+    /// Share of an animal that no nearer animal covers, mean over animals and frames, 0..=1.
     pub visible_share: f64,
-    /// Share of those that have another within 3 body lengths; mean over the frames.
+    /// Share of boids with a neighbor within 3 body lengths, mean over the frames.
     pub neighbor_share: f64,
-    /// Groups of boids within 4 body lengths of one another; mean over the frames.
+    /// Number of groups, mean over the frames. Boids within 4 body lengths of each other are in one group.
     pub groups: f64,
-    /// How near boids may come to each other, body lengths: 0.5, less where the tank is small for so many.
+    /// Distance that boids keep from each other, body lengths: 0.5, or less if the tank is small for the
+    /// flock.
     pub overlap_bl: f64,
-    /// Boids beyond a wall or within an obstacle, all frames together.
+    /// Number of boids beyond a wall or within an obstacle, summed over the frames.
     pub wall_violations: u64,
-    /// Pairs of boids nearer than `overlap_bl`, all frames together.
+    /// Number of pairs of boids nearer than `overlap_bl`, summed over the frames.
     pub overlap_violations: u64,
 }
 
-/// Measures a flock, all but its room and how near its boids may come; rounded as files hold it.
+/// Returns the measures of a flock, rounded as in files. `room_for`, `spacing_bl`, `crossings_per_min`,
+/// `visible_share` and `overlap_bl` are 0.
 pub fn measure(
     individuals: &[Individual],
     orders: &[Order],
@@ -155,7 +160,7 @@ fn heading_errors(individual: &Individual) -> Vec<f64> {
         .collect()
 }
 
-/// Angles between directions in space.
+/// Returns the angles between shown and wanted directions in space, radians.
 fn direction_errors(individual: &Individual) -> Vec<f64> {
     let shown = individual.forward.iter().flatten();
     let pairs = shown.zip(individual.boid.forward.iter().flatten());
@@ -199,7 +204,7 @@ fn jumps_per_100_frames(individuals: &[Individual]) -> f64 {
     100.0 * n_jumps as f64 / n_frames.max(1) as f64
 }
 
-/// Frames that show, on the same side, what the individual showed less than `REPEAT_S` before.
+/// Returns the frames per 100 that the individual showed on the same mirror side less than `REPEAT_S` before.
 fn repeats_per_100_frames(individuals: &[Individual], fps: f64) -> f64 {
     let span = (REPEAT_S * fps).round() as usize;
     let repeats = |individual: &Individual| {
@@ -241,7 +246,7 @@ fn clone_share(individuals: &[Individual], within_px: f64, within_frames: f64) -
     clones as f64 / near.max(1) as f64
 }
 
-/// The most frames of which no two are nearer than `apart_frames`.
+/// Returns the largest number of frames of which no two are nearer than `apart_frames`.
 fn distinct_looks(component: &[u32], apart_frames: f64) -> u32 {
     let mut n_looks = 0;
     let mut last: Option<u32> = None;
@@ -263,7 +268,7 @@ fn variety(individuals: &[Individual], library: &Library) -> f64 {
     n_used as f64 / library.playback.component.len().max(1) as f64
 }
 
-/// 0 of nothing.
+/// Returns the quantile, or 0 for an empty list.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     percentile(&mut values, share).unwrap_or(0.0)
 }

@@ -1,23 +1,25 @@
-//! A rotation that follows what is wanted slowly, and without delay (ALGORITHMS.md 8, shown heading).
+//! Smoothing of sprite rotations without delay (docs/explanation/algorithms.md, "Placement").
 //!
-//! A low-pass that looks back alone lags behind whoever turns, and the lag is error. This one looks both
-//! ways: it minimizes sum (r_t - wanted_t)^2 + stiffness * sum (r_t - r_(t-1))^2, whose answer to an impulse falls
-//! by a constant factor a frame on either side, and which a tridiagonal system gives at once.
+//! A one-sided low-pass lags behind an animal that turns, and the lag is heading error. This filter looks
+//! both ways. It minimizes sum (r_t - wanted_t)^2 + stiffness * sum (r_t - r_(t-1))^2, which is a tridiagonal
+//! system. Its impulse response falls by a constant factor per frame on both sides.
 
-/// Of an oscillation of this period in seconds, times 2 pi, half is left, as of one that passed a one-sided
-/// low-pass with the 0.1 s of ALGORITHMS.md 8.
+/// Time constant of the filter, seconds. An oscillation whose period is 2 pi times this is halved. Derived
+/// from a one-sided low-pass with a time constant of 0.1 s (docs/explanation/algorithms.md, "Placement"),
+/// which halves the same oscillation.
 const HALVED_S: f64 = 0.1 / 1.732_050_807_568_877_2;
 
-/// How much a step from frame to frame counts against a distance from what is wanted.
+/// Returns the weight of steps from frame to frame against distances from the wanted rotation.
 pub(super) fn stiffness(fps: f64) -> f64 {
     let falls_by = libm::exp(-1.0 / (HALVED_S * fps));
     falls_by / ((1.0 - falls_by) * (1.0 - falls_by))
 }
 
-/// The rotations of frames in succession, of which `before` came before the first.
+/// Returns the smoothed rotations of successive frames, radians. `before` is the rotation of the frame before
+/// the first one.
 pub(super) fn settled(wanted_rad: &[f64], before: Option<f64>, stiffness: f64) -> Vec<f64> {
     let n = wanted_rad.len();
-    // Thomas's algorithm: what each equation leaves of the next unknown, and its right side.
+    // Thomas algorithm: the coefficient of the next unknown in each equation, and the right side.
     let mut next = Vec::with_capacity(n);
     let mut settled: Vec<f64> = Vec::with_capacity(n);
     for (t, &wanted) in wanted_rad.iter().enumerate() {

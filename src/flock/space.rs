@@ -1,26 +1,27 @@
-//! Where boids are in space: how the tank is seen and where it ends (ALGORITHMS.md 7), as flock.json tells it, so that
-//! whoever reads that can reckon distances, order and walls anew.
+//! Geometry of a flock as stored in flock.json: the projection and the walls of the tank. A reader of the
+//! file can recompute distances, order and walls from it (docs/reference/formats.md, "flock.json").
 
 use super::boids::tank::{Tank, Wall};
 use super::boids::vector::Vec3;
 use super::individual::rounded;
 use super::lens::Lens;
 
-/// The space of a flock, rounded as files hold it.
+/// Geometry of a flock, rounded as in files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Space {
-    /// From places, in body lengths, to the picture.
+    /// Projection from positions in body lengths to the image.
     pub lens: Lens,
-    /// The depth of the tank's front, body lengths from the camera; 0 where the lens is flat.
+    /// Depth of the front of the tank, body lengths from the camera; 0 for a flat lens.
     pub front_bl: f64,
-    /// The axis about which boids turn, a unit vector: the vertical, or out of the picture where they have no depth.
+    /// Axis about which boids turn, a unit vector: the vertical, or in a flat tank the normal of the image
+    /// plane.
     pub up: Vec3,
-    /// Where the tank ends. In one without depth its front and back are walls too, at the boids' own depth.
+    /// Walls of the tank. A flat tank has a front and a back wall too, both at the depth of the boids.
     pub walls: Vec<Wall>,
 }
 
 impl Space {
-    /// Of a tank that is seen through a lens.
+    /// Returns the geometry of a tank that is seen through a lens.
     pub fn of(lens: &Lens, tank: &Tank) -> Space {
         let wall = |wall: &Wall| Wall {
             outward: wall.outward.map(|part| rounded(part, 6)),
@@ -44,7 +45,7 @@ mod tests {
     use crate::library::View;
     use crate::progress::Silent;
 
-    /// As README.md has it.
+    /// Returns the position of a boid, body lengths, by the formula of README.md.
     fn place_bl(space: &Space, [x, y, behind]: [f64; 3]) -> Vec3 {
         let length_px = space.lens.length_px;
         let z = space.front_bl + behind / length_px;
@@ -57,7 +58,7 @@ mod tests {
         [(x - cx) / px, (y - cy) / px, z]
     }
 
-    /// How far a place is beyond the wall that it is farthest beyond, body lengths; below 0 inside.
+    /// Returns how far a position is beyond the walls, body lengths; negative inside.
     fn beyond_bl(space: &Space, place: Vec3) -> f64 {
         let beyond = |wall: &Wall| {
             let along = (0..3).map(|axis| wall.outward[axis] * place[axis]);

@@ -1,5 +1,5 @@
-//! A library drawn by code, for tests: an animal of known motion, so that what may follow what is
-//! known without looking at pixels.
+//! A synthetic library for tests: an animal of known motion, so that the right jumps are known without a
+//! comparison of pixels.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -13,16 +13,16 @@ use crate::library::{
 use crate::raster::RgbImage;
 use crate::scratch::{Full, InMemory};
 
-/// Length of the animal when seen from the side.
+/// Length of the animal seen from the side, pixels.
 pub(crate) const LENGTH_PX: f64 = 40.0;
 const N_FRAMES: u32 = 600;
 const CLIP_FRAMES: usize = 8;
-/// The tail beats once in so many frames.
+/// Period of the tail beat, frames.
 const BEAT: u32 = 10;
 const SIZE_PX: [u32; 2] = [320, 240];
 
-/// An animal that turns now this way, now that: seen from above, or from the side with its length
-/// shrinking as it turns away. It may jump where it points, turns and beats alike.
+/// Returns the library of an animal that turns to both sides. In side view its length in the image shrinks as
+/// it turns away. Jumps join frames of similar heading and turn rate in the same phase of the tail beat.
 pub(crate) fn library(view: View) -> Library {
     let frames = poses(view);
     let scratch = Arc::new(InMemory::default());
@@ -64,7 +64,7 @@ pub(crate) fn library(view: View) -> Library {
     }
 }
 
-/// The same from the side with 24 frames of two beats and some that only play on, so that a plan repeats.
+/// Returns the side-view library reduced to 24 frames and five jumps, so that plans repeat frames.
 pub(crate) fn few_looks() -> Library {
     let mut library = library(View::Side);
     let jump = |from, to, cost, mirrored| Jump {
@@ -87,10 +87,10 @@ pub(crate) fn few_looks() -> Library {
     library
 }
 
-/// Where it points: 0 = right, a quarter turn = away from the viewer (in top view: down).
+/// Returns the yaw, radians: 0 = right, pi/2 = away from the viewer (in top view: down).
 fn yaw_rad(frame: u32) -> f64 {
     let turn = |period: f64, phase: f64| libm::sin(TAU * f64::from(frame) / period + phase);
-    // Mostly left or right, with turns between.
+    // Mostly left or right, with turns in between.
     PI / 2.0 - PI / 2.0 * libm::tanh(2.5 * turn(173.0, 0.0)) + 0.3 * turn(61.0, 1.0)
 }
 
@@ -194,7 +194,7 @@ fn water() -> RgbImage {
     image
 }
 
-/// A body, a tail that beats, and an eye above the middle line so that mirror and turn can be told.
+/// Draws a body, a beating tail, and an eye above the center line, which shows mirroring and rotation.
 fn draw(rgba: &mut [u8], pose: &Pose, frame: u32) {
     let heading = pose.heading_rad.unwrap_or(0.0);
     let upside_down = libm::cos(heading) < 0.0;

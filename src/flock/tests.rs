@@ -1,4 +1,4 @@
-//! The whole way from a library to a placed flock.
+//! Tests of `plan_flock`, from a library to a placed flock.
 
 use super::*;
 use crate::flock::params::TankExtent;
@@ -110,7 +110,7 @@ fn a_flock_tells_how_many_the_tank_has_room_for() {
         let flock = plan_flock(&synthetic::library(view), &params, &Silent).unwrap();
         flock.stats.room_for
     };
-    // 8 x 6 body lengths, less the margins, at 1.6 x 1.6 each, however many are asked for.
+    // The tank has 8 x 6 body lengths less the margins. An animal takes 1.6 x 1.6, whatever the count.
     let top = room_for(View::Top, 2);
     assert!((10..19).contains(&top), "{top}");
     assert_eq!(room_for(View::Top, 5), top);
@@ -161,7 +161,7 @@ fn a_crowd_goes_farther_than_the_animal_did_but_not_over_a_wall() {
         xs.fold(0.0, f64::max)
     };
     let mut library = synthetic::library(View::Top);
-    // It swims round in the middle of the picture.
+    // The animal circles in the middle of the image.
     let [w, h] = library.poses.image_size_px.map(f64::from);
     let radius_px = 0.2 * h;
     for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
@@ -238,7 +238,7 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
                 let (a, b) = (a.boid.position_px[t], b.boid.position_px[u]);
                 (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
             });
-            // Somebody may be pushed aside just then.
+            // A boid may be pushed aside at the seam.
             let seam_px = 0.015 * LENGTH_PX;
             assert!(
                 across <= inside + seam_px,
@@ -251,7 +251,7 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
             });
             assert!(shown.1 <= shown.0 + seam_px, "{name} {} {shown:?}", one.id);
             assert!(moved(one.centroid_px[last], heir.centroid_px[0]) < 0.2 * LENGTH_PX);
-            // The animal may turn there, but its sprite is not turned by more than at any jump.
+            // The rotation changes no more at the seam than elsewhere.
             let turn = wrap_rad(one.rotation_rad[last] - heir.rotation_rad[0]).abs();
             assert!(turn <= widest_rad + 0.002, "{name} {} {turn}", one.id);
             let state = |one: &Individual, t: usize| (one.source_frame[t], one.mirrored[t]);
@@ -322,14 +322,14 @@ fn nobody_passes_through_anybody_in_a_loop() {
         assert_eq!(stats.wall_violations, 0, "seed {seed}");
         stats.overlap_violations
     };
-    // Now and then one would have to swim too fast. With no one going aside there are 145 to 604 in each.
+    // Some overlaps remain that only too fast a boid could avoid. Without `go_aside` there are 145 to 604.
     let all: Vec<u64> = (1..=6).map(n_overlaps).collect();
     assert!(all.iter().sum::<u64>() < 225, "{all:?}");
 }
 
 #[test]
 fn who_is_not_wanted_any_more_does_not_form() {
-    /// Cancels when asked for the third time.
+    /// Cancels at the third call.
     struct Impatient(std::sync::atomic::AtomicU32);
     impl Progress for Impatient {
         fn report(&self, stage: &'static str, fraction: f64) {

@@ -1,4 +1,5 @@
-//! poses.csv: one row a frame, the scalars of poses.json under the same names; empty where null.
+//! poses.csv: one row per frame with the scalars of poses.json, empty if null (docs/reference/formats.md,
+//! "CSV files").
 
 use std::fmt::Write;
 
@@ -12,7 +13,7 @@ gamma_rad,\
 raw_heading_rad,raw_x_m,raw_y_m,raw_z_m,raw_forward_x,raw_forward_y,raw_forward_z,raw_gamma_rad,\
 tail_beat_hz\n";
 
-/// The poses as comma-separated values, with a header line.
+/// Returns the poses as comma-separated values, with a header line.
 pub fn write_poses(poses: &Poses) -> String {
     let mut text = String::from(COLUMNS);
     for (idx, pose) in poses.frames.iter().enumerate() {
@@ -29,7 +30,7 @@ pub fn write_poses(poses: &Poses) -> String {
     text
 }
 
-/// The scalars after `cut`, in the order of the header.
+/// Returns the scalars after `cut`, in the order of the header.
 fn scalars(pose: &Pose) -> Vec<Option<f64>> {
     let at = |values: Option<[f64; 3]>, k: usize| values.map(|v| v[k]);
     let centroid = |k: usize| pose.centroid_px.map(|c| c[k]);

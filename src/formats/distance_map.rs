@@ -1,27 +1,29 @@
-//! `distance.png` and `candidates.png`: which clips are near which, from one pass over the distances
-//! (O's figures 2 and 3).
+//! distance.png and candidates.png: pictures of the distances between clips, from one pass over the distances
+//! (Okabe et al., figures 2 and 3).
 //!
-//! The first shows D, near = black, far = white: gray levels are round(255 D / largest D drawn);
-//! whoever wants numbers takes `distance.npy`. Of more than 8192 clips all that is four epsilon apart
-//! or more is white, because to know how far takes very long. The second shows the pairs with D < epsilon, faintly,
-//! and over them the transitions that were kept, mirrored ones in another color. At most 1024 x 1024:
-//! of a longer footage a cell shows the least of its pairs, so that a single like moment still shows.
+//! distance.png shows D from near (black) to far (white): gray levels are round(255 D / largest drawn D). The
+//! exact numbers are in distance.npy. With more than 8192 clips, distances of at least 4 epsilon are white;
+//! they are not computed, to save time.
+//!
+//! The picture candidates.png shows the pairs with D < epsilon faintly and the transitions over them.
+//! Mirrored ones have another color. Both pictures have at most 1024 x 1024 cells. For longer footage a cell
+//! shows the minimum of its pairs, so that a single similar pair stays visible.
 
 use super::picture;
 use crate::analysis::distance::{Cancelled, ClipPair, Distances, Everything};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
-/// Rows and columns at most.
+/// Maximum number of rows and columns.
 pub const LARGEST_SIDE: usize = 1024;
 
-/// From this side on a transition is a mark of 3 x 3 cells, else a single cell.
+/// Number of cells per side from which a transition is drawn as 3 x 3 cells instead of one.
 const LARGE_SIDE: usize = 256;
 
-/// Of more clips than these only the distances below some epsilon are computed.
+/// Number of clips above which only distances below `FAR` epsilon are computed.
 const MOST_WHOLE: usize = 8192;
 const FAR: u64 = 4;
-/// Stands for a distance that was not computed.
+/// Marks a distance that was not computed.
 const UNKNOWN: u64 = u64::MAX;
 
 const PAPER: [u8; 3] = [0xfd, 0xfc, 0xf9];
@@ -32,19 +34,19 @@ const KEPT: [u8; 3] = [0xc8, 0x3c, 0x08];
 /// A transition to the mirror image.
 const MIRRORED: [u8; 3] = [0x12, 0x5c, 0x96];
 
-/// What both pictures are drawn from: the distances pooled to a picture's size.
+/// The distances, pooled to the size of the pictures.
 pub struct DistanceMap {
     side: usize,
     n_clips: usize,
-    /// Row by row, symmetric: the least D of a cell's pairs.
+    /// Minimum D of each cell's pairs, row by row, symmetric.
     least: Vec<u64>,
-    /// Likewise: whether one of them, with every sprite present, has D < epsilon.
+    /// Whether a cell has a pair with D < epsilon and all sprites present, row by row, symmetric.
     alike: Vec<bool>,
 }
 
 impl DistanceMap {
-    /// Computes the distances, and pools D(i, j) into cell (i side / n, j side / n), divisions rounded
-    /// down, with `side` = min(n, 1024).
+    /// Computes the distances and pools D(i, j) into cell (i side / n, j side / n). Divisions are rounded
+    /// down, and `side` is min(n, 1024).
     pub fn of(
         distances: &Distances<'_>,
         library: &Library,
@@ -68,7 +70,7 @@ impl DistanceMap {
         Ok(map)
     }
 
-    /// `distance.png`. A footage shorter than a clip gives a single white pixel.
+    /// Returns distance.png. Footage shorter than a clip gives a single white pixel.
     pub fn draw_distances(&self) -> Vec<u8> {
         let side = self.side as u32;
         match side {
@@ -77,14 +79,15 @@ impl DistanceMap {
         }
     }
 
-    /// `candidates.png`, with the library's transitions. A footage shorter than a clip gives a single pixel.
+    /// Returns candidates.png with the library's transitions. Footage shorter than a clip gives a single
+    /// pixel.
     pub fn draw_candidates(&self, library: &Library) -> Vec<u8> {
         let side = self.side.max(1);
         let mut pixels = vec![PAPER; side * side];
         for (pixel, _) in pixels.iter_mut().zip(&self.alike).filter(|cell| *cell.1) {
             *pixel = ALIKE;
         }
-        // The plain ones come last: where both meet, they are seen.
+        // Transitions without mirroring are drawn last and stay visible where both overlap.
         for mirrored in [true, false] {
             let color = if mirrored { MIRRORED } else { KEPT };
             for transition in library
@@ -134,7 +137,7 @@ impl DistanceMap {
         clip_idx * self.side / self.n_clips
     }
 
-    /// On both sides of the diagonal.
+    /// Marks a pair on both sides of the diagonal.
     fn mark(&self, pixels: &mut [[u8; 3]], [from, to]: [usize; 2], color: [u8; 3]) {
         if from.max(to) >= self.n_clips {
             return;
@@ -153,7 +156,7 @@ impl DistanceMap {
     }
 }
 
-/// Which clips have all their sprites: frames without the animal are alike, but nothing to see.
+/// Returns which clips have all their sprites. Frames without the animal are similar but show nothing.
 fn whole_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
     let present: Vec<bool> = (0..sprites.n_frames())
         .map(|frame_idx| sprites.is_present(frame_idx))
@@ -193,7 +196,7 @@ mod tests {
         assert_eq!(levels(&[0, UNKNOWN, 10]), [0, 255, 255]);
     }
 
-    /// `n_clips` clips, all far from each other but for the pairs given.
+    /// Returns a map of `n_clips` clips, all distant except the given pairs.
     fn map(n_clips: usize, near: &[(usize, usize)], present: &[bool]) -> DistanceMap {
         let mut map = DistanceMap::empty(n_clips);
         for i in 0..n_clips {

@@ -1,5 +1,5 @@
-//! refused.jpg: what a film shows that could not be measured. One frame with boxes around what moves, or a frame
-//! from before a change beside one from after it.
+//! refused.jpg: evidence why a film could not be measured. It shows one frame with boxes around moving
+//! objects, or the frames before and after a change side by side.
 
 use super::overlay::{HEADING, outline, stroke, unit_px};
 use super::picture;
@@ -7,17 +7,18 @@ use crate::geometry::Rect;
 use crate::raster::resize::resized;
 use crate::raster::{Frame, Pen, RgbImage};
 
-/// Each frame is made smaller until neither side is longer, pixels.
+/// Maximum side of each frame, pixels. Larger frames are reduced. Free choice.
 const LONGEST_PX: u32 = 640;
-/// Between two frames, pixels.
+/// Gap between two frames, pixels.
 const GAP_PX: u32 = 8;
-/// A pixel has changed when its luma differs by more, levels of 255.
+/// Difference of luma above which a pixel counts as changed, levels of 255. Free choice.
 const CHANGED: u8 = 24;
-/// Where more than this share of the pixels has changed, marking them would only hide the frame.
+/// Share of changed pixels above which they are not marked, because the marks would hide the frame. Free
+/// choice.
 const MOST_MARKED: f64 = 0.5;
 
-/// Draws the frames side by side, with boxes over the last one, as JPEG. Where there are two, what changed is
-/// marked in the second. Panics when there is no frame, or when they differ in size.
+/// Draws the frames side by side as JPEG, with boxes over the last one. If there are two, changed pixels are
+/// marked in the second. Panics if there is no frame, or if the frames differ in size.
 pub fn draw(mut frames: Vec<Frame>, boxes_px: &[Rect]) -> Vec<u8> {
     let before = (frames.len() > 1).then(|| frames[0].clone());
     if let Some(last) = frames.last_mut() {
@@ -52,7 +53,7 @@ fn mark_changes(before: &Frame, after: &Frame, picture: &mut RgbImage) {
     }
 }
 
-/// The picture, no side longer than [`LONGEST_PX`].
+/// Returns the picture, reduced so that no side is longer than [`LONGEST_PX`].
 fn shrunk(picture: &RgbImage) -> RgbImage {
     let [width, height] = [picture.width, picture.height].map(f64::from);
     let scale = (f64::from(LONGEST_PX) / width.max(height)).min(1.0);
@@ -60,7 +61,7 @@ fn shrunk(picture: &RgbImage) -> RgbImage {
     resized(picture, width, height)
 }
 
-/// Pictures of one size in a row, on white.
+/// Returns pictures of one size in a row, on white.
 fn side_by_side(pictures: &[RgbImage]) -> RgbImage {
     let (n, step) = (pictures.len() as u32, pictures[0].width + GAP_PX);
     let mut row = RgbImage::new(n * step - GAP_PX, pictures[0].height);

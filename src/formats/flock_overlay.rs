@@ -1,5 +1,5 @@
-//! What the boids meant, drawn over the film of their flock (O's figure 10): for everyone the boid's place
-//! and where it heads, a line to the animal drawn for it, where that heads, and its number.
+//! The boids drawn over the video of their flock (Okabe et al., figure 10). For each individual: position and
+//! heading of the boid, a line to the drawn animal, the heading of the animal, and its number.
 
 use crate::flock::{Flock, Individual};
 use crate::raster::{Frame, Pen};
@@ -9,19 +9,19 @@ const BOID: [u8; 3] = [84, 214, 230];
 const SHOWN: [u8; 3] = [255, 132, 60];
 const NUMBER: [u8; 3] = [236, 240, 238];
 
-/// Draws the boids of a flock over its film.
+/// Draws the boids of a flock over its video.
 pub struct FlockOverlay {
     pen: Pen,
     scale: f64,
     offset_px: [f64; 2],
-    /// Strokes are wider on larger pictures.
+    /// Unit of stroke widths, pixels; grows with the picture size.
     unit_px: f64,
-    /// Length of the heading lines.
+    /// Length of the heading lines, pixels.
     reach_px: f64,
 }
 
 impl FlockOverlay {
-    /// For films of `size_px`, which show the flock's picture as large as they can, in their middle.
+    /// Makes an overlay for videos of `size_px`. The flock's picture is scaled to fit and centered.
     pub fn new(flock: &Flock, size_px: [u32; 2]) -> FlockOverlay {
         let [w, h] = flock.image_size_px.map(f64::from);
         let [width, height] = size_px.map(f64::from);
@@ -36,7 +36,7 @@ impl FlockOverlay {
         }
     }
 
-    /// Draws over a frame of the film.
+    /// Draws over a frame of the video.
     pub fn draw(&mut self, flock: &Flock, frame_idx: usize, frame: &mut Frame) {
         let unit = self.unit_px;
         for individual in &flock.individuals {
@@ -54,7 +54,7 @@ impl FlockOverlay {
         }
     }
 
-    /// Where the boid and its animal are in the film.
+    /// Returns the positions of the boid and its animal in the video, pixels.
     fn places(&self, individual: &Individual, frame_idx: usize) -> ([f64; 2], [f64; 2]) {
         let [x, y, _] = individual.boid.position_px[frame_idx];
         let film = |at: [f64; 2]| [0, 1].map(|k| self.offset_px[k] + at[k] * self.scale);
@@ -91,7 +91,7 @@ impl FlockOverlay {
         self.pen.ink(frame, NUMBER);
     }
 
-    /// A line in one color on its rim.
+    /// Draws a line in one color with a dark outline.
     fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
         self.pen
             .polyline(points, radius_px + 0.7 * self.unit_px, 0.45);

@@ -1,6 +1,7 @@
-//! library.json: what may follow what, and how good a library is (DESIGN.md, a library on disk).
+//! library.json: the playback graph and the statistics of a library (docs/reference/formats.md,
+//! "library.json").
 //!
-//! Poses, background and mattes lie beside it; `library_dir` puts all together.
+//! Poses, background and mattes are separate files; `library_dir` combines them.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,51 +9,51 @@ use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
 use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Shadow, Transition};
 
-/// The schema's name and version.
+/// Name and version of the schema.
 pub const SCHEMA: &str = "flockreel/library@1";
 
-/// Which footage a library was made from.
+/// The footage from which a library was made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FootageSummary {
-    /// SHA-256 of the file, or of the pictures of a folder one after the other, hexadecimal.
+    /// SHA-256 of the file, or of the concatenated pictures of a folder, hexadecimal.
     pub sha256: String,
-    /// Size of the file or of all those pictures, bytes.
+    /// Size of the file, or of all those pictures, bytes.
     pub n_bytes: u64,
 }
 
-/// Everything of a library that library.json holds.
+/// The contents of library.json.
 pub struct Summary {
-    /// Which footage it was made from.
+    /// The footage from which the library was made.
     pub footage: FootageSummary,
-    /// With which parameters.
+    /// Parameters of the analysis.
     pub params: Params,
-    /// Width and height of the sprites.
+    /// Width and height of the sprites, pixels.
     pub sprite_size_px: [u32; 2],
-    /// Sizes of the sprites relative to the footage, unless all are as filmed.
+    /// Scale of each frame's sprite relative to the footage; `None` if all are 1.
     pub sprite_scale: Option<Vec<f64>>,
-    /// The centroid in every frame's matte; empty in files of before, whose mattes are sprites.
+    /// Centroid in each frame's matte, pixels; empty in older files, which have sprites instead of mattes.
     pub matte_center_px: Vec<Option<[f64; 2]>>,
-    /// Whether something is known to stand before the animal: occluders.png.
+    /// Whether occluders.png exists, with objects in front of the animal.
     pub occluders: bool,
-    /// The shadow that the animal casts.
+    /// The shadow of the animal.
     pub shadow: Option<Shadow>,
-    /// f.
+    /// Number of sprites in a clip.
     pub clip_frames: usize,
-    /// Clips nearer than this are alike.
+    /// Distance below which two clips are similar.
     pub epsilon: u64,
     /// Median of D(i, i+1).
     pub natural_step: u64,
-    /// Pairs of like clips.
+    /// Pairs of similar clips.
     pub transitions: Vec<Transition>,
-    /// Jumps and component.
+    /// Jumps and component of the playback graph.
     pub playback: Playback,
-    /// Runs between jump ends.
+    /// Runs of sprites between jump ends.
     pub patches: Vec<Patch>,
-    /// Counts and shares.
+    /// Statistics.
     pub stats: LibraryStats,
 }
 
-/// The JSON of a library.
+/// Returns the JSON of a library.
 pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Vec<u8> {
     let file = LibraryFile {
         schema: SCHEMA.into(),
@@ -83,7 +84,7 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
     serde_json::to_vec(&file).expect("plain values serialise")
 }
 
-/// Reads what `write` wrote.
+/// Parses the output of `write`.
 pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
     let file: LibraryFile = serde_json::from_slice(bytes)?;
     Ok(Summary {
@@ -122,16 +123,16 @@ struct LibraryFile {
     params: Params,
     footage: FootageSummary,
     sprite_size_px: [u32; 2],
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     sprite_scale: Option<Vec<f64>>,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     matte_center_px: Vec<Option<[f64; 2]>>,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     occluders: bool,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     shadow: Option<ShadowFile>,
     clip_frames: usize,
@@ -201,7 +202,7 @@ impl TransitionFile {
     }
 }
 
-/// [frame, next frame, cost] or [frame, next frame, cost, true] where the mirror side changes.
+/// [frame, next frame, cost], or [frame, next frame, cost, true] if the mirror side changes.
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
 enum JumpFile {
@@ -232,7 +233,7 @@ impl JumpFile {
     }
 }
 
-/// Frames `start..end`: `end` is one past the last.
+/// Frames `start..end`; `end` is exclusive.
 #[derive(Serialize, Deserialize)]
 struct PatchFile {
     id: usize,
@@ -283,7 +284,7 @@ struct StatsFile {
     speed_bl_per_s: Option<[f64; 3]>,
     turn_rate_rad_per_s: Option<f64>,
     length_px: Option<f64>,
-    /// For people and programs that read the file; the library itself is asked anew.
+    /// For readers of the file. It is not read back, because it is computed from the library.
     #[serde(default, skip_deserializing)]
     advice: Vec<AdviceFile>,
 }

@@ -1,5 +1,5 @@
-//! Values to bytes and back: the files that are a contract (DESIGN.md). Only `library_dir` touches
-//! the file system.
+//! File formats: conversion of values to bytes and back (docs/reference/formats.md). Only `library_dir`
+//! accesses the file system.
 
 pub mod csv;
 pub mod distance_map;

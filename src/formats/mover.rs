@@ -1,4 +1,4 @@
-//! What moved besides the animal, in poses.json.
+//! Moving objects other than the animal, in poses.json (docs/reference/formats.md, "poses.json").
 
 use serde::{Deserialize, Serialize};
 

@@ -1,18 +1,18 @@
-//! `distance.npy`: D as NumPy reads it (DESIGN.md, a library on disk), shape (N-f+1, N-f+1), u32, or
-//! u64 where a distance needs it.
+//! distance.npy: the matrix D in NumPy's format, of shape (N-f+1, N-f+1), as u32, or u64 if a distance needs
+//! it.
 //!
-//! The format is version 1.0 of NumPy's NEP 1: a magic number, a Python literal padded to a
-//! multiple of 64 bytes, and the numbers in C order, little-endian.
+//! The format is version 1.0 of NumPy's NEP 1. It has a magic number, a Python literal padded to a multiple
+//! of 64 bytes, and the numbers in C order, little-endian.
 
 use std::io::{self, Write};
 
 use crate::analysis::distance::DistanceMatrix;
 use crate::code::Code;
 
-/// Above this many frames the file is refused: it would hold more than 256 MB.
+/// Maximum number of frames. Longer footage is refused, because its matrix would exceed 256 MB.
 pub const MAX_FRAMES: usize = 8192;
 
-/// Why there is no such file.
+/// Reasons why the matrix cannot be written.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// The footage is too long for a whole matrix.
@@ -21,13 +21,13 @@ pub enum Error {
          take distance.png, which is never refused, or analyze a shorter piece"
     )]
     TooManyFrames {
-        /// Frames of the footage.
+        /// Number of frames of the footage.
         n_frames: usize,
     },
 }
 
 impl Error {
-    /// The stable code.
+    /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self {
             Error::TooManyFrames { .. } => Code::TooManyFrames,
@@ -35,7 +35,7 @@ impl Error {
     }
 }
 
-/// Whether a footage is short enough for a whole matrix; to be asked before one is computed.
+/// Checks that a footage is short enough for a whole matrix. Call it before computing the matrix.
 pub fn check(n_frames: usize) -> Result<(), Error> {
     match n_frames {
         0..=MAX_FRAMES => Ok(()),
@@ -43,7 +43,7 @@ pub fn check(n_frames: usize) -> Result<(), Error> {
     }
 }
 
-/// Writes the matrix. Fails only when the writer does.
+/// Writes the matrix. Fails only if the writer fails.
 pub fn write(matrix: &DistanceMatrix, out: &mut impl Write) -> io::Result<()> {
     let n = matrix.n_clips();
     let wide = matrix.max() > u64::from(u32::MAX);
@@ -82,7 +82,7 @@ mod tests {
     fn numpys_own_bytes_come_out() {
         let mut bytes = Vec::new();
         write(&matrix_of_gray_levels(&[0, 3, 1], 1), &mut bytes).expect("memory takes all");
-        // As numpy.save writes numpy.array([[0, 9, 3], [9, 0, 6], [3, 6, 0]], "<u4").
+        // The output of numpy.save for numpy.array([[0, 9, 3], [9, 0, 6], [3, 6, 0]], "<u4").
         let mut wanted = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
         wanted.extend_from_slice(b"{'descr': '<u4', 'fortran_order': False, 'shape': (3, 3), }");
         wanted.resize(127, b' ');

@@ -1,13 +1,13 @@
-//! The poses drawn over the footage, frame by frame (O's figure 10): box, centroid, a line to where
-//! the head points, the way of the last two seconds, the midline, frame number and time.
+//! The poses drawn over the footage (Okabe et al., figure 10): bounding box, centroid, heading arrow, path of
+//! the last two seconds and midline. A label shows frame number and time.
 //!
-//! Every stroke lies on a dark rim, so that it can be seen on light and dark.
+//! Every stroke has a dark outline, so that it is visible on light and dark pictures.
 
 use crate::geometry::Rect;
 use crate::library::{Pose, Poses};
 use crate::raster::{Frame, Pen};
 
-/// How much of the way is shown, seconds.
+/// Length of the drawn path, seconds. Free choice.
 const TRACE_S: f64 = 2.0;
 const RIM: [u8; 3] = [16, 24, 28];
 const BOX: [u8; 3] = [236, 240, 238];
@@ -15,18 +15,18 @@ const TRACE: [u8; 3] = [84, 214, 230];
 pub(super) const HEADING: [u8; 3] = [255, 132, 60];
 const MIDLINE: [u8; 3] = [255, 226, 92];
 
-/// Draws poses over frames of one footage.
+/// Draws poses over the frames of one footage.
 pub struct Overlay<'a> {
     poses: &'a Poses,
     pen: Pen,
-    /// Strokes are wider on larger pictures.
+    /// Unit of stroke widths, pixels; grows with the picture size.
     unit_px: f64,
-    /// Length of the heading line.
+    /// Length of the heading arrow, pixels.
     reach_px: f64,
 }
 
 impl<'a> Overlay<'a> {
-    /// What draws the poses of a footage.
+    /// Makes an overlay for the poses of a footage.
     pub fn new(poses: &'a Poses) -> Overlay<'a> {
         let [width, height] = poses.image_size_px;
         let unit_px = unit_px(width, height);
@@ -41,8 +41,8 @@ impl<'a> Overlay<'a> {
         }
     }
 
-    /// Draws over frame `frame_idx` of the footage what was measured in it. A frame beyond the last
-    /// pose stays as it is. Panics when the frame has another size than the footage.
+    /// Draws the pose of frame `frame_idx` over the frame. A frame after the last pose stays unchanged.
+    /// Panics if the frame and the footage differ in size.
     pub fn draw(&mut self, frame_idx: usize, frame: &mut Frame) {
         let Some(pose) = self.poses.frames.get(frame_idx) else {
             return;
@@ -58,13 +58,13 @@ impl<'a> Overlay<'a> {
         self.heading(pose, frame);
         let label = format!("{frame_idx:06}  {:.2} s", pose.time_s);
         let [dot, n_dots] = [1.6 * unit, 6.0 * label.len() as f64];
-        // On a picture too small for it, the label would only hide the animal.
+        // On a small picture the label would hide the animal.
         if n_dots * dot < 0.6 * f64::from(poses.image_size_px[0]) {
             self.label(frame, &label, dot);
         }
     }
 
-    /// The way of the last seconds, fading toward the past.
+    /// Draws the path of the last seconds, fading with age.
     fn trace(&mut self, frame_idx: usize, frame: &mut Frame) {
         let n_frames = ((TRACE_S * self.poses.fps).round() as usize).max(1);
         let first = frame_idx.saturating_sub(n_frames);
@@ -84,7 +84,7 @@ impl<'a> Overlay<'a> {
         }
     }
 
-    /// An arrow from the centroid to where the head points; only the centroid where that is unknown.
+    /// Draws an arrow from the centroid toward the head; only the centroid if the heading is unknown.
     fn heading(&mut self, pose: &Pose, frame: &mut Frame) {
         let Some(center) = pose.centroid_px else {
             return;
@@ -128,7 +128,8 @@ impl<'a> Overlay<'a> {
     }
 }
 
-/// A line in one color on its rim: its radius, and how wide a stroke is on a picture of this size, pixels.
+/// Draws a line in one color with a dark outline. `radius_px` is its half-width, `unit_px` the unit of stroke
+/// widths.
 pub(super) fn stroke(
     pen: &mut Pen,
     frame: &mut Frame,
@@ -142,12 +143,12 @@ pub(super) fn stroke(
     pen.ink(frame, rgb);
 }
 
-/// How much wider strokes are on a larger picture.
+/// Returns the unit of stroke widths for a picture size, pixels.
 pub(super) fn unit_px(width: u32, height: u32) -> f64 {
     (f64::from(width.max(height)) / 640.0).clamp(0.5, 4.0)
 }
 
-/// The way around a box, pixels.
+/// Returns the outline of a box as a closed line, pixels.
 pub(super) fn outline(rect: &Rect) -> [[f64; 2]; 5] {
     let [x, y] = [f64::from(rect.x), f64::from(rect.y)];
     let [right, bottom] = [f64::from(rect.right()), f64::from(rect.bottom())];

@@ -1,5 +1,5 @@
-//! Parameters from JSON: `{"preset": "papers", "kappa": 3}` starts from a preset and overrides it;
-//! without a preset it starts from the defaults. One way for every kind of parameters.
+//! Parameters from JSON: `{"preset": "papers", "kappa": 3}` overrides values of a preset; without a preset it
+//! overrides the defaults. All kinds of parameters use this module.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -7,16 +7,16 @@ use serde_json::{Map, Value};
 
 use crate::{analysis, fish, flock};
 
-/// Parameters that have presets and ranges.
+/// Parameters with presets and ranges.
 pub trait Preset: Serialize + DeserializeOwned + Default {
-    /// The parameters of a preset's name, if there is one.
+    /// Returns the parameters of a preset by name, if it exists.
     fn preset(name: &str) -> Option<Self>;
 
-    /// Checks every range; the sentence says which parameter is out of which range.
+    /// Checks all ranges. The error names the parameter and its range.
     fn check(&self) -> Result<(), String>;
 }
 
-/// Why a JSON object is not a set of parameters.
+/// Reasons why a JSON object is not a valid set of parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// The preset is unknown.
@@ -27,9 +27,8 @@ pub enum Error {
     Invalid(String),
 }
 
-/// The parameters that an object of overrides, with or without a `preset`, asks for.
-///
-/// Fails with a sentence that names the parameter.
+/// Returns the parameters of an object with an optional `preset` and overrides. The error names the
+/// parameter.
 pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
     let start = match overrides.remove("preset") {
         None | Some(Value::Null) => P::default(),
@@ -45,7 +44,7 @@ pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
     Ok(params)
 }
 
-/// Objects are overridden field by field, everything else whole.
+/// Merges overrides into a value. Objects are merged field by field, other values are replaced.
 fn override_with(value: &mut Value, overrides: Value) {
     match (value, overrides) {
         (Value::Object(fields), Value::Object(overrides)) => {

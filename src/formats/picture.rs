@@ -1,4 +1,5 @@
-//! Pictures as PNG bytes and back: plates, sprites, maps, labels; posters as JPEG. Fast deflate: files are many and small.
+//! Conversion of pictures to PNG and back, and of posters to JPEG. PNG uses fast compression, because the
+//! files are many and small.
 
 use std::io::Cursor;
 
@@ -8,46 +9,46 @@ use png::{BitDepth, ColorType, Compression};
 
 use crate::raster::{RgbImage, RgbaImage};
 
-/// PNG bytes that are not such a picture.
+/// Reasons why PNG bytes cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The bytes are not a PNG.
     #[error("not a PNG: {0}")]
     Decode(#[from] png::DecodingError),
-    /// The pixels are of another kind.
+    /// The pixels have an unexpected format.
     #[error("expected 8-bit {wanted}, found {found:?}")]
     Kind {
-        /// What was expected.
+        /// The expected format.
         wanted: &'static str,
-        /// What the file holds.
+        /// The format of the file.
         found: (ColorType, BitDepth),
     },
-    /// It has more pixels than expected.
+    /// The picture is larger than allowed.
     #[error("{width} x {height} pixels are more than there can be")]
     TooLarge {
-        /// Columns.
+        /// Width, pixels.
         width: u32,
-        /// Rows.
+        /// Height, pixels.
         height: u32,
     },
 }
 
-/// An RGB image as PNG.
+/// Returns an RGB image as PNG.
 pub fn write_rgb(image: &RgbImage) -> Vec<u8> {
     encode(image.width, image.height, ColorType::Rgb, &image.pixels)
 }
 
-/// Straight-alpha RGBA pixels as PNG. Panics when there are not `width * height * 4` of them.
+/// Returns straight-alpha RGBA pixels as PNG. Panics unless there are `width * height * 4` bytes.
 pub fn write_rgba(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     encode(width, height, ColorType::Rgba, pixels)
 }
 
-/// Gray levels as PNG. Panics when there are not `width * height` of them.
+/// Returns gray levels as PNG. Panics unless there are `width * height` of them.
 pub fn write_gray(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
     encode(width, height, ColorType::Grayscale, pixels)
 }
 
-/// Labels as a PNG of 16-bit gray. Panics when there are not `width * height` of them.
+/// Returns labels as a PNG of 16-bit gray. Panics unless there are `width * height` of them.
 pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
     let bytes: Vec<u8> = labels
         .iter()
@@ -61,7 +62,7 @@ pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
     )
 }
 
-/// An RGB image as JPEG, for posters.
+/// Returns an RGB image as JPEG, for posters.
 pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 90);
@@ -86,7 +87,7 @@ pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
     })
 }
 
-/// Reads an 8-bit RGBA PNG of at most so many columns and rows.
+/// Reads an 8-bit RGBA PNG of at most `most_px` columns and rows.
 pub fn read_rgba(bytes: &[u8], most_px: [u32; 2]) -> Result<RgbaImage, Error> {
     let (width, height, pixels) = decode(bytes, (ColorType::Rgba, "RGBA"), most_px)?;
     Ok(RgbaImage {

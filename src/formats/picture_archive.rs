@@ -1,40 +1,41 @@
-//! Pictures of the frames of a footage in one file: a zip whose entries 000000.png ... are stored, so that any tool opens
-//! them and one is read without the others. A frame may have none.
+//! Archive of pictures of the frames of a footage (docs/reference/formats.md, "mattes.zip"): a zip with
+//! uncompressed entries 000000.png ... Any tool opens it, and one picture can be read without the others. A
+//! frame may have none.
 
 use std::io::{Read, Seek, Write};
 
 use rayon::prelude::*;
 use zip::write::SimpleFileOptions;
 
-/// Why a file is no such archive.
+/// Reasons why a file is not such an archive.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// It is damaged.
+    /// The file is damaged.
     #[error("{0}")]
     Zip(#[from] zip::result::ZipError),
-    /// It holds something else.
+    /// The file has unexpected contents.
     #[error("{0}")]
     Mismatch(&'static str),
 }
 
-/// Where a picture lies in an archive.
+/// Position of a picture in an archive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// Its first byte.
+    /// Offset of its first byte.
     pub at: u64,
-    /// Its length.
+    /// Length, bytes.
     pub n_bytes: usize,
 }
 
-/// Pictures encoded at a time, on all threads: what is held in memory.
+/// Number of pictures that are encoded in parallel and held in memory. Free choice.
 const BATCH: usize = 256;
 
-/// The name of a frame's picture, in archives and in folders.
+/// Returns the name of a frame's picture in archives and folders.
 pub fn name(frame_idx: usize) -> String {
     format!("{frame_idx:06}.png")
 }
 
-/// Writes the pictures of some frames, in order, which `encode` makes; gives back what was written to.
+/// Writes the pictures of the given frames, in order, as made by `encode`. Returns the writer.
 pub fn write<W: Write + Seek>(
     out: W,
     frames: impl Iterator<Item = usize>,
@@ -53,7 +54,7 @@ pub fn write<W: Write + Seek>(
     archive.finish()
 }
 
-/// Where the pictures of `n_frames` frames lie in an archive of `n_bytes`.
+/// Returns the position of each of `n_frames` frames' pictures in an archive of `n_bytes`.
 pub fn entries(
     archive: impl Read + Seek,
     n_bytes: u64,

@@ -1,7 +1,7 @@
-//! poses.json: what was measured in every frame (DESIGN.md, a library on disk).
+//! poses.json: the measurements of every frame (docs/reference/formats.md, "poses.json").
 //!
-//! Numbers are rounded to the last digit that means something (`round`): files stay readable, and
-//! equal measurements give equal bytes.
+//! Numbers are rounded to their significant digits (`round`). Files stay readable, and equal measurements
+//! give equal bytes.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,10 +10,10 @@ use crate::analysis::Params;
 use crate::geometry::{Camera, Rect};
 use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 
-/// The schema's name and version.
+/// Name and version of the schema.
 pub const SCHEMA: &str = "flockreel/poses@1";
 
-/// The poses as JSON, one line a frame.
+/// Returns the poses as JSON, one line per frame.
 pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
     let file = PosesFile {
         schema: SCHEMA.into(),
@@ -60,7 +60,7 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
     bytes
 }
 
-/// Reads what `write` wrote.
+/// Parses the output of `write`.
 pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
     let file: PosesFile<Vec<PoseFile>> = serde_json::from_slice(bytes)?;
     Ok(Poses {
@@ -91,10 +91,10 @@ pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
     })
 }
 
-/// `value` rounded to `digits` after the point.
+/// Returns `value` rounded to `digits` decimals.
 pub(super) fn round(value: f64, digits: i32) -> f64 {
     let scale = 10f64.powi(digits);
-    // + 0.0 turns -0 into 0.
+    // Adding 0.0 turns -0 into 0.
     (value * scale).round() / scale + 0.0
 }
 
@@ -226,8 +226,7 @@ struct PoseFile {
     raw: Option<RawFile>,
 }
 
-/// What one frame alone says: `forward`, `position_m`, `heading_rad`, `gamma_rad` before all frames were
-/// looked at together.
+/// Estimates from one frame only, before all frames are combined.
 #[derive(Serialize, Deserialize)]
 struct RawFile {
     heading_rad: Option<f64>,

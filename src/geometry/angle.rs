@@ -1,11 +1,11 @@
-//! Angles: radians wrapped to (-pi, pi], and 16-bit turns in which wrapping is free.
+//! Angles: radians wrapped to (-pi, pi], and 16-bit integers that wrap by themselves.
 //!
-//! The plan compares headings as integers (ALGORITHMS.md 6), so that the same plan comes out on
-//! any machine: 65536 turns make the circle and differences wrap by themselves.
+//! Planning compares headings as integers, 65536 to the circle, so that every machine computes the same plan
+//! (docs/explanation/algorithms.md, "Planning").
 
 use std::f64::consts::{PI, TAU};
 
-/// The angle equal to `angle_rad` modulo a full turn, in (-pi, pi].
+/// Returns the angle wrapped to (-pi, pi].
 ///
 /// ```
 /// use flockreel::geometry::wrap_rad;
@@ -17,12 +17,13 @@ pub fn wrap_rad(angle_rad: f64) -> f64 {
     if wrapped <= -PI { PI } else { wrapped }
 }
 
-/// The heading after a left-right mirror: pi - heading, wrapped.
+/// Returns the heading after a left-right mirror: pi - heading, wrapped.
 pub fn mirrored_rad(heading_rad: f64) -> f64 {
     wrap_rad(PI - heading_rad)
 }
 
-/// The mean direction of some angles, in (-pi, pi]; `None` for no angles or when they cancel.
+/// Returns the mean direction of the angles, in (-pi, pi]. Returns `None` if there are none or if they
+/// cancel.
 pub fn mean_rad(angles_rad: impl IntoIterator<Item = f64>) -> Option<f64> {
     let (mut x, mut y) = (0.0, 0.0);
     for angle in angles_rad {
@@ -32,31 +33,31 @@ pub fn mean_rad(angles_rad: impl IntoIterator<Item = f64>) -> Option<f64> {
     (libm::hypot(x, y) > 1e-9).then(|| libm::atan2(y, x))
 }
 
-/// A heading or a difference of headings in 65536ths of a circle.
+/// A heading or a difference of headings, in units of 1/65536 of a circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub struct Turns(pub u16);
 
 impl Turns {
-    /// Turns per radian: 65536 / 2 pi.
+    /// Units per radian: 65536 / (2 pi).
     pub const PER_RAD: f64 = 65536.0 / TAU;
 
-    /// The nearest 65536th of a circle.
+    /// Converts from radians, rounding to the nearest unit.
     pub fn from_rad(angle_rad: f64) -> Turns {
-        // Wrapped first, so that the product fits an i32; a cast to u16 then wraps modulo 65536.
+        // Wrapping first makes the product fit an i32. The cast to u16 then wraps modulo 65536.
         Turns((wrap_rad(angle_rad) * Self::PER_RAD).round() as i32 as u16)
     }
 
-    /// The angle in (-pi, pi].
+    /// Converts to radians in (-pi, pi].
     pub fn to_rad(self) -> f64 {
         wrap_rad(f64::from(self.0) / Self::PER_RAD)
     }
 
-    /// |self - other| the short way round: 0..=32768.
+    /// Returns the absolute difference along the shorter arc, 0..=32768.
     pub fn gap(self, other: Turns) -> u16 {
         (self.0.wrapping_sub(other.0) as i16).unsigned_abs()
     }
 
-    /// The heading after a left-right mirror.
+    /// Returns the heading after a left-right mirror.
     pub fn mirrored(self) -> Turns {
         Turns(32768u16.wrapping_sub(self.0))
     }

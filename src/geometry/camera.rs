@@ -1,7 +1,8 @@
-//! The pinhole camera before a tank (N 5.1, with the refraction of ALGORITHMS.md 1).
+//! A pinhole camera in front of a tank (Nakajima et al., section 5.1), with refraction
+//! (docs/explanation/algorithms.md, "Corrections to the papers").
 //!
-//! Origin at the camera, x right, y down, z away, metres; the front pane is the plane `z = z_min_m`.
-//! Everything in the image is measured on the pane: `pane_px_per_m` pixels to the metre.
+//! Camera coordinates are in metres: origin at the camera, x right, y down, z away. The front pane is the
+//! plane `z = z_min_m`. Image sizes are converted to sizes on the pane by `pane_px_per_m`.
 
 /// A calibrated camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -10,28 +11,30 @@ pub struct Camera {
     pub z_min_m: f64,
     /// Pixels per metre on the pane, > 0.
     pub pane_px_per_m: f64,
-    /// The image point straight ahead, pixels.
+    /// Principal point: the image point on the optical axis, pixels.
     pub center_px: [f64; 2],
-    /// Refractive index behind the pane: 1 for air (N), 4/3 for water.
+    /// Refractive index behind the pane: 1 for air (Nakajima et al.), 4/3 for water.
     pub medium_index: f64,
 }
 
 impl Camera {
-    /// The focal length in pixels: `pane_px_per_m * z_min_m`.
+    /// Returns the focal length, pixels: `pane_px_per_m * z_min_m`.
     pub fn focal_px(&self) -> f64 {
         self.pane_px_per_m * self.z_min_m
     }
 
-    /// Apparent depth, metres, of an upright extent `height_m` seen `height_px` tall.
+    /// Returns the apparent depth, metres, of an object of height `height_m` that appears `height_px` tall.
     ///
-    /// N (7) corrected: `z = H z_min / len`, `len` in metres on the pane. The printed form has the
-    /// quotient upside down and puts a farther fish nearer.
+    /// The formula is Nakajima et al., equation 7, corrected: `z = H z_min / len`, with `len` in metres on
+    /// the pane. The printed equation has the quotient inverted, which places a more distant fish nearer.
     pub fn apparent_depth_m(&self, height_m: f64, height_px: f64) -> f64 {
         height_m * self.z_min_m / (height_px / self.pane_px_per_m)
     }
 
-    /// Where an image point at an apparent depth lies: N (1), x and y by the apparent depth, z
-    /// pushed back by the medium, `z = z_min + n (z_app - z_min)` (paraxial).
+    /// Returns the position, metres, of an image point at an apparent depth.
+    ///
+    /// The apparent depth gives x and y by Nakajima et al., equation 1. Refraction changes only the depth
+    /// (paraxial): `z = z_min + n (z_app - z_min)`.
     pub fn point_in_camera(&self, point_px: [f64; 2], z_apparent_m: f64) -> [f64; 3] {
         let scale = z_apparent_m / self.focal_px();
         [
@@ -41,7 +44,7 @@ impl Camera {
         ]
     }
 
-    /// The image point, pixels, of a point in the camera frame: the inverse of `point_in_camera`.
+    /// Returns the image point, pixels, of a position in camera coordinates. Inverse of `point_in_camera`.
     pub fn image_from_camera(&self, point_m: [f64; 3]) -> [f64; 2] {
         let scale = self.focal_px() / self.apparent_from_true_depth_m(point_m[2]);
         [
@@ -50,7 +53,7 @@ impl Camera {
         ]
     }
 
-    /// The depth at which a point at true depth `z_m` seems to lie.
+    /// Returns the apparent depth, metres, of a point at true depth `z_m`.
     pub fn apparent_from_true_depth_m(&self, z_m: f64) -> f64 {
         self.z_min_m + (z_m - self.z_min_m) / self.medium_index
     }

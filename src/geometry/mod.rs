@@ -1,4 +1,4 @@
-//! Angles, pixel rectangles and the pinhole camera (conventions of DESIGN.md).
+//! Angles, pixel rectangles and the pinhole camera (docs/reference/formats.md, "Conventions").
 
 pub mod angle;
 pub mod camera;

@@ -1,6 +1,6 @@
-//! Pixel rectangles: half-open, x right, y down, never outside the image they belong to.
+//! Pixel rectangles: half-open, x right, y down, within the image they belong to.
 
-/// The pixels `x..x + w`, `y..y + h`.
+/// The pixels with columns `x..x + w` and rows `y..y + h`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Rect {
     /// Leftmost column.
@@ -14,12 +14,13 @@ pub struct Rect {
 }
 
 impl Rect {
-    /// The whole of an image of `w` by `h` pixels.
+    /// Returns the rectangle that covers an image of `w` by `h` pixels.
     pub fn of_size(w: u32, h: u32) -> Rect {
         Rect { x: 0, y: 0, w, h }
     }
 
-    /// The part of `left..right`, `top..bottom` (any integers) that lies in an image of `w` by `h`.
+    /// Returns the part of the rectangle `left..right`, `top..bottom` that lies in an image of `w` by `h`
+    /// pixels.
     pub fn clipped(left: i64, top: i64, right: i64, bottom: i64, w: u32, h: u32) -> Rect {
         let clip = |v: i64, limit: u32| v.clamp(0, i64::from(limit)) as u32;
         let (x0, x1) = (clip(left, w), clip(right, w));
@@ -32,27 +33,27 @@ impl Rect {
         }
     }
 
-    /// One past the last column.
+    /// Returns the index after the last column.
     pub fn right(&self) -> u32 {
         self.x + self.w
     }
 
-    /// One past the last row.
+    /// Returns the index after the last row.
     pub fn bottom(&self) -> u32 {
         self.y + self.h
     }
 
-    /// Number of pixels.
+    /// Returns the number of pixels.
     pub fn area(&self) -> u64 {
         u64::from(self.w) * u64::from(self.h)
     }
 
-    /// True when it holds no pixel.
+    /// Returns true if the rectangle has no pixels.
     pub fn is_empty(&self) -> bool {
         self.w == 0 || self.h == 0
     }
 
-    /// Grown by `margin_px` on every side, clipped to an image of `w` by `h`.
+    /// Returns the rectangle grown by `margin_px` on every side and clipped to an image of `w` by `h`.
     pub fn inflated(&self, margin_px: u32, w: u32, h: u32) -> Rect {
         let m = i64::from(margin_px);
         Rect::clipped(
@@ -65,7 +66,7 @@ impl Rect {
         )
     }
 
-    /// The smallest rectangle that holds both; an empty one adds nothing.
+    /// Returns the smallest rectangle that contains both. An empty rectangle adds nothing.
     pub fn union(&self, other: &Rect) -> Rect {
         if self.is_empty() {
             return *other;
@@ -86,7 +87,7 @@ impl Rect {
         }
     }
 
-    /// The pixels in both; empty where they do not meet.
+    /// Returns the pixels common to both; empty if they do not overlap.
     pub fn intersection(&self, other: &Rect) -> Rect {
         let (x, y) = (self.x.max(other.x), self.y.max(other.y));
         let (right, bottom) = (
@@ -101,7 +102,7 @@ impl Rect {
         }
     }
 
-    /// Whether the pixel (x, y) lies inside.
+    /// Returns whether the pixel (x, y) lies inside.
     pub fn contains(&self, x: u32, y: u32) -> bool {
         x >= self.x && x < self.right() && y >= self.y && y < self.bottom()
     }

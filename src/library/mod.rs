@@ -1,6 +1,7 @@
-//! The library: all that one analysis yields, and all that a flock needs (DESIGN.md, names).
+//! The library: the result of one analysis and the input of a flock.
 //!
-//! Plain values that cannot be wrong once made; `formats` writes and reads them.
+//! The types here are plain values without I/O. `formats` writes and reads them (docs/reference/formats.md,
+//! "library.json").
 
 pub mod playback;
 pub mod pose;
@@ -13,112 +14,114 @@ pub use sprites::{Matte, Sprites};
 use crate::geometry::Rect;
 use crate::raster::{RgbImage, RgbaImage};
 
-/// What one analysis yields.
+/// The result of one analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Library {
-    /// What was measured in every frame.
+    /// Measurements of every frame.
     pub poses: Poses,
-    /// The scene without the animal, of the footage's size.
+    /// The background: the scene without the animal, of the footage's size.
     pub background: RgbImage,
-    /// What stands before the animal and is seen in the background too: its straight color, and as alpha the share of
-    /// the pixel that it takes; of the footage's size. `None` when nothing is known to.
+    /// Foreground objects that hide parts of the animal and are part of the background too. Color is straight
+    /// and alpha is the share of the pixel that the object covers; of the footage's size. `None` if none are
+    /// known.
     pub occluders: Option<RgbaImage>,
     /// The animal cut out of every frame in which it was found.
     pub sprites: Sprites,
-    /// The shadow that it casts, seen from above; `None` where it casts none, or is seen from the side.
+    /// The shadow of the animal. `None` if it casts none or the view is from the side.
     pub shadow: Option<Shadow>,
-    /// f: how many sprites a clip holds.
+    /// Number of sprites in a clip: f in Okabe et al.
     pub clip_frames: usize,
-    /// Clips nearer than this (strictly) are alike.
+    /// Distance below which (strictly) two clips are similar.
     pub epsilon: u64,
-    /// The median of D(i, i+1): how much the animal changes from one frame to the next.
+    /// Median of D(i, i+1), the distance between successive clips: the natural change from frame to frame.
     pub natural_step: u64,
-    /// The pairs of clips that were found alike, by (from, to, mirrored).
+    /// Pairs of similar clips, sorted by (from, to, mirrored).
     pub transitions: Vec<Transition>,
-    /// What may follow what.
+    /// The playback graph: which frames may follow which.
     pub playback: Playback,
-    /// The runs of sprites between jumps.
+    /// Runs of sprites between jumps.
     pub patches: Vec<Patch>,
-    /// What is worth knowing about the above.
+    /// Statistics of this library.
     pub stats: LibraryStats,
 }
 
-/// The shadow of an animal on the floor below it: its outline, shifted and blurred.
+/// The shadow of an animal on the floor below it: the animal's outline, shifted and blurred.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shadow {
-    /// The share of the light that it takes in its midst, 0..=1.
+    /// Share of the light that the shadow removes at its center, 0..=1.
     pub darkness: f64,
-    /// How far from the animal it lies in the picture, x right and y down, body lengths.
+    /// Offset of the shadow from the animal in the picture, x right and y down, body lengths.
     pub offset_bl: [f64; 2],
-    /// Standard deviation of the Gaussian that blurs it, body lengths.
+    /// Standard deviation of the Gaussian blur, body lengths.
     pub blur_bl: f64,
 }
 
-/// Something that moved besides the animal.
+/// A moving object other than the animal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mover {
-    /// What it seems to be.
+    /// Classification.
     pub kind: MoverKind,
-    /// When it was first seen, seconds.
+    /// Time at which the object is first seen, seconds.
     pub from_s: f64,
-    /// When it was last seen, seconds.
+    /// Time at which the object is last seen, seconds.
     pub to_s: f64,
-    /// The box of all its places, in the frame.
+    /// Bounding box of all its positions, in the frame.
     pub box_px: Rect,
 }
 
-/// What a mover seems to be.
+/// Classification of a moving object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MoverKind {
-    /// It looks like the animal.
+    /// An object that looks like the animal.
     Animal,
-    /// The animal's own image in a mirror, a pane or the water's surface.
+    /// The reflection of the animal in a mirror, a pane or the water surface.
     MirrorImage,
-    /// It reaches in across the border of the picture: a hand, a person, a cable.
+    /// An object that enters across the border of the picture: a hand, a person, a cable.
     FromBorder,
-    /// It changes where it is: a plant, a clock, a reflection, bedding.
+    /// An object that changes in place: a plant, a clock, a reflection, bedding.
     InPlace,
-    /// Something else.
+    /// Anything else.
     Other,
 }
 
-/// Counts and shares that say how good a library is.
+/// Counts and shares that describe the quality of a library.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct LibraryStats {
-    /// Frames of the footage.
+    /// Number of frames of the footage.
     pub n_frames: usize,
-    /// Frames in which the animal was found.
+    /// Number of frames in which the animal was found.
     pub n_detected: usize,
-    /// Pixels of the background that the animal never left free: continued from the texture around them
-    /// (Efros & Leung 1999), nearest the rim first; past 16384 of them the rest is filled smoothly.
+    /// Number of background pixels that the animal never left free. They are filled with the texture around
+    /// them (Efros & Leung 1999), starting at the edge; beyond 16384 pixels the rest is interpolated
+    /// smoothly.
     pub never_seen_px: u64,
-    /// Several animals move in the footage, and the largest was followed because that was asked for.
+    /// Whether several animals move in the footage and the largest was followed, as requested.
     pub several_animals: bool,
-    /// Frames that show another scene than the film (black frames, title cards); nothing is measured in them.
+    /// Number of frames that show another scene (black frames, title cards). They are not measured.
     pub n_foreign_frames: usize,
-    /// When the first of them is shown, seconds.
+    /// Time of the first such frame, seconds; null if there is none.
     pub first_foreign_s: Option<f64>,
-    /// The animal covers too few pixels for sprites: there are poses alone.
+    /// Whether the animal covers too few pixels for sprites. The library then holds poses only.
     pub animal_too_small: bool,
-    /// Pairs of clips that may be joined (whole, far enough apart, the animal pointing the same way, or turning
-    /// alike from above) and have D < epsilon, before only the nearest of those around are kept.
+    /// Number of pairs of clips with D < epsilon that may be joined, before the selection of local minima.
+    /// Such clips are complete and far enough apart; the animal has the same heading, or from above the same
+    /// turn rate.
     pub n_candidates: u64,
-    /// Of an approximate search, the share of such pairs that it finds, measured on the pairs of 256 clips, 0..=1;
-    /// null where all pairs were looked at.
+    /// Share of such pairs that an approximate search finds, 0..=1, estimated from 256 clips. Null if the
+    /// search compared all pairs.
     pub recall: Option<f64>,
-    /// Transitions found: pairs that are alike, point the same way and are the best around (O: 72).
+    /// Number of transitions: pairs that are also local minima of the distance (72 in Okabe et al.).
     pub n_transitions: usize,
-    /// The multiple of the natural step that epsilon is; null when epsilon was given.
+    /// Ratio of epsilon to the natural step; null if epsilon was given.
     pub kappa_used: Option<f64>,
     /// Share of the frames that lie in the largest strongly connected component, 0..=1.
     pub component_share: f64,
-    /// Frames of the component by heading: 36 bins of 10 degrees from -180.
+    /// Number of frames of the component by heading: 36 bins of 10 degrees from -180.
     pub heading_histogram: Vec<u32>,
-    /// Measured speeds of the animal, lengths a second: 5th percentile, median, 95th percentile.
+    /// Measured speed of the animal, body lengths per second: 5th percentile, median, 95th percentile.
     pub speed_bl_per_s: Option<[f64; 3]>,
-    /// 95th percentile of the measured turn rate, radians a second.
+    /// 95th percentile of the measured turn rate, radians per second.
     pub turn_rate_rad_per_s: Option<f64>,
-    /// Length of the animal in the image when seen at length (80th percentile), pixels: the body
-    /// length (BL) of the flock.
+    /// Body length (BL) of the flock: 80th percentile of the animal's length in the image, pixels.
     pub length_px: Option<f64>,
 }

@@ -1,60 +1,62 @@
-//! What may follow what: transitions between like clips, the playback graph that they make, and the
-//! patches between jumps (ALGORITHMS.md 5; O 3.3).
+//! Playback graph: transitions between similar clips, the jumps they allow, and the patches between jumps.
+//! Source: Okabe et al., section 3.3; docs/explanation/algorithms.md, "Transitions and playback".
 
 use std::ops::Range;
 
-/// Two clips that look alike and point the same way: playback may jump between them.
+/// A pair of clips with similar appearance and heading. Playback may jump between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transition {
-    /// First frame of the one clip.
+    /// First frame of one clip.
     pub from: u32,
     /// First frame of the other clip.
     pub to: u32,
-    /// The other clip was compared left-right mirrored.
+    /// Whether the other clip was compared mirrored left-right.
     pub mirrored: bool,
-    /// D of the two clips.
+    /// Distance D of the two clips.
     pub distance: u64,
-    /// Difference of the clips' mean headings, 0..=pi.
+    /// Difference of the clips' mean headings, radians, 0..=pi.
     pub heading_gap_rad: f64,
 }
 
-/// One step of playback that is not frame -> frame + 1.
+/// A step of playback other than frame -> frame + 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Jump {
-    /// The last frame shown before the jump.
+    /// Last frame shown before the jump.
     pub from: u32,
-    /// The frame shown next.
+    /// First frame shown after the jump.
     pub to: u32,
-    /// D of the clips that it joins.
+    /// Distance D of the two clips that the jump joins.
     pub cost: u64,
-    /// The jump changes the mirror side.
+    /// Whether the jump changes the mirror side.
     pub mirrored: bool,
 }
 
-/// The playback graph over states (frame, mirror side): frame -> frame + 1 at no cost, and the jumps.
+/// The playback graph over states (frame, mirror side). Its edges are frame -> frame + 1, at no cost, and the
+/// jumps.
 ///
-/// With mirrored jumps both sides of every frame are states; the graph is the same seen from either
-/// side. Only frames of the component may be shown: within it playback never ends.
+/// If there are mirrored jumps, both mirror sides of every frame are states; the graph looks the same from
+/// either side. Playback uses only frames of the component, within which it never ends.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Playback {
-    /// Every jump within the component, sorted, without repeats of (from, to, mirrored).
+    /// All jumps within the component, sorted, without duplicates of (from, to, mirrored).
     pub jumps: Vec<Jump>,
-    /// The frames of the largest strongly connected component, rising.
+    /// Frames of the largest strongly connected component, in increasing order.
     pub component: Vec<u32>,
 }
 
 /// A run of sprites between two jump ends, and the patches that may follow it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Patch {
-    /// Its frames, `start..end`.
+    /// Frames of the patch, `start..end`.
     pub frames: Range<u32>,
-    /// Indices of the patches that can be played after it, rising.
+    /// Indices of the patches that may follow, in increasing order.
     pub next: Vec<u32>,
 }
 
 impl Playback {
-    /// The same without jumps after which playback must end: two jumps are at least `dwell` frames apart, and some runs are
-    /// shorter than that. Without `mirror` all jumps that change the side are left out.
+    /// Returns the graph without the jumps after which playback would end. Successive jumps are at least
+    /// `dwell` frames apart, and some runs are shorter than that. If `mirror` is false, the result has no
+    /// mirrored jumps.
     pub fn without_dead_ends(&self, mirror: bool, dwell: usize) -> Playback {
         let mut jumps = self.jumps.clone();
         jumps.retain(|jump| mirror || !jump.mirrored);
@@ -65,7 +67,7 @@ impl Playback {
             for from in jumps.iter().filter_map(|jump| at(jump.from)) {
                 leaves[from] = true;
             }
-            // Whether a jump lies ahead in the run, and how many frames of the run do.
+            // For each frame: whether the rest of its run has a jump, and how many frames of the run follow.
             let mut n_ahead = vec![0; n];
             for k in (0..n.saturating_sub(1)).rev() {
                 if self.component[k + 1] == self.component[k] + 1 {

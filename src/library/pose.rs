@@ -1,9 +1,10 @@
-//! Poses: what is measured in each frame. What could not be measured is `None`, never invented.
+//! Poses: the measurements of each frame (docs/reference/formats.md, "poses.json"). A value that could not be
+//! measured is `None`, never a guess.
 
 use super::Mover;
 use crate::geometry::{Camera, Rect};
 
-/// From where the animal is seen.
+/// The camera's viewpoint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// From the side: gravity points down in the picture.
@@ -12,40 +13,40 @@ pub enum View {
     Top,
 }
 
-/// The known size of the animal.
+/// Known size of the animal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Animal {
-    /// From the nose to the tip of the tail, metres.
+    /// Length from the nose to the tip of the tail, metres.
     pub length_m: f64,
-    /// Dorsoventral extent of the whole silhouette, fins included, metres.
+    /// Dorsoventral extent of the whole silhouette, including fins, metres.
     pub height_m: f64,
 }
 
-/// The poses of a footage, one for every frame.
+/// The poses of a footage, one for each frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Poses {
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
     /// Width and height in square pixels.
     pub image_size_px: [u32; 2],
-    /// From where the animal is seen.
+    /// The camera's viewpoint.
     pub view: View,
-    /// The probability that the view was guessed right, .5..=1; `None` where it was given.
+    /// Probability that the view was detected correctly, 0.5..=1; `None` if it was given.
     pub view_confidence: Option<f64>,
-    /// What moved besides the animal, by the first time it was seen.
+    /// Moving objects other than the animal, ordered by the time at which they are first seen.
     pub other_movers: Vec<Mover>,
-    /// The camera, when it was given.
+    /// The camera; `None` if it was not given.
     pub camera: Option<Camera>,
-    /// The animal's size, when it was given.
+    /// Size of the animal; `None` if it was not given.
     pub animal: Option<Animal>,
-    /// One entry for every frame of the footage, in order.
+    /// One pose for each frame of the footage, in order.
     pub frames: Vec<Pose>,
-    /// How often the tail beats, where that can be told.
+    /// Tail beat frequency; `None` if it could not be measured.
     pub tail_beat: Option<TailBeat>,
 }
 
 impl Poses {
-    /// Tail beats a second in a frame, where they were measured.
+    /// Returns the tail beat frequency in a frame, beats per second; `None` if it was not measured there.
     pub fn tail_beat_hz(&self, frame_idx: usize) -> Option<f64> {
         let spans = &self.tail_beat.as_ref()?.spans;
         let span = (spans.iter()).find(|s| (s.frames[0]..s.frames[1]).contains(&frame_idx))?;
@@ -53,103 +54,104 @@ impl Poses {
     }
 }
 
-/// How often the tail beats.
+/// Measured tail beats.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TailBeat {
-    /// What swings with the tail.
+    /// The signal that was measured.
     pub method: TailBeatMethod,
-    /// Where it stands out of the noise, in order and apart; at least one.
+    /// Spans in which the beat exceeds the noise, in order and without overlap; at least one.
     pub spans: Vec<BeatSpan>,
 }
 
-/// What the tail beat was measured by.
+/// Signal from which the tail beat was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TailBeatMethod {
-    /// The bend of the midline, seen from above.
+    /// Bend of the midline (top view).
     Bend,
-    /// The length and the skew of the silhouette, seen from the side.
+    /// Length and skew of the silhouette (side view).
     LengthAndSkew,
 }
 
-/// A while in which the tail beats at one rate.
+/// A span with one tail beat frequency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BeatSpan {
-    /// The first frame and the one after the last.
+    /// The first frame and the frame after the last.
     pub frames: [usize; 2],
-    /// Seconds from the first frame of the footage, at its constant rate.
+    /// Start, seconds from the first frame of the footage, at the constant frame rate.
     pub start_s: f64,
-    /// Likewise.
+    /// End, in the same unit.
     pub end_s: f64,
-    /// Beats a second: one to the left and one to the right is one beat.
+    /// Beats per second. One stroke to the left and one to the right make one beat.
     pub frequency_hz: f64,
-    /// Of the bend, radians; of the length, as a share of it.
+    /// Amplitude: of the bend, radians, or of the length, as a share of the length.
     pub amplitude: f64,
-    /// 1 less the noise floor over the power, 0.75..=1.
+    /// 1 - (noise floor / power), 0.75..=1.
     pub confidence: f64,
 }
 
-/// What was measured in one frame.
+/// Measurements of one frame.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Pose {
     /// True time of the picture, seconds from the first frame.
     pub time_s: f64,
-    /// The silhouette touches the border of the image.
+    /// Whether the silhouette touches the border of the image.
     pub cut: bool,
     /// Probability that the centroid lies within a tenth of the body length of the true one, 0.5..=1.
     pub confidence: Option<f64>,
-    /// Posterior probability of the head being where `heading_rad` says, 0.5..=1.
+    /// Posterior probability that `heading_rad` points to the head, 0.5..=1.
     pub head_confidence: Option<f64>,
     /// Posterior probability of the sign of `forward[2]`, 0.5..=1.
     pub depth_sign_confidence: Option<f64>,
-    /// Centroid of the silhouette, N (2); the centre of the first pixel is (0.5, 0.5).
+    /// Centroid of the silhouette, pixels (Nakajima et al., equation 2). The center of the first pixel is
+    /// (0.5, 0.5).
     pub centroid_px: Option<[f64; 2]>,
     /// Bounding box of the silhouette.
     pub box_px: Option<Rect>,
     /// Area of the silhouette, pixels.
     pub area_px: Option<f64>,
-    /// Direction of the length axis, in (-pi/2, pi/2].
+    /// Direction of the length axis, radians, in (-pi/2, pi/2].
     pub axis_rad: Option<f64>,
-    /// Direction in which the head points, in (-pi, pi].
+    /// Direction in which the head points, radians, in (-pi, pi].
     pub heading_rad: Option<f64>,
-    /// Extent of the silhouette along the length axis.
+    /// Extent of the silhouette along the length axis, pixels.
     pub length_px: Option<f64>,
-    /// Extent of the silhouette along the height axis.
+    /// Extent of the silhouette along the height axis, pixels.
     pub height_px: Option<f64>,
-    /// Third standardised moment along the length axis, positive toward +axis.
+    /// Third standardized moment along the length axis, positive in the direction of `axis_rad`.
     pub skew: Option<f64>,
-    /// Points from head to tail, top view only.
+    /// Midline points from head to tail, pixels; top view only.
     pub midline_px: Option<Vec<[f64; 2]>>,
-    /// Angle of the last third of the midline against the first third.
+    /// Angle of the last third of the midline against the first third, radians.
     pub bend_rad: Option<f64>,
-    /// Position in the camera frame, metres: x right, y down, z away.
+    /// Position in camera coordinates, metres: x right, y down, z away.
     pub position_m: Option<[f64; 3]>,
-    /// Unit vector of the direction in space.
+    /// Unit vector of the animal's direction in space, camera coordinates.
     pub forward: Option<[f64; 3]>,
-    /// atan2(dz, dx) of `forward`.
+    /// atan2(dz, dx) of `forward`, radians.
     pub yaw_rad: Option<f64>,
-    /// asin(dy) of `forward`: positive = nose down.
+    /// asin(dy) of `forward`, radians; positive is nose down.
     pub pitch_rad: Option<f64>,
-    /// Angle between the direction in space and the image plane, N (8), 0..=pi/2.
+    /// Angle between `forward` and the image plane, radians, 0..=pi/2 (Nakajima et al., equation 8).
     pub gamma_rad: Option<f64>,
-    /// What this frame alone says of the same, before all frames were looked at together.
+    /// The same quantities from this frame only, before smoothing over all frames.
     pub raw: Option<Raw>,
 }
 
-/// Values of one frame alone (N 5 and 6).
+/// Estimates from one frame only (Nakajima et al., sections 5 and 6).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Raw {
-    /// Along the length axis, in (-pi, pi].
+    /// Heading along the length axis, radians, in (-pi, pi].
     pub heading_rad: Option<f64>,
-    /// From the height of the silhouette, metres.
+    /// Position from the height of the silhouette, metres.
     pub position_m: Option<[f64; 3]>,
-    /// From the share of the length that is seen; away or toward by the change of depth.
+    /// Direction from the foreshortening of the length. The change of depth decides between away and toward.
     pub forward: Option<[f64; 3]>,
-    /// N (8), 0..=pi/2.
+    /// Angle to the image plane, radians, 0..=pi/2 (Nakajima et al., equation 8).
     pub gamma_rad: Option<f64>,
 }
 
 impl Pose {
-    /// True when the animal was found in the frame: its confidence is 0.5 at least.
+    /// Returns whether the animal was found in the frame; its confidence is then at least 0.5.
     pub fn detected(&self) -> bool {
         self.centroid_px.is_some()
     }

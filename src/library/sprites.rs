@@ -1,9 +1,9 @@
-//! The animal of every frame: cut out as it was filmed, pixel for pixel, and from that the sprites, all of
-//! one size with the centroid at the middle (O's clip U).
+//! Mattes and sprites. A matte is the animal as cut out of one frame, pixel for pixel. Sprites all have one
+//! size, with the centroid at the middle (the clips U of Okabe et al.).
 //!
-//! What is drawn into a flock is the matte, so that it is interpolated once; what is compared and exported
-//! are sprites, put together when they are asked for. A long footage has many: their pixels lie in a
-//! [`Scratch`].
+//! Flocks are drawn from mattes, so that each picture is interpolated only once. Distances and exports use
+//! sprites, which are computed from mattes on request. The pixels lie in a [`Scratch`], because a long
+//! footage has many.
 
 use std::sync::Arc;
 
@@ -15,32 +15,32 @@ use crate::raster::canvas::straight;
 use crate::raster::resample::{Placement, Premultiplied, Resampled, Room, bounds_of};
 use crate::scratch::{Full, InMemory, Scratch};
 
-/// The animal of every frame of the footage, in straight-alpha RGBA.
+/// The animal in every frame of the footage, in straight-alpha RGBA.
 ///
-/// A frame without the animal has no sprite: its picture is wholly transparent and it is not `present`.
+/// A frame without the animal has no matte, and its sprite is fully transparent.
 #[derive(Clone, Debug)]
 pub struct Sprites {
     width: u32,
     height: u32,
     mattes: Vec<Option<Matte>>,
-    /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
+    /// Scale of each frame's sprite relative to the footage; `None` if all are 1.
     scales: Option<Vec<f64>>,
     scratch: Arc<dyn Scratch>,
 }
 
-/// The animal cut out of one frame, its pixels those of the frame.
+/// The animal cut out of one frame, with the pixels of that frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Matte {
-    /// Columns and rows.
+    /// Width and height, pixels.
     pub size: [u32; 2],
-    /// The animal's centroid, from the upper left corner, to 3 decimals, as files hold it.
+    /// Centroid of the animal, pixels from the upper left corner, rounded to 3 decimals as in files.
     pub center_px: [f64; 2],
-    /// Where the RGBA bytes lie.
+    /// Offset of the RGBA bytes in the scratch.
     pub at: u64,
 }
 
 impl Matte {
-    /// How far its farthest corner is from the centroid, pixels.
+    /// Returns the distance from the centroid to the farthest corner, pixels.
     pub fn reach_px(&self) -> f64 {
         let farthest = |k: usize| {
             let after = f64::from(self.size[k]) - self.center_px[k];
@@ -51,7 +51,7 @@ impl Matte {
 }
 
 impl Sprites {
-    /// `n_frames` missing sprites of `width` by `height`.
+    /// Returns `n_frames` missing sprites of `width` by `height` pixels.
     pub fn missing(width: u32, height: u32, n_frames: usize) -> Sprites {
         Sprites::of(
             [width, height],
@@ -61,7 +61,8 @@ impl Sprites {
         )
     }
 
-    /// Sprites of `size` pixels, of mattes that lie in `scratch`: as large as filmed, or of `scales`.
+    /// Makes sprites of `size` pixels from mattes stored in `scratch`. `scales` holds one scale per frame;
+    /// `None` means 1.
     pub fn of(
         [width, height]: [u32; 2],
         mattes: Vec<Option<Matte>>,
@@ -77,9 +78,10 @@ impl Sprites {
         }
     }
 
-    /// Draws a sprite for every frame, on all threads, and puts aside what each shows.
+    /// Draws a sprite for every frame, in parallel, and stores its visible part in `scratch` as a matte.
     ///
-    /// `draw` is given a frame's number and its picture, wholly transparent, and says whether the frame has a sprite.
+    /// `draw` gets the frame index and a fully transparent picture. It returns whether the frame has a
+    /// sprite.
     pub fn drawn<E: From<Full> + Send>(
         [width, height]: [u32; 2],
         n_frames: usize,
@@ -117,42 +119,42 @@ impl Sprites {
         Ok(Sprites::of([width, height], mattes, None, scratch))
     }
 
-    /// Columns of each sprite.
+    /// Returns the width of each sprite, pixels.
     pub fn width(&self) -> u32 {
         self.width
     }
 
-    /// Rows of each sprite.
+    /// Returns the height of each sprite, pixels.
     pub fn height(&self) -> u32 {
         self.height
     }
 
-    /// Bytes of one sprite: width * height * 4.
+    /// Returns the size of one sprite, bytes: width * height * 4.
     pub fn n_bytes(&self) -> usize {
         self.width as usize * self.height as usize * 4
     }
 
-    /// One for every frame of the footage, missing ones included.
+    /// Returns the number of frames of the footage, including frames without a sprite.
     pub fn n_frames(&self) -> usize {
         self.mattes.len()
     }
 
-    /// Whether frame `frame_idx` has a sprite.
+    /// Returns whether frame `frame_idx` has a sprite. Panics beyond the last frame.
     pub fn is_present(&self, frame_idx: usize) -> bool {
         self.mattes[frame_idx].is_some()
     }
 
-    /// How large every frame's sprite is relative to the footage; `None` when all are as filmed.
+    /// Returns the scale of each frame's sprite relative to the footage; `None` if all are 1.
     pub fn scales(&self) -> Option<&[f64]> {
         self.scales.as_deref()
     }
 
-    /// What was cut out of a frame. Panics beyond the last frame.
+    /// Returns the matte of a frame, if it has one. Panics beyond the last frame.
     pub fn matte(&self, frame_idx: usize) -> Option<Matte> {
         self.mattes[frame_idx]
     }
 
-    /// The RGBA bytes of a matte, by rows, in memory that the caller lends.
+    /// Reads the RGBA bytes of a matte, row by row, into `rgba`, whose memory is reused.
     pub fn read_matte(&self, matte: &Matte, rgba: &mut Vec<u8>) {
         let [width, height] = matte.size;
         rgba.clear();
@@ -160,10 +162,10 @@ impl Sprites {
         self.scratch.get(matte.at, rgba);
     }
 
-    /// The RGBA bytes of a frame's sprite, all zero when it is missing. Panics beyond the last frame.
+    /// Returns the RGBA bytes of a frame's sprite, all zero if it is missing. Panics beyond the last frame.
     ///
-    /// The centroid's sub-pixel rest is interpolated by Catmull and Rom's curve in premultiplied alpha; where
-    /// there is none, pixels are those of the matte.
+    /// If the shift to the centroid is a whole number of pixels and the scale is 1, the pixels are those of
+    /// the matte. Otherwise they are interpolated in premultiplied alpha (Catmull-Rom).
     pub fn sprite(&self, frame_idx: usize) -> Vec<u8> {
         let mut picture = vec![0; self.n_bytes()];
         let Some(matte) = self.mattes[frame_idx] else {
@@ -179,7 +181,7 @@ impl Sprites {
         picture
     }
 
-    /// Where the corner of a matte comes to lie in its sprite, if that is on a whole pixel.
+    /// Returns the position of the matte's corner in its sprite, if it is a whole number of pixels.
     fn whole_shift(&self, matte: &Matte) -> Option<[i64; 2]> {
         let middle = [self.width, self.height].map(|side| f64::from(side) / 2.0);
         let shift = [0, 1].map(|k| middle[k] - matte.center_px[k]);
@@ -220,13 +222,13 @@ impl Sprites {
         }
     }
 
-    /// Where more may be put aside that belongs to these sprites.
+    /// Returns the scratch, which may store more data that belongs to these sprites.
     pub fn scratch(&self) -> &Arc<dyn Scratch> {
         &self.scratch
     }
 }
 
-/// A pixel whose alpha rounds to nothing has no color either.
+/// Clears the color of a pixel whose alpha is 0.
 fn visible(pixel: [u8; 4]) -> [u8; 4] {
     match pixel[3] {
         0 => [0; 4],
@@ -234,7 +236,7 @@ fn visible(pixel: [u8; 4]) -> [u8; 4] {
     }
 }
 
-/// Where the rows of a box lie among the bytes of a picture of `width` columns.
+/// Returns the byte range of each row of a box in an RGBA picture of `width` columns.
 fn rows(bounds: Rect, width: u32) -> impl Iterator<Item = std::ops::Range<usize>> {
     (bounds.y..bounds.bottom()).map(move |y| {
         let first = (y as usize * width as usize + bounds.x as usize) * 4;
@@ -242,7 +244,7 @@ fn rows(bounds: Rect, width: u32) -> impl Iterator<Item = std::ops::Range<usize>
     })
 }
 
-/// The same pictures, wherever they lie.
+/// Compares the pictures, not their storage.
 impl PartialEq for Sprites {
     fn eq(&self, other: &Sprites) -> bool {
         let shape = |s: &Sprites| (s.width, s.height, s.n_frames());
@@ -281,7 +283,7 @@ mod tests {
         assert_eq!(sprites.sprite(1), vec![0; 120]);
     }
 
-    /// A white bar of 3 x 1 in a matte of 5 x 3, in a sprite of 4 x 2, as alpha.
+    /// Returns the alpha of a sprite of 4 x 2 pixels. It shows a white bar of 3 x 1 in a matte of 5 x 3.
     fn alpha_of_bar(center_px: [f64; 2], scales: Option<Vec<f64>>) -> Vec<u8> {
         let scratch = InMemory::default();
         let mut rgba = vec![0; 5 * 3 * 4];
@@ -309,7 +311,7 @@ mod tests {
     fn between_pixels_a_sprite_is_interpolated_and_another_scale_shows_it_larger() {
         let half = alpha_of_bar([2.5, 1.0], None);
         assert_eq!(half[..4], [0; 4]);
-        // Catmull and Rom's curve half way up an edge: 9 / 16 - 1 / 16.
+        // Catmull-Rom weights half way up an edge: 9/16 - 1/16.
         assert_eq!(half[4..], [128, 255, 255, 128]);
         let large = alpha_of_bar([2.5, 1.5], Some(vec![2.0]));
         assert!(large.iter().all(|&alpha| alpha > 200), "{large:?}");

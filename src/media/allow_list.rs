@@ -1,5 +1,5 @@
-//! What ffmpeg may open and run (RELIABILITY.md, "The gate"): protocols, demuxers, decoders, and
-//! how much of each. A file that names other files, or needs a decoder outside the list, fails.
+//! Allow-lists for ffmpeg: protocols, demuxers, decoders and sizes (docs/explanation/promises.md, "Confined
+//! media tools"). A file that refers to other files, or needs a decoder outside the list, fails.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -7,34 +7,35 @@ use std::path::Path;
 use super::container::Container;
 use super::limits::Limits;
 
-/// Demuxers that may run. `Container` chooses one of them; this list holds inside ffmpeg as well.
+/// Allowed demuxers. `Container` selects one of them; ffmpeg enforces this list as well.
 const FORMATS: &str = "mov,matroska,avi,mpegts,asf,mpeg,flv,ogg,h264,hevc";
 
-/// Decoders that may run, by ffmpeg's names.
+/// Allowed video decoders, by ffmpeg's names.
 const DECODERS: &str = "h264,hevc,vp8,vp9,libvpx,libvpx-vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
                         ffv1,rawvideo,wmv2,wmv3,vc1,mpeg1video,huffyuv,ffvhuff,png,theora,flv,h263";
 
-/// Decoders of sound and titles. Nothing of theirs is ever decoded to the end, but ffprobe gives up
-/// on a file when it may not open one of its streams.
+/// Allowed decoders of audio and subtitles. None of these streams is used, but ffprobe fails on a file if it
+/// may not open one of its streams.
 const OTHER_DECODERS: &str = "aac,mp3float,mp3,mp2float,mp2,ac3,eac3,dca,truehd,opus,libopus,vorbis,\
     flac,alac,amrnb,amrwb,wmav1,wmav2,wmapro,adpcm_ms,adpcm_ima_wav,adpcm_swf,nellymoser,speex,pcm_u8,pcm_s8,pcm_s16le,pcm_s16be,\
     pcm_s24le,pcm_s24be,pcm_s32le,pcm_s32be,pcm_f32le,pcm_f32be,pcm_alaw,pcm_mulaw,pcm_dvd,pcm_bluray,\
     mov_text,subrip,srt,ass,ssa,webvtt,dvbsub,dvdsub,pgssub";
 
-/// The rate that a bare stream is opened with. A stream that tells its own has another then; no camera has this one.
+/// Frame rate with which an elementary stream is opened, frames per second. A stream with its own rate
+/// overrides it. No camera has this rate, so it marks an unknown rate.
 pub(super) const NO_RATE: f64 = 997.0 / 7.0;
 
-/// The arguments that close the ways out of a file, then the file as the input.
+/// Returns the arguments that restrict ffmpeg to the given file, followed by the file as input.
 pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> Vec<OsString> {
     let mut file = OsString::from("file:");
     file.push(path);
-    // Decoders round sizes up to whole blocks; the picture's own size is checked by `probe`.
+    // Decoders round sizes up to whole blocks. `probe` checks the exact picture size.
     let max_pixels = limits.max_pixels + u64::from(limits.max_side_px) * 128;
     let mut args: Vec<OsString> = [
         ("-protocol_whitelist", "file".to_owned()),
         ("-format_whitelist", FORMATS.to_owned()),
         ("-codec_whitelist", format!("{DECODERS},{OTHER_DECODERS}")),
-        // No single piece of memory is larger than this many times a picture.
+        // Upper limit of a single allocation.
         (
             "-max_alloc",
             (limits.max_pixels * 64).max(64 << 20).to_string(),
@@ -66,24 +67,25 @@ mod tests {
     use crate::media::sandbox::Layers;
     use crate::media::tools::Tool;
 
-    /// The lists alone are to be judged here, whether or not the sandbox would hold.
+    /// The limits for these tests. Only the allow-lists are tested, so the kernel layers of the sandbox are
+    /// off.
     fn limits() -> Limits {
         Limits {
             layers: Layers::OLD,
-            // A busy machine takes its time to start a program.
+            // Starting a program takes longer on a busy machine.
             probe_time: Duration::from_secs(60),
             ..Limits::default()
         }
     }
 
-    /// What ffmpeg says to such arguments; None where it does as it is told.
+    /// Returns the error message of ffmpeg for the arguments; `None` on success.
     fn complaint(args: Vec<OsString>) -> Option<String> {
         let mut child = Child::reading(Order::new(Tool::Ffmpeg, args, &limits(), 0)).unwrap();
         child.read_full(&mut vec![0; 1 << 20]).unwrap();
         child.finish().unwrap().check().err().map(|e| e.to_string())
     }
 
-    /// Decodes a film to nowhere, without our own look at its container, and with one list changed.
+    /// Decodes a film and discards the frames, without our container detection and with one list changed.
     fn decode(path: &Path, list: &str, value: Option<&str>) -> Option<String> {
         let mut args = input_args(Container::Mov, path, &limits());
         for (name, value) in [("-f", None), (list, value)] {

@@ -1,12 +1,12 @@
-//! Which of the decoders and encoders that flockreel uses the installed ffmpeg has, and what each lack
-//! means for people. Builds differ: a distribution may leave out what is patented.
+//! Decoders and encoders of the installed ffmpeg, and the effect of each missing one. Distributions may leave
+//! out patented codecs.
 
 use std::collections::BTreeSet;
 
 use super::error::Error;
 use super::tools::{answer, whole_place};
 
-/// Decoders by what they read; the first that is there is taken.
+/// Decoders by the format they read. The first one available is used.
 const DECODERS: [(&str, &[&str]); 14] = [
     ("H.264", &["h264"]),
     ("H.265", &["hevc"]),
@@ -24,7 +24,7 @@ const DECODERS: [(&str, &[&str]); 14] = [
     ("VC-1", &["vc1"]),
 ];
 
-/// Encoders by what they write.
+/// Encoders, each with the effect of its absence.
 const ENCODERS: [(&str, &str); 5] = [
     (
         "libx264",
@@ -36,17 +36,17 @@ const ENCODERS: [(&str, &str); 5] = [
     ("gif", "no GIF can be written"),
 ];
 
-/// What an ffmpeg can read and write of what flockreel asks of it.
+/// Decoders and encoders of an ffmpeg, among those that flockreel uses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Coders {
-    /// Names of what it can do.
+    /// Names of the available ones.
     pub has: Vec<&'static str>,
-    /// Names of what it cannot do, each with what that means.
+    /// Names of the missing ones, each with the effect.
     pub lacks: Vec<(&'static str, String)>,
 }
 
 impl Coders {
-    /// Asks the installed ffmpeg.
+    /// Queries the installed ffmpeg.
     pub fn installed() -> Result<Coders, Error> {
         let place = whole_place()?;
         let decoders = answer(place, &["-hide_banner", "-decoders"], false)?;
@@ -79,7 +79,7 @@ impl Coders {
     }
 }
 
-/// The second word of each line of a list.
+/// Returns the second word of each line of a list.
 fn names(list: &str) -> BTreeSet<&str> {
     let words = list.lines().map(|line| line.split_whitespace().nth(1));
     words.flatten().collect()

@@ -1,16 +1,16 @@
-//! Which container a file is, by its first bytes and by nothing else (RELIABILITY.md, "Facts": a
-//! playlist or a script under a video's name must never be taken for one). The demuxer found here is
-//! then forced on ffmpeg, so that its own guessing never runs.
+//! Detection of the container from the first bytes of a file, never from its name. A playlist or a script
+//! with the name of a video must not be opened as one (docs/explanation/promises.md, "Bad input"). The
+//! detected demuxer is forced on ffmpeg, so that ffmpeg does not guess.
 
 use super::error::Error;
 
-/// How many bytes of a file [`Container::of`] wants to see.
+/// Number of bytes that [`Container::of`] needs.
 pub(super) const HEAD_BYTES: usize = 4096;
 
-/// The accepted containers.
+/// Accepted containers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Container {
-    /// MP4, QuickTime and their relatives.
+    /// MP4, QuickTime and related formats.
     Mov,
     /// Matroska and WebM.
     Matroska,
@@ -26,13 +26,13 @@ pub(super) enum Container {
     Flv,
     /// Ogg.
     Ogg,
-    /// A bare H.264 stream: no container, no times.
+    /// H.264 elementary stream: no container and no timestamps.
     H264,
-    /// A bare H.265 stream: no container, no times.
+    /// H.265 elementary stream: no container and no timestamps.
     Hevc,
 }
 
-/// First bytes of files that are no video: (offset, bytes, what it is).
+/// Signatures of files that are not video: (offset, bytes, kind).
 const PICTURES: [(usize, &[u8], &str); 6] = [
     (0, b"\x89PNG", "a still image"),
     (0, b"\xff\xd8\xff", "a still image"),
@@ -42,7 +42,7 @@ const PICTURES: [(usize, &[u8], &str); 6] = [
     (0, b"%PDF", "a document"),
 ];
 
-/// First bytes of sound files.
+/// Signatures of audio files.
 const SOUNDS: [(usize, &[u8]); 6] = [
     (8, b"WAVE"),
     (0, b"fLaC"),
@@ -52,7 +52,7 @@ const SOUNDS: [(usize, &[u8]); 6] = [
     (8, b"AIFF"),
 ];
 
-/// First bytes of containers that are not accepted.
+/// Signatures of containers that are not accepted.
 const OTHER_CONTAINERS: [(usize, &[u8], &str); 6] = [
     (0, b"DKIF", "ivf"),
     (0, b"YUV4MPEG2", "yuv4mpeg"),
@@ -66,7 +66,8 @@ const OTHER_CONTAINERS: [(usize, &[u8], &str); 6] = [
 const STILL_BRANDS: [&[u8; 4]; 6] = [b"heic", b"heix", b"mif1", b"msf1", b"avif", b"avis"];
 
 impl Container {
-    /// The container that begins with `head` (the first [`HEAD_BYTES`] bytes, or all there are).
+    /// Returns the container of a file. `head` is its first [`HEAD_BYTES`] bytes, or the whole file if
+    /// shorter.
     pub(super) fn of(head: &[u8]) -> Result<Container, Error> {
         let has = |at: usize, magic: &[u8]| head.get(at..at + magic.len()) == Some(magic);
         if has(0, b"\x1a\x45\xdf\xa3") {
@@ -114,7 +115,7 @@ impl Container {
         Err(Error::NotAVideo(what.into()))
     }
 
-    /// ffmpeg's name of the demuxer, for `-f`.
+    /// Returns the name of the demuxer for ffmpeg's `-f`.
     pub(super) fn demuxer(self) -> &'static str {
         match self {
             Container::Mov => "mov",
@@ -130,16 +131,19 @@ impl Container {
         }
     }
 
-    /// Whether the file has no times: its rate is in the stream's own header, or nowhere.
+    /// Returns whether the file is an elementary stream, without timestamps. Its frame rate is in the stream
+    /// header or unknown.
     pub(super) fn is_bare(self) -> bool {
         matches!(self, Container::H264 | Container::Hevc)
     }
 }
 
-/// The codec of a bare stream: it begins with a start code, and its head holds a sequence parameter set.
+/// Returns the codec of an elementary stream, which begins with a start code and has a parameter set near the
+/// start.
 ///
-/// H.264 (ITU-T H.264, 7.3.1): one byte of unit header, type 7 of the low five bits, with a known profile
-/// after it. H.265 (ITU-T H.265, 7.3.1.2): two bytes, type 32 or 33 in bits 1 to 6, layer 0, temporal id 1.
+/// H.264 (ITU-T H.264, 7.3.1): the unit header is one byte with type 7 in the low five bits; a known profile
+/// follows. H.265 (ITU-T H.265, 7.3.1.2): the unit header is two bytes, type 32 or 33 in bits 1 to 6, layer
+/// 0, temporal id 1.
 fn bare_stream(head: &[u8]) -> Option<Container> {
     const H264_PROFILES: [u8; 10] = [44, 66, 77, 88, 100, 110, 118, 122, 128, 244];
     let starts = head.windows(3).enumerate();
@@ -157,7 +161,7 @@ fn bare_stream(head: &[u8]) -> Option<Container> {
     })
 }
 
-/// The first box of a QuickTime file, whose size must make sense too.
+/// Returns whether the file begins with a known QuickTime box of a plausible size.
 fn is_mov(head: &[u8]) -> bool {
     let Some((size, name)) = head.get(..8).map(|b| b.split_at(4)) else {
         return false;
@@ -166,12 +170,12 @@ fn is_mov(head: &[u8]) -> bool {
     let known: [&[u8]; 7] = [
         b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"styp",
     ];
-    // A brand list is short; a text that happens to have these letters is not.
+    // The brand list is short. This excludes a text that contains these letters.
     let longest = if name == b"ftyp" { 4096 } else { u32::MAX };
     known.contains(&name) && (8..=longest).contains(&size) || (name == b"mdat" && size <= 1)
 }
 
-/// Sync bytes at a packet's distance, for packets of 188 or 192 bytes, at least four of them.
+/// Returns whether sync bytes repeat at the distance of a packet (188 or 192 bytes), at least four times.
 fn is_transport_stream(head: &[u8]) -> bool {
     [(188, 0), (192, 4)].iter().any(|&(step, first)| {
         let mut syncs = head.iter().skip(first).step_by(step);
@@ -232,7 +236,7 @@ mod tests {
         ] {
             assert_eq!(code_of(head), Code::ContainerNotAllowed);
         }
-        // Start codes alone are no stream: a parameter set must follow, and nothing may come before.
+        // Start codes are not sufficient: a parameter set must follow, and nothing may precede them.
         assert_eq!(code_of(b"\0\0\x01\x05\xff\xff"), Code::NotAVideo);
         assert_eq!(code_of(b"\0\0\0\0\0\0\x01\x67\x64"), Code::NotAVideo);
         assert_eq!(code_of(b"\xff\0\0\x01\x67\x64"), Code::NotAVideo);

@@ -1,4 +1,5 @@
-//! How a media child ended, and what that means for the film (RELIABILITY.md, "Reason codes").
+//! Exit of a media child process and its meaning as an error code (docs/explanation/promises.md, "Bad
+//! input").
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
@@ -6,16 +7,16 @@ use std::process::ExitStatus;
 
 use super::error::Error;
 
-/// How a child ended.
+/// The exit of a child process.
 pub(super) struct End {
     /// Exit code or signal.
     pub(super) status: ExitStatus,
-    /// The last of what it said.
+    /// The end of its stderr.
     pub(super) complaint: String,
 }
 
 impl End {
-    /// What an end by failure means.
+    /// Returns the exit if it was successful, otherwise the error that it means.
     pub(super) fn check(self) -> Result<End, Error> {
         const OUT_OF_MEMORY: [&str; 4] = [
             "Cannot allocate memory",
@@ -34,7 +35,8 @@ impl End {
             _ if says("No space left on device") || says("Disk quota exceeded") => {
                 Err(Error::StorageFull)
             }
-            // A kill that is not ours is the kernel's, out of memory.
+            // Flockreel kills only children that it no longer waits for, so this kill came from the kernel,
+            // out of memory.
             signal if signal == Some(SIGKILL) || OUT_OF_MEMORY.into_iter().any(says) => {
                 Err(Error::MemoryLimit {
                     complaint: self.complaint,
@@ -48,7 +50,7 @@ impl End {
     }
 }
 
-/// What a child said, without where our files lie.
+/// Replaces the paths of our files in a message of a child.
 pub(super) fn without(files: &[PathBuf], complaint: String) -> String {
     files.iter().fold(complaint, |text, file| {
         let path = file.to_string_lossy();

@@ -1,163 +1,163 @@
-//! Why a video cannot be read or written: one variant a reason, each with its stable code
-//! (RELIABILITY.md, "Reason codes").
+//! Errors of reading and writing video: one variant per reason, each with its stable code
+//! (docs/explanation/promises.md, "Bad input").
 
 use std::io;
 
 use crate::code::Code;
 use crate::footage::SourceError;
 
-/// What of a film is missing.
+/// The missing part of a damaged film.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Damage {
-    /// Nothing says where its pictures lie.
+    /// The index that locates the pictures is missing.
     #[error("it has no index")]
     NoIndex,
-    /// It goes on past its end, by its own structure.
+    /// The file ends before its own structure does.
     #[error("its pictures end after {span_s:.1} s, with number {n_pictures}")]
     EndsAt {
-        /// Pictures found.
+        /// Number of pictures found.
         n_pictures: usize,
-        /// From the first of them to the last, seconds.
+        /// Time from the first to the last picture, seconds.
         span_s: f64,
     },
-    /// Pictures that cannot be decoded.
+    /// Some pictures cannot be decoded.
     #[error("{n_decoded} of {n_pictures} pictures can be decoded")]
     Undecodable {
-        /// Pictures decoded.
+        /// Number of decoded pictures.
         n_decoded: usize,
-        /// Pictures found.
+        /// Number of pictures in the file.
         n_pictures: usize,
     },
 }
 
-/// The reasons. `complaint` is the end of what ffmpeg said, for the log.
+/// A reason to fail. `complaint` is the end of ffmpeg's stderr, for the log.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Empty, text, a still image, a playlist, noise.
+    /// Not a video: empty, text, a still image, a playlist or noise.
     #[error("not a video: {0}")]
     NotAVideo(String),
-    /// A container outside the list.
+    /// The container is not on the allow-list.
     #[error("the container is not among those accepted: {0}")]
     ContainerNotAllowed(&'static str),
-    /// A codec outside the list.
+    /// The codec is not on the allow-list.
     #[error("the codec is not among those accepted: {0}")]
     CodecNotAllowed(String),
-    /// Sound, subtitles, data: no picture.
+    /// The file holds only audio, subtitles or data.
     #[error("the file holds no video stream")]
     NoVideoStream,
-    /// Wider, higher or larger than the limit.
+    /// A side or the area of the picture exceeds the limit.
     #[error("the picture is too large: {width}x{height}")]
     TooManyPixels {
-        /// Columns.
+        /// Width, pixels.
         width: u64,
-        /// Rows.
+        /// Height, pixels.
         height: u64,
     },
-    /// Narrower or lower than the limit.
+    /// A side of the picture is below the limit.
     #[error("the picture is too small: {width}x{height}")]
     TooFewPixels {
-        /// Columns.
+        /// Width, pixels.
         width: u64,
-        /// Rows.
+        /// Height, pixels.
         height: u64,
     },
-    /// Pictures of several sizes.
+    /// The pictures have different sizes.
     #[error(
         "the pictures differ in size: number {number} is {}x{}, the first {}x{}",
         found[0], found[1], first[0], first[1]
     )]
     PicturesDiffer {
-        /// The first that differs, counted from 1.
+        /// Number of the first picture that differs, counted from 1.
         number: usize,
-        /// Its columns and rows.
+        /// Its width and height, pixels.
         found: [u32; 2],
-        /// Columns and rows of the first.
+        /// Width and height of the first picture, pixels.
         first: [u32; 2],
     },
-    /// More frames than the limit.
+    /// The number of frames exceeds the limit.
     #[error("the footage has more frames than the limit: {limit}")]
     TooManyFrames {
         /// The limit.
         limit: usize,
     },
-    /// Fewer frames than the limit.
+    /// The number of frames is below the limit.
     #[error("the footage has too few frames: {n_frames}")]
     TooFewFrames {
-        /// Frames found.
+        /// Number of frames.
         n_frames: usize,
     },
-    /// More streams than the limit.
+    /// The number of streams exceeds the limit.
     #[error("the file holds more streams than the limit: {limit}")]
     TooManyStreams {
         /// The limit.
         limit: u32,
     },
-    /// Longer than the limit, in seconds or in bytes.
+    /// The duration or the file size exceeds the limit.
     #[error("the footage is too long: {found} {unit}")]
     TooLong {
-        /// How long.
+        /// Duration or size.
         found: f64,
-        /// In what: `s` or `bytes`.
+        /// Unit of `found`: `s` or `bytes`.
         unit: &'static str,
     },
-    /// A frame rate above the limit.
+    /// The frame rate exceeds the limit.
     #[error("the frame rate is too high: {fps}")]
     TooFast {
-        /// Frames a second.
+        /// Frame rate, frames per second.
         fps: f64,
     },
-    /// Ends inside its own structure, or damaged inside.
+    /// The file is cut off or damaged.
     #[error("the file is cut off or damaged: {0}")]
     Truncated(Damage),
-    /// Encrypted samples.
+    /// The video is encrypted.
     #[error("the video is encrypted")]
     Encrypted,
-    /// The wall clock, the wait for a frame, or the processor time ran out.
+    /// A time limit was exceeded: wall clock, waiting for a frame, or processor time.
     #[error("the media tool took longer than its time limit")]
     TimeLimit,
-    /// The address space ran out.
+    /// The child ran out of address space.
     #[error("the media tool needed more memory than its limit: {complaint}")]
     MemoryLimit {
-        /// ffmpeg's last words.
+        /// The end of ffmpeg's stderr.
         complaint: String,
     },
-    /// The child died or gave up.
+    /// The child died or failed.
     #[error("the media tool stopped unexpectedly ({status}): {complaint}")]
     Crashed {
         /// Exit code or signal.
         status: String,
-        /// ffmpeg's last words.
+        /// The end of ffmpeg's stderr.
         complaint: String,
     },
-    /// No room for the output.
+    /// The disk is full.
     #[error("there is no room left for the output")]
     StorageFull,
-    /// A frame of another size than the video that it is written to, or a rate that is none.
+    /// The encoder was given a frame of the wrong size, or an invalid size or rate.
     #[error("the encoder was given what it cannot take: {0}")]
     BadOutput(&'static str),
-    /// ffmpeg is not installed, or does not run.
+    /// ffmpeg is not installed or does not run.
     #[error("the media tool is not installed: {0}")]
     ToolMissing(String),
-    /// `--sandbox strict` was asked for, and a layer is missing.
+    /// `--sandbox strict` is set and a layer is missing.
     #[error("the sandbox is not whole, as `--sandbox strict` demands: {layer}: {reason}")]
     SandboxIncomplete {
-        /// The first layer that is missing.
+        /// The first missing layer.
         layer: &'static str,
-        /// Why.
+        /// Why it is missing.
         reason: String,
     },
-    /// A file or pipe of ours failed.
+    /// A file or pipe operation failed.
     #[error("{doing}: {source}")]
     Io {
-        /// What was being done.
+        /// The operation.
         doing: &'static str,
-        /// Why it failed.
+        /// The underlying error.
         source: io::Error,
     },
 }
 
 impl Error {
-    /// The stable code.
+    /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self {
             Error::NotAVideo(_) | Error::PicturesDiffer { .. } => Code::NotAVideo,
@@ -184,7 +184,7 @@ impl Error {
         }
     }
 
-    /// Wraps a failure of ours; a full disk keeps its own reason.
+    /// Wraps an I/O error; a full disk becomes `StorageFull`.
     pub(super) fn io(doing: &'static str) -> impl Fn(io::Error) -> Error {
         move |source| match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Error::StorageFull,

@@ -1,9 +1,8 @@
-//! The gate: the one place where a process is started (RELIABILITY.md, "The gate"). Every child
-//! gets its arguments as a list, an empty environment, the allow-lists, a cage (`sandbox`), a wall
-//! clock and a watch on its progress; it is killed and reaped, as a group, when its handle goes.
+//! The only module that starts a media tool (docs/explanation/promises.md, "Confined media tools"). Every
+//! child gets arguments as a list, an empty environment, allow-lists, a sandbox, a time limit and a stall
+//! limit. Dropping its handle kills and reaps the whole process group.
 //!
-//! The clock runs only while we wait for the child: a caller that thinks long between two frames
-//! does not use up its decoder's time.
+//! The time limit counts only while we wait for the child. A slow caller does not use up its decoder's time.
 
 use std::ffi::OsString;
 use std::io::{self, Read, Write};
@@ -23,20 +22,20 @@ use super::limits::Limits;
 use super::sandbox::{self, Cage};
 use super::tools::{self, Place, Tool};
 
-/// How much of a child's complaints is kept.
+/// Kept length of a child's stderr, bytes. Free choice.
 const COMPLAINT_BYTES: usize = 8 << 10;
-/// The size we ask the kernel to give each pipe.
+/// Requested size of each pipe, bytes.
 const PIPE_BYTES: usize = 1 << 20;
 
-/// How long a reader may take to end once we listen no more; a writer, who may have its whole film to write again
-/// with the index in front, has all the time that it has left.
+/// Time for a decoder to exit once its output is closed. Free choice. An encoder may rewrite the whole file
+/// to move the index to the front, so it gets all of its remaining time.
 const END_TIME: Duration = Duration::from_secs(30);
 
-/// What to start, and within which limits.
+/// A program to start, with its limits.
 pub(super) struct Order {
     tool: Tool,
     args: Vec<OsString>,
-    /// Ask the loader what the program is made of, instead of running it.
+    /// Whether the loader lists the program's libraries instead of running the program.
     lists_libraries: bool,
     cage: Cage,
     time: Duration,
@@ -44,7 +43,7 @@ pub(super) struct Order {
 }
 
 impl Order {
-    /// An order for work on `n_frames` frames (0 for reading headers). It may open no file.
+    /// Makes an order for work on `n_frames` frames (0 for reading headers). The child may open no file.
     pub(super) fn new(tool: Tool, args: Vec<OsString>, limits: &Limits, n_frames: usize) -> Order {
         let time = match n_frames {
             0 => limits.probe_time,
@@ -67,26 +66,26 @@ impl Order {
         }
     }
 
-    /// The same with `more` time on the wall clock.
+    /// Adds `more` to the time limit.
     pub(super) fn with_more_time(mut self, more: Duration) -> Order {
         self.time += more;
         self
     }
 
-    /// The same, allowed to read a file.
+    /// Allows the child to read a file.
     pub(super) fn with_input(mut self, path: &Path) -> Order {
         self.cage.input = Some(path.to_owned());
         self
     }
 
-    /// The same, allowed to write a file that is there already, up to `bytes`.
+    /// Allows the child to write an existing file, up to `bytes`.
     pub(super) fn with_output(mut self, path: &Path, bytes: u64) -> Order {
         self.cage.output = Some(path.to_owned());
         self.cage.file_bytes = bytes;
         self
     }
 
-    /// The same, but the loader lists the program's libraries and ends.
+    /// Makes the loader list the program's libraries and exit.
     pub(super) fn listing_libraries(mut self) -> Order {
         self.lists_libraries = true;
         self
@@ -101,22 +100,22 @@ fn n_cores() -> u64 {
 pub(super) struct Child {
     process: process::Child,
     group: Pid,
-    /// Its number may be another's by now.
+    /// After reaping, the process id may belong to another process.
     reaped: bool,
     ended: OwnedFd,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
     stderr: Option<JoinHandle<String>>,
     time_left: Duration,
-    /// When it is late by the wall clock.
+    /// End of the time limit by the wall clock, for `read_some`.
     due: Instant,
     stall: Duration,
-    /// The files it was given: what it says of them is for people, who know them by other names.
+    /// Files given to the child. Their paths are removed from its messages, because users do not know them.
     files: Vec<PathBuf>,
 }
 
 impl Child {
-    /// Starts a child that reads nothing and writes to us.
+    /// Starts a child that reads no input and writes to us.
     pub(super) fn reading(order: Order) -> Result<Child, Error> {
         Child::start(order, Stdio::null())
     }
@@ -125,7 +124,7 @@ impl Child {
     pub(super) fn writing(order: Order) -> Result<Child, Error> {
         let child = Child::start(order, Stdio::piped())?;
         if let Some(stdin) = &child.stdin {
-            // A blocking write could not be given up when the clock runs out.
+            // A blocking write could not be abandoned at the time limit.
             let flags = rustix::fs::fcntl_getfl(stdin);
             flags
                 .and_then(|flags| {
@@ -142,7 +141,7 @@ impl Child {
         Child::launch(order, place, stdin)
     }
 
-    /// Starts a program in all layers that both the order and the place know.
+    /// Starts a program in the layers that both the order and the tool allow.
     pub(super) fn launch(order: Order, place: &Place, stdin: Stdio) -> Result<Child, Error> {
         let failed = Error::io("starting the media tool");
         let cage = Cage {
@@ -185,7 +184,8 @@ impl Child {
         })
     }
 
-    /// Fills `buffer` from the child's output; less than its length only at the end of the output.
+    /// Fills `buffer` from the child's output. Returns fewer bytes than its length only at the end of the
+    /// output.
     pub(super) fn read_full(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
         let Some(mut stdout) = self.stdout.take() else {
             return Ok(0);
@@ -205,8 +205,8 @@ impl Child {
         Ok(n_read)
     }
 
-    /// Reads some of the child's output, as much as there is; 0 at its end. Here the clock runs all the time,
-    /// for one who talks without end is never waited for.
+    /// Reads the available output of the child; 0 at its end. Here the time limit counts all the time,
+    /// because a child with endless output never makes us wait.
     pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
         if Instant::now() > self.due {
             return Err(Error::TimeLimit);
@@ -222,7 +222,7 @@ impl Child {
         Ok(n_read)
     }
 
-    /// Gives the child `bytes`. When it has died, says why.
+    /// Writes `bytes` to the child. If the child has died, returns the reason.
     pub(super) fn write_all(&mut self, mut bytes: &[u8]) -> Result<(), Error> {
         let Some(mut stdin) = self.stdin.take() else {
             return Err(Error::BadOutput("a frame after the last"));
@@ -248,7 +248,7 @@ impl Child {
         Ok(())
     }
 
-    /// Closes the child's input, waits for its end, and says how it ended.
+    /// Closes the child's input, waits for its exit and returns it.
     pub(super) fn finish(mut self) -> Result<End, Error> {
         self.end()
     }
@@ -274,8 +274,8 @@ impl Child {
             .try_clone()
             .map_err(Error::io("watching the media tool"))?;
         self.wait_for(ended.as_fd(), PollFlags::IN, Instant::now() + patience)?;
-        // It has ended but is not reaped, so its number is still its own: whatever it may have
-        // started goes with it.
+        // The child has exited but is not reaped, so its process id is still valid. Kill any processes that
+        // it started.
         rustix::process::kill_process_group(self.group, Signal::KILL).ok();
         let status = self
             .process
@@ -290,7 +290,7 @@ impl Child {
         Ok(End { status, complaint })
     }
 
-    /// Waits until `fd` is ready, at most until `deadline` and within the time that is left.
+    /// Waits until `fd` is ready, at most until `deadline` and within the remaining time.
     fn wait_for(
         &mut self,
         fd: BorrowedFd<'_>,
@@ -334,7 +334,7 @@ fn command(args: &[OsString], place: &Place, lists_libraries: bool) -> process::
         .args(args)
         .env_clear()
         .env("LC_ALL", "C")
-        // Each arena reserves address space, of which the cage leaves only so much.
+        // Each arena reserves address space, which the sandbox limits.
         .env("MALLOC_ARENA_MAX", "4")
         .current_dir("/")
         .stdout(Stdio::piped())
@@ -345,15 +345,15 @@ fn command(args: &[OsString], place: &Place, lists_libraries: bool) -> process::
     command
 }
 
-/// Kills what is left of the group, then reaps the child, which may have ended before others of its group.
-/// The order matters: until it is reaped nobody else can get its number.
+/// Kills the remaining group, then reaps the child, which may have exited before others of its group. The
+/// order matters: until the child is reaped, no other process can get its id.
 fn kill_and_reap(process: &mut process::Child, group: Pid) {
     rustix::process::kill_process_group(group, Signal::KILL).ok();
     process.wait().ok();
 }
 
-/// Starts a command on a thread that never ends: the kernel takes the end of the thread that
-/// started a child for the parent's death, and would kill the child.
+/// Starts a command on a thread that never ends. When the thread that started a child ends, the kernel treats
+/// that as the parent's death and kills the child.
 fn spawn(command: process::Command) -> io::Result<process::Child> {
     type Request = (process::Command, mpsc::Sender<io::Result<process::Child>>);
     static SPAWNER: OnceLock<Mutex<mpsc::Sender<Request>>> = OnceLock::new();
@@ -379,12 +379,12 @@ fn spawn(command: process::Command) -> io::Result<process::Child> {
     receive.recv().map_err(|_closed| gone())?
 }
 
-/// A larger pipe means fewer turns between two processes; a refusal costs only speed.
+/// Enlarges a pipe, which reduces context switches. Failure is ignored: it only costs speed.
 fn grow(pipe: impl AsFd) {
     rustix::pipe::fcntl_setpipe_size(pipe, PIPE_BYTES).ok();
 }
 
-/// Reads to the end, keeping the last [`COMPLAINT_BYTES`].
+/// Reads to the end and returns the last [`COMPLAINT_BYTES`].
 fn last_words(mut pipe: impl Read) -> String {
     let mut kept = Vec::new();
     let mut chunk = [0; 4096];

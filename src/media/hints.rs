@@ -1,12 +1,12 @@
-//! What a person says of a film where its file is wrong or silent.
+//! Metadata given by the user where that of the file is wrong or missing.
 
-/// Each overrides what the file says.
+/// Each value overrides the metadata of the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hints {
-    /// Frames a second: every picture of the file is then shown once, at this rate.
+    /// Frame rate, frames per second. Each picture of the file is then shown once, at this rate.
     pub fps: Option<f64>,
-    /// Width of a pixel over its height.
+    /// Pixel aspect ratio: width of a pixel divided by its height.
     pub pixel_aspect: Option<f64>,
-    /// Gives the alpha channel instead of the colors, as gray.
+    /// Whether to return the alpha channel, as gray, instead of the colors.
     pub of_alpha: bool,
 }

@@ -1,5 +1,5 @@
-//! Pictures that somebody gives, a background or one of a footage, within limits that hold before anything is
-//! decoded (RELIABILITY.md, "Parse at the door" of STYLE.md, habit 4).
+//! Still pictures: a background image or one picture of a footage. Limits are checked before decoding
+//! (docs/explanation/promises.md, "Bad input").
 
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -22,10 +22,10 @@ pub fn read_image(path: &Path, limits: &Limits) -> Result<RgbImage, Error> {
     decode_image(&bytes, limits)
 }
 
-/// Decodes a PNG or JPEG; alpha is ignored, deeper channels become 8 bits.
+/// Decodes a PNG or JPEG. Alpha is ignored and deeper channels are reduced to 8 bits.
 ///
-/// Fails with `not_a_video` for anything else or damaged, and with the codes for too many or too
-/// few pixels.
+/// Fails with `not_a_video` for other formats and damaged files, with `too_long` for too many bytes, and with
+/// `too_many_pixels` or `too_few_pixels`.
 pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
     let image = decode(bytes, &[ImageFormat::Png, ImageFormat::Jpeg], limits)?;
     let (width, height) = (image.width(), image.height());
@@ -36,7 +36,7 @@ pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
     })
 }
 
-/// Decodes a picture of one of these formats, within limits that hold before anything is decoded.
+/// Decodes a picture of one of the given formats. Limits are checked before decoding.
 pub(super) fn decode(
     bytes: &[u8],
     formats: &[ImageFormat],
@@ -71,7 +71,7 @@ pub(super) fn decode(
     reader.decode().map_err(refused)
 }
 
-/// More than any encoder needs for the largest picture.
+/// Returns the largest accepted file, bytes: more than any encoder needs for the largest picture.
 pub(super) fn largest_file(limits: &Limits) -> u64 {
     limits.max_pixels * 8 + (1 << 20)
 }

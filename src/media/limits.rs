@@ -1,5 +1,4 @@
-//! What a file may be and what its decoder may use (RELIABILITY.md, "The gate": the default
-//! limits, all settable).
+//! Limits of an input file and of the resources of its decoder (docs/explanation/promises.md, "Bad input").
 
 use std::time::Duration;
 
@@ -8,41 +7,41 @@ use super::sandbox::Layers;
 /// The limits of one file and of the child processes that read it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
-    /// Least side of the picture, pixels.
+    /// Smallest side of the picture, pixels.
     pub min_side_px: u32,
-    /// Greatest side of the picture, pixels.
+    /// Largest side of the picture, pixels.
     pub max_side_px: u32,
-    /// Greatest area of the picture, pixels.
+    /// Largest area of the picture, pixels.
     pub max_pixels: u64,
-    /// Fewest frames.
+    /// Smallest number of frames.
     pub min_frames: usize,
-    /// Most frames.
+    /// Largest number of frames.
     pub max_frames: usize,
-    /// Greatest frame rate, frames a second.
+    /// Highest frame rate, frames per second.
     pub max_fps: f64,
-    /// Longest footage, seconds.
+    /// Longest duration of the footage, seconds.
     pub max_duration_s: f64,
     /// Largest file, bytes.
     pub max_bytes: u64,
-    /// Most streams (video, audio, anything) in one file.
+    /// Largest number of streams (video, audio and others) in one file.
     pub max_streams: u32,
-    /// Wall clock for reading a file's headers.
+    /// Time limit for reading the headers of a file, wall clock.
     pub probe_time: Duration,
-    /// Wall clock for decoding or encoding: the part that does not depend on the length.
+    /// Time limit for decoding or encoding, wall clock: the part independent of the length.
     pub base_time: Duration,
-    /// Wall clock for decoding or encoding: the part for each frame.
+    /// Time limit for decoding or encoding, wall clock: the part per frame.
     pub time_per_frame: Duration,
     /// Longest wait for one frame.
     pub stall_time: Duration,
     /// Address space of a child, bytes.
     pub max_memory_bytes: u64,
-    /// Largest file a child may write, bytes.
+    /// Largest file that a child may write, bytes.
     pub max_output_bytes: u64,
-    /// Decoding threads; 0 = one for each core.
+    /// Maximum number of decoding threads; 0 means the number of cores.
     pub threads: u32,
-    /// The layers of the sandbox that a child enters, as far as this machine has them.
+    /// Layers of the sandbox that a child enters, if this machine supports them.
     pub layers: Layers,
-    /// Accept a file that is cut off inside, up to the cut.
+    /// Whether to accept a file that is cut off, up to the cut.
     pub allow_truncated: bool,
 }
 
@@ -72,7 +71,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// Wall clock for `n_frames` frames.
+    /// Returns the time limit for `n_frames` frames, wall clock.
     pub(super) fn work_time(&self, n_frames: usize) -> Duration {
         let n = u32::try_from(n_frames).unwrap_or(u32::MAX);
         self.base_time + self.time_per_frame.saturating_mul(n)

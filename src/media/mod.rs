@@ -1,30 +1,30 @@
-//! Video files in and out, by ffmpeg as a child process behind one gate (RELIABILITY.md, "Facts"
-//! and "The gate"; ECOSYSTEM.md 5). A decoder's crash or exploit must never be ours.
+//! Reading and writing of video files, by ffmpeg as a sandboxed child process (docs/explanation/promises.md,
+//! "Confined media tools"). A crash or exploit of a decoder cannot reach this process.
 //!
-//! Pictures are the exception: libraries without unsafe C decode them here.
+//! Still pictures are the exception: libraries without unsafe C code decode them in this process.
 //!
-//! [`Video`] parses a foreign file at the door: once it is open, its size, rate and length are
-//! within the [`Limits`], and its frames come as planar 4:2:0 at a constant rate.
+//! [`Video`] checks a file when it is opened. Its size, frame rate and length are then within the [`Limits`].
+//! Its frames are planar YUV 4:2:0 at a constant rate.
 
-mod allow_list; // what ffmpeg may open and run
-mod coders; // what the installed ffmpeg can read and write
-mod container; // which of the accepted containers a file is, by its first bytes
-mod decode; // a film -> frames
+mod allow_list; // arguments that restrict what ffmpeg may open
+mod coders; // decoders and encoders of the installed ffmpeg
+mod container; // detection of the container from the first bytes
+mod decode; // video file -> frames
 mod encode; // VideoWriter: frames -> MP4, WebM, ProRes, GIF, WebP
-mod end; // how a child ended
+mod end; // exit of a child and its meaning
 mod error;
-mod gate; // the one place that starts a process
-mod hints; // what a person says of a film
-mod image; // a given background
+mod gate; // the only module that starts a media tool
+mod hints; // metadata given by the user
+mod image; // still pictures, such as a background
 mod limits;
-mod niceness; // who steps back for whom
-mod note; // what is worth knowing of a film that was accepted
-mod pictures; // a folder, a zip or a TIFF of pictures -> frames
-mod probe; // what a file holds: headers, packets, pictures, times
-mod sandbox; // what the child may do
-mod stretch; // which levels of gray become black and white
-mod tools; // where the tools lie, and in which walls they work
-mod video; // Video: films and pictures alike
+mod niceness; // priority of media tools
+mod note; // notes about accepted footage
+mod pictures; // folder, zip or TIFF of pictures -> frames
+mod probe; // contents of a file: headers, packets, pictures, times
+mod sandbox; // sandbox of a child
+mod stretch; // reduction of gray to 8 bits
+mod tools; // paths of the tools, and the layers in which they run
+mod video; // Video: video files and still pictures
 
 pub use coders::Coders;
 pub use encode::{Coding, Quality, VideoFormat, VideoWriter};

@@ -1,19 +1,20 @@
-//! Gray of more than 8 bits: cameras store 10 or 12 bits in words of 16, microscopes a tenth of their range. What of
-//! it a film uses becomes the whole range from black to white.
+//! Reduction of gray of more than 8 bits to 8 bits. Cameras store 10 or 12 bits in 16-bit words, and
+//! microscopes use a tenth of their range. The range of levels that a film uses becomes the full range from
+//! black to white.
 
 use super::note::Note;
 
-/// Fewest frames that are looked at, spread over the film.
+/// Least number of frames sampled, spread over the film. Free choice.
 pub(super) const LEAST_FRAMES: usize = 16;
 
-/// Share of the pixels that may lie beyond either end of the range: a hot pixel or three of a picture of 640x480,
-/// but fewer than a fluorescent animal of 24 pixels has.
+/// Share of the pixels that may lie beyond either end of the range. In a picture of 640 x 480 it excludes up
+/// to three hot pixels, but not a fluorescent animal of 24 pixels.
 const BEYOND: f64 = 1e-5;
 
-/// Levels that the range holds at least, of 65,536: a picture of one gray keeps its noise as small as it is.
+/// Least width of the range, levels of 65,536. It keeps the noise of a uniform picture small. Free choice.
 const LEAST_RANGE: u16 = 256;
 
-/// The range of gray that a film uses, of 16 bits.
+/// The range of gray levels that a film uses, 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Stretch {
     from: u16,
@@ -21,19 +22,19 @@ pub(super) struct Stretch {
 }
 
 impl Stretch {
-    /// Returns a level of 16 bits as gray of 8 bits: 0 at the start of the range and below, 255 at its end and above.
+    /// Converts a 16-bit level to 8 bits: 0 at the start of the range and below, 255 at its end and above.
     pub(super) fn gray(&self, level: u16) -> u8 {
         let (above, range) = (level.saturating_sub(self.from), self.to - self.from);
         ((u32::from(above.min(range)) * 255 + u32::from(range) / 2) / u32::from(range)) as u8
     }
 
-    /// The filter that makes the range the whole one.
+    /// Returns the ffmpeg filter that expands the range to 16 bits.
     pub(super) fn filter(&self) -> String {
         let (from, range) = (self.from, self.to - self.from);
         format!("format=gray16le,lut=c0='clip((val-{from})*65535/{range},0,65535)'")
     }
 
-    /// The range in levels of `bits` bits, for people.
+    /// Returns a note with the range in levels of `bits` bits.
     pub(super) fn note(&self, bits: u32) -> Note {
         let level = |value: u16| value >> (16 - bits);
         Note::GrayStretched {
@@ -43,7 +44,7 @@ impl Stretch {
         }
     }
 
-    /// The range that these counts of each level use.
+    /// Returns the range of levels used, given the number of pixels at each level.
     pub(super) fn of(counts: &[u64]) -> Stretch {
         let n_beyond = (counts.iter().sum::<u64>() as f64 * BEYOND) as u64;
         let from = beyond(counts.iter(), n_beyond);
@@ -56,7 +57,7 @@ impl Stretch {
     }
 }
 
-/// How many levels hold no more than `n_beyond` pixels together.
+/// Returns the number of first levels that together hold at most `n_beyond` pixels.
 fn beyond<'a>(counts: impl Iterator<Item = &'a u64>, n_beyond: u64) -> u16 {
     let sums = counts.scan(0, |sum, count| {
         *sum += count;

@@ -1,7 +1,7 @@
-//! The two media tools: where they lie, what they are made of, and in which layers of the sandbox they
-//! can work (RELIABILITY.md, "The gate"). Found out once, at the first need: a layer that the kernel
-//! lacks or in which the installed tool does not even tell its version is left out, and said; with
-//! `--sandbox strict` nothing is started then.
+//! The two media tools: their paths, their libraries, and the layers of the sandbox in which they run
+//! (docs/explanation/promises.md, "Sandbox"). The search happens once, at first use. A layer is left out and
+//! reported if the kernel lacks it or the tool cannot print its version inside it. With `--sandbox strict` no
+//! tool is started then.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -12,10 +12,10 @@ use super::limits::Limits;
 use super::sandbox::{Layer, Layers, Reach, lack_of, landlock_abi};
 use crate::config::{Media, Sandbox};
 
-/// The two programs that may be started.
+/// The programs that may be started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tool {
-    /// Reads headers and packet times.
+    /// Reads headers and packet timestamps.
     Ffprobe,
     /// Decodes and encodes.
     Ffmpeg,
@@ -24,26 +24,26 @@ pub enum Tool {
 /// An installed tool.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
-    /// The program.
+    /// Path of the program.
     pub(super) path: PathBuf,
-    /// What it is made of.
+    /// Files that the program needs.
     pub(super) reach: Reach,
-    /// The layers in which it works here.
+    /// Layers in which it runs on this machine.
     pub(super) layers: Layers,
 }
 
-/// What is known of the media tool and of the walls around it on this machine.
+/// The media tool and its sandbox on this machine.
 #[derive(Clone, Debug)]
 pub struct Walls {
     /// The version line of ffmpeg.
     pub version: String,
-    /// Landlock's version in the kernel, where it has it.
+    /// Landlock ABI version of the kernel; `None` if it has no Landlock.
     pub landlock_abi: Option<i64>,
-    /// Every layer, with the reason where it does not stand.
+    /// All layers. A layer that is not in use has the reason.
     pub layers: Vec<(Layer, Option<String>)>,
 }
 
-/// A tool that was looked for.
+/// The result of a search for a tool.
 struct Found {
     place: Place,
     version: String,
@@ -53,7 +53,7 @@ struct Found {
 /// The search for a tool.
 struct Search {
     outcome: OnceLock<Result<Found, String>>,
-    /// Held by who searches, so that whoever comes meanwhile waits instead of searching too.
+    /// Held during the search, so that other threads wait for the result instead of searching too.
     turn: Mutex<()>,
 }
 
@@ -61,30 +61,29 @@ static SETTINGS: OnceLock<Media> = OnceLock::new();
 static FFMPEG: Search = Search::new();
 static FFPROBE: Search = Search::new();
 
-/// Folders of libraries where the loader tells none: a program in one piece, or another loader.
+/// Library folders if the loader lists none, for example for a static program or another loader.
 const USUAL_FOLDERS: [&str; 5] = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib"];
 
-/// What a tool may say of itself at most, bytes.
+/// Maximum output of a tool about itself, bytes. Free choice.
 const MAX_ANSWER_BYTES: usize = 1 << 20;
 
-/// Chooses tools and sandbox for this process. Called before any film is touched; later calls change
-/// nothing.
+/// Sets tools and sandbox for this process. Call it before the first film is read; later calls have no
+/// effect.
 pub fn set_up(settings: &Media) {
-    // A second call finds the first one's choice.
+    // On a second call the first settings remain.
     SETTINGS.set(settings.clone()).ok();
 }
 
-/// Begins to look for tools beside what comes next: to start one and ask its version takes a while, and whoever
-/// needs it later need not wait so long.
+/// Starts the search for the tools in the background, because starting a tool to get its version takes time.
 pub fn look_for(tools: &[Tool]) {
     for &tool in tools {
-        // Where no thread can be had, or nothing is found, it is looked for again where it is needed, and said.
+        // Errors are ignored here: the search is repeated at first use, which reports them.
         let thread = std::thread::Builder::new();
         thread.spawn(move || found(tool).is_ok()).ok();
     }
 }
 
-/// What stands around every media child here. Fails when a tool is missing or does not run at all.
+/// Returns the sandbox of media children on this machine. Fails if a tool is missing or does not run.
 pub fn walls() -> Result<Walls, Error> {
     let found = found(Tool::Ffmpeg)?;
     let other = self::found(Tool::Ffprobe)?;
@@ -100,19 +99,19 @@ pub fn walls() -> Result<Walls, Error> {
     })
 }
 
-/// The same, refused with one sentence where `--sandbox strict` is asked for and a layer is missing.
+/// Like [`walls`], but also fails if `--sandbox strict` is set and a layer is missing.
 pub fn demanded_walls() -> Result<Walls, Error> {
     place(Tool::Ffprobe)?;
     place(Tool::Ffmpeg)?;
     walls()
 }
 
-/// The version line of the installed ffmpeg.
+/// Returns the version line of the installed ffmpeg.
 pub fn tool_version() -> Result<String, Error> {
     found(Tool::Ffmpeg).map(|found| found.version.clone())
 }
 
-/// Where a tool lies and what it can bear; refused where it is missing, or where `strict` is not met.
+/// Returns an installed tool. Fails if it is missing, or if `--sandbox strict` is set and a layer is missing.
 pub(super) fn place(tool: Tool) -> Result<&'static Place, Error> {
     let found = found(tool)?;
     let strict = mode() == Sandbox::Strict;
@@ -125,7 +124,7 @@ pub(super) fn place(tool: Tool) -> Result<&'static Place, Error> {
     }
 }
 
-/// Where ffmpeg lies, whether or not its walls are as demanded: for questions about itself.
+/// Returns the installed ffmpeg even if `--sandbox strict` is not satisfied, to query its features.
 pub(super) fn whole_place() -> Result<&'static Place, Error> {
     found(Tool::Ffmpeg).map(|found| &found.place)
 }
@@ -150,7 +149,8 @@ impl Search {
         }
     }
 
-    /// What came of it; searches where nobody has. What is only of the moment is no outcome.
+    /// Returns the result of the search and searches if there is none. Transient errors are not stored as
+    /// results.
     fn outcome(&self, tool: Tool) -> Result<&Result<Found, String>, Error> {
         let _turn = match self.outcome.get() {
             Some(outcome) => return Ok(outcome),
@@ -215,7 +215,7 @@ fn path_of(tool: Tool) -> Result<PathBuf, Error> {
         .ok_or_else(|| Error::ToolMissing(name.to_owned()))
 }
 
-/// Whether it says something of a machine that had too much to do, and nothing of the tool or its layers.
+/// Returns whether the error is transient, caused by an overloaded machine and not by the tool or its layers.
 fn is_of_the_moment(error: &Error) -> bool {
     use std::io::ErrorKind::{Interrupted, OutOfMemory, ResourceBusy, WouldBlock};
     const TOO_MANY_FILES: [Option<i32>; 2] = [Some(libc::EMFILE), Some(libc::ENFILE)];
@@ -229,8 +229,8 @@ fn is_of_the_moment(error: &Error) -> bool {
     }
 }
 
-/// Lets the tool tell its version in all layers that there are; where it cannot, in fewer. Returns
-/// what it said, and which layers it cannot bear. No layer is given up because the machine was busy.
+/// Runs the tool for its version in all supported layers, and with fewer layers if that fails. Returns the
+/// version and the layers in which it does not run. A transient error never removes a layer.
 fn try_out(place: &mut Place) -> Result<(String, Vec<(Layer, String)>), Error> {
     let asked = match ask(place, &["-version"]) {
         Err(error) if is_of_the_moment(&error) => ask(place, &["-version"]),
@@ -263,13 +263,13 @@ fn try_out(place: &mut Place) -> Result<(String, Vec<(Layer, String)>), Error> {
     )))
 }
 
-/// The first line that the tool answers to a question about itself.
+/// Returns the first line of the tool's answer to a query about itself.
 fn ask(place: &Place, question: &[&str]) -> Result<String, Error> {
     let text = answer(place, question, false)?;
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
-/// What a program is made of, as the loader tells it: the folders of its libraries, and the loader.
+/// Returns the files that a program needs, as listed by its loader: its library folders and the loader.
 fn reach_of(path: &Path) -> Reach {
     let place = Place {
         path: path.to_owned(),
@@ -285,7 +285,7 @@ fn reach_of(path: &Path) -> Reach {
     reach
 }
 
-/// Everything that the tool says, or its loader when asked for the libraries.
+/// Returns the output of the tool for `question`, or with `of_loader` the list of its libraries.
 pub(super) fn answer(place: &Place, question: &[&str], of_loader: bool) -> Result<String, Error> {
     let limits = Limits::default();
     let args = question.iter().map(Into::into).collect();
@@ -303,7 +303,7 @@ pub(super) fn answer(place: &Place, question: &[&str], of_loader: bool) -> Resul
     Ok(String::from_utf8_lossy(&text[..n_bytes]).into_owned())
 }
 
-/// Lines such as `libz.so.1 => /lib/libz.so.1 (0x7f00)`, and the loader's own, which has no arrow.
+/// Parses lines such as `libz.so.1 => /lib/libz.so.1 (0x7f00)`. The line of the loader itself has no arrow.
 fn parse_listing(listing: &str) -> Reach {
     let mut reach = Reach::default();
     for line in listing.lines().filter(|line| line.contains(" (0x")) {

@@ -1,4 +1,4 @@
-//! Footage of any kind: a film, which the child decodes, or pictures, which are decoded here.
+//! Footage of any kind: a video file, decoded by a child process, or still pictures, decoded in this process.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::note::Note;
 use super::pictures::Pictures;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
 
-/// Footage that is within its limits and can be read any number of times.
+/// Footage that is within the limits and can be read any number of times.
 #[derive(Clone, Debug)]
 pub struct Video(Kind);
 
@@ -21,16 +21,16 @@ enum Kind {
 }
 
 impl Video {
-    /// As [`Video::open_with`], without hints.
+    /// Opens footage like [`Video::open_with`], without hints.
     pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
         Video::open_with(path, limits, &Hints::default())
     }
 
-    /// Opens a film, a zip of pictures, a TIFF of several pages or a folder of pictures. `hints` override what the
-    /// file says.
+    /// Opens a video file, a zip of pictures, a TIFF of several pages or a folder of pictures. `hints`
+    /// override the file's own metadata.
     ///
-    /// Fails with the reason of the first limit that the footage breaks. `path` must be ours or that of who runs
-    /// the command line: the name of an uploaded file never comes here.
+    /// Fails with the reason of the first limit that the footage exceeds. `path` comes from the store or from
+    /// the command line, never from the name of an uploaded file.
     pub fn open_with(path: &Path, limits: &Limits, hints: &Hints) -> Result<Video, Error> {
         let path = std::path::absolute(path).map_err(Error::io("finding the footage"))?;
         Ok(Video(match Pictures::open(&path, limits, hints)? {
@@ -39,7 +39,7 @@ impl Video {
         }))
     }
 
-    /// Whether the footage has an alpha channel, which may be opaque throughout.
+    /// Returns whether the footage has an alpha channel, even if it is opaque throughout.
     pub fn has_alpha(&self) -> bool {
         match &self.0 {
             Kind::Film(film) => film.has_alpha(),
@@ -47,7 +47,7 @@ impl Video {
         }
     }
 
-    /// Returns what is worth knowing of the file: assumptions, and faults that were mended.
+    /// Returns notes about the file: assumptions, and corrected faults.
     pub fn notes(&self) -> &[Note] {
         match &self.0 {
             Kind::Film(film) => film.notes(),
@@ -55,7 +55,7 @@ impl Video {
         }
     }
 
-    /// Returns the files that are read, in the order of their pictures: more than one for a folder only.
+    /// Returns the files that are read, in the order of their pictures. Only a folder has more than one.
     pub fn files(&self) -> &[PathBuf] {
         match &self.0 {
             Kind::Film(film) => film.files(),

@@ -1,12 +1,13 @@
-//! Two placed sprites as one: the cross-fade at a jump (ALGORITHMS.md 8), premultiplied, in the encoded
-//! values in which they were cut out.
+//! Cross-fade of two placed sprites into one, at a jump (docs/explanation/algorithms.md, "Compositing"). It
+//! works on premultiplied colors in encoded sRGB, the values from which mattes are cut.
 
 use super::resample::{Quad, Resampled, scaled};
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
-/// `weight` of `second` (0..=1) and the rest of `main`, in `main`: its box grows to hold both. `memory` is
-/// lent; this machine must have the instructions of `cpu`.
+/// Blends `weight` (0..=1) of `second` with the rest of `main`, and stores the result in `main`. The box of
+/// `main` grows to contain both. `memory` is a reused buffer. This machine must support the instructions of
+/// `cpu`.
 pub fn mix(
     main: &mut Resampled,
     second: &Resampled,
@@ -24,7 +25,7 @@ pub fn mix(
     std::mem::swap(main, memory);
 }
 
-/// Makes one run of those that touch.
+/// Merges runs that touch.
 fn join(runs: &mut Vec<[u32; 3]>) {
     runs.sort_unstable();
     runs.dedup_by(|next, run| {
@@ -36,7 +37,7 @@ fn join(runs: &mut Vec<[u32; 3]>) {
     });
 }
 
-/// Makes transparent what a layer may show.
+/// Clears the pixels in the runs of a layer.
 fn clear_runs(layer: &mut Resampled) {
     let Rect { x, y, w, .. } = layer.rect;
     for &[row, from, to] in &layer.runs {
@@ -45,15 +46,15 @@ fn clear_runs(layer: &mut Resampled) {
     }
 }
 
-/// Lets only `share` of a layer's color through (0..=1) and puts another, of alpha 1, in the place of the
-/// rest; alpha stays.
+/// Replaces the share `1 - share` of a layer's color by the opaque color `color`. Alpha is unchanged. `share`
+/// is in 0..=1.
 pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
     let kept = (share * 32767.0).round() as i16;
     let area = layer.rect.area() as usize;
     for pixel in &mut layer.pixels[..area] {
         let alpha = pixel[3];
         for channel in 0..3 {
-            // Twice, because a color goes to 16384 and a weight to 32768.
+            // Doubled, because colors range to 16384 and weights to 32768.
             let whole = (2 * i32::from(color[channel])).min(32767) as i16;
             let veil = scaled(scaled(alpha, whole), 32767 - kept);
             pixel[channel] = (scaled(pixel[channel], kept) + veil).min(alpha);
@@ -70,7 +71,7 @@ fn add(sum: &mut Resampled, (layer, weight): (&Resampled, i16), cpu: Level) {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
                 #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
-                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
                 unsafe {
                     add_row_avx2(out, row, weight);
                 }

@@ -1,29 +1,29 @@
-//! From decoded YUV to RGB and back, in 16.16 fixed point: the same values on every machine.
+//! Conversion between YUV and RGB in 16.16 fixed point, identical on every machine.
 //!
-//! Chroma belongs to its 2 x 2 block as it stands (no interpolation), as ffmpeg's own unscaled
-//! converter does: what is measured, cut out and put back is what an editor sees.
+//! Each chroma sample applies to its whole 2 x 2 block without interpolation, as in ffmpeg's unscaled
+//! converter. What is measured, cut out and put back therefore matches what a video editor shows.
 
-/// Which luma weights the planes were made with.
+/// Luma weights with which the planes were made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Matrix {
-    /// ITU-R BT.601: standard definition, and whatever says nothing, as ffmpeg and OpenCV read it.
+    /// ITU-R BT.601: standard definition, and video without a tag, which ffmpeg and OpenCV read this way.
     #[default]
     Bt601,
     /// ITU-R BT.709: high definition.
     Bt709,
 }
 
-/// Whether luma fills 16..=235 or 0..=255.
+/// Range of the values: 16..=235 or 0..=255 for luma.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Range {
     /// Luma 16..=235, chroma 16..=240: nearly all video.
     #[default]
     Limited,
-    /// 0..=255: motion JPEG and gray footage.
+    /// 0..=255: motion JPEG and gray video.
     Full,
 }
 
-/// How the YUV values of a frame are to be read.
+/// The meaning of YUV values: luma weights and range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct ColorSpec {
     /// Luma weights.
@@ -55,7 +55,7 @@ pub struct FromRgb {
 }
 
 impl ColorSpec {
-    /// (K_r, K_b) of the matrix.
+    /// Returns (K_r, K_b) of the matrix.
     fn weights(self) -> (f64, f64) {
         match self.matrix {
             Matrix::Bt601 => (0.299, 0.114),
@@ -63,7 +63,7 @@ impl ColorSpec {
         }
     }
 
-    /// (luma offset, luma span, chroma span).
+    /// Returns (luma offset, luma span, chroma span).
     fn spans(self) -> (f64, f64, f64) {
         match self.range {
             Range::Limited => (16.0, 219.0, 224.0),
@@ -71,7 +71,7 @@ impl ColorSpec {
         }
     }
 
-    /// The luma of black, levels of 255.
+    /// Returns the luma of black, 0..=255.
     pub fn black(self) -> f32 {
         match self.range {
             Range::Limited => 16.0,
@@ -79,7 +79,7 @@ impl ColorSpec {
         }
     }
 
-    /// The factors that turn a YUV triple into RGB.
+    /// Returns the factors for the conversion of YUV to RGB.
     pub fn to_rgb(self) -> ToRgb {
         let (kr, kb) = self.weights();
         let kg = 1.0 - kr - kb;
@@ -95,7 +95,7 @@ impl ColorSpec {
         }
     }
 
-    /// The factors that turn an RGB triple into YUV.
+    /// Returns the factors for the conversion of RGB to YUV.
     pub fn from_rgb(self) -> FromRgb {
         let (kr, kb) = self.weights();
         let kg = 1.0 - kr - kb;
@@ -119,7 +119,7 @@ impl ColorSpec {
     }
 }
 
-/// Fixed-point factors from premultiplied colors of alpha 1, in 16384ths, to YUV.
+/// Fixed-point factors from opaque premultiplied colors, in units of 1/16384, to YUV.
 #[derive(Clone, Copy, Debug)]
 pub struct FromQuads {
     pub(super) y_offset: i32,
@@ -129,12 +129,12 @@ pub struct FromQuads {
 }
 
 impl ColorSpec {
-    /// The factors that turn a color in 16384ths into YUV.
+    /// Returns the factors for the conversion of colors in units of 1/16384 to YUV.
     pub fn from_quads(self) -> FromQuads {
         let (kr, kb) = self.weights();
         let kg = 1.0 - kr - kb;
         let (offset, luma, chroma) = self.spans();
-        // In 2^21sts, so that products of sums of four stay below 2^31.
+        // In units of 2^-21, so that products with sums of four pixels stay below 2^31.
         let fixed = |v: f64, span: f64| (v * span * 128.0).round() as i32;
         let (u, v) = (0.5 / (1.0 - kb), 0.5 / (1.0 - kr));
         FromQuads {
@@ -147,14 +147,14 @@ impl ColorSpec {
 }
 
 impl FromQuads {
-    /// The luma of one pixel.
+    /// Returns the luma of one pixel.
     #[inline(always)]
     pub fn luma(&self, [r, g, b, _]: [i16; 4]) -> u8 {
         let y = dot(self.y, [r, g, b].map(i32::from));
         (self.y_offset + ((y + (1 << 20)) >> 21)).clamp(0, 255) as u8
     }
 
-    /// The chroma (U, V) of a block given the sums of its four pixels' channels.
+    /// Returns the chroma (U, V) of a block, given the channel sums of its four pixels.
     #[inline(always)]
     pub fn chroma_of_block(&self, sum: [i32; 3]) -> [u8; 2] {
         let chroma = |k: [i32; 3]| (128 + ((dot(k, sum) + (1 << 22)) >> 23)).clamp(0, 255) as u8;
@@ -163,7 +163,7 @@ impl FromQuads {
 }
 
 impl ToRgb {
-    /// One pixel, each channel rounded and clamped to 0..=255.
+    /// Converts one pixel. Each channel is rounded and clamped to 0..=255.
     pub fn convert(&self, y: u8, u: u8, v: u8) -> [u8; 3] {
         let luma = (i32::from(y) - self.y_offset) * self.y + 32768;
         let (u, v) = (i32::from(u) - 128, i32::from(v) - 128);
@@ -177,15 +177,15 @@ impl ToRgb {
 }
 
 impl FromRgb {
-    /// The luma of one pixel.
+    /// Returns the luma of one pixel.
     pub fn luma(&self, rgb: [u8; 3]) -> u8 {
         let y = dot(self.y, rgb.map(i32::from));
         (self.y_offset + ((y + 32768) >> 16)).clamp(0, 255) as u8
     }
 
-    /// The chroma (U, V) of a block given the sums of its four pixels' channels.
+    /// Returns the chroma (U, V) of a block, given the channel sums of its four pixels.
     pub fn chroma_of_block(&self, sum: [i32; 3]) -> [u8; 2] {
-        // Sums of four: two more bits to shift, half of the divisor for rounding.
+        // The sum of four pixels needs a shift by two more bits; half of the divisor is added for rounding.
         let chroma = |k: [i32; 3]| (128 + ((dot(k, sum) + (1 << 17)) >> 18)).clamp(0, 255) as u8;
         [chroma(self.u), chroma(self.v)]
     }

@@ -1,37 +1,36 @@
-//! A decoded picture: planar YUV 4:2:0, the form in which the decoder gives it and the encoder
-//! takes it. Only the boxes that matter are ever converted to RGB (ALGORITHMS.md 3 and 8).
+//! A decoded frame in planar YUV 4:2:0, the format of the decoder and the encoder. Only boxes of interest are
+//! converted to RGB (docs/explanation/algorithms.md, "Tracking" and "Compositing").
 
 use super::{ColorSpec, RgbImage};
 use crate::geometry::Rect;
 
-/// One frame: a luma plane of `width` by `height`, then two chroma planes of half the size, the
-/// halves rounded up.
+/// One frame: a luma plane of `width` by `height`, then two chroma planes of half the size, rounded up.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Frame {
-    /// Columns of luma.
+    /// Number of luma columns.
     pub width: u32,
-    /// Rows of luma.
+    /// Number of luma rows.
     pub height: u32,
-    /// How the values are to be read.
+    /// Conversion of the values to RGB.
     pub color: ColorSpec,
-    /// Y, then U, then V, without padding.
+    /// The planes Y, U and V in this order, without padding.
     pub planes: Vec<u8>,
-    /// How much of each pixel is the animal, where that is given.
+    /// Given alpha of the animal, if any.
     pub mask: Option<GivenMask>,
 }
 
-/// How much of each pixel of a frame is the animal, as its footage or a person says.
+/// Alpha of the animal in a frame, from an alpha channel of the footage or from the user's masks.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct GivenMask {
     /// 0..=255 for each pixel, row by row.
     pub alpha: Vec<u8>,
-    /// Whether pixels that are the animal in part show what lies behind it too, as a camera films them. The colors of
-    /// footage that has an alpha channel are the animal's alone.
+    /// Whether the colors of partly covered pixels include the background, as filmed by a camera. Footage
+    /// with an alpha channel holds the animal's colors only.
     pub is_mixed: bool,
 }
 
 impl Frame {
-    /// A frame of zeros.
+    /// Returns a frame of zeros.
     pub fn new(width: u32, height: u32, color: ColorSpec) -> Frame {
         Frame {
             width,
@@ -42,47 +41,47 @@ impl Frame {
         }
     }
 
-    /// The size in bytes of a frame of `width` by `height`.
+    /// Returns the size of a frame of `width` by `height`, bytes.
     pub fn n_bytes(width: u32, height: u32) -> usize {
         let chroma = width.div_ceil(2) as usize * height.div_ceil(2) as usize;
         width as usize * height as usize + 2 * chroma
     }
 
-    /// The luma plane, row by row.
+    /// Returns the luma plane, row by row.
     pub fn luma(&self) -> &[u8] {
         &self.planes[..self.width as usize * self.height as usize]
     }
 
-    /// What each value of luma is as gray, 0..=255.
+    /// Returns the gray level, 0..=255, for each luma value.
     pub fn gray_levels(&self) -> [u8; 256] {
         let convert = self.color.to_rgb();
         std::array::from_fn(|luma| convert.convert(luma as u8, 128, 128)[1])
     }
 
-    /// The two chroma planes, rows of `chroma_width`.
+    /// Returns the two chroma planes, with rows of `chroma_width`.
     pub fn chroma(&self) -> (&[u8], &[u8]) {
         let luma = self.width as usize * self.height as usize;
         self.planes[luma..].split_at((self.planes.len() - luma) / 2)
     }
 
-    /// Columns of a chroma plane.
+    /// Returns the number of columns of a chroma plane.
     pub fn chroma_width(&self) -> u32 {
         self.width.div_ceil(2)
     }
 
-    /// The box converted to RGB. Panics when it does not lie inside the frame.
+    /// Returns a box converted to RGB. Panics if it does not lie inside the frame.
     pub fn rgb(&self, rect: Rect) -> RgbImage {
         let mut image = RgbImage::new(rect.w, rect.h);
         self.rgb_into(rect, &mut image);
         image
     }
 
-    /// The whole frame converted to RGB.
+    /// Returns the whole frame converted to RGB.
     pub fn to_rgb(&self) -> RgbImage {
         self.rgb(Rect::of_size(self.width, self.height))
     }
 
-    /// As `rgb`, reusing the image's memory; its size becomes that of the box.
+    /// Like `rgb`, but writes to `image`, which is resized to the box and whose memory is reused.
     pub fn rgb_into(&self, rect: Rect, image: &mut RgbImage) {
         assert!(
             rect.right() <= self.width && rect.bottom() <= self.height,
@@ -108,17 +107,15 @@ impl Frame {
         }
     }
 
-    /// Writes a canvas of the frame's own size into the planes.
-    ///
-    /// Panics when the canvas has another size than the frame.
+    /// Writes a whole canvas into the planes. Panics if its size differs from the frame's.
     pub fn draw_all_rgb(&mut self, canvas: &RgbImage) {
         self.draw_rgb(canvas, Rect::of_size(self.width, self.height));
     }
 
-    /// Writes the box of a canvas of the frame's own size into the planes: luma of the box, chroma
-    /// of every 2 x 2 block that the box touches.
+    /// Writes a box of a canvas into the planes: the pixels and chroma of every 2 x 2 block that the box
+    /// touches.
     ///
-    /// Panics when the canvas has another size than the frame.
+    /// Panics if the sizes of canvas and frame differ.
     pub fn draw_rgb(&mut self, canvas: &RgbImage, rect: Rect) {
         assert_eq!(
             (canvas.width, canvas.height),
@@ -139,7 +136,7 @@ impl Frame {
             for bx in x0..x1 {
                 let mut sum = [0; 3];
                 for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    // At an odd right or bottom edge the last pixel stands in for the missing one.
+                    // At an odd right or bottom edge the last pixel is used twice.
                     let (x, y) = ((2 * bx + dx).min(width - 1), (2 * by + dy).min(height - 1));
                     let at = y * width + x;
                     let rgb = [

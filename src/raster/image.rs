@@ -1,6 +1,6 @@
 //! Packed 8-bit images in encoded sRGB values: RGB without alpha, RGBA with straight alpha.
 
-/// An RGB image, rows from the top, three bytes a pixel.
+/// An RGB image, rows from the top, three bytes per pixel.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct RgbImage {
     /// Columns.
@@ -11,7 +11,7 @@ pub struct RgbImage {
     pub pixels: Vec<u8>,
 }
 
-/// An RGBA image with straight (not premultiplied) alpha, four bytes a pixel.
+/// An RGBA image with straight (not premultiplied) alpha, four bytes per pixel.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct RgbaImage {
     /// Columns.
@@ -23,7 +23,7 @@ pub struct RgbaImage {
 }
 
 impl RgbImage {
-    /// A black image.
+    /// Returns a black image.
     pub fn new(width: u32, height: u32) -> RgbImage {
         RgbImage {
             width,
@@ -32,7 +32,7 @@ impl RgbImage {
         }
     }
 
-    /// The pixel in column `x` and row `y`. Panics outside the image.
+    /// Returns the pixel in column `x` and row `y`. Panics outside the image.
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 3] {
         let at = (y as usize * self.width as usize + x as usize) * 3;
         [self.pixels[at], self.pixels[at + 1], self.pixels[at + 2]]
@@ -46,7 +46,7 @@ impl RgbImage {
 }
 
 impl RgbaImage {
-    /// A wholly transparent image.
+    /// Returns a fully transparent image.
     pub fn new(width: u32, height: u32) -> RgbaImage {
         RgbaImage {
             width,
@@ -55,7 +55,7 @@ impl RgbaImage {
         }
     }
 
-    /// The pixel in column `x` and row `y`. Panics outside the image.
+    /// Returns the pixel in column `x` and row `y`. Panics outside the image.
     pub fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let at = (y as usize * self.width as usize + x as usize) * 4;
         [

@@ -1,19 +1,19 @@
-//! A yes or no for every pixel of a rectangle, and the small operations on it that a silhouette
-//! needs: holes filled, ragged edges smoothed by majority, erosion and opening (ALGORITHMS.md 2.6).
+//! Binary masks over a rectangle, with the operations for silhouettes: filling holes, majority filter,
+//! erosion, dilation and opening (docs/explanation/algorithms.md, "Silhouette").
 
 use crate::geometry::Rect;
 
-/// Which pixels of `rect` are set; everything outside is clear.
+/// The set pixels of `rect`. Pixels outside `rect` count as clear.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Mask {
-    /// The part of the image that the mask speaks of.
+    /// The part of the image that the mask covers.
     pub rect: Rect,
-    /// One byte a pixel, row by row: 0 or 1.
+    /// One byte per pixel, row by row: 0 or 1.
     pub bits: Vec<u8>,
 }
 
 impl Mask {
-    /// A clear mask.
+    /// Returns a clear mask.
     pub fn new(rect: Rect) -> Mask {
         Mask {
             rect,
@@ -21,23 +21,23 @@ impl Mask {
         }
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn width(&self) -> usize {
         self.rect.w as usize
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn height(&self) -> usize {
         self.rect.h as usize
     }
 
-    /// Whether the pixel in column `x` and row `y` of the image is set.
+    /// Returns whether the pixel in column `x` and row `y` of the image is set.
     pub fn is_set(&self, x: u32, y: u32) -> bool {
         let at = || (y - self.rect.y) as usize * self.width() + (x - self.rect.x) as usize;
         self.rect.contains(x, y) && self.bits[at()] == 1
     }
 
-    /// Sets what is set in another mask, within this one's box.
+    /// Sets the pixels that are set in another mask, within this mask's rectangle.
     pub fn add(&mut self, other: &Mask) {
         let both = self.rect.intersection(&other.rect);
         for y in both.y..both.bottom() {
@@ -53,13 +53,12 @@ impl Mask {
         }
     }
 
-    /// Number of set pixels.
+    /// Returns the number of set pixels.
     pub fn area(&self) -> usize {
         self.bits.iter().map(|&bit| bit as usize).sum()
     }
 
-    /// Sets every clear pixel that cannot be reached from the mask's border over clear pixels
-    /// (4-connected).
+    /// Sets every clear pixel that is not connected to the mask's border through clear pixels (4-connected).
     pub fn fill_holes(&mut self) {
         let (w, h) = (self.width(), self.height());
         if w == 0 || h == 0 {
@@ -100,38 +99,38 @@ impl Mask {
         }
     }
 
-    /// Each pixel as the majority of its 3 x 3 neighborhood says (5 of 9 or more).
+    /// Returns the majority of each 3 x 3 neighborhood: set if at least 5 of 9 pixels are.
     pub fn majority(&self) -> Mask {
         self.counted(|n, _| n >= 5)
     }
 
-    /// Pixels whose 3 x 3 neighborhood is all set; the outside counts as clear.
+    /// Returns the pixels whose 3 x 3 neighborhood is completely set. Pixels outside `rect` count as clear.
     pub fn eroded(&self) -> Mask {
         self.counted(|n, _| n == 9)
     }
 
-    /// Pixels with any set pixel in their 3 x 3 neighborhood.
+    /// Returns the pixels with any set pixel in their 3 x 3 neighborhood.
     pub fn dilated(&self) -> Mask {
         self.counted(|n, _| n > 0)
     }
 
-    /// Eroded so many times.
+    /// Returns the mask eroded `n_px` times.
     pub fn eroded_by(&self, n_px: u32) -> Mask {
         (0..n_px).fold(self.clone(), |mask, _| mask.eroded())
     }
 
-    /// Dilated so many times.
+    /// Returns the mask dilated `n_px` times.
     pub fn dilated_by(&self, n_px: u32) -> Mask {
         (0..n_px).fold(self.clone(), |mask, _| mask.dilated())
     }
 
-    /// Eroded, then dilated: without anything thinner than 3 pixels.
+    /// Returns the mask eroded, then dilated, which removes parts thinner than 3 pixels.
     pub fn opened(&self) -> Mask {
         self.eroded().dilated()
     }
 
-    /// For each pixel how many erosions clear it: the chessboard distance to the nearest clear pixel, the outside counting
-    /// as clear; 0 where it is clear already.
+    /// Returns, for each pixel, the number of erosions that clear it; 0 if it is clear. This is the
+    /// chessboard distance to the nearest clear pixel, with pixels outside `rect` clear.
     pub fn depth_px(&self) -> Vec<u32> {
         let (w, h) = (self.width(), self.height());
         let mut depth = vec![0; w * h];
@@ -161,14 +160,15 @@ impl Mask {
         depth
     }
 
-    /// A mask from the number of set pixels in each 3 x 3 neighborhood and the pixel itself.
+    /// Returns a mask computed from the number of set pixels in each 3 x 3 neighborhood and from the pixel
+    /// itself.
     fn counted(&self, keep: impl Fn(u8, u8) -> bool) -> Mask {
         let (w, h) = (self.width(), self.height());
         let mut result = Mask::new(self.rect);
         if w == 0 {
             return result;
         }
-        // Sums of three along rows first, then along columns, a row of zeros above and below.
+        // Sums of three along rows first, then along columns, with a row of zeros above and below.
         let mut rows = vec![0u8; (h + 2) * w];
         for (sums, bits) in rows[w..].chunks_exact_mut(w).zip(self.bits.chunks_exact(w)) {
             sums.copy_from_slice(bits);

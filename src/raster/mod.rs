@@ -1,4 +1,4 @@
-//! Pictures as values: frames as they are decoded, RGB and RGBA images, masks.
+//! Raster types: decoded frames, RGB and RGBA images, masks, and the operations on them.
 
 pub mod blend;
 pub mod canvas;

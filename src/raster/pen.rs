@@ -1,22 +1,22 @@
-//! A pen for planar frames: smooth lines, discs and small figures, gathered as coverage and then inked
-//! in one color, so that strokes of one drawing do not darken each other where they cross.
+//! A pen for planar frames: anti-aliased lines, discs and digits. Strokes accumulate as coverage and are
+//! drawn together in one color, so that crossing strokes do not darken each other.
 
 use super::Frame;
 use crate::geometry::Rect;
 
-/// Coverage of the strokes since the last ink, for frames of one size.
+/// Coverage of the strokes since the last call of `ink`, for frames of one size.
 #[derive(Clone, Debug)]
 pub struct Pen {
     width: usize,
     height: usize,
     /// 0..=255 for each pixel.
     coverage: Vec<u8>,
-    /// The pixels touched.
+    /// Bounding box of the pixels with coverage.
     touched: Rect,
 }
 
 impl Pen {
-    /// A pen for frames of `width` by `height` pixels.
+    /// Returns a pen for frames of `width` by `height` pixels.
     pub fn new(width: u32, height: u32) -> Pen {
         Pen {
             width: width as usize,
@@ -26,8 +26,8 @@ impl Pen {
         }
     }
 
-    /// A round-ended line from `from` to `to`, pixels, `radius_px` to either side; `alpha` in 0..=1.
-    /// A line without length is a disc.
+    /// Adds a line with round ends from `from` to `to`, pixels, with half-width `radius_px` and `alpha` in
+    /// 0..=1. A line of length 0 is a disc.
     pub fn line(&mut self, from: [f64; 2], to: [f64; 2], radius_px: f64, alpha: f64) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let squared = along[0] * along[0] + along[1] * along[1];
@@ -42,15 +42,15 @@ impl Pen {
         });
     }
 
-    /// A line through all points.
+    /// Adds a line through all points.
     pub fn polyline(&mut self, points: &[[f64; 2]], radius_px: f64, alpha: f64) {
         for pair in points.windows(2) {
             self.line(pair[0], pair[1], radius_px, alpha);
         }
     }
 
-    /// Figures, a point and the letters f and s with their upper left corner at `at`, each dot of
-    /// their 5 x 7 dots `dot_px` wide; what is not known to the pen is a space.
+    /// Adds text in a 5 x 7 dot font, with the upper left corner at `at` and dots `dot_px` wide. The font has
+    /// the digits, the point and the letter s; other characters are blank.
     pub fn text(&mut self, text: &str, at: [f64; 2], dot_px: f64) {
         for (n, glyph) in text.chars().map(rows_of).enumerate() {
             for (row, bits) in glyph.into_iter().enumerate() {
@@ -71,8 +71,7 @@ impl Pen {
         }
     }
 
-    /// Lays the color over the frame where the strokes are, and forgets them. Panics on a frame of
-    /// another size.
+    /// Draws the strokes onto the frame in one color and clears them. Panics if the frame has another size.
     pub fn ink(&mut self, frame: &mut Frame, rgb: [u8; 3]) {
         assert_eq!(
             (frame.width as usize, frame.height as usize),
@@ -108,7 +107,7 @@ impl Pen {
         self.touched = Rect::default();
     }
 
-    /// Raises the coverage of the pixels between two corners to what `of` says of their centers.
+    /// Raises the coverage of each pixel between two corners to `of` its center.
     fn cover(&mut self, least: [f64; 2], most: [f64; 2], of: impl Fn([f64; 2]) -> f64) {
         let (w, h) = (self.width as u32, self.height as u32);
         if [least, most].concat().iter().any(|c| !c.is_finite()) {
@@ -150,7 +149,7 @@ fn mixed(old: u8, new: u8, alpha: u32) -> u8 {
     ((u32::from(old) * (255 - alpha) + u32::from(new) * alpha + 127) / 255) as u8
 }
 
-/// The seven rows of a figure, five dots each, the leftmost dot the highest bit.
+/// Returns the seven rows of a character, five dots each; the leftmost dot is the highest bit.
 fn rows_of(figure: char) -> [u8; 7] {
     match figure {
         '0' => [
@@ -212,7 +211,7 @@ mod tests {
             let row = 33 * y..33 * (y + 1);
             assert_eq!(frame.luma()[row.clone()], old.luma()[row]);
         }
-        // The pen is empty now.
+        // The first ink cleared the pen.
         let inked = frame.clone();
         pen.ink(&mut frame, [0, 255, 0]);
         assert_eq!(frame, inked);

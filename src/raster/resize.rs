@@ -1,16 +1,16 @@
-//! Whole pictures made larger or smaller: what lies behind a flock at another size than it was filmed
-//! (ALGORITHMS.md 8). Catmull and Rom's curve, as wide as an output pixel where the picture shrinks, so
-//! that nothing flickers; the edges go on.
+//! Resizing of whole pictures: the background of a flock rendered at another size than the footage
+//! (docs/explanation/algorithms.md, "Compositing"). The filter is a Catmull-Rom kernel, widened to the output
+//! pixel when shrinking, so that fine detail does not flicker. Edge pixels extend outward.
 
 use super::RgbImage;
 
-/// The picture at a size of `width` by `height`, each at least 1.
+/// Returns the picture resized to `width` by `height`, each at least 1.
 pub fn resized(image: &RgbImage, width: u32, height: u32) -> RgbImage {
     if (image.width, image.height) == (width, height) {
         return image.clone();
     }
     let (rows, columns) = (image.height as usize, image.width as usize);
-    // Across, transposed on the way, then down and back.
+    // Each pass transposes: the first resizes the rows, the second the columns.
     let across = resampled(&image.pixels, (columns, rows), width as usize);
     let pixels = resampled(&across, (rows, width as usize), height as usize);
     RgbImage {
@@ -20,7 +20,7 @@ pub fn resized(image: &RgbImage, width: u32, height: u32) -> RgbImage {
     }
 }
 
-/// Makes rows of `n` pixels out of those of `length`, and columns of rows.
+/// Resizes rows of `length` pixels to `n` pixels and transposes the result.
 fn resampled(pixels: &[u8], (length, n_rows): (usize, usize), n: usize) -> Vec<u8> {
     let mut out = vec![0; n * n_rows * 3];
     for (to, taps) in taps(length, n).iter().enumerate() {
@@ -33,14 +33,14 @@ fn resampled(pixels: &[u8], (length, n_rows): (usize, usize), n: usize) -> Vec<u
                 }
             }
             let at = (to * n_rows + row) * 3;
-            // A cast saturates: no clamp is needed.
+            // The cast saturates, so no clamp is needed.
             out[at..at + 3].copy_from_slice(&sum.map(|value| (value + 0.5) as u8));
         }
     }
     out
 }
 
-/// For each of `n` output pixels, which of `length` pixels it is made of, and how much of each.
+/// Returns, for each of `n` output pixels, the indices and weights of the `length` input pixels it sums.
 fn taps(length: usize, n: usize) -> Vec<Vec<(usize, f32)>> {
     let step = length as f64 / n as f64;
     let width = step.max(1.0);
@@ -58,7 +58,7 @@ fn taps(length: usize, n: usize) -> Vec<Vec<(usize, f32)>> {
         .collect()
 }
 
-/// Catmull and Rom's curve at a distance.
+/// Returns the value of the Catmull-Rom kernel at a distance in pixels.
 fn curve(distance: f64) -> f64 {
     let d = distance.abs();
     if d < 1.0 {
@@ -90,7 +90,7 @@ mod tests {
         for (width, height) in [(80, 60), (20, 15), (40, 30)] {
             let other = resized(&image, width, height);
             let step = 40.0 / f64::from(width);
-            // Away from the edges, which go on flat.
+            // Excludes the edges, where the extension is constant.
             for (x, y) in [(width / 2, height / 2), (width / 4, 2 * height / 3)] {
                 let want = [4.0, 5.0]
                     .map(|slope| move |at: u32| slope * ((f64::from(at) + 0.5) * step - 0.5));

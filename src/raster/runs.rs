@@ -1,12 +1,12 @@
-//! 8-connected components of a mask, found run by run with union-find in one pass.
+//! 8-connected components of a mask, found from runs of pixels with union-find in one pass.
 //!
-//! He, Chao & Suzuki, "A run-based two-scan labeling algorithm", 2008, without the second scan over
-//! pixels: a component is its list of runs.
+//! Source: He, Chao & Suzuki, "A run-based two-scan labeling algorithm", 2008. The second scan over pixels is
+//! omitted, because a component is stored as its list of runs.
 
 use super::Mask;
 use crate::geometry::Rect;
 
-/// Pixels `x0..x1` of row `y`, in image coordinates.
+/// The pixels `x0..x1` of row `y`, in image coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     /// The row.
@@ -20,7 +20,7 @@ pub struct Run {
 /// One connected component.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Component {
-    /// Its runs, from the top, then from the left.
+    /// Runs, ordered from the top, then from the left.
     pub runs: Vec<Run>,
     /// Number of pixels.
     pub area: u64,
@@ -29,7 +29,7 @@ pub struct Component {
 }
 
 impl Component {
-    /// The component alone, as a mask over `rect`; what lies outside `rect` is left out.
+    /// Returns the component as a mask over `rect`, clipped to it.
     pub fn mask(&self, rect: Rect) -> Mask {
         let mut mask = Mask::new(rect);
         for run in self
@@ -47,7 +47,7 @@ impl Component {
         mask
     }
 
-    /// The mean of its pixels' centers, from sums along the runs (exact in integers).
+    /// Returns the centroid of the pixel centers, pixels. Integer sums along the runs make it exact.
     ///
     /// ```
     /// use flockreel::{geometry::Rect, raster::{Mask, runs::components}};
@@ -65,7 +65,7 @@ impl Component {
         [twice_x as f64 / twice_area, twice_y as f64 / twice_area]
     }
 
-    /// Both as one.
+    /// Returns the union of two components.
     pub fn joined(mut self, other: Component) -> Component {
         self.runs.extend(other.runs);
         self.runs.sort_by_key(|run| (run.y, run.x0));
@@ -75,9 +75,9 @@ impl Component {
     }
 }
 
-/// The components of a mask, in the order of their first pixel from the top left.
+/// Returns the components of a mask, ordered by their first pixel from the top left.
 ///
-/// Two pixels that touch by a corner belong together:
+/// Pixels that touch at a corner are connected:
 /// ```
 /// use flockreel::{geometry::Rect, raster::{Mask, runs::components}};
 /// let mask = Mask { rect: Rect::of_size(3, 2), bits: vec![1, 0, 0, 0, 1, 1] };
@@ -111,7 +111,7 @@ pub fn components(mask: &Mask) -> Vec<Component> {
     found
 }
 
-/// The runs of a mask and, for each, a run of the same component (itself for a root).
+/// Returns the runs of a mask and the parent of each in the union-find forest (a root is its own parent).
 fn label(mask: &Mask) -> (Vec<Run>, Vec<usize>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut parents: Vec<usize> = Vec::new();
@@ -138,7 +138,7 @@ fn label(mask: &Mask) -> (Vec<Run>, Vec<usize>) {
             let idx = runs.len();
             runs.push(run);
             parents.push(idx);
-            // Runs above that end before this one begins touch nothing further right either.
+            // A run above that ends before this one cannot touch later runs of this row either.
             while candidate < above.end && runs[candidate].x1 < run.x0 {
                 candidate += 1;
             }
@@ -155,7 +155,7 @@ fn label(mask: &Mask) -> (Vec<Run>, Vec<usize>) {
     (runs, parents)
 }
 
-/// Makes two runs one component; the smaller index is the root, so that the order is the image's.
+/// Unites two runs. The smaller index becomes the root, which keeps components in image order.
 fn join(parents: &mut [usize], a: usize, b: usize) {
     let (a, b) = (find(parents, a), find(parents, b));
     parents[a.max(b)] = a.min(b);
@@ -175,7 +175,7 @@ mod tests {
 
     use super::*;
 
-    /// Flood fill: the definition.
+    /// Flood fill, the reference for the test.
     fn flooded(mask: &Mask) -> Vec<Vec<(u32, u32)>> {
         let (w, h) = (mask.rect.w as i64, mask.rect.h as i64);
         let mut left = mask.bits.clone();

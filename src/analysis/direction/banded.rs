@@ -1,16 +1,19 @@
-//! Symmetric positive definite systems whose unknowns touch only their neighbors in time: normal
-//! equations in a band, solved by Cholesky, O(frames).
+//! Normal equations of a least-squares problem in which each residual involves at most three successive
+//! frames.
+//!
+//! The matrix is then a band, and Cholesky factorisation takes time proportional to the number of frames.
 
-/// Unknowns of one frame.
+/// Number of unknowns per frame.
 pub(super) const N_STATE: usize = 5;
-/// A residual reaches over three frames.
+/// Width of the band. A residual involves at most three successive frames.
 pub(super) const BAND: usize = 3 * N_STATE;
 
-/// The normal equations `H x = -g` of a sum of squares; `H` by rows, each from the diagonal leftward.
+/// The normal equations `H x = -g` of a sum of squares. `H` is stored by rows, each from the diagonal
+/// leftward.
 pub(super) struct Normal {
     rows: Vec<[f64; BAND]>,
     gradient: Vec<f64>,
-    /// Half the energy itself is not needed: this is the whole sum of squares.
+    /// The weighted sum of squared residuals, without the factor 1/2.
     pub(super) cost: f64,
 }
 
@@ -23,7 +26,7 @@ impl Normal {
         }
     }
 
-    /// Adds one residual of weight `weight`; `terms` are (unknown, derivative), unknowns ascending.
+    /// Adds a residual with its weight. `terms` are pairs of unknown and derivative, by ascending unknown.
     pub(super) fn add(&mut self, residual: f64, weight: f64, terms: &[(usize, f64)]) {
         for (k, &(row, slope)) in terms.iter().enumerate() {
             let pulled = weight * slope;
@@ -34,8 +37,11 @@ impl Normal {
         }
     }
 
-    /// The step that minimises the quadratic model with `damping` times the diagonal added (Marquardt
-    /// 1963); unknowns for which `held` is true do not move. `None` when the system is not definite.
+    /// Returns the step that minimises the quadratic model with `damping` times the diagonal added (Marquardt
+    /// 1963).
+    ///
+    /// Unknowns for which `held` returns true do not move. Returns `None` when the system is not positive
+    /// definite.
     pub(super) fn step(&self, damping: f64, held: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
         let n = self.rows.len();
         let mut factor = self.rows.clone();
@@ -54,13 +60,13 @@ impl Normal {
                 }
             }
         }
-        // From here on the diagonal holds its reciprocal: a division waits long.
+        // From here on each diagonal entry holds its reciprocal, because divisions are slow.
         for i in 0..n {
             let (done, rest) = factor.split_at_mut(i);
             let row = &mut rest[0];
             let reach = BAND.min(i + 1);
             for back in (1..reach).rev() {
-                // Column j = i - back: dot product of rows i and j left of j.
+                // Column j = i - back: subtract the dot product of rows i and j, left of column j.
                 let other = &done[i - back];
                 let sum = row[back] - dot(&row[back + 1..], &other[1..BAND - back]);
                 row[back] = sum * other[0];
@@ -87,7 +93,7 @@ impl Normal {
     }
 }
 
-/// The dot product, in four sums that need not wait for each other.
+/// Returns the dot product. Four independent sums let the processor overlap the additions.
 #[inline]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());

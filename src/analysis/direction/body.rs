@@ -1,8 +1,8 @@
-//! The body's own axes in the camera frame, and how they are projected and turned.
+//! The body axes in the camera frame, their derivatives, and their projection into the image.
 //!
-//! A fish in side view does not roll: its side stays level. Then yaw and pitch say everything.
+//! The body does not roll: its sideways axis stays horizontal. Yaw and pitch then define all three axes.
 
-/// Forward, down and side: an orthonormal triple. The side is level.
+/// Orthonormal body axes in the camera frame: forward, down and side. The side axis is horizontal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axes {
     pub(super) forward: [f64; 3],
@@ -11,7 +11,7 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    /// `yaw_rad` = atan2(dz, dx), `pitch_rad` = asin(dy) of the forward vector (DESIGN.md).
+    /// Returns the axes for a yaw and a pitch. Yaw is atan2(z, x) and pitch is asin(y) of the forward vector.
     pub(super) fn of(yaw_rad: f64, pitch_rad: f64) -> Axes {
         let (sin_yaw, cos_yaw) = libm::sincos(yaw_rad);
         let (sin_pitch, cos_pitch) = libm::sincos(pitch_rad);
@@ -22,7 +22,7 @@ impl Axes {
         }
     }
 
-    /// How the axes move as the yaw grows: about the vertical.
+    /// Returns the derivative of the axes with respect to yaw.
     pub(super) fn by_yaw(&self) -> Axes {
         let turned = |v: [f64; 3]| [-v[2], 0.0, v[0]];
         Axes {
@@ -32,7 +32,7 @@ impl Axes {
         }
     }
 
-    /// How the axes move as the pitch grows: forward goes down, down goes backward.
+    /// Returns the derivative of the axes with respect to pitch.
     pub(super) fn by_pitch(&self) -> Axes {
         Axes {
             forward: self.down,
@@ -41,16 +41,19 @@ impl Axes {
         }
     }
 
-    /// What is seen of them at a place whose line of sight has the given slope: rows x and y of the
-    /// picture, columns forward, down, side. `flatten` is how much shorter the medium makes depths look.
+    /// Returns the projection of the axes at a point whose line of sight has the given slope.
+    ///
+    /// The rows are x and y in the image, the columns forward, down and side. `flatten` is the factor by
+    /// which the medium shortens apparent depth.
     pub(super) fn seen(&self, slope: [f64; 2], flatten: f64) -> [[f64; 3]; 2] {
         let columns = [&self.forward, &self.down, &self.side];
         [0, 1].map(|row| columns.map(|v| v[row] - slope[row] * flatten * v[2]))
     }
 }
 
-/// `a C b'` for rows `a`, `b` and the symmetric `c` = [ll, vv, ww, lv, lw] (l forward, v down, w side; v and w are
-/// not correlated).
+/// Returns `a C b'`, for row vectors `a` and `b` and the symmetric covariance matrix C of the body.
+///
+/// `c` lists the entries [ll, vv, ww, lv, lw], with l forward, v down and w side. The entry vw is 0.
 pub(super) fn form(a: &[f64; 3], b: &[f64; 3], c: &[f64; 5]) -> f64 {
     c[0] * a[0] * b[0]
         + c[1] * a[1] * b[1]

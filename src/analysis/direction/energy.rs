@@ -1,44 +1,49 @@
-//! How badly a course through space explains what was seen: the sum of squares that the best estimate
-//! makes least (ALGORITHMS.md 4).
+//! The energy that the estimate minimises: a weighted sum of squared residuals over all frames
+//! (docs/explanation/algorithms.md, "Direction in space").
 //!
-//! The unknowns of a frame are the logarithm of the apparent depth, yaw, pitch, speed, and the sway: how
-//! far the body's length and side vary together, which is how far the tail lies to one side. Residuals,
-//! each in units of its standard deviation, those of measurements with Huber weights:
+//! Each frame has five unknowns: logarithm of the apparent depth, yaw, pitch, speed and sway. Sway is the
+//! covariance of the body's forward and side axes; it is large where the tail lies to one side. Each residual
+//! is in units of its standard deviation. Measurements have Huber weights.
 //!
-//! - second moments of the silhouette against those of the body;
-//! - its upright extent, which hardly depends on yaw or sway, against the animal's height;
-//! - motion against speed along forward, sideways slip allowed;
-//! - changes of yaw rate, pitch rate and speed; swimming backward; pitch itself; sway against what the turn would bend.
+//! - The second moments of the silhouette are compared with those of the projected body.
+//! - The vertical extent is compared with the animal's height.
+//! - The motion is compared with the speed along the forward axis; some sideways slip is allowed.
+//! - Priors limit changes of yaw rate, pitch rate and speed, backward swimming, and pitch.
+//! - A prior ties the sway to the bend that the turn would cause.
 
 use super::banded::{N_STATE, Normal};
 use super::body::{Axes, form};
 use super::shape::Shape;
 use super::{Outline, View, Views};
 
-/// Residuals of measurements beyond this many standard deviations count linearly (Huber 1964).
+/// Residuals of measurements grow linearly beyond this many standard deviations (Huber 1964). Free choice.
 const HUBER: f64 = 2.5;
-/// Noise of a centroid, pixels.
+/// Standard deviation of a centroid coordinate, pixels. Free choice.
 const CENTROID_NOISE_PX: f64 = 0.2;
-/// Sideways slip, lengths a second.
+/// Standard deviation of the sideways speed, body lengths per second. Free choice.
 const SLIP_BL: f64 = 0.2;
-/// Usual turning rate, radians a second.
+/// Standard deviation of the yaw rate, radians per second. Free choice.
 const TURN_RATE: f64 = 3.0;
-/// Change of the turning rate, radians a second, per square root of a second.
+/// Standard deviation of the change in yaw rate within one second, radians per second. It grows with the
+/// square root of time. Free choice.
 const TURN_CHANGE: f64 = 6.5;
-/// The same of pitch.
+/// Standard deviation of the change in pitch rate within one second, radians per second. Free choice.
 const PITCH_CHANGE: f64 = 1.5;
-/// Usual pitch, radians.
+/// Standard deviation of the pitch, radians. Free choice.
 const PITCH: f64 = 0.5;
-/// Change of speed, lengths a second, per square root of a second.
+/// Standard deviation of the change in speed within one second, body lengths per second. It grows with the
+/// square root of time. Free choice.
 const SPEED_CHANGE_BL: f64 = 2.2;
-/// Animals rarely swim backward, lengths a second.
+/// Standard deviation of the backward speed, body lengths per second. Free choice.
 const BACKWARD_BL: f64 = 0.1;
-/// Pointing away from where the head is known to be.
+/// Standard deviation of the component of the forward vector that points away from a head given by the user.
+/// Small: the user's choice holds.
 const PINNED: f64 = 0.01;
-/// Turning rates count toward the bend up to here, radians a second.
+/// Yaw rates above this do not bend the body further, radians per second. Free choice.
 pub(super) const BEND_RATE: f64 = 4.0;
 
-/// The unknowns of one frame.
+/// The unknowns of one frame: logarithm of apparent depth (metres), yaw and pitch (radians), speed (metres
+/// per second), sway (square metres).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State(pub(super) [f64; N_STATE]);
 
@@ -60,13 +65,13 @@ impl State {
     }
 }
 
-/// The energy of courses through the views, for a body of known shape.
+/// The energy of a sequence of states, for given measurements and a given body shape.
 pub(super) struct Energy<'a> {
     pub(super) views: &'a Views,
     pub(super) shape: &'a Shape,
 }
 
-/// Standard deviations of xx, xy, yy as they were measured.
+/// Returns the standard deviations of the measured moments xx, xy and yy, square pixels, from their values.
 pub(super) fn moment_noise([xx, _, yy]: [f64; 3]) -> [f64; 3] {
     let mean = (xx * yy).max(1.0).sqrt();
     [
@@ -81,8 +86,7 @@ impl<'a> Energy<'a> {
         Energy { views, shape }
     }
 
-    /// The sum of squares over the frames from `start` on that `states` covers: the residuals among
-    /// them alone.
+    /// Returns the energy of `states`, which begin at frame `start`. Only residuals among these frames count.
     pub(super) fn cost(&self, start: usize, states: &[State]) -> f64 {
         let mut cost = 0.0;
         self.visit(start, states, &mut |residual, scale, robust, _| {
@@ -91,7 +95,7 @@ impl<'a> Energy<'a> {
         cost
     }
 
-    /// The normal equations of the same, with the cost.
+    /// Returns the normal equations of [`Energy::cost`], with the cost itself.
     pub(super) fn normal(&self, start: usize, states: &[State]) -> Normal {
         let mut normal = Normal::new(states.len() * N_STATE);
         let mut cost = 0.0;
@@ -109,7 +113,7 @@ impl<'a> Energy<'a> {
         normal
     }
 
-    /// Gives every residual to `add`: value, weight, whether it is a measurement, derivatives.
+    /// Calls `add` for every residual with its value, its weight, whether it is robust, and its derivatives.
     fn visit(&self, start: usize, states: &[State], add: &mut Add) {
         let evidence = self.views.evidence();
         let axes: Vec<Axes> = states
@@ -178,7 +182,7 @@ impl<'a> Energy<'a> {
             let turned =
                 by.map(|b| scale * (form(&b[i], &seen[j], &body) + form(&seen[i], &b[j], &body)));
             let swayed = scale * (seen[i][0] * seen[j][2] + seen[i][2] * seen[j][0]);
-            // A pixel is a square: 1 / 12 of second moment of its own.
+            // Each pixel is a square with a second moment of 1/12.
             let pixel = if i == j { 1.0 / 12.0 } else { 0.0 };
             let residual = (value + pixel - outline.covariance_px2[c]) / noise[c];
             let at = k * N_STATE;
@@ -204,7 +208,7 @@ impl<'a> Energy<'a> {
         add(residual, &terms);
     }
 
-    /// The way from one frame to the next against speed along forward.
+    /// Adds the residuals of the displacement to the next frame against the speed along the forward axis.
     fn motion(&self, start: usize, k: usize, states: &[State], axes: [&Axes; 2], add: &mut AddOne) {
         let views = self.views;
         let both = [&views.frames[start + k], &views.frames[start + k + 1]];
@@ -222,7 +226,7 @@ impl<'a> Energy<'a> {
         let slopes = [0, 1].map(|m| [both[m].slope[0], both[m].slope[1], views.medium_index]);
         let by = axes.map(|a| [a.by_yaw().forward, a.by_pitch().forward]);
         for c in 0..3 {
-            // x and y follow the apparent depth, z is stretched by the medium.
+            // x and y scale with the apparent depth. The medium scales the true depth z.
             let place = [0, 1].map(|m| slopes[m][c] * depth[m]);
             let forward = (axes[0].forward[c] + axes[1].forward[c]) / 2.0;
             let residual = ((place[1] - place[0]) / views.dt - speed * forward) / slip;
@@ -244,7 +248,7 @@ impl<'a> Energy<'a> {
         }
     }
 
-    /// What animals rarely do.
+    /// Adds the residuals of the priors on turning, speed and sway.
     fn habits(&self, k: usize, states: &[State], add: &mut AddOne) {
         let dt = self.views.dt;
         let root = dt.sqrt();
@@ -293,10 +297,10 @@ impl<'a> Energy<'a> {
     }
 }
 
-/// Takes a residual and its derivatives.
+/// Receives a residual and its derivatives.
 type AddOne<'a> = dyn FnMut(f64, &[(usize, f64)]) + 'a;
 
-/// Takes a residual, its weight, whether it is a measurement, and its derivatives.
+/// Receives a residual, its weight, whether Huber weights apply, and its derivatives.
 type Add<'a> = dyn FnMut(f64, f64, bool, &[(usize, f64)]) + 'a;
 
 fn loss(residual: f64, robust: bool) -> f64 {

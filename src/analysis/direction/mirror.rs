@@ -1,8 +1,9 @@
-//! Turns that could also have gone the mirrored way.
+//! Tries mirrored versions of each turn, and keeps those that fit better.
 //!
-//! The picture of an animal that comes is nearly that of one that goes, and a course can take the wrong
-//! way round between two moments at which both ways meet: broadside (toward or away) or head-on (left
-//! or right). Each such stretch is mirrored, settled, and kept so when its energy is clearly less.
+//! An approaching animal looks almost like a receding one. A course can therefore follow the wrong
+//! alternative between two frames in which both agree. They agree at broadside (toward or away) and head-on
+//! (left or right). Each range between two such frames is mirrored and optimised. It is kept if its energy is
+//! clearly lower.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -14,27 +15,27 @@ use super::energy::{Energy, State};
 use super::solve;
 use crate::geometry::wrap_rad;
 
-/// Times all stretches are tried.
+/// Largest number of passes over all ranges. Free choice.
 const SWEEPS: usize = 2;
-/// Frames around a stretch that settle with it.
+/// Number of frames on each side of a range that are optimised with it. Free choice.
 const MARGIN: usize = 20;
-/// Longest stretch, seconds.
+/// Longest range that is tried, seconds. Free choice.
 const LONGEST_S: f64 = 5.0;
-/// Both ways may meet where the sine (or cosine) of yaw is at a minimum below this.
+/// The two alternatives may agree at a local minimum of |sin yaw| (or |cos yaw|) below this. Free choice.
 const MEETING: f64 = 0.6;
-/// How much less the energy must be.
+/// Decrease in energy that a mirrored range must exceed to be kept. Free choice.
 const GAIN: f64 = 2.0;
 
-/// Which plane a stretch is mirrored in.
+/// The plane in which a range is mirrored.
 #[derive(Clone, Copy)]
 enum Plane {
-    /// The picture: toward becomes away.
+    /// The image plane: toward becomes away.
     Picture,
-    /// The upright plane along the line of sight: left becomes right.
+    /// The vertical plane along the line of sight: left becomes right.
     Sight,
 }
 
-/// Mirrors whatever stretches become likelier by it.
+/// Mirrors each range whose mirrored version has clearly less energy.
 pub(super) fn improve(energy: &Energy, states: &mut States) {
     for _ in 0..SWEEPS {
         let mut changed = false;
@@ -55,13 +56,13 @@ pub(super) fn improve(energy: &Energy, states: &mut States) {
     }
 }
 
-/// A stretch that became likelier, with what lies around it.
+/// A mirrored range that lowers the energy, with the frames around it.
 struct Trial {
     start: usize,
     states: States,
 }
 
-/// Takes over the trials in order; one that overlaps an earlier one waits for the next sweep.
+/// Accepts the trials in order. A trial that overlaps an accepted one is skipped until the next pass.
 fn accept(states: &mut States, trials: Vec<Trial>) {
     let mut free_from = 0;
     for Trial {
@@ -73,7 +74,8 @@ fn accept(states: &mut States, trials: Vec<Trial>) {
             continue;
         }
         let end = start + trial.len();
-        // Yaws may be whole turns off: before the stretch by an earlier trial, after it by this one.
+        // Yaw is continuous only up to whole turns. `offset` aligns the trial with the states before it,
+        // `turns` the states after it with the trial.
         let whole = |gap: f64| TAU * (gap / TAU).round();
         let offset = whole(states[start].yaw() - trial[0].yaw());
         let turns = whole(trial[trial.len() - 1].yaw() + offset - states[end - 1].yaw());
@@ -88,7 +90,7 @@ fn accept(states: &mut States, trials: Vec<Trial>) {
     }
 }
 
-/// Frames at which both ways meet, with the first frame and the end.
+/// Returns the frames in which both alternatives agree, together with frame 0 and the end.
 fn meetings(states: &[State], plane: Plane) -> Vec<usize> {
     let size: Vec<f64> = states
         .iter()
@@ -109,7 +111,7 @@ fn meetings(states: &[State], plane: Plane) -> Vec<usize> {
     meetings
 }
 
-/// The frames of a stretch mirrored, if the course becomes likelier by it.
+/// Returns the range mirrored and optimised, or `None` if the energy falls by at most `GAIN`.
 fn mirrored(
     energy: &Energy,
     states: &[State],
@@ -138,7 +140,7 @@ fn mirrored(
     })
 }
 
-/// Makes the yaw continuous from the first frame on.
+/// Adds whole turns so that yaw changes by at most half a turn from frame to frame.
 fn unwrap(states: &mut [State]) {
     for k in 1..states.len() {
         let last = states[k - 1].yaw();

@@ -1,14 +1,15 @@
-//! The direction in space of an animal seen from the side, from all frames together (ALGORITHMS.md 4,
-//! best estimate).
+//! Estimates the direction in space of an animal filmed from the side, over all frames together
+//! (docs/explanation/algorithms.md, "Direction in space").
 //!
-//! N measures direction from two extents of one silhouette, and stops being able to where the animal is
-//! foreshortened, pitched or bent. Here the second moments of every silhouette are read as those of a
-//! body that is the same in all frames (`shape`): an ellipsoid whose outline under projection has
-//! exactly the projected moments, with a tail that sways sideways. Three steps: a histogram filter on
-//! the sphere of directions decides head or tail and toward or away over the whole footage
-//! (`sphere`); Gauss-Newton over all frames finds the likeliest depth, yaw, pitch, speed and sway
-//! (`energy`, `solve`); and every turn that could also have gone the mirrored way is tried that way
-//! (`mirror`). The body's shape is learned from the footage itself between two such rounds.
+//! The two extents of one silhouette (Nakajima et al.) fail for a foreshortened, pitched or bent animal. This
+//! module fits one body shape (`shape`) to the second moments of all silhouettes: an ellipsoid with a swaying
+//! tail.
+//!
+//! 1. A histogram filter on the sphere of directions (`sphere`) decides head or tail, and toward or away.
+//! 2. Gauss-Newton (`energy`, `solve`) finds the most probable depth, yaw, pitch, speed and sway.
+//! 3. Each turn is also tried mirrored (`mirror`), because approaching and receding animals look alike.
+//!
+//! The body shape is estimated again between rounds.
 
 mod banded;
 mod body;
@@ -25,25 +26,27 @@ use crate::order::percentile;
 use energy::{Energy, State};
 use shape::Shape;
 
-/// What the silhouette of one frame says.
+/// Measurements of the silhouette in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// N (2), pixels.
+    /// Centroid in the image (Nakajima et al., equation 2), pixels.
     pub centroid_px: [f64; 2],
     /// Second central moments over the area: xx, xy, yy, square pixels.
     pub covariance_px2: [f64; 3],
-    /// Extent from the topmost to the lowest solid pixel.
+    /// Vertical extent from the topmost to the lowest solid pixel, pixels.
     pub upright_px: f64,
-    /// The border of the image cuts the silhouette: only its place is used, not its shape.
+    /// True where the image border cuts the silhouette. The estimate then uses the centroid only, not the
+    /// moments.
     pub cut: bool,
-    /// Where the head is known to be, from the centroid in the picture.
+    /// Vector in the image from the centroid to the head, pixels, from the user; `None` where the user gave
+    /// none.
     pub toward: Option<[f64; 2]>,
-    /// Where the head seems to be by the look of both ends: a direction in the picture, as long as half the logarithm of the
-    /// odds.
+    /// Direction in the image in which the shape of the two ends suggests the head. Its length is half the
+    /// logarithm of the odds; `None` without evidence.
     pub ends: Option<[f64; 2]>,
 }
 
-/// A camera like most, for films whose camera is not known: it sees 45 degrees across.
+/// Returns a camera with a horizontal field of view of 45 degrees, for footage from an uncalibrated camera.
 pub fn usual_camera(width_px: u32, height_px: u32) -> Camera {
     Camera {
         z_min_m: 1.0,
@@ -53,13 +56,15 @@ pub fn usual_camera(width_px: u32, height_px: u32) -> Camera {
     }
 }
 
-/// An animal of the seen proportions whose height is a metre: only directions can be had with it.
+/// Returns an animal with the proportions seen in the footage and a height of 1 m.
+///
+/// Directions computed with this animal are valid; depths and lengths are not in metres.
 pub fn usual_animal(seen: &[Option<Seen>]) -> Animal {
     let whole = seen
         .iter()
         .flatten()
         .filter(|s| !s.cut && s.upright_px > 0.0);
-    // A uniform ellipse is four standard deviations long; bodies hardly differ.
+    // A uniform ellipse is four standard deviations long; real bodies differ little from that.
     let mut ratios: Vec<f64> = whole
         .map(|s| 4.0 * s.covariance_px2[0].max(0.0).sqrt() / s.upright_px)
         .collect();
@@ -70,14 +75,14 @@ pub fn usual_animal(seen: &[Option<Seen>]) -> Animal {
     }
 }
 
-/// The direction of one frame, and what belongs to it.
+/// The estimated direction and position in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Direction {
-    /// Where the centroid is in the picture; between its neighbors in a gap.
+    /// Centroid in the image, pixels; interpolated linearly within a gap.
     pub centroid_px: [f64; 2],
-    /// Apparent depth (before refraction is taken out), metres.
+    /// Apparent depth before the correction for refraction, metres.
     pub z_apparent_m: f64,
-    /// The unit vector in which the head points: x right, y down, z away.
+    /// Unit vector toward the head in the camera frame: x right, y down, z away from the camera.
     pub forward: [f64; 3],
     /// Posterior probability of the head's side in the image, 0.5..=1.
     pub head_confidence: f64,
@@ -85,14 +90,15 @@ pub struct Direction {
     pub depth_sign_confidence: f64,
 }
 
-/// Rounds of mirroring and learning anew, after a first look.
+/// Number of final rounds: shape estimate, fit, mirrored turns, fit. Free choice.
 const ROUNDS: usize = 2;
-/// Longest gap between sightings that is bridged, seconds.
+/// Longest gap between detections that is interpolated, seconds. Free choice.
 const BRIDGE_S: f64 = 0.5;
 
-/// The direction of every frame that was seen, or lies in a gap of at most half a second.
+/// Returns the direction in every frame with a detection or in a gap of at most 0.5 s.
 ///
-/// `None` for all where fewer than a second's worth of whole silhouettes was seen.
+/// All entries are `None` when the footage has uncut silhouettes for less than one second or fewer than 8
+/// frames.
 pub fn estimate(
     seen: &[Option<Seen>],
     camera: &Camera,
@@ -106,7 +112,7 @@ pub fn estimate(
     let Some(mut shape) = Shape::first(&views, animal) else {
         return nothing();
     };
-    // The first round learns what the animal looks like; the second knows where to look.
+    // The first pass only learns the shape of the body. The second decoding uses that shape.
     let mut states = sphere::decode(&views, &shape).states(&views, &shape);
     solve::whole(&Energy::new(&views, &shape), &mut states);
     shape = shape.learned(&views, &states);
@@ -139,29 +145,29 @@ pub fn estimate(
         .collect()
 }
 
-/// What is seen, from the first sighting to the last, made ready: gaps have interpolated places.
+/// The measurements from the first detection to the last, with interpolated centroids in the gaps.
 struct Views {
-    /// The frame of the footage that `frames[0]` is.
+    /// Frame number in the footage of `frames[0]`.
     first: usize,
     frames: Vec<View>,
-    /// Seen, or in a gap short enough.
+    /// True for frames with a detection and for frames in a gap of at most `BRIDGE_S`.
     bridged: Vec<bool>,
     dt: f64,
     focal_px: f64,
     medium_index: f64,
 }
 
-/// One frame made ready.
+/// The measurements of one frame in the form the estimate uses.
 #[derive(Clone, Copy)]
 struct View {
-    /// The centroid's slope in the picture: (centroid - center) / focal length.
+    /// Slope of the line of sight to the centroid: (centroid - image center) / focal length.
     slope: [f64; 2],
     seen: bool,
-    /// Unit vector in the picture toward the head, where that is known.
+    /// Unit vector in the image toward the head, from the user.
     toward: Option<[f64; 2]>,
-    /// Where the head seems to be by the look of both ends.
+    /// Evidence for the head's side from the shape of the ends, as in [`Seen::ends`].
     ends: Option<[f64; 2]>,
-    /// Moments and upright extent of a whole silhouette.
+    /// Moments and vertical extent; `None` without a detection or where the image border cuts the silhouette.
     outline: Option<Outline>,
 }
 
@@ -224,13 +230,14 @@ impl Views {
         })
     }
 
-    /// Frames a second count as at most thirty independent looks.
+    /// Returns the weight of one frame, 0..=1. Above 30 frames a second, neighboring frames are not
+    /// independent: all frames of one second together weigh at most 30.
     fn evidence(&self) -> f64 {
         (30.0 * self.dt).min(1.0)
     }
 }
 
-/// The states of all frames.
+/// One state per frame.
 type States = Vec<State>;
 
 #[cfg(test)]

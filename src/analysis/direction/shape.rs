@@ -1,9 +1,7 @@
-//! The body that all silhouettes of a footage show: its second moments in its own axes, learned from
-//! the footage.
+//! The shape of the body: second moments in its own axes, estimated from the footage.
 //!
-//! The silhouette of an ellipsoid under parallel projection is an ellipse whose second moments are
-//! the projected moments of the body. Fish are near enough to it once the sway of the tail is an unknown
-//! of its own.
+//! An ellipsoid projects to an ellipse whose second moments are the projected moments of the body. Fish are
+//! close enough to that once the sway of the tail is a separate unknown.
 
 use super::body::{Axes, form};
 use super::energy::{BEND_RATE, State, moment_noise};
@@ -11,48 +9,52 @@ use super::{Outline, View, Views};
 use crate::library::Animal;
 use crate::order::{median, percentile};
 
-/// The body's constants, metres.
+/// Constants of the body and of the measurement noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// Nose to tail tip.
+    /// Length from the nose to the tip of the tail, metres.
     pub(super) length_m: f64,
-    /// Of the whole silhouette, fins included.
+    /// Height of the silhouette, fins included, metres.
     height_m: f64,
-    /// Second moments about the centroid, square metres: along forward, down and side.
+    /// Second moment along the forward axis, square metres. `down_m2` and `side_m2` are those along the other
+    /// axes.
     along_m2: f64,
     down_m2: f64,
     side_m2: f64,
-    /// Forward and down together: the tail above or below the axis.
+    /// Covariance of the forward and down axes, square metres: the tail lies above or below the axis.
     slant_m2: f64,
-    /// Forward and side together, per radian a second of turning.
+    /// Sway per radian per second of yaw rate, square metres.
     pub(super) bend: f64,
     /// Standard deviation of the sway, square metres.
     pub(super) sway_sd: f64,
-    /// Noise of the upright extent, relative: fins rise and fall.
+    /// Standard deviation of the vertical extent, as a share of it. Fins rise and fall.
     pub(super) upright_noise: f64,
-    /// Noise of the moments, against `moment_noise`.
+    /// Noise of the moments as a multiple of `moment_noise`.
     pub(super) moment_noise: f64,
 }
 
-/// Half the time over which the way of an animal is measured, seconds.
+/// Half the time span over which the direction of motion is measured, seconds. Free choice.
 const STRIDE_S: f64 = 0.1;
-/// Slower than this, lengths a second, the way says nothing.
+/// Below this speed, in body lengths per second, the direction of motion is not used. Free choice.
 const LEAST_SPEED_BL: f64 = 0.4;
-/// Sway of an unknown animal, against its second moment along forward.
+/// Initial standard deviation of the sway, as a share of the moment along the forward axis. Free choice.
 const FIRST_SWAY: f64 = 0.15;
-/// And never less than this.
+/// Smallest standard deviation of the sway, as a share of the moment along the forward axis. Free choice.
 const LEAST_SWAY: f64 = 0.1;
-/// Noise of the upright extent of an unknown animal.
+/// Initial standard deviation of the vertical extent, as a share of it. Free choice.
 const FIRST_UPRIGHT_NOISE: f64 = 0.03;
-/// Residuals are smaller than the noise, for the states follow it.
+/// Factor from residuals to noise. Residuals are smaller than the noise because the fitted states follow it.
 const FOLLOWED: f64 = 1.2;
-/// Learning changes a moment by at most this factor at a time.
+/// Largest factor by which one estimate may change a moment. Free choice.
 const TRUST: f64 = 1.25;
 
 impl Shape {
-    /// From frames in which the animal is seen broadside (the longest fifth) and head-on (the shortest).
+    /// Returns a first estimate from broadside and head-on views, or `None` without silhouettes.
+    ///
+    /// Broadside views are the fifth with the largest ratio of horizontal to vertical moment. The head-on
+    /// value is the third percentile of that ratio.
     pub(super) fn first(views: &Views, animal: &Animal) -> Option<Shape> {
-        // In units of the animal's height, which the upright extent shows in every frame.
+        // In units of the animal's height, which the vertical extent shows in every frame.
         let moment =
             |o: &Outline, c: usize| o.covariance_px2[c] * (animal.height_m / o.upright_px).powi(2);
         let outlines: Vec<(usize, &Outline)> = views
@@ -83,7 +85,7 @@ impl Shape {
         })
     }
 
-    /// The covariance of the body as `body::form` takes it.
+    /// Returns the covariance of the body in the order that `body::form` takes.
     pub(super) fn body(&self, sway: f64) -> [f64; 5] {
         [
             self.along_m2,
@@ -94,8 +96,10 @@ impl Shape {
         ]
     }
 
-    /// How tall the animal stands at a pitch, metres, and the derivative by pitch: an ellipse of the
-    /// animal's height and length.
+    /// Returns the vertical extent of the animal at a pitch, metres, and its derivative with respect to
+    /// pitch.
+    ///
+    /// The outline is an ellipse with the animal's length and height as axes.
     pub(super) fn upright_m(&self, pitch_rad: f64) -> (f64, f64) {
         let (sin, cos) = libm::sincos(pitch_rad);
         let (height2, length2) = (self.height_m.powi(2), self.length_m.powi(2));
@@ -103,12 +107,13 @@ impl Shape {
         (extent, (length2 - height2) * sin * cos / extent)
     }
 
-    /// The silhouette's apparent depth when the animal is level, metres.
+    /// Returns the apparent depth of the silhouette for an animal without pitch, metres.
     pub(super) fn level_depth_m(&self, views: &Views, outline: &Outline) -> f64 {
         views.focal_px * self.height_m / outline.upright_px
     }
 
-    /// The shape that explains the moments best where the states are right: robust linear least squares.
+    /// Returns the shape that fits the moments best for the given states, by robust linear least squares.
+    /// Returns `self` if the moments do not determine a shape.
     pub(super) fn learned(&self, views: &Views, states: &[State]) -> Shape {
         let rows: Vec<([f64; 3], f64)> = views
             .frames
@@ -139,7 +144,7 @@ impl Shape {
         .with_noise(views, states)
     }
 
-    /// How far off the measurements lie from what the states make of the shape.
+    /// Returns the shape with its noise set from the residuals of the given states.
     fn with_noise(self, views: &Views, states: &[State]) -> Shape {
         let outlines = || {
             let seen = views.frames.iter().zip(states);
@@ -162,7 +167,7 @@ impl Shape {
         }
     }
 
-    /// The moments that a silhouette shows in a state: xx, xy, yy.
+    /// Returns the moments xx, xy and yy that a silhouette shows in a given state, square pixels.
     fn moments_px2(&self, views: &Views, view: &View, state: &State) -> [f64; 3] {
         let seen = Axes::of(state.yaw(), state.pitch()).seen(view.slope, 1.0 / views.medium_index);
         let scale = (views.focal_px * libm::exp(-state.log_z())).powi(2);
@@ -173,8 +178,10 @@ impl Shape {
         })
     }
 
-    /// The three moments of one frame as rows of a linear system for (along, down, side), in standard
-    /// deviations; the slant and the sway are taken out.
+    /// Returns the three moments of one frame as rows of a linear system for (along, down, side).
+    ///
+    /// The rows are in units of the standard deviation. The known contributions of slant and sway are
+    /// subtracted.
     fn rows(
         &self,
         views: &Views,
@@ -199,9 +206,11 @@ impl Shape {
     }
 }
 
-/// How the body's length and depth vary together, in square metres, of an animal that swims the way it
-/// points: its silhouettes seen at length are slanted against its motion by that much. Learning it from
-/// states would not do, for their pitch follows it.
+/// Returns the covariance of the forward and down axes, square metres, or `None` without usable frames.
+///
+/// An animal that swims along its forward axis shows its pitch by its motion. The method compares the tilt of
+/// broadside silhouettes with that pitch. The fitted states cannot be used, because their pitch follows the
+/// tilt.
 fn slant<'a>(
     views: &Views,
     animal: &Animal,
@@ -218,7 +227,7 @@ fn slant<'a>(
         if way / length < LEAST_SPEED_BL * (next - last) as f64 * views.dt {
             return None;
         }
-        // Nose down by so much, whichever way it faces.
+        // Sine and cosine of the pitch, positive with the nose down, for either side.
         let (sin, cos) = (y / way, x.abs() / way);
         let scale = (animal.height_m / outline.upright_px).powi(2);
         let shown = outline.covariance_px2[1] * scale * x.signum();
@@ -226,8 +235,9 @@ fn slant<'a>(
     }))
 }
 
-/// How far the body sways for each radian a second of turning: least squares over the frames in which sway
-/// shows, the animal being seen between broadside and head-on.
+/// Returns the sway per radian per second of yaw rate, square metres, by least squares.
+///
+/// Only frames between broadside and head-on count, because sway is visible there.
 fn bend(views: &Views, states: &[State]) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for (k, state) in states.iter().enumerate() {
@@ -241,14 +251,14 @@ fn bend(views: &Views, states: &[State]) -> f64 {
     if square > 0.0 { product / square } else { 0.0 }
 }
 
-/// Radians a second, limited to what bends the body.
+/// Returns the yaw rate, radians per second, limited to the range in which it bends the body.
 fn turn_rate(views: &Views, states: &[State], k: usize) -> f64 {
     let (a, b) = (k.saturating_sub(1), (k + 1).min(states.len() - 1));
     let rate = (states[b].yaw() - states[a].yaw()) / ((b - a).max(1) as f64 * views.dt);
     rate.clamp(-BEND_RATE, BEND_RATE)
 }
 
-/// Least squares with Huber weights beyond two standard deviations.
+/// Returns the least-squares solution with Huber weights beyond two standard deviations.
 fn robust_fit(rows: &[([f64; 3], f64)]) -> Option<[f64; 3]> {
     let mut found = [0.0; 3];
     for round in 0..5 {
@@ -272,7 +282,8 @@ fn robust_fit(rows: &[([f64; 3], f64)]) -> Option<[f64; 3]> {
     Some(found)
 }
 
-/// Solves three equations with their right side in the last column; `None` when they say too little.
+/// Returns the solution of three equations with the right side in the last column, or `None` for a singular
+/// system.
 fn eliminate(mut a: [[f64; 4]; 3]) -> Option<[f64; 3]> {
     let scale: [f64; 3] = std::array::from_fn(|k| a[k][k].sqrt().max(1e-300));
     for i in 0..3 {
@@ -282,7 +293,7 @@ fn eliminate(mut a: [[f64; 4]; 3]) -> Option<[f64; 3]> {
         a[i][3] /= scale[i];
     }
     for k in 0..3 {
-        // Symmetric and scaled: a small pivot means that an unknown is not determined.
+        // The matrix is symmetric and scaled: a small pivot means an undetermined unknown.
         if a[k][k] < 1e-6 {
             return None;
         }

@@ -1,25 +1,29 @@
-//! Gauss-Newton with Levenberg's damping over all frames, or over a stretch of them.
+//! Gauss-Newton with Levenberg-Marquardt damping, over all frames or over a range of them.
 
 use super::States;
 use super::banded::N_STATE;
 use super::energy::{Energy, State};
 
-/// Steps over the whole footage at most.
+/// Largest number of steps over the whole footage. Free choice.
 const STEPS: usize = 30;
-/// Steps over a stretch at most.
+/// Largest number of steps over a range of frames. Free choice.
 const STRETCH_STEPS: usize = 6;
-/// A stretch is given up when so many times the last gain would not be enough.
+/// The descent over a range stops when this many times the gain of the last step cannot reach the wanted
+/// energy. Free choice.
 const HOPE: f64 = 2.0;
-/// Frames at an inner end of a stretch that stay where they are.
+/// Number of frames that stay fixed at an end of a range where the footage continues. Residuals involve at
+/// most three frames.
 pub(super) const HELD: usize = 3;
 
-/// Finds the nearest least energy of the whole course.
+/// Moves the states to a local minimum of the energy.
 pub(super) fn whole(energy: &Energy, states: &mut States) {
     descend(energy, 0, states, (STEPS, f64::INFINITY), |_| false);
 }
 
-/// The same for the frames from `start` on that `states` covers; returns the energy among them. The
-/// ends stay fixed where the footage goes on. Gives up early where it will not come below `wanted`.
+/// Minimises the energy over the frames from `start` that `states` covers, and returns that energy.
+///
+/// The first and last frames stay fixed where the footage continues. The descent stops early when the energy
+/// is unlikely to fall below `wanted`.
 pub(super) fn stretch(energy: &Energy, start: usize, states: &mut [State], wanted: f64) -> f64 {
     let n = states.len();
     let goes_on = start + n < energy.views.frames.len();
@@ -65,7 +69,7 @@ fn descend(
         let gained = cost - reached;
         let settled = gained < 1e-4 * cost;
         cost = reached;
-        // Each step gains less than the one before it, but for the first two.
+        // After the first two steps, each step gains less than the one before.
         let hopeless = step >= 2 && cost - HOPE * gained > wanted;
         if settled || hopeless {
             break;

@@ -1,4 +1,4 @@
-//! A swimmer whose course is known, seen as the projected moments of many points of its body.
+//! Tests on a synthetic swimmer with a known course. Its silhouette moments come from many projected points.
 
 use std::f64::consts::TAU;
 
@@ -16,14 +16,14 @@ const ANIMAL: Animal = Animal {
     height_m: 0.05,
 };
 
-/// Where it was and how it lay.
+/// The true position and direction.
 struct Truth {
     position_m: [f64; 3],
     forward: [f64; 3],
 }
 
-/// It wanders for `n` frames: yaw in uneven turns all round, a little pitch, speed about a length a second,
-/// the tail beating.
+/// Returns `n` frames of a swimmer: uneven turns in yaw, little pitch, about one body length per second, and
+/// a beating tail.
 fn wandering(n: usize, camera: &Camera) -> (Vec<Truth>, Vec<Option<Seen>>) {
     let mut place = [0.0, 0.0, 0.85];
     (0..n)
@@ -46,12 +46,12 @@ fn wandering(n: usize, camera: &Camera) -> (Vec<Truth>, Vec<Option<Seen>>) {
         .unzip()
 }
 
-/// The moments of points spread through an ellipsoid with a bent tail, each projected by itself.
+/// Returns the moments of 600 projected points of an ellipsoid with a bent tail.
 fn look(axes: &body::Axes, place: [f64; 3], bend: f64, camera: &Camera, frame: usize) -> Seen {
     let points: Vec<[f64; 2]> = (0..600)
         .map(|m| {
             let [a, b, c] = [0, 1, 2].map(|word| random::normal(11, &[m, word]));
-            // A uniform ellipsoid's silhouette has a quarter of its half axes as standard deviation.
+            // The silhouette of a uniform ellipsoid has a quarter of each full axis as standard deviation.
             let along = a * ANIMAL.length_m / 4.0;
             let side = c * 0.018 / 4.0 + bend * (along - 0.05).powi(2) / 0.1;
             let down = b * ANIMAL.height_m / 4.0;
@@ -171,7 +171,7 @@ fn too_little_is_no_direction() {
     );
 }
 
-/// Makes the yaw continuous.
+/// Adds whole turns so that the yaw is continuous.
 fn unwrapped(states: &mut [State]) {
     for k in 1..states.len() {
         let last = states[k - 1].yaw();

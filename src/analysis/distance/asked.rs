@@ -1,25 +1,25 @@
-//! Which distances are asked for at all (ALGORITHMS.md 5, exact pruning: the gate comes first).
+//! Selects the distances that the search for transitions needs (docs/explanation/algorithms.md, "Distances").
 //!
-//! A transition joins only clips that point the same way, but it is kept only where none of its neighbors is
-//! nearer, whichever way those point. So what is asked for are the pairs that may be joined; and where one of
-//! these is near, so are all around it that local minima look at: with their distances the minima among the former
-//! come out the same as with all distances.
+//! A transition joins only clips that pass the gate. It is kept only if it is a local minimum among all its
+//! neighbors, whether these pass the gate or not. The search therefore asks for the pairs that pass. Around
+//! each of these that is below the limit, it also computes the neighbors. The local minima are then the same
+//! as with all distances.
 
 use super::marks::Marks;
 use super::minima::REACH;
 
-/// Says of pairs of clips whether their distance matters.
+/// Tells which pairs of clips need their distance.
 pub trait Asked: Sync {
-    /// Marks the pairs of clip `i` that matter: entry k of `row` is (i, i + k).
+    /// Marks the needed pairs of clip `i`: entry k of `row` is the pair (i, i + k).
     fn mark(&self, i: usize, row: &mut Marks);
 
-    /// How many clips away, in each clip of a pair that matters, the others are that it competes with.
+    /// Returns the distance, in clips, within which neighbors of a needed pair compete with it.
     fn reach(&self) -> usize {
         REACH
     }
 }
 
-/// Every distance.
+/// Asks for every distance.
 pub struct Everything;
 
 impl Asked for Everything {
@@ -32,7 +32,8 @@ impl Asked for Everything {
     }
 }
 
-/// All within `reach` of what is marked, in clips in succession, but for what was asked for already.
+/// Returns the pairs within `reach` of the pairs in `near`, without those in `asked`. Both hold successive
+/// clips.
 pub(super) fn competing(near: &[Marks], asked: &[Marks], reach: usize) -> Vec<Marks> {
     let reach = reach as isize;
     let of_clip = |(clip, asked): (usize, &Marks)| {
@@ -41,7 +42,8 @@ pub(super) fn competing(near: &[Marks], asked: &[Marks], reach: usize) -> Vec<Ma
             let Some(near) = clip.checked_add_signed(other).and_then(|at| near.get(at)) else {
                 continue;
             };
-            // The same column stands as many entries later there as that clip begins earlier.
+            // Rows are indexed by offset from their clip, so the same column is shifted by the difference of
+            // the clips.
             (-reach..=reach).for_each(|column| row.add(near, column - other));
         }
         row.drop(asked);

@@ -1,52 +1,54 @@
-//! What two sprites differ by at least: the sums of their pixels over squares (ALGORITHMS.md 5, exact
-//! pruning). By the triangle inequality |sum a - sum b| <= sum |a - b| over any set of pixels, so squares
-//! that differ in their sums differ by no less in their pixels.
+//! Lower bounds for the distance of two sprites: their pixel sums over squares
+//! (docs/explanation/algorithms.md, "Distances").
 //!
-//! Sums are taken over squares of 8 and of 16 pixels, one for each plane; those of the mirrored sprite
-//! are its own, counted from the other edge. Those of 16 pixels are kept halved, so that a signed 16-bit lane
-//! holds their differences: what rounding may add is taken off the bound again.
+//! By the triangle inequality, |sum a - sum b| <= sum |a - b| over any set of pixels. The summed differences
+//! of the square sums are therefore at most the distance.
+//!
+//! The squares are 8 and 16 pixels wide, with one sum per plane. The squares of a mirrored sprite are counted
+//! from the opposite edge. The sums of 16-pixel squares are halved, so that their differences fit signed
+//! 16-bit lanes. The bound then subtracts the largest possible rounding error.
 
 use super::kernel::{LANES, least_differences};
 use super::page::Flip;
 use crate::cpu::Level;
 
-/// Side of a fine square, pixels: its sum is at most 64 * 255.
+/// Side of a fine square, pixels. Its sum is at most 64 * 255.
 const FINE: usize = 8;
 
-/// Sums over the squares of every sprite.
+/// Square sums of all sprites, for one size of squares.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SquareSums {
-    /// Values of one sprite: squares, by rows, times 4 planes, padded.
+    /// Number of values per sprite: squares by rows, times 4 planes, padded to a multiple of `LANES`.
     n_values: usize,
     values: Vec<u16>,
-    /// The values are halves, rounded down.
+    /// True if the values are half the sums, rounded down.
     halved: bool,
 }
 
-/// Both sizes of squares, of sprites as they are or mirrored.
+/// Square sums of both sizes, for plain or for mirrored sprites.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bounds {
     pub(super) coarse: SquareSums,
     pub(super) fine: SquareSums,
 }
 
-/// What is added up of one sprite.
+/// Square sums of one sprite.
 pub(super) struct Sums {
     fine: Vec<u16>,
     coarse: Vec<u16>,
 }
 
 impl Sums {
-    /// Of a sprite's bytes, four a pixel, `width` pixels a row.
+    /// Computes the sums of a sprite with four bytes per pixel and `width` pixels per row.
     pub(super) fn of(bytes: &[u8], width: usize) -> Sums {
         Sums::placed(bytes, width, [0, 0])
     }
 
-    /// Of the sprite mirrored.
+    /// Computes the sums of the mirrored sprite.
     pub(super) fn of_mirrored(bytes: &[u8], width: usize, flip: Flip) -> Sums {
         let height = bytes.len() / (4 * width).max(1);
         let room = |side: usize| side.next_multiple_of(FINE) - side;
-        // Its squares begin at the other edge, and come in the other order.
+        // The squares begin at the opposite edge and are in reverse order.
         let (mut sums, size) = match flip {
             Flip::Columns => (fine(bytes, width, [room(width), 0]), squares(width, height)),
             Flip::Rows => (
@@ -87,17 +89,18 @@ impl Sums {
     }
 }
 
-/// Columns and rows of fine squares.
+/// Returns the number of columns and rows of fine squares.
 fn squares(width: usize, height: usize) -> [usize; 2] {
     [width.div_ceil(FINE), height.div_ceil(FINE)]
 }
 
-/// The sums over fine squares of a picture that lies `offset` pixels from the grid's corner.
+/// Returns the sums over fine squares of an image that starts `[left, top]` pixels from the corner of the
+/// grid.
 fn fine(bytes: &[u8], width: usize, [left, top]: [usize; 2]) -> Vec<u16> {
     let height = bytes.len() / (4 * width).max(1);
     let [columns, rows] = squares(width, height);
     let mut sums = vec![[0u16; 4]; columns * rows];
-    // Down first, for that adds whole rows.
+    // Vertical sums come first, because they add whole rows.
     let mut band = vec![0u16; width * 4];
     for row in 0..rows {
         let first = (row * FINE).saturating_sub(top);
@@ -116,7 +119,7 @@ fn fine(bytes: &[u8], width: usize, [left, top]: [usize; 2]) -> Vec<u16> {
 }
 
 impl Bounds {
-    /// Of all sprites, one after the other.
+    /// Collects the sums of all sprites in order.
     pub(super) fn of(sums: &[Sums]) -> Bounds {
         Bounds {
             coarse: SquareSums::of(sums.iter().map(|s| &s.coarse[..]), true),
@@ -141,13 +144,15 @@ impl SquareSums {
         }
     }
 
-    /// Of one sprite, each below 2^15.
+    /// Returns the values of one sprite, each below 2^15.
     pub(super) fn row(&self, frame_idx: usize) -> &[u16] {
         &self.values[frame_idx * self.n_values..][..self.n_values]
     }
 
-    /// At least what the row sprite (of these) differs by from each of the column sprites, from
-    /// `first_column` on; what exceeds 32 bits is cut off there.
+    /// Writes lower bounds of the distances between a row sprite and the column sprites from `first_column`
+    /// on.
+    ///
+    /// The row sprite is from `self`. Bounds saturate at 32 bits.
     pub(super) fn against(
         &self,
         cpu: Level,
@@ -159,7 +164,7 @@ impl SquareSums {
         let others = &columns.values[first_column * columns.n_values..];
         least_differences(cpu, self.row(row), others, least);
         if self.halved {
-            // Of two halves rounded down the difference may be half too large.
+            // Halves are rounded down, so each doubled difference may be too large by 1.
             let rounding = self.n_values as u32;
             for sum in least {
                 *sum = sum.saturating_mul(2).saturating_sub(rounding);
@@ -174,7 +179,7 @@ mod tests {
 
     #[test]
     fn squares_are_added_up_and_mirrored_from_the_other_edge() {
-        // 10 x 9 pixels whose first plane is the column, the second 1.
+        // 10 x 9 pixels. The first plane contains the column index, the second 1.
         let bytes: Vec<u8> = (0..90).flat_map(|k| [(k % 10) as u8, 1, 0, 0]).collect();
         let plain = Sums::of(&bytes, 10);
         let first: Vec<[u16; 2]> = plain

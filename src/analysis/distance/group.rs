@@ -1,47 +1,46 @@
-//! Sprites in groups of 48, cut into blocks, as the kernels read them (ALGORITHMS.md 5).
+//! Stores sprites in groups of 48, divided into blocks, in the layout that the kernels read.
 //!
-//! Inside a group the sprites are cut into blocks of 16 x 16 pixels, and block 0 of all 48 comes before
-//! block 1: a tile of 48 x 48 distances then reads two runs of at most 48 KB at a time. Of blank blocks, which
-//! most of a large sprite are, there is one for all. Bytes beyond the last sprite and beyond the last pixel, up to
-//! whole blocks, are 0.
+//! A block has 16 x 16 pixels. Block 0 of all 48 sprites precedes block 1. A tile of 48 x 48 distances
+//! therefore reads two runs of at most 48 KB at a time. Most of a large sprite is blank; all blank blocks
+//! share one copy. Bytes after the last sprite and after the last pixel of a block are 0.
 
 use super::kernel;
 use super::page::Page;
 use crate::scratch::{Full, Scratch};
 
-/// Sprites in a group: the side of a tile of distances.
+/// Number of sprites in a group, which is the side of a tile of distances.
 pub(super) const GROUP: usize = 48;
-/// Bytes in a block.
+/// Size of a block, bytes.
 pub(super) const BLOCK: usize = SIDE * SIDE * 4;
-/// Side of the square of pixels that a block holds: an animal fills few of them, and of two blank blocks
-/// nothing need be compared.
+/// Side of a block, pixels. Small, because the animal then fills few blocks and two blank blocks need no
+/// comparison.
 pub(super) const SIDE: usize = 16;
 
-/// 16 x 16 pixels of a sprite, on cache lines of their own.
+/// 16 x 16 pixels of a sprite, aligned to cache lines.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(super) struct Block(pub(super) [u8; BLOCK]);
 
 pub(super) const BLANK: Block = Block([0; BLOCK]);
 
-/// A group, and memory for the next.
+/// The blocks of a group, with buffers that the next group reuses.
 #[derive(Default)]
 pub(super) struct GroupMemory {
-    /// The first is blank; after it those that are not.
+    /// One blank block, then the blocks that are not blank.
     blocks: Vec<Block>,
-    /// By blocks, then sprites: where it is among those.
+    /// Index into `blocks`, by block, then by sprite.
     places: Vec<u32>,
-    /// Likewise: what its bytes add up to.
+    /// Sum of the bytes of each block, in the same order as `places`.
     sums: Vec<u32>,
-    /// Of every block, the sprites that have anything in it.
+    /// For each block, the sprites in which it is not blank: bit k is sprite k.
     filled: Vec<u64>,
-    /// Before they are put in order, or bytes of them.
+    /// Buffers: blocks in the order of the sprites, and bytes for the temporary storage.
     loose: Vec<Block>,
     packed: Vec<u8>,
 }
 
 impl GroupMemory {
-    /// Takes in so many sprites of so many blocks, as `draw` draws them.
+    /// Replaces the content with `n_sprites` sprites of `n_blocks` blocks, drawn by `draw`.
     pub(super) fn take_in(
         &mut self,
         [n_sprites, n_blocks]: [usize; 2],
@@ -75,7 +74,7 @@ impl GroupMemory {
         self.find_places();
     }
 
-    /// Where each block is among those that are not blank, which are in order.
+    /// Computes `places` and `filled` from the sums. The blocks that are not blank are in order.
     fn find_places(&mut self) {
         let mut n_filled = 0;
         let place = |&sum: &u32| {
@@ -92,7 +91,7 @@ impl GroupMemory {
         self.filled.extend(self.sums.chunks(GROUP).map(bits));
     }
 
-    /// What is in it, as a group of so many sprites.
+    /// Returns the content as a group of `n_sprites` sprites.
     pub(super) fn lend(&self, n_sprites: usize) -> Group<'_> {
         Group {
             n_sprites,
@@ -103,19 +102,19 @@ impl GroupMemory {
         }
     }
 
-    /// Bytes of all blocks that are not blank.
+    /// Returns the size of all blocks that are not blank, bytes.
     pub(super) fn n_bytes(&self) -> usize {
         (self.blocks.len() - 1) * BLOCK
     }
 
-    /// Gives back what is not needed to hold it.
+    /// Frees the buffers.
     pub(super) fn hold(mut self) -> GroupMemory {
         (self.loose, self.packed) = Default::default();
         self.blocks.shrink_to_fit();
         self
     }
 
-    /// Puts the blocks that are not blank aside: their sums, and where they lie.
+    /// Writes the blocks that are not blank to the temporary storage. Returns the sums and the offset.
     pub(super) fn put_aside(mut self, scratch: &dyn Scratch) -> Result<(Vec<u32>, u64), Full> {
         self.packed.clear();
         let blocks = self.blocks[1..].iter();
@@ -124,7 +123,7 @@ impl GroupMemory {
         Ok((self.sums, at))
     }
 
-    /// Has the blocks back.
+    /// Reads the blocks back from the temporary storage.
     pub(super) fn have_back(&mut self, sums: &[u32], at: u64, scratch: &dyn Scratch) {
         self.sums.clear();
         self.sums.extend_from_slice(sums);
@@ -139,7 +138,7 @@ impl GroupMemory {
     }
 }
 
-/// 48 sprites, the last ones blank where the footage ends.
+/// 48 sprites. The last group is padded with blank ones.
 #[derive(Clone, Copy)]
 pub(super) struct Group<'a> {
     pub(super) n_sprites: usize,
@@ -150,24 +149,24 @@ pub(super) struct Group<'a> {
 }
 
 impl<'a> Group<'a> {
-    /// Blocks in each sprite.
+    /// Returns the number of blocks per sprite.
     pub(super) fn n_blocks(&self) -> usize {
         self.filled.len()
     }
 
-    /// One block of one of the 48 sprites.
+    /// Returns one block of one of the 48 sprites.
     #[inline]
     pub(super) fn block(&self, block: usize, sprite: usize) -> &'a Block {
         &self.blocks[self.places[block * GROUP + sprite] as usize]
     }
 
-    /// Which of the 48 sprites have anything in that block: bit k is sprite k.
+    /// Returns the sprites in which a block is not blank: bit k is sprite k.
     #[inline]
     pub(super) fn filled(&self, block: usize) -> u64 {
         self.filled[block]
     }
 
-    /// What all bytes of each sprite add up to.
+    /// Returns the sum of all bytes of each sprite.
     pub(super) fn totals(&self) -> [u64; GROUP] {
         let mut totals = [0; GROUP];
         for sums in self.sums.as_chunks::<GROUP>().0 {
@@ -177,7 +176,7 @@ impl<'a> Group<'a> {
         totals
     }
 
-    /// What the bytes of that block add up to.
+    /// Returns the sum of the bytes of a block.
     #[inline]
     pub(super) fn sum(&self, block: usize, sprite: usize) -> u32 {
         self.sums[block * GROUP + sprite]

@@ -1,10 +1,10 @@
-//! Which clips may be alike, without asking every pair: inverted lists, for footage so long that even bounds
-//! of all pairs take long (ALGORITHMS.md 5, above 50 000 frames).
+//! Inverted lists for the approximate search, for footage so long that even the bounds of all pairs take too
+//! long (docs/explanation/algorithms.md, "Transitions and playback").
 //!
-//! The sums over 8 x 8 squares of the frame in a clip's middle, where playback jumps, are its vector. Vectors
-//! are gathered around centers (k-means, from vectors spread evenly through the footage), and a clip is compared with those
-//! of the lists whose centers are nearest to it. What is found is measured exactly afterward; what is
-//! missed is told as recall. Whole numbers and ties to the smaller: the same with any number of threads.
+//! The vector of a clip holds the sums over 8 x 8 squares of its middle frame, where playback jumps. K-means
+//! groups the vectors around centers. A clip is compared only with the clips of the lists with the nearest
+//! centers. Distances of these pairs are exact; `recall` reports the share of similar pairs found. Arithmetic
+//! is integer and ties go to the smaller index, so the result does not depend on the number of threads.
 
 use rayon::prelude::*;
 
@@ -16,27 +16,28 @@ use super::pixels::ComparedSprites;
 use super::window::Clip;
 use crate::cpu::Level;
 
-/// Lists at most; about the square root of the number of clips below.
+/// Largest number of lists. For fewer clips it is about the square root of their number. Free choice.
 const MOST_LISTS: usize = 1024;
-/// The share of all lists that a clip is compared with, at least `LEAST_PROBED`.
+/// A clip is compared with one in this many lists, but with at least `LEAST_PROBED`. Free choice.
 const PROBED_SHARE: usize = 16;
 const LEAST_PROBED: usize = 8;
-/// Vectors that the centers are learned from, for each of them; and how often.
+/// Number of training vectors per center. Free choice.
 const LEARNED_FROM: usize = 48;
+/// Number of k-means iterations. Free choice.
 const N_ROUNDS: usize = 5;
 
-/// Clips in lists of those that look alike.
+/// The clips in lists of similar ones.
 pub struct Lists {
-    /// Of each clip its list.
+    /// The list of each clip.
     list_of: Vec<u32>,
-    /// Of each list its clips, rising.
+    /// The clips of each list, ascending.
     members: Vec<Vec<u32>>,
-    /// Of each clip the lists that it is compared with, rising; as it is, and mirrored.
+    /// The lists with which each clip is compared, ascending; plain, then mirrored.
     probed: [Vec<Vec<u32>>; 2],
 }
 
 impl Lists {
-    /// Of all clips; `mirrored`: they will be asked for mirrored too.
+    /// Builds the lists of all clips. `mirrored` states whether mirrored pairs are searched too.
     pub fn of(pixels: &ComparedSprites, clip: Clip, mirrored: bool, cpu: Level) -> Lists {
         let n_clips = (pixels.n_frames() + 1).saturating_sub(clip.frames);
         let plain = &pixels.bounds(Side::Plain).fine;
@@ -72,8 +73,8 @@ impl Lists {
         }
     }
 
-    /// Marks those that clip `i` is compared with, from itself on: entry k of `row` is clip i + k. Nothing else
-    /// is changed.
+    /// Marks the clips with which clip `i` is compared, from `i` on: entry k of `row` is clip i + k. Other
+    /// marks stay.
     pub fn mark(&self, side: Side, i: usize, row: &mut Marks) {
         for &list in &self.probed[side as usize][i] {
             let members = &self.members[list as usize];
@@ -84,7 +85,7 @@ impl Lists {
         }
     }
 
-    /// Whether clip `i` is compared with clip `j` >= i.
+    /// Returns whether clip `i` is compared with clip `j`, for j >= i.
     pub fn holds(&self, side: Side, i: usize, j: usize) -> bool {
         self.probed[side as usize][i]
             .binary_search(&self.list_of[j])
@@ -92,7 +93,7 @@ impl Lists {
     }
 }
 
-/// What lists are gathered around.
+/// The centers of the lists.
 struct Centers {
     cpu: Level,
     n_lists: usize,
@@ -132,7 +133,7 @@ impl Centers {
         centers
     }
 
-    /// Moves each center to the mean of those nearest to it, rounded down, if there are any.
+    /// Moves each center to the mean of its vectors, rounded down. A center without vectors stays.
     fn move_to<'a>(&mut self, vectors: impl Iterator<Item = &'a [u16]>, nearest: &[u32]) {
         let n_values = self.values.len() / self.n_lists.max(1);
         let mut sums = vec![0u64; self.values.len()];
@@ -150,7 +151,7 @@ impl Centers {
         }
     }
 
-    /// The `n` lists whose centers are nearest, the nearest first.
+    /// Returns the `n` lists with the nearest centers, the nearest first.
     fn nearest(&self, vector: &[u16], n: usize) -> Vec<u32> {
         let mut away = vec![0; self.n_lists];
         least_differences(self.cpu, vector, &self.values, &mut away);

@@ -1,25 +1,25 @@
-//! Which pairs of clips, or of frames, are looked at: a bit for each, in rows by their offset j - i.
+//! Rows of bits that mark pairs of clips or frames. Entry k of row i is the pair (i, i + k).
 //!
-//! Of a long footage every pair is asked before any is compared, so what is done to all of them is done to 64
-//! at a time. Entry k of row i is the pair (i, i + k).
+//! In a long footage every pair is tested before any is compared. The operations therefore process 64 entries
+//! at a time.
 
 use std::ops::Range;
 
-/// Entries in a word.
+/// Number of entries in a word.
 const WORD: usize = u64::BITS as usize;
-/// Runs nearer to each other than this are one: stopping between them costs more than it spares.
+/// Gaps up to this length, in entries, become part of a run. An interruption costs more than it saves.
 const SHORT_GAP: usize = 3;
 
 /// A row of entries, each marked or not.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Marks {
     n: usize,
-    /// Bits beyond the last entry are 0.
+    /// Bits after the last entry are 0.
     words: Vec<u64>,
 }
 
 impl Marks {
-    /// So many entries, none of them marked.
+    /// Creates `n` unmarked entries.
     pub fn none(n: usize) -> Marks {
         Marks {
             n,
@@ -27,7 +27,7 @@ impl Marks {
         }
     }
 
-    /// How many entries there are.
+    /// Returns the number of entries.
     #[expect(
         clippy::len_without_is_empty,
         reason = "no row is asked whether it is empty"
@@ -36,7 +36,7 @@ impl Marks {
         self.n
     }
 
-    /// Marks entry `k`, below the number of entries.
+    /// Marks entry `k`, which must exist.
     pub fn mark(&mut self, k: usize) {
         debug_assert!(k < self.n, "entry {k} of {}", self.n);
         self.words[k / WORD] |= 1 << (k % WORD);
@@ -48,7 +48,7 @@ impl Marks {
         self.trim();
     }
 
-    /// Marks the entries whose value is such: value k is entry k's.
+    /// Marks each entry k for which `such(values[k])` is true.
     pub fn mark_where<T>(&mut self, values: &[T], such: impl Fn(&T) -> bool) {
         for (word, values) in self.words.iter_mut().zip(values.chunks(WORD)) {
             let bits = (0..).zip(values);
@@ -57,12 +57,12 @@ impl Marks {
         self.trim();
     }
 
-    /// Takes the mark off entry `k`.
+    /// Unmarks entry `k`.
     pub fn unmark(&mut self, k: usize) {
         self.words[k / WORD] &= !(1 << (k % WORD));
     }
 
-    /// Takes the marks off the first `n` entries.
+    /// Unmarks the first `n` entries.
     pub fn unmark_first(&mut self, n: usize) {
         let n = n.min(self.n);
         self.words[..n / WORD].fill(0);
@@ -71,20 +71,20 @@ impl Marks {
         }
     }
 
-    /// Keeps the marks of those entries k of which entry k + `by` of the other row is marked.
+    /// Keeps only the marks of entries k for which entry k + `by` of `other` is marked.
     pub fn keep(&mut self, other: &Marks, by: usize) {
         for (word, at) in self.words.iter_mut().zip((by as isize..).step_by(WORD)) {
             *word &= other.bits(at);
         }
     }
 
-    /// Takes the marks off the entries that the other row has marked.
+    /// Unmarks the entries that are marked in `other`.
     pub fn drop(&mut self, other: &Marks) {
         let both = self.words.iter_mut().zip(&other.words);
         both.for_each(|(word, other)| *word &= !other);
     }
 
-    /// Marks also those entries k of which entry k + `by` of the other row is marked.
+    /// Marks also the entries k for which entry k + `by` of `other` is marked.
     pub fn add(&mut self, other: &Marks, by: isize) {
         for (word, at) in self.words.iter_mut().zip((by..).step_by(WORD)) {
             *word |= other.bits(at);
@@ -92,7 +92,7 @@ impl Marks {
         self.trim();
     }
 
-    /// 64 entries from `at` on, the first in the lowest bit; 0 before the first and after the last.
+    /// Returns 64 entries from `at` on, the first in the lowest bit. Entries that do not exist are 0.
     pub fn bits(&self, at: isize) -> u64 {
         let word = |k: isize| {
             let k = usize::try_from(k).ok();
@@ -105,7 +105,7 @@ impl Marks {
         }
     }
 
-    /// The marked entries, rising.
+    /// Returns the marked entries, ascending.
     pub fn ones(&self) -> impl Iterator<Item = usize> {
         (0..).zip(&self.words).flat_map(|(k, &word)| {
             let rest = |&bits: &u64| Some(bits & (bits - 1)).filter(|&rest| rest != 0);
@@ -114,7 +114,7 @@ impl Marks {
         })
     }
 
-    /// The stretches of marked entries, and with them the gaps that are too short to stop for.
+    /// Returns the runs of marked entries, including gaps up to `SHORT_GAP`.
     pub fn runs(&self) -> impl Iterator<Item = Range<usize>> {
         let mut next = self.next_marked(0);
         std::iter::from_fn(move || {
@@ -215,7 +215,7 @@ mod tests {
                 let at = usize::try_from(by + k).ok();
                 prop_assert_eq!(bits >> k & 1 == 1, at.and_then(|at| a.get(at)) == Some(&true));
             }
-            // Runs: all that is marked, and no gap in them longer than three.
+            // Runs cover all marks and contain no gap longer than three.
             let runs: Vec<_> = row.runs().collect();
             let inside = |k: usize| runs.iter().any(|run| run.contains(&k));
             prop_assert!((0..a.len()).all(|k| !a[k] || inside(k)));

@@ -1,29 +1,28 @@
-//! Local minima of D: of many pairs of clips around one moment, the one that fits best (Kovar,
-//! Gleicher & Pighin, Motion Graphs, 2002; ALGORITHMS.md 5, candidates).
+//! Local minima of D: of many pairs of clips around one moment, the best one (Kovar, Gleicher & Pighin,
+//! Motion Graphs, 2002; docs/explanation/algorithms.md, "Transitions and playback").
 //!
-//! A pair is a local minimum when no other pair within two frames of it, in either clip, has a
-//! smaller D; among equals the smaller (i, j) wins. Only pairs that may become transitions compete:
-//! an animal at rest looks the same all the while, and the best of its pairs must not lose to ones
-//! too near the diagonal to be of use.
+//! A pair is a local minimum if no other pair within two frames of it, in either clip, has a smaller D. Among
+//! equals, the smaller (i, j) wins. Only pairs of usable clips with the minimum gap compete. Otherwise the
+//! pairs of a resting animal would lose to useless pairs close to the diagonal.
 
 use std::cmp::Ordering;
 
-/// Neighbors this far away, in each clip, are compared.
+/// Radius of the neighborhood in each clip, clips. Free choice.
 pub(super) const REACH: usize = 2;
 const N_ROWS: usize = 2 * REACH + 1;
 
-/// Two clips, `from <= to`, and their distance.
+/// A pair of clips, `from <= to`, and its distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ClipPair {
-    /// First frame of the one clip.
+    /// First frame of the earlier clip.
     pub from: usize,
-    /// First frame of the other clip.
+    /// First frame of the later clip.
     pub to: usize,
-    /// D or Dm.
+    /// D, or Dm for mirrored pairs.
     pub distance: u64,
 }
 
-/// Finds the local minima below a limit in rows that stream by.
+/// Finds the local minima below a limit in a stream of rows.
 pub struct LocalMinima<'a> {
     usable: &'a [bool],
     least_gap: usize,
@@ -32,17 +31,17 @@ pub struct LocalMinima<'a> {
     n_rows: usize,
 }
 
-/// The pairs of one clip that compete.
+/// The competing pairs of one clip.
 #[derive(Default)]
 struct Row {
     pairs: Vec<ClipPair>,
-    /// Their distances by j - i, and `u64::MAX` where there is none.
+    /// Distances of the pairs by j - i; `u64::MAX` for pairs that do not compete.
     by_gap: Vec<u64>,
 }
 
 impl LocalMinima<'_> {
-    /// For clips of which `usable` says which take part, in pairs at least `least_gap` apart; only
-    /// D < `limit` is reported.
+    /// Starts a search among pairs of `usable` clips at least `least_gap` apart. Only D < `limit` is
+    /// reported.
     pub fn new(usable: &[bool], least_gap: usize, limit: u64) -> LocalMinima<'_> {
         LocalMinima {
             usable,
@@ -53,8 +52,8 @@ impl LocalMinima<'_> {
         }
     }
 
-    /// Takes the pairs (i, j >= i) of the next clip i, those that are left out being far, and reports the minima
-    /// that are settled by it.
+    /// Adds the pairs (i, j) with j >= i of the next clip i, and reports the minima that are then certain.
+    /// Missing pairs count as infinitely distant.
     pub fn push(&mut self, pairs: &[ClipPair], on_minimum: impl FnMut(ClipPair)) {
         let i = self.n_rows;
         let competes = |pair: &&ClipPair| {
@@ -91,7 +90,7 @@ impl LocalMinima<'_> {
         })
     }
 
-    /// The pair of clips a and b in the order of the upper triangle, unless there is none.
+    /// Returns the pair of clips a and b with the smaller clip first, or `None` if its row is not known.
     fn distance(&self, a: usize, b: usize) -> Option<ClipPair> {
         let (from, to) = (a.min(b), a.max(b));
         if from >= self.n_rows {

@@ -1,8 +1,10 @@
-//! How unlike any two clips are: D(i, j), O (1) to (3), integer-exact (ALGORITHMS.md 5).
+//! Computes the distance D(i, j) between any two clips exactly, in integers (Okabe et al., equations 1 to 3;
+//! docs/explanation/algorithms.md, "Distances").
 //!
-//! d(i, j) is the sum over pixels and planes of |U_i - U_j|, D(i, j) its sum over the f frames of
-//! two clips; the mirrored Dm compares i with j mirrored. Both are symmetric, so only j >= i is
-//! computed. The rows stream by in order, in panels of 4 times 48: no N x N matrix is held here.
+//! d(i, j) is the sum over pixels and planes of |U_i - U_j|, where U is the premultiplied sprite. D(i, j) is
+//! the weighted sum of d over the f frames of two clips. The mirrored Dm compares i with j mirrored. Both are
+//! symmetric, so only j >= i is computed. The rows are streamed in order, in panels of 4 x 48 rows. The N x N
+//! matrix is never held.
 
 mod asked;
 mod bounds;
@@ -37,44 +39,45 @@ use group::{GROUP, Group, GroupMemory};
 use kernel::Tile;
 use window::WindowSums;
 
-/// Groups of rows in a panel: so many tiles are computed for each group of columns that is looked at.
+/// Number of row groups in a panel. Each loaded column group serves this many tiles. Free choice.
 const PANEL: usize = 4;
 
-/// What is compared with clip i: clip j as it is, or clip j mirrored.
+/// The version of clip j that is compared with clip i.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// D.
+    /// D: clip j unmirrored.
     Plain,
-    /// Dm: j with its columns reversed in side view, mirrored across its own axis in top view.
+    /// Dm: clip j with reversed columns in side view, mirrored across the body axis in top view.
     Mirrored,
 }
 
-/// The computation was cancelled by its listener.
+/// The computation was cancelled through `progress`.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Cancelled;
 
 /// The distances between the clips of a footage.
 #[derive(Clone, Copy)]
 pub struct Distances<'a> {
-    /// The sprites compared.
+    /// The compared sprites.
     pub pixels: &'a ComparedSprites,
-    /// What is added up.
+    /// Length and weights of the clips.
     pub clip: Clip,
     /// Plain or mirrored.
     pub side: Side,
-    /// The instructions to use; the result is the same with any.
+    /// Instruction level. The result is the same with any.
     pub cpu: Level,
 }
 
 impl Distances<'_> {
-    /// N - f + 1, or 0 where the footage is shorter than a clip.
+    /// Returns the number of clips, N - f + 1, or 0 for footage shorter than a clip.
     pub fn n_clips(&self) -> usize {
         (self.pixels.n_frames() + 1).saturating_sub(self.clip.frames)
     }
 
-    /// Calls `on_row(i, D(i, i..))` for every clip i in order: entry k is D(i, i + k).
+    /// Calls `on_row(i, D(i, i..))` for every clip i in order. Entry k of the row is D(i, i + k).
     ///
-    /// Reports the stage `distances`; threads are those of the caller's rayon pool.
+    /// Reports progress as stage `distances`. Uses the threads of the caller's rayon pool. Fails when
+    /// cancelled.
     pub fn for_each_row(
         &self,
         progress: &dyn Progress,
@@ -89,7 +92,7 @@ impl Distances<'_> {
                 return Err(Cancelled);
             }
             let first = panel_idx * GROUP;
-            // Two rows from the bottom hold two distances: work done is that of the triangle above.
+            // The remaining work is a triangle, so it shrinks with the square of the remaining rows.
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
             let tiles = self.panel(panel_idx, &mut memory);
@@ -107,8 +110,8 @@ impl Distances<'_> {
         Ok(())
     }
 
-    /// The tiles of a panel of groups of rows, from the diagonal to the right: for every group of columns
-    /// one for each group of rows not below it.
+    /// Returns the tiles of a panel from the diagonal to the right: for every column group, one tile per row
+    /// group not below the diagonal.
     fn panel(
         &self,
         first: usize,
@@ -141,7 +144,7 @@ impl Distances<'_> {
             .collect()
     }
 
-    /// A group of rows: as it is compared.
+    /// Returns a group of rows, mirrored if the distances are.
     fn row_group<'b>(&'b self, group_idx: usize, memory: &'b mut GroupMemory) -> Group<'b> {
         match self.side {
             Side::Plain => self.pixels.group(group_idx, memory),

@@ -1,29 +1,29 @@
-//! One sprite in blocks, before it comes to its group (ALGORITHMS.md 5): drawn, or another one's mirror image.
-//!
-//! Only blocks that something is drawn to are looked at: most of a large sprite is blank.
+//! A buffer for one sprite in blocks: a drawn sprite, or the mirror image of another. Only blocks with
+//! content are processed, because most of a large sprite is blank.
 
 use super::group::{BLANK, BLOCK, Block, Group, SIDE};
 
-/// How a sprite is mirrored.
+/// The way a sprite is mirrored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Flip {
-    /// Columns reversed: the side view's left-right mirror.
+    /// Columns reversed: left-right mirroring in side view.
     Columns,
-    /// Rows reversed: an animal that heads along +x, mirrored across its own axis.
+    /// Rows reversed: mirroring across the body axis of an animal that heads along +x.
     Rows,
 }
 
-/// A sprite of width x height pixels, four bytes each, in blocks by rows; what is beyond its edges is 0.
+/// A sprite of width x height pixels with four bytes each, in blocks by rows. Pixels outside it are 0.
 pub(super) struct Page {
     width: usize,
     height: usize,
     blocks: Vec<Block>,
-    /// Whether a block holds anything of this sprite, or what is left of another.
+    /// True for blocks with content of the current sprite. Other blocks may hold content of an earlier
+    /// sprite.
     drawn: Vec<bool>,
 }
 
 impl Page {
-    /// For sprites of that size.
+    /// Creates a buffer for sprites of a given size.
     pub(super) fn new([width, height]: [usize; 2]) -> Page {
         let n_blocks = width.div_ceil(SIDE) * height.div_ceil(SIDE);
         Page {
@@ -34,18 +34,18 @@ impl Page {
         }
     }
 
-    /// Forgets the sprite.
+    /// Removes the sprite.
     pub(super) fn clear(&mut self) {
         self.drawn.fill(false);
     }
 
-    /// The blocks that were drawn to, and which they are.
+    /// Returns the blocks with content, with their indices.
     pub(super) fn drawn(&self) -> impl Iterator<Item = (usize, &Block)> {
         let blocks = self.blocks.iter().enumerate().zip(&self.drawn);
         blocks.filter(|(_, drawn)| **drawn).map(|(block, _)| block)
     }
 
-    /// Draws a sprite's bytes, row by row.
+    /// Draws a sprite from its bytes, row by row.
     pub(super) fn draw(&mut self, bytes: &[u8]) {
         let rows = bytes.as_chunks().0.chunks_exact(self.width.max(1));
         for (y, row) in rows.enumerate() {
@@ -57,7 +57,7 @@ impl Page {
         }
     }
 
-    /// Draws a sprite of a group mirrored.
+    /// Draws the mirror image of a sprite of a group.
     pub(super) fn draw_mirrored(&mut self, group: Group<'_>, sprite: usize, flip: Flip) {
         let n_columns = self.n_columns();
         let filled = |block: &usize| group.filled(*block) >> sprite & 1 == 1;
@@ -80,7 +80,8 @@ impl Page {
         }
     }
 
-    /// Draws the pixels of a row of a block in that column of blocks to where they stand in the mirror image.
+    /// Draws one pixel row of a block at its position in the left-right mirror image. `column` is the column
+    /// of blocks, `y` the row of pixels.
     fn draw_reversed(&mut self, [column, y]: [usize; 2], pixels: &[[u8; 4]]) {
         let inside = SIDE.min(self.width - column * SIDE);
         let mut reversed = [[0; 4]; SIDE];
@@ -95,7 +96,7 @@ impl Page {
         }
     }
 
-    /// Row `y` of the blocks in that column of blocks.
+    /// Returns pixel row `y` of a column of blocks, and marks the block as drawn.
     fn pixels(&mut self, [column, y]: [usize; 2]) -> &mut [[u8; 4]] {
         let block = y / SIDE * self.n_columns() + column;
         if !self.drawn[block] {

@@ -1,8 +1,10 @@
-//! The pixels that distances compare (ALGORITHMS.md 5), laid out for the kernels.
+//! Prepares the compared pixels and stores them in the layout of the kernels
+//! (docs/explanation/algorithms.md, "Distances").
 //!
-//! Each sprite becomes U: four bytes a pixel, color premultiplied as `(A*C + 127) div 255`, then A;
-//! with `planes: rgb` the byte of A is 0 in every sprite and adds nothing. They are kept in
-//! groups (`group`), in memory or put aside, together with the sums that bound their distances (`bounds`).
+//! Each sprite becomes U with four bytes per pixel: the colors premultiplied as `(A*C + 127) div 255`, then
+//! A. With `planes: rgb` the byte of A is 0 in every sprite and adds nothing. The sprites are stored in
+//! groups (`group`), in memory or in the temporary storage, together with the sums that bound their distances
+//! (`bounds`).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -20,27 +22,27 @@ use crate::cpu::Level;
 use crate::library::{Poses, Sprites, View};
 use crate::scratch::{Full, Scratch};
 
-/// Bytes of blocks that stay in memory; what else a longer footage has is put aside.
+/// Size of the blocks that stay in memory, bytes. The rest goes to the temporary storage. Free choice.
 const HELD_BYTES: usize = 64 << 20;
 
-/// Every frame's U.
+/// The U of all frames.
 pub struct ComparedSprites {
     n_frames: usize,
     width: usize,
     height: usize,
     flip: Flip,
     groups: Vec<Stored>,
-    /// Of the sprites as they are.
+    /// Bounds of the unmirrored sprites.
     plain: Bounds,
-    /// Of the sprites mirrored.
+    /// Bounds of the mirrored sprites.
     mirrored: Bounds,
     scratch: Arc<dyn Scratch>,
 }
 
-/// Where a group is.
+/// Storage of a group.
 enum Stored {
     Held(GroupMemory),
-    /// The sums, and those blocks that are not blank.
+    /// The sums, and the offset of the blocks that are not blank in the temporary storage.
     Aside {
         sums: Vec<u32>,
         at: u64,
@@ -48,14 +50,15 @@ enum Stored {
 }
 
 impl ComparedSprites {
-    /// U of every frame: as the sprites stand in side view, turned to heading 0 in top view.
+    /// Computes U of every frame: unrotated in side view, rotated to heading 0 in top view.
     ///
-    /// Missing sprites are blank; so are, in top view, those of unknown heading.
+    /// Missing sprites are blank. In top view, sprites of unknown heading are blank too. Fails when the
+    /// temporary storage is full.
     pub fn new(sprites: &Sprites, poses: &Poses, planes: Planes) -> Result<Self, Full> {
         ComparedSprites::holding(HELD_BYTES, sprites, poses, planes)
     }
 
-    /// As `new`, with no more than `held_bytes` of the blocks in memory.
+    /// Works like `new`, but keeps at most `held_bytes` of blocks in memory.
     pub(super) fn holding(
         held_bytes: usize,
         sprites: &Sprites,
@@ -85,7 +88,7 @@ impl ComparedSprites {
             scratch: Arc::clone(sprites.scratch()),
         };
         let n_groups = compared.n_frames.div_ceil(GROUP);
-        // Which stay depends on the order in which they come; what they are compared to does not.
+        // Thread timing decides which groups stay in memory. The distances do not depend on it.
         let n_held = AtomicUsize::new(0);
         let source = Source {
             sprites,
@@ -116,7 +119,7 @@ impl ComparedSprites {
         Ok(compared)
     }
 
-    /// The blocks of one group, made of its sprites, and the sums of each, as it is and mirrored.
+    /// Returns the blocks of one group, and the square sums of each sprite, plain and mirrored.
     fn gathered(&self, group_idx: usize, source: &Source<'_>) -> (GroupMemory, Vec<(Sums, Sums)>) {
         let mut group = GroupMemory::default();
         let mut bytes = vec![0; self.n_bytes()];
@@ -131,17 +134,17 @@ impl ComparedSprites {
         (group, sums)
     }
 
-    /// Frames of the footage.
+    /// Returns the number of frames of the footage.
     pub fn n_frames(&self) -> usize {
         self.n_frames
     }
 
-    /// Bytes that one pair of sprites compares.
+    /// Returns the number of bytes compared per pair of sprites.
     pub fn n_bytes(&self) -> usize {
         self.width * self.height * 4
     }
 
-    /// d(i, i + 1) of every frame but the last.
+    /// Returns d(i, i + 1) for every frame but the last.
     pub fn steps(&self, cpu: Level) -> Vec<u64> {
         let of_group = |group_idx: usize| {
             let (mut one, mut other) = (GroupMemory::default(), GroupMemory::default());
@@ -176,7 +179,7 @@ impl ComparedSprites {
         steps.concat()
     }
 
-    /// The sums over squares of all sprites, as they are or mirrored.
+    /// Returns the square sums of all sprites, plain or mirrored.
     pub(super) fn bounds(&self, side: Side) -> &Bounds {
         match side {
             Side::Plain => &self.plain,
@@ -188,7 +191,7 @@ impl ComparedSprites {
         self.groups.len()
     }
 
-    /// A group, in memory that the caller lends if it was put aside.
+    /// Returns a group. If it is in the temporary storage, it is read into `memory`.
     pub(super) fn group<'a>(&'a self, group_idx: usize, memory: &'a mut GroupMemory) -> Group<'a> {
         let n_sprites = self.n_sprites(group_idx);
         match &self.groups[group_idx] {
@@ -200,7 +203,7 @@ impl ComparedSprites {
         }
     }
 
-    /// The group mirrored, in memory that the caller lends.
+    /// Returns a group mirrored, in `memory`.
     pub(super) fn mirrored_group<'a>(
         &self,
         group_idx: usize,
@@ -228,7 +231,7 @@ impl ComparedSprites {
     }
 }
 
-/// What U is made of.
+/// The inputs of U.
 struct Source<'a> {
     sprites: &'a Sprites,
     poses: &'a Poses,
@@ -237,7 +240,7 @@ struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// U of a frame.
+    /// Writes U of a frame.
     fn draw(&self, frame_idx: usize, bytes: &mut [u8]) {
         let sprite = self.sprites.sprite(frame_idx);
         match self.canvas {
@@ -251,7 +254,7 @@ impl Source<'_> {
     }
 }
 
-/// U of a straight-alpha sprite.
+/// Writes U of a sprite with straight alpha.
 fn premultiply(sprite: &[u8], planes: Planes, out: &mut [u8]) {
     let keep_alpha = match planes {
         Planes::Rgba => 255,

@@ -1,11 +1,11 @@
-//! Only the distances below a limit, without computing most of the others (ALGORITHMS.md 5, exact pruning).
+//! Computes only the distances below a limit, and skips most others
+//! (docs/explanation/algorithms.md, "Distances").
 //!
-//! Of the pairs of clips in a panel that are asked for the sums over 16 x 16 squares are compared; where the
-//! bound of a pair is below the limit, those over 8 x 8 squares; where it still is, and of all that such a pair
-//! competes with, the pixels. What comes out is exact: a distance that is asked for is left out only when a
-//! bound says that it is not below the limit.
+//! For the needed pairs of a panel (see `asked`), bounds from 16 x 16 squares come first. Pairs with a bound
+//! below the limit get bounds from 8 x 8 squares. Pairs that remain, and their competitors, get exact
+//! distances. A needed pair is skipped only if a bound proves that its distance is not below the limit.
 //!
-//! Pairs of clips are told by their offset j - i, so that all that one of them adds up stands in one column.
+//! Pairs are indexed by their offset j - i. All frame pairs of one clip pair are then in one column.
 
 use std::ops::Range;
 
@@ -19,16 +19,19 @@ use super::marks::Marks;
 use super::{Cancelled, ClipPair, Distances, Side};
 use crate::progress::Progress;
 
-/// Bytes that a panel takes, about: what has been put aside is had back once for each.
+/// Approximate memory of a panel, bytes. Groups in the temporary storage are read once per panel. Free
+/// choice.
 const PANEL_BYTES: usize = 128 << 20;
-/// Bytes for a pair of frames: its bound, and its place in a tile.
+/// Memory per pair of frames, bytes: its bound and its entry in a tile.
 const PAIR_BYTES: usize = size_of::<u32>() + size_of::<u64>();
-/// Most groups of clips in a panel; in tests so few that their films have several.
+/// Largest number of groups in a panel. Tests use 1, so that their short films have several panels.
 const MOST_GROUPS: usize = if cfg!(test) { 1 } else { 8 };
 
 impl Distances<'_> {
-    /// Calls `on_row(i, pairs)` for every clip i in order, with the pairs (i, j), j >= i and rising, that have
-    /// D(i, j) < `limit`: all of those asked for, and some that they compete with.
+    /// Calls `on_row(i, pairs)` for every clip i in order. The pairs (i, j) have D(i, j) < `limit` and
+    /// ascending j >= i.
+    ///
+    /// They are all needed pairs and some of their competitors. Fails when cancelled.
     pub fn for_each_row_below(
         &self,
         limit: u64,
@@ -56,19 +59,18 @@ impl Distances<'_> {
     }
 }
 
-/// Some clips against all that come after them, and the memory for it.
+/// Some clips against all later ones, with the buffers for it.
 struct Panel<'a> {
     distances: &'a Distances<'a>,
     limit: u64,
     weights: Vec<u64>,
-    /// Bounds are cut off here: so low that all that is added up fits 32 bits, and where it can be as high
-    /// as the limit.
+    /// Largest stored bound. Small enough that weighted sums fit 32 bits; up to the limit where possible.
     most: u32,
     /// The first clip.
     first: usize,
-    /// Per frame of these clips: at least d of it and the frame so many after it, where that was looked at.
+    /// Lower bounds of d by frame of these clips and by offset; valid only where computed.
     least: Vec<Vec<u32>>,
-    /// For their groups.
+    /// Buffers for the row groups.
     memory: Vec<GroupMemory>,
 }
 
@@ -87,10 +89,10 @@ impl<'a> Panel<'a> {
         }
     }
 
-    /// The pairs below the limit of each of the clips, rising.
+    /// Returns the pairs below the limit for each of the clips, ascending.
     fn pairs(&mut self, clips: Range<usize>, asked: &impl Asked) -> Vec<Vec<ClipPair>> {
         let (reach, n_clips) = (asked.reach(), self.distances.n_clips());
-        // A pair of a clip before or after may compete with one of these.
+        // Pairs of earlier or later clips may have competitors among these clips.
         let around = clips.start.saturating_sub(reach)..n_clips.min(clips.end + reach);
         let ask = |i: usize| {
             let mut row = Marks::none(n_clips - i);
@@ -119,13 +121,13 @@ impl<'a> Panel<'a> {
         let n_frames = self.distances.pixels.n_frames();
         self.first = clips.start;
         self.least.resize_with(frames.len(), Vec::new);
-        // What is left of a panel before is never read: bounds are, where they were looked at.
+        // Old values from an earlier panel are never read, because each bound is computed before it is used.
         let rows = self.least.iter_mut().zip(frames);
         rows.for_each(|(least, row)| least.resize(n_frames - row, 0));
     }
 
-    /// Looks at the bounds by such squares of the frames of all pairs that are near, and drops the pairs that are
-    /// not near by these.
+    /// Computes the bounds for the frames of all pairs in `near`, and drops the pairs whose bound reaches the
+    /// limit.
     fn drop_far(&mut self, near: &mut [Marks], rows: &SquareSums, columns: &SquareSums) {
         let (first, f, cpu) = (self.first, self.distances.clip.frames, self.distances.cpu);
         let (most, limit, weights) = (self.most, self.limit, &self.weights);
@@ -145,7 +147,7 @@ impl<'a> Panel<'a> {
         clips.for_each(|(clip, near)| drop_far_of(near, &least[clip..], weights, limit));
     }
 
-    /// Of these clips the pairs marked that are below the limit.
+    /// Returns the marked pairs of these clips with an exact distance below the limit.
     fn exact(&mut self, first: usize, near: &[Marks]) -> Vec<Vec<ClipPair>> {
         let tiles = Tiles::of(self.distances, first, near, &mut self.memory);
         let one = |(from, near): (usize, &Marks)| {
@@ -166,7 +168,8 @@ impl<'a> Panel<'a> {
     }
 }
 
-/// Which pairs of frame `row` (of the first of these clips) and later ones the pairs of clips consist of.
+/// Returns which frame pairs of frame `row` the pairs of clips contain. `row` counts from the first of the
+/// clips.
 fn frames_of(clips: &[Marks], row: usize, f: usize) -> Marks {
     let within = clips[..clips.len().min(row + 1)].iter();
     let mut within = within.skip((row + 1).saturating_sub(f));
@@ -175,8 +178,7 @@ fn frames_of(clips: &[Marks], row: usize, f: usize) -> Marks {
     frames
 }
 
-/// Drops the pairs of a clip that the bounds of their frames say are not below the limit. All that is
-/// added up fits 32 bits.
+/// Drops the pairs of a clip whose summed bounds reach the limit. The sums fit 32 bits.
 fn drop_far_of(near: &mut Marks, least: &[Vec<u32>], weights: &[u64], limit: u64) {
     let mut sums = Vec::new();
     let runs: Vec<Range<usize>> = near.runs().collect();
@@ -195,16 +197,16 @@ fn drop_far_of(near: &mut Marks, least: &[Vec<u32>], weights: &[u64], limit: u64
     }
 }
 
-/// d of some pairs of frames, by tiles of 48 x 48.
+/// d of some pairs of frames, in tiles of 48 x 48.
 struct Tiles {
-    /// The first group of rows; columns are counted from it too.
+    /// The first row group. Column groups count from it too.
     first: usize,
-    /// By groups of columns, then of rows.
+    /// Tiles by column group, then by row group.
     tiles: Vec<Vec<Option<Box<SadTile>>>>,
 }
 
 impl Tiles {
-    /// Of the frames of the pairs that are marked, of clips from `first_clip` on.
+    /// Computes the tiles for the frames of the marked pairs. The first clip is `first_clip`.
     fn of(
         distances: &Distances<'_>,
         first_clip: usize,
@@ -247,7 +249,7 @@ impl Tiles {
         }
     }
 
-    /// d of a pair that was wanted.
+    /// Returns d of a pair of frames that was computed.
     fn sad(&self, row: usize, column: usize) -> u64 {
         let tile = &self.tiles[column / GROUP - self.first][row / GROUP - self.first];
         tile.as_ref()
@@ -255,7 +257,8 @@ impl Tiles {
     }
 }
 
-/// Which pairs of a group of rows and one of columns are wanted, of those of frames from `first` on.
+/// Returns the needed pairs of a row group and a column group. `first` is the frame of the first entry in
+/// `frames`.
 fn wanted(frames: &[Marks], first: usize, [row_idx, column_idx]: [usize; 2]) -> Wanted {
     std::array::from_fn(|k| {
         let row = row_idx * GROUP + k;

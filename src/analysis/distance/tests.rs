@@ -1,4 +1,4 @@
-//! D against its definition, written out pixel by pixel, at every level that the machine has.
+//! Tests of D against a pixel-by-pixel definition, at every instruction level of this machine.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::progress::Silent;
 use crate::random;
 use crate::scratch::{Full, InMemory};
 
-/// Noise: every byte of every sprite at random, alpha included.
+/// Returns sprites of random bytes, alpha included.
 fn noise(width: u32, height: u32, n_frames: usize, seed: u64) -> Sprites {
     drawn([width, height], n_frames, |frame_idx, rgba| {
         for (k, byte) in rgba.iter_mut().enumerate() {
@@ -20,7 +20,7 @@ fn noise(width: u32, height: u32, n_frames: usize, seed: u64) -> Sprites {
     })
 }
 
-/// A sprite for every frame.
+/// Returns drawn sprites, one per frame.
 pub(crate) fn drawn(
     size: [u32; 2],
     n_frames: usize,
@@ -65,7 +65,7 @@ fn from_the_side(sprites: &Sprites) -> Poses {
     poses(View::Side, vec![Some(0.0); sprites.n_frames()])
 }
 
-/// D for f = 1 of sprites that are `n_pixels` opaque grays in a row, one level a frame.
+/// Returns D for f = 1 of sprites of `n_pixels` opaque gray pixels in a row, with one gray level per frame.
 pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMatrix {
     let sprites = drawn([n_pixels, 1], levels.len(), |frame_idx, rgba| {
         let level = levels[frame_idx];
@@ -80,7 +80,7 @@ pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMat
     DistanceMatrix::of(&distances, &Silent).expect("nobody cancels")
 }
 
-/// The engine's upper triangle.
+/// Returns the upper triangle as the engine computes it.
 fn triangle(sprites: &Sprites, poses: &Poses, f: usize, side: Side, cpu: Level) -> Vec<Vec<u64>> {
     triangle_of(
         &compared(sprites, poses, Planes::Rgba),
@@ -107,7 +107,7 @@ fn triangle_of(pixels: &ComparedSprites, clip: Clip, side: Side, cpu: Level) -> 
     rows
 }
 
-/// ALGORITHMS.md 5 to the letter: U(n, m, p) of one frame.
+/// Returns U(n, m, p) of one frame, from the definition.
 fn u(sprites: &Sprites, frame: usize, n: usize, m: usize, p: usize) -> i64 {
     let at = (m * sprites.width() as usize + n) * 4;
     let pixel = &sprites.sprite(frame)[at..at + 4];
@@ -142,7 +142,7 @@ fn triangle_by_definition(sprites: &Sprites, f: usize, side: Side) -> Vec<Vec<u6
 
 #[test]
 fn every_level_gives_the_sums_of_the_definition_at_the_edges_of_its_tiles() {
-    // Below and above groups of 48, lines of 64 bytes and blocks of 1 KB; longer clips than footage.
+    // Sizes around groups of 48, lines of 64 bytes and blocks of 1 KB; clips longer than the footage.
     for (w, h, n_frames, f) in [
         (1, 1, 1, 1),
         (3, 5, 47, 2),
@@ -210,7 +210,7 @@ fn one_thread_and_two_give_the_same() {
 
 #[test]
 fn blocks_put_aside_are_compared_as_those_in_memory() {
-    // Five groups, so two panels; a corner of every other sprite is empty.
+    // Five groups, so two panels. Every other sprite is partly blank.
     let sprites = drawn([40, 24], 200, |frame_idx, rgba| {
         let n = if frame_idx % 2 == 0 { 2000 } else { 3840 };
         for (k, byte) in rgba[..n].iter_mut().enumerate() {
@@ -236,7 +236,7 @@ fn blocks_put_aside_are_compared_as_those_in_memory() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Soft spots that wander about: some pairs are alike, some are not.
+    /// Moving soft spots. Some pairs are similar, some are not.
     #[test]
     fn pruned_distances_are_all_those_below_the_limit(
         (w, h, n_frames, f) in (1u32..40, 1u32..40, 1usize..220, 1usize..6),
@@ -263,7 +263,7 @@ proptest! {
             let whole = triangle_of(&pixels, clip, side, Level::detect());
             let mut all: Vec<u64> = whole.iter().flatten().copied().collect();
             all.sort_unstable();
-            // From nothing to everything.
+            // The limit ranges from nothing to everything.
             let limit = all.get(all.len() * percent / 100).copied().unwrap_or(u64::MAX);
             for cpu in [Level::Scalar, Level::detect()] {
                 let distances = Distances { pixels: &pixels, clip, side, cpu };
@@ -293,12 +293,13 @@ fn rgb_planes_leave_alpha_out() {
     assert_eq!(d(Planes::Rgba), [40 + 204]);
 }
 
-/// An L of three pixels about the center of an 8 x 8 sprite, turned by quarter turns: its long arm
-/// points along the heading, its short arm to the left of it (or to the right).
+/// Returns a letter L around the center of an 8 x 8 sprite, rotated by quarter turns.
+///
+/// The long arm points along the heading. The short arm points to the left or right of it, by its sign.
 fn letter(quarter_turns: u32, short_arm: i32) -> (Sprites, Option<f64>) {
     let mut bytes = [0; 256];
     for (x, y, red) in [(1, 1, 9), (3, 1, 90), (5, 1, 200), (1, 3 * short_arm, 50)] {
-        // Odd half pixels about the center; a quarter turn takes (x, y) to (-y, x).
+        // Pixel centers are at odd half pixels from the center. A quarter turn maps (x, y) to (-y, x).
         let (mut x, mut y) = (x, y);
         for _ in 0..quarter_turns {
             (x, y) = (-y, x);
@@ -330,7 +331,7 @@ fn from_above_an_animal_looks_the_same_wherever_it_points() {
 
 #[test]
 fn from_above_the_mirror_is_across_the_animals_own_axis() {
-    // Pixels stand at odd half offsets, so the mirror of y = 1 is y = -1.
+    // Pixel centers are at odd half pixels, so the mirror image of y = 1 is y = -1.
     let (image, heading_rad) = letter(0, 1);
     let rows = image.sprite(0);
     let mirror_image = drawn([8, 8], 1, |_, rgba| {

@@ -1,9 +1,9 @@
-//! Top-view sprites turned to heading 0 before they are compared (ALGORITHMS.md 5, View): seen from
-//! above any heading can be shown by rotation, so likeness must not depend on it.
+//! Rotates top-view sprites to heading 0 before they are compared. In top view any heading can be shown by
+//! rotation, so similarity must not depend on it.
 //!
-//! Exactly, so that others can recompute it; all divisions round down. Let t = the heading as
-//! `geometry::Turns` (round(heading * 65536 / 2 pi)), c = round(65536 cos(t)), s = round(65536 sin(t)),
-//! P the premultiplied sprite of w x h, and W x H the canvas, both even. For output pixel (x, y)
+//! The rotation is defined exactly, so that others can reproduce it. All divisions round down. Let t be the
+//! heading as `geometry::Turns` (round(heading * 65536 / 2 pi)), c = round(65536 cos(t)), s = round(65536
+//! sin(t)), P the premultiplied sprite of w x h, and W x H the canvas, both even. For output pixel (x, y):
 //!
 //! ```text
 //! u = (w << 16) + c (2x + 1 - W) - s (2y + 1 - H) - 65536      v = (h << 16) + s (..) + c (..) - 65536
@@ -11,15 +11,14 @@
 //! out = ((256-a)(256-b) P[y0][x0] + a (256-b) P[y0][x0+1] + (256-a) b P[y0+1][x0] + a b P[y0+1][x0+1] + 32768) >> 16
 //! ```
 //!
-//! with P = 0 outside the sprite. The canvas is as large as the turned animals need; a larger one
-//! would only add zeros to every sprite, so D does not depend on its size.
+//! P is 0 outside the sprite. The size of the canvas does not change D: a larger one only adds zeros.
 
 use rayon::prelude::*;
 
 use crate::geometry::Turns;
 use crate::library::{Pose, Poses, Sprites};
 
-/// The common picture into which sprites are turned, their center in its middle.
+/// The common image into which all sprites are rotated, around its center.
 pub(super) struct Canvas {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -28,7 +27,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// The smallest canvas, in multiples of 8, that holds every sprite of known heading.
+    /// Returns the smallest canvas, in multiples of 8 pixels, that fits every sprite with a known heading.
     pub(super) fn around(sprites: &Sprites, poses: &Poses) -> Canvas {
         let (w, h) = (sprites.width() as usize, sprites.height() as usize);
         let most = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
@@ -46,7 +45,7 @@ impl Canvas {
         };
         let frames = poses.frames.par_iter().enumerate();
         let [half_width, half_height] = frames.map(halves).reduce(|| [0.0; 2], most);
-        // One pixel for the reach of the interpolation, one for the rounding of the heading.
+        // One pixel for the interpolation and one for the rounding of the heading.
         let side = |half: f64| ((half + 2.0) * 2.0).ceil() as usize;
         Canvas {
             width: side(half_width).next_multiple_of(8),
@@ -56,7 +55,7 @@ impl Canvas {
         }
     }
 
-    /// Turns a premultiplied sprite to heading 0; blank when the heading is unknown.
+    /// Rotates a premultiplied sprite to heading 0. Writes a blank sprite when the heading is unknown.
     pub(super) fn turn(&self, sprite: &[u8], heading_rad: Option<f64>, out: &mut [u8]) {
         let Some(heading_rad) = heading_rad else {
             out.fill(0);
@@ -102,7 +101,7 @@ impl Canvas {
     }
 }
 
-/// Corners whose convex hull covers every pixel that is not transparent: per row the outer edges.
+/// Returns the outer corners of the opaque pixels in each row. Their convex hull covers all opaque pixels.
 fn outline(sprite: &[u8], width: usize) -> Vec<[f64; 2]> {
     let mut corners = Vec::new();
     for (y, row) in sprite.as_chunks::<4>().0.chunks_exact(width).enumerate() {

@@ -1,23 +1,24 @@
-//! From distances of frames to distances of clips: D(i, j) = sum over k < f of w(k) d(i + k, j + k),
-//! O (2) where every w is 1, by sums that slide along the diagonals (ALGORITHMS.md 5).
+//! Sums frame distances to clip distances: D(i, j) = sum over k < f of w(k) d(i + k, j + k) (Okabe et al.,
+//! equation 2, with w = 1; docs/explanation/algorithms.md, "Distances").
 //!
-//! Rows are held by their offset j - i, so that a diagonal is a column: sliding along it is one
-//! addition and one subtraction, and f rows of d are all that is remembered. Binomial weights, which let the
-//! middle of the clip count most (Schoedl et al., Video Textures, 2000), are f - 1 sums of two, one after the other.
+//! The sums slide along the diagonals. Rows are indexed by offset j - i, so a diagonal is a column. Each step
+//! is then one addition and one subtraction, and only f rows of d are stored. Binomial weights (Schoedl et
+//! al., Video Textures, 2000) emphasise the middle of the clip. They are computed by f - 1 successive sums of
+//! two.
 
 use crate::analysis::params::ClipWeights;
 
-/// What is added up to the distance of two clips.
+/// The frames that are summed to a clip distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clip {
-    /// f, at least 1.
+    /// Clip length f, frames, at least 1.
     pub frames: usize,
-    /// How much each of them counts.
+    /// Weights of the frames.
     pub weights: ClipWeights,
 }
 
 impl Clip {
-    /// w(k) for every k < f: 1, or the binomial coefficient of k out of f - 1.
+    /// Returns w(k) for every k < f: 1, or the binomial coefficient of k out of f - 1.
     pub fn weights(&self) -> Vec<u64> {
         let next = |w: &mut u64, k: usize| {
             let this = *w;
@@ -31,13 +32,13 @@ impl Clip {
     }
 }
 
-/// Slides over the rows of d, from the first, and yields the rows of D.
+/// Turns successive rows of d into rows of D.
 pub(super) struct WindowSums {
     slides: Vec<Slide>,
 }
 
 impl WindowSums {
-    /// For clips of a footage of `n_frames` frames.
+    /// Creates the sums for a footage of `n_frames` frames.
     pub(super) fn new(clip: Clip, n_frames: usize) -> WindowSums {
         let [n_slides, n_rows] = match clip.weights {
             ClipWeights::Uniform => [1, clip.frames],
@@ -49,7 +50,7 @@ impl WindowSums {
         }
     }
 
-    /// Takes d(r, r..) for the next r. From r = f - 1 on it returns D(i, i..) for i = r - f + 1.
+    /// Takes d(r, r..) for the next r. From r = f - 1 on, returns D(i, i..) for i = r - f + 1.
     pub(super) fn push<'a>(&'a mut self, row: &'a [u64]) -> Option<&'a [u64]> {
         self.slides
             .iter_mut()
@@ -57,7 +58,7 @@ impl WindowSums {
     }
 }
 
-/// Sums of some rows in succession.
+/// A sliding sum of successive rows.
 struct Slide {
     ring: Vec<Vec<u64>>,
     sums: Vec<u64>,

@@ -1,5 +1,8 @@
-//! What the animal casts on things much darker than its ground, as its mirror image in a dark wall: it stays behind.
-//! A few levels less are a large share of the little light there, and would be a dark patch on anything lighter.
+//! Removes mirror images from the matte: what the animal casts on things much darker than its ground, such as
+//! a dark wall.
+//!
+//! A few levels are a large share of the little light in a dark thing. In a matte, they would become a dark
+//! patch on any lighter background.
 
 use super::solid::Coat;
 use crate::analysis::scene::plate::Plate;
@@ -8,24 +11,26 @@ use crate::order::percentile;
 use crate::raster::Mask;
 use crate::raster::runs::{Component, components};
 
-/// A thing is dark that has less than this share of the ground's light. A wall in which an image was seen (mouse in a round
-/// arena) has a third of the floor's.
+/// A thing is dark below this share of the ground's brightness. Free choice; a wall that showed an image
+/// (mouse in a round arena) has a third of the floor's brightness.
 const DARK: f32 = 0.65;
-/// So much light, the sum of R, G and B, is nothing: no thing is darker than black.
+/// Brightness added to both sides of a comparison, sum of R, G and B: near black no thing is darker. Free
+/// choice.
 const BLACK: f32 = 48.0;
-/// It may stand half on dark things: its ground is the lighter quarter of what is behind it.
+/// Percentile of the brightness behind the animal that counts as its ground; half the animal may be over dark
+/// things.
 const LIGHTER: f64 = 0.75;
 
-/// What so many erosions wear away is thin.
+/// Erosions that a dark region must survive; thinner ones, such as wires, show no image. Free choice.
 const THIN_PX: u32 = 3;
 
-/// A limb is smaller than the body by more than this factor.
+/// A limb is smaller than the body by more than this factor. Free choice.
 const LIMB: u64 = 8;
 
-/// What the animal stands on.
+/// The ground on which the animal stands.
 pub(super) struct Ground<'a> {
     plate: &'a Plate,
-    /// How bright it is: the sum of R, G and B.
+    /// Brightness: the sum of R, G and B, 0..=765.
     brightness: f32,
 }
 
@@ -45,12 +50,12 @@ impl Ground<'_> {
         }
     }
 
-    /// Whether a place of the frame shows something much darker than the ground.
+    /// Returns whether the background at a place of the frame is much darker than the ground.
     fn is_dark(&self, x: u32, y: u32) -> bool {
         brightness(self.plate, x, y) + BLACK < DARK * (self.brightness + BLACK)
     }
 
-    /// What of a mask lies on the ground, and not on darker things.
+    /// Returns the part of a mask that lies on the ground and not on darker things.
     pub(super) fn on(&self, mask: &Mask) -> Mask {
         let (rect, width) = (mask.rect, mask.width());
         let mut on_ground = mask.clone();
@@ -61,9 +66,10 @@ impl Ground<'_> {
         on_ground
     }
 
-    /// Clears what is faint where a mask lies on darker things and is mostly of another color than the coat there: an image
-    /// may be as dark as the animal in its midst, but fades toward its edges. Lines of the scene, such as wires, are too thin
-    /// to show one. Returns where images are.
+    /// Clears the faint pixels of mirror images in `solid`; returns the mask of the images.
+    ///
+    /// An image is a broad region of `mask` on darker things where most pixels do not have the coat's color.
+    /// Its middle may be as dark as the animal, but it fades toward its edges.
     pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) -> Mask {
         let rect = solid.rect;
         let mut on_dark = mask.clone();
@@ -87,8 +93,10 @@ impl Ground<'_> {
         images
     }
 
-    /// Clears what lies apart from the largest piece, mostly on darker things: images. But not a limb of which a part is
-    /// hidden: it is small, mostly of the coat's color, only dark things lie between, and it is no part of `images`.
+    /// Clears pieces apart from the largest one that lie mostly on darker things: they are mirror images.
+    ///
+    /// A limb with a hidden part stays. It is small, has mostly the coat's color, is separated by dark things
+    /// only, and does not overlap `images`.
     pub(super) fn clear_images(&self, solid: &mut Mask, images: &Mask, coat: &Coat) {
         let (rect, width) = (solid.rect, solid.width());
         let is_dark =
@@ -122,7 +130,7 @@ impl Ground<'_> {
     }
 }
 
-/// A component's pixels in a mask over `rect`, by their numbers.
+/// Returns the indices of a component's pixels in a mask over `rect`.
 fn numbers(piece: &Component, rect: Rect) -> Vec<usize> {
     let places = (piece.runs.iter()).flat_map(|run| (run.x0..run.x1).map(|x| (x, run.y)));
     let number = |(x, y): (u32, u32)| ((y - rect.y) * rect.w + x - rect.x) as usize;

@@ -1,20 +1,27 @@
-//! The animal cut out by a mask that is given with the footage.
+//! Mattes from a mask that comes with the footage.
+//!
+//! Alpha is that of the mask. Where the footage mixes the colors of animal and background, the background's
+//! share is subtracted.
 
 use super::{Matte, NOWHERE, moved, nearest_set};
 use crate::raster::{Frame, GivenMask, Mask, RgbaImage, runs};
 
-/// Less alpha is noise, not animal, 0..=255.
+/// Least alpha that connects pixels, 0..=255; less is noise. Free choice.
 const TRACE: u8 = 4;
-/// And this much is the animal alone.
+/// Least alpha of a pixel that shows the animal only, 0..=255. Free choice.
 const SOLID: u8 = 250;
-/// The less of a pixel is the animal, the less its color can be told from what lies behind. It is taken in part from the
-/// nearest pixel that is the animal alone: half of it where the square of the share is this (a free choice).
+/// Squared alpha at which half of the color comes from the nearest pixel of the animal only. Free choice.
+///
+/// The smaller the alpha, the less certain the color without the background.
 const DOUBT: f32 = 0.2;
-/// What is soft reaches beyond the silhouette by this share of its longer side at most: a fin that lets light through.
+/// Margin around the silhouette as a share of its longer side, for soft parts such as a clear fin. Free
+/// choice.
 const REACH: f64 = 0.25;
 
-/// Cuts a silhouette out with the alpha that is given, with all that is soft and hangs together with it. Where colors
-/// are mixed, what lies behind a pixel is the nearest pixel of the frame that is no animal at all: so it may move.
+/// Returns the matte of a silhouette with the given alpha, including all soft pixels connected to it.
+///
+/// Where colors are mixed, the background of a pixel is the nearest pixel of the same frame with alpha 0. So
+/// the background may move.
 pub(super) fn pull(frame: &Frame, given: &GivenMask, silhouette: &Mask) -> Matte {
     let box_px = silhouette.rect;
     let margin_px = (REACH * f64::from(box_px.w.max(box_px.h))).ceil() as u32 + 2;
@@ -67,14 +74,14 @@ pub(super) fn pull(frame: &Frame, given: &GivenMask, silhouette: &Mask) -> Matte
                 }
             }
         };
-        // A cast saturates.
+        // The cast to `u8` saturates.
         let [r, g, b] = color.map(|value| (value + 0.5) as u8);
         rgba.copy_from_slice(&[r, g, b, level]);
     }
     Matte { rect, image }
 }
 
-/// The pixels with some alpha that hang together with a silhouette.
+/// Returns the pixels with alpha that are connected to the silhouette.
 fn hanging_together(silhouette: &Mask, alpha_at: impl Fn(usize) -> u8) -> Mask {
     let soft = Mask {
         rect: silhouette.rect,

@@ -1,11 +1,12 @@
-//! Soft alpha and clean color: the animal cut out of a frame so that it can be put over anything
-//! (ALGORITHMS.md 2.7).
+//! Mattes: the animal cut out of a frame, with soft alpha and without the background's color.
 //!
-//! Inside the silhouette alpha is 1; in a band around its outline alpha is how far the pixel lies
-//! from the plate toward the animal's color nearby, and the color is what remains when the plate's
-//! share is taken away. A shadow is no part of it: it would be turned with the body (`shadow` measures it). Computed
-//! in encoded values, as the compositor blends: putting the matte back over the plate returns the frame
-//! but for shadows and mirror images (`cast`).
+//! Alpha is 1 inside the silhouette. In a band around the outline, alpha is the pixel's share of the way from
+//! the background's color to the animal's color nearby. The background's share is then subtracted from the
+//! color. Shadows are left out, because a sprite would turn them with the body; `shadow` measures them.
+//! Mirror images are left out too (`cast`).
+//!
+//! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
+//! for shadows and mirror images. See docs/explanation/algorithms.md, "Mattes".
 
 mod cast;
 mod given;
@@ -22,14 +23,16 @@ use crate::raster::{Frame, Mask, RgbaImage};
 /// The animal cut out of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matte {
-    /// Where it lies in the frame.
+    /// Box of the matte in the frame, pixels.
     pub rect: Rect,
-    /// Straight alpha, in the plate's light.
+    /// Colors with straight alpha, in the light of the background.
     pub image: RgbaImage,
 }
 
-/// Cuts the silhouette out of a frame. `length_px` is the animal's rough length: the band is 2
-/// pixels wide, or 2 % of it. Where a mask is given, alpha is the mask's.
+/// Returns the matte of a silhouette.
+///
+/// `length_px` is the approximate length of the animal. The band along the outline is 2 % of it wide, 2 to 8
+/// pixels. When the frame has a given mask, its alpha is used.
 pub fn pull(
     frame: &Frame,
     plate: &Plate,
@@ -85,21 +88,21 @@ pub fn pull(
     Matte { rect, image }
 }
 
-/// The mask over another box; what lies outside the old one is clear.
+/// Returns the mask over another box, clear outside the old one.
 fn moved(mask: &Mask, rect: Rect) -> Mask {
     let mut result = Mask::new(rect);
     result.add(mask);
     result
 }
 
-/// No set pixel is known for this one.
+/// Marks a pixel without a known nearest set pixel.
 const NOWHERE: u32 = u32::MAX;
 
-/// For each pixel of `wanted` the index of a set pixel of `mask` reached from it in the fewest steps
-/// (8-connected); [`NOWHERE`] everywhere when no pixel is set.
+/// Returns for each pixel of `wanted` the index of the set pixel of `mask` that takes the fewest steps to
+/// reach (8-connected). All entries are [`NOWHERE`] when no pixel is set.
 ///
-/// The front starts at the set pixels that have a clear neighbor and stops when it has been everywhere
-/// that is wanted; a frame of pixels around the mask that count as reached keeps it inside.
+/// A breadth-first search starts at the set pixels with a clear neighbor. It stops when all wanted pixels are
+/// reached. A border of pixels marked as reached keeps it inside the mask.
 fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
     const BORDER: u32 = NOWHERE - 1;
     let (w, h) = (mask.width(), mask.height());
@@ -140,15 +143,16 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
     rows.flat_map(|row| row[1..=w].iter().copied()).collect()
 }
 
-/// Less alpha is noise, not animal.
+/// Alpha below this value is noise, 0..=1. Free choice.
 const TRACE: f32 = 0.04;
-/// A gap of up to twice as many pixels, as where a wire goes across the animal, is narrow.
+/// Half the width of gaps in the silhouette that count as narrow, pixels. A wire across the animal leaves
+/// one.
 const GAP_PX: u32 = 2;
-/// The animal near a pixel of the band.
+/// Properties of the animal near a pixel of the band.
 struct Nearby {
-    /// The animal's color there.
+    /// The animal's color, levels of 255.
     color: [f32; 3],
-    /// Whether the pixel looks like the background with less light.
+    /// Whether the pixel has the background's color with less light.
     is_shadow: bool,
 }
 
@@ -156,18 +160,18 @@ struct Puller<'a> {
     difference: &'a Difference,
     plate: &'a Plate,
     mask: &'a Mask,
-    /// The mask less the shadow around the animal.
+    /// The silhouette without the shadow around it.
     solid: &'a Mask,
-    /// The solid part less the band along its outline: alpha 1.
+    /// The solid part without the band along its outline, where alpha is 1.
     inside: &'a Mask,
     /// The solid part where it is at least 3 pixels broad, and the pixels next to it.
     broad: &'a Mask,
-    /// The solid part with its narrow gaps.
+    /// The solid part with its narrow gaps closed.
     closed: &'a Mask,
     coat: &'a Coat<'a>,
-    /// For each pixel an inside pixel near it.
+    /// Index of an inside pixel near each pixel, or [`NOWHERE`].
     nearest_inside: Vec<u32>,
-    /// For each pixel a solid pixel near it.
+    /// Index of a solid pixel near each pixel, or [`NOWHERE`].
     nearest_solid: Vec<u32>,
     band_px: u32,
 }
@@ -178,7 +182,7 @@ impl Puller<'_> {
         [rgb[0], rgb[1], rgb[2]]
     }
 
-    /// A pixel's place in the plate.
+    /// Returns the index of a pixel in the background image.
     fn place(&self, k: usize) -> usize {
         let (rect, width) = (self.mask.rect, self.mask.width());
         let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
@@ -190,7 +194,7 @@ impl Puller<'_> {
         [0, 1, 2].map(|c| f32::from(self.plate.rgb.pixels[at + c]))
     }
 
-    /// A pixel of the band: straight color and alpha.
+    /// Returns the straight color and the alpha of a pixel of the band.
     fn band_pixel(&self, k: usize) -> [u8; 4] {
         let Some(Nearby { color, is_shadow }) = self.nearby(k) else {
             return [0; 4];
@@ -222,15 +226,18 @@ impl Puller<'_> {
         [r, g, b, (alpha * 255.0 + 0.5) as u8]
     }
 
-    /// The color of the body nearest to a part that is at most 2 pixels broad, as a tail far away; `None` elsewhere.
+    /// Returns the color of the nearest inside pixels for a part at most 2 pixels broad; `None` for broader
+    /// parts.
     fn core(&self, k: usize) -> Option<[f32; 3]> {
         let inside = self.nearest_inside[k];
         (inside != NOWHERE && self.broad.bits[k] == 0).then(|| self.mean_inside(inside as usize))
     }
 
-    /// The alpha of a pixel of a thin part. Between the colors of the background and the body it is a mixture of both, as the
-    /// part does not fill it. Its alpha is then the body's share, but at least half, so that the part stays within the contour.
-    /// Its color comes out nearer to the body's, and does not shine on a dark background.
+    /// Returns the alpha of a pixel of a thin part, such as a tail far away.
+    ///
+    /// A pixel between the colors of background and body is a mixture, because the part does not fill it. Its
+    /// alpha is then the body's share, but at least 0.5 to keep the part within its outline. The resulting
+    /// color is near the body's, so the part does not shine on a dark background.
     fn thinned(&self, alpha: f32, core: [f32; 3], k: usize) -> f32 {
         let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
         let explained = self.toward(core, k).filter(|&share| {
@@ -240,7 +247,9 @@ impl Puller<'_> {
         explained.map_or(alpha, |share| share.max(0.5).min(alpha))
     }
 
-    /// How far a pixel lies from the plate toward a color, 0 to 1, where the color stands out from the plate.
+    /// Returns the share of the way from the background's color to `fore`, 0..=1.
+    ///
+    /// Returns `None` when the two colors differ by less than three standard deviations of the noise.
     fn toward(&self, fore: [f32; 3], k: usize) -> Option<f32> {
         let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
         let (span, seen_span) = (minus(fore, back), minus(seen, back));
@@ -248,8 +257,10 @@ impl Puller<'_> {
         is_distinct.then(|| (dot(seen_span, span) / dot(span, span)).clamp(0.0, 1.0))
     }
 
-    /// Alpha where the animal's color is that of the plate. What differs all the same is itself, whole: as a share of
-    /// something it would be exaggerated.
+    /// Returns the alpha where the animal has the background's color.
+    ///
+    /// A pixel that differs from the background is opaque: a share of a small color difference would
+    /// exaggerate it.
     fn alike(&self, k: usize) -> f32 {
         let off = minus(self.frame_color(k).map(f32::from), self.plate_color(k));
         match dot(off, off) < self.noise_squared(k) {
@@ -262,8 +273,9 @@ impl Puller<'_> {
         (3.0 * self.plate.sigma[self.place(k)]).powi(2)
     }
 
-    /// The color of the animal near a pixel of the band; `None` outside of the band. In narrow gaps of the animal no pixel counts
-    /// as shadow.
+    /// Returns the animal's color near a pixel of the band; `None` outside the band.
+    ///
+    /// Pixels in narrow gaps of the animal never count as shadow.
     fn nearby(&self, k: usize) -> Option<Nearby> {
         let band = self.band_px as usize;
         let solid = self.nearest_solid[k];
@@ -281,14 +293,14 @@ impl Puller<'_> {
         })
     }
 
-    /// How many steps it is from one pixel to another (8-connected).
+    /// Returns the number of steps from one pixel to another (8-connected).
     fn steps(&self, from: usize, to: usize) -> usize {
         let width = self.mask.width();
         let along_x = (from % width).abs_diff(to % width);
         along_x.max((from / width).abs_diff(to / width))
     }
 
-    /// Mean color of the inside pixels of a 3 x 3 neighborhood whose middle is one.
+    /// Returns the mean color of the inside pixels in the 3 x 3 neighborhood of an inside pixel.
     fn mean_inside(&self, at: usize) -> [f32; 3] {
         let [x, y] = self.xy(at);
         let (mut sum, mut n) = ([0.0; 3], 0.0);
@@ -306,7 +318,7 @@ impl Puller<'_> {
         sum.map(|s| s / n)
     }
 
-    /// The color of the solid pixel within 2 pixels that differs most from the plate.
+    /// Returns the color of the solid pixel within 2 pixels that differs most from the background.
     fn starkest(&self, at: usize) -> Option<[f32; 3]> {
         let [x, y] = self.xy(at);
         let around = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (dx, dy)));
@@ -317,7 +329,7 @@ impl Puller<'_> {
             .map(|at| self.frame_color(at).map(f32::from))
     }
 
-    /// What is solid, blurred by a Gaussian of 0.7 pixels (5 x 5).
+    /// Returns the solid mask at a pixel after a Gaussian blur of 0.7 pixels (5 x 5), 0..=1.
     fn blurred_solid(&self, k: usize) -> f32 {
         let [x, y] = self.xy(k);
         // exp(-d^2 / (2 * 0.49)) for d = 0, 1, 2.

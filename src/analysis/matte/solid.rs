@@ -1,4 +1,7 @@
-//! What of a silhouette is the animal itself, and what is shadow around it.
+//! Separates the animal in a silhouette from the shadow and the floor around it.
+//!
+//! The coat is the color of the pixels that differ most from the background. Pixels that differ much less,
+//! and are a darker background or within its noise, are no part of the animal.
 
 use std::ops::RangeInclusive;
 
@@ -7,22 +10,25 @@ use crate::analysis::silhouette::{Difference, shadow};
 use crate::order::{median, percentile};
 use crate::raster::Mask;
 
-/// A pixel that differs by less than this part of what the starkest ones do is faint.
+/// A pixel is faint when it differs by less than this share of the difference of the starkest pixels. Free
+/// choice.
 const FAINT: f64 = 0.3;
-/// What is of the coat is off its color by less than this share of what it is off the plate.
+/// A pixel has the coat's color when it differs from it by less than this share of its difference from the
+/// background. Free choice.
 const MATCH: f64 = 0.25;
-/// How much of its light a place in the shadow has.
+/// Brightness of a shadow as a share of the background's. Free choice.
 const SHADOW: RangeInclusive<f32> = 0.45..=1.0;
 
-/// What the animal looks like where it differs most from the plate.
+/// The animal's appearance where it differs most from the background.
 pub(super) struct Coat<'a> {
     difference: &'a Difference,
     plate: &'a Plate,
-    /// What its starkest quarter differs by, at least, in levels: a mean would sink with the shadow around it.
+    /// 75th percentile of the differences from the background, levels of 255. A mean would sink with the
+    /// shadow.
     starkest: f64,
-    /// The same as a share of the light.
+    /// 75th percentile of the differences as shares of the brightness, 0..=1.
     starkest_share: f64,
-    /// The median of R, G and B there.
+    /// Median R, G and B of the pixels that differ by at least `starkest`, levels of 255.
     color: [f64; 3],
 }
 
@@ -46,8 +52,9 @@ impl Coat<'_> {
         coat
     }
 
-    /// The one that differs more from the plate: in the other there is too much of an image in a dark wall, or of shadows
-    /// on a floor that is brighter there.
+    /// Returns the coat that differs more from the background.
+    ///
+    /// The other one contains too much of a mirror image in a dark wall, or of a shadow on a brighter floor.
     pub(super) fn or_starker(self, other: Self) -> Self {
         match other.starkest > self.starkest {
             true => other,
@@ -55,12 +62,14 @@ impl Coat<'_> {
         }
     }
 
-    /// How far a pixel lies from the plate.
+    /// Returns the difference of a pixel from the background, levels of 255.
     fn level(&self, k: usize) -> f64 {
         f64::from(self.difference.levels[k])
     }
 
-    /// The same as a share of the brighter of the two, 0 to 1: the one shadow is more levels where the floor is brighter.
+    /// Returns the difference as a share of the brightest channel of pixel and background, 0..=1.
+    ///
+    /// The same shadow differs by more levels where the floor is brighter; the share stays equal.
     fn share(&self, k: usize) -> f64 {
         let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
         let (x, y) = ((k % width) as u32, (k / width) as u32);
@@ -70,12 +79,12 @@ impl Coat<'_> {
         self.level(k) / f64::from(brightest)
     }
 
-    /// Whether a pixel differs by little of what the starkest ones do.
+    /// Returns whether a pixel differs much less from the background than the starkest pixels.
     pub(super) fn is_faint(&self, k: usize) -> bool {
         self.level(k) < FAINT * self.starkest || self.share(k) < FAINT * self.starkest_share
     }
 
-    /// Whether a pixel has its color: it is much nearer to it than to the plate.
+    /// Returns whether a pixel has the coat's color: it is much nearer to it than to the background.
     pub(super) fn matches(&self, k: usize) -> bool {
         let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         let off = seen.iter().zip(self.color);
@@ -85,7 +94,7 @@ impl Coat<'_> {
         most_off < MATCH * self.level(k)
     }
 
-    /// Whether a pixel that is faint looks like the plate, only darker.
+    /// Returns whether a faint pixel has the background's color, but darker.
     pub(super) fn is_shadow(&self, k: usize) -> bool {
         let width = self.difference.rect.w as usize;
         self.is_faint(k)
@@ -93,7 +102,7 @@ impl Coat<'_> {
             && shadow::has_darker_color(self.difference, self.plate, k % width, k / width, SHADOW)
     }
 
-    /// Whether a pixel that is faint is as good as the plate.
+    /// Returns whether a faint pixel cannot be told from the background.
     fn is_floor(&self, k: usize) -> bool {
         let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
         let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
@@ -103,9 +112,10 @@ impl Coat<'_> {
             && self.difference.levels[k] <= self.plate.weak_threshold(at)
     }
 
-    /// The mask less the soft shadow around the animal, and less the floor that shows between its parts. So a shadow on the
-    /// floor stays a shadow. What of this lies in the midst of the animal is a patch of its own that looks so, as a white
-    /// belly over a white floor: solid all the same; and so is what has the coat's color, as black fur before a dark wall.
+    /// Returns the mask without the soft shadow around the animal and without the floor between its parts.
+    ///
+    /// Pixels that the animal encloses stay, such as a white belly over a white floor. Pixels of the coat's
+    /// color stay too, such as black fur in front of a dark wall.
     pub(super) fn without_halo(&self, mask: &Mask, band_px: u32) -> Mask {
         let mut solid = mask.clone();
         for (k, bit) in solid.bits.iter_mut().enumerate() {
@@ -116,8 +126,9 @@ impl Coat<'_> {
     }
 }
 
-/// Adds what walls enclose that are more than twice `reach_px` thick. Thinner ones, as a tail and its shadow that meet,
-/// enclose nothing.
+/// Sets the pixels that are enclosed by parts more than twice `reach_px` thick.
+///
+/// Thinner parts enclose nothing: a tail and its shadow may meet around a patch of floor.
 fn add_midst(solid: &mut Mask, reach_px: u32) {
     let mut filled = solid.clone();
     filled.fill_holes();

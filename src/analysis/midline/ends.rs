@@ -1,15 +1,16 @@
-//! Where an outline ends in head and tail: at its sharpest bends (ALGORITHMS.md 4, Midline).
+//! Finds the two ends of an outline, head and tail, at its points of highest curvature
+//! (docs/explanation/algorithms.md, "Midline and tail beat").
 
 use super::outline::N_POINTS;
 
-/// Half the base of the triangles that curvature is taken from, points.
+/// Distance from a point to each of the two neighbors that its curvature is computed from, outline points.
 const REACH: usize = 4;
 
-/// The two ends of an outline as indices: the sharp one, and the one across from it.
+/// Returns the indices of the two ends of an outline: the sharper one first, then the opposite one.
 ///
-/// The sharp end is the peak of curvature with the largest integral. The other is where the outline
-/// bends most around the point farthest from it by index: the middle of all that bends there, not
-/// the highest peak, for a head may have two eyes or two ears at its corners.
+/// The sharper end is the curvature peak with the largest integral. The opposite end is the center of the
+/// high curvature around the point farthest from it by index. The center is used instead of the highest peak,
+/// because a head may have two eyes or two ears at its corners.
 pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
     let sharpest = peaks(&above_mean(outline))
         .into_iter()
@@ -21,7 +22,7 @@ pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
     [sharp, across(outline, sharp)]
 }
 
-/// The end across from another end.
+/// Returns the index of the end opposite a given end.
 pub(super) fn across(outline: &[[f64; 2]], end: usize) -> usize {
     bent_around(&above_mean(outline), (end + N_POINTS / 2) % N_POINTS)
 }
@@ -32,7 +33,7 @@ fn above_mean(outline: &[[f64; 2]]) -> Vec<f64> {
     curvature.iter().map(|c| c - mean).collect()
 }
 
-/// The middle of the curvature above the mean near an index, found by going there a few times.
+/// Returns the center of the above-mean curvature near an index, by four iterations of the weighted mean.
 fn bent_around(above: &[f64], start: usize) -> usize {
     const NEAR: i64 = N_POINTS as i64 / 6;
     let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
@@ -51,8 +52,10 @@ fn bent_around(above: &[f64], start: usize) -> usize {
     at(shift)
 }
 
-/// Curvature at each point of a clockwise outline, 1 / pixels, positive where it is convex: four
-/// times the area of the triangle with the points on either side, over the product of its sides.
+/// Returns the curvature at each point of a clockwise outline, 1/pixels, positive where it is convex.
+///
+/// The curvature is four times the area of the triangle with the two points at distance `REACH`, divided by
+/// the product of its sides.
 fn curvature(outline: &[[f64; 2]]) -> Vec<f64> {
     let distance = |p: [f64; 2], q: [f64; 2]| libm::hypot(q[0] - p[0], q[1] - p[1]);
     (0..N_POINTS)
@@ -69,7 +72,7 @@ struct Peak {
     integral: f64,
 }
 
-/// The runs of values above 0 around the circle: where each is highest, and its sum.
+/// Returns the runs of positive values around the circle, each with the index of its maximum and its sum.
 fn peaks(values: &[f64]) -> Vec<Peak> {
     let n = values.len();
     let Some(start) = (0..n).find(|&k| values[k] <= 0.0) else {
@@ -102,7 +105,7 @@ mod tests {
 
     use super::*;
 
-    /// A drop: round at index 64, pointed at index 0.
+    /// Returns the outline of a drop: round at index 64, pointed at index 0.
     fn drop() -> Vec<[f64; 2]> {
         (0..N_POINTS)
             .map(|k| {

@@ -1,8 +1,9 @@
-//! The midline of an animal seen from above, and how far it is bent (ALGORITHMS.md 4, Midline).
+//! Computes the midline of the animal and its bend (docs/explanation/algorithms.md, "Midline and tail beat").
 //!
-//! From the outline: both sides are walked from head to tail and the points facing each other are
-//! paired (after Walter & Couzin, TRex, eLife 2021). From the side a swimming body bends along the
-//! line of sight, where no outline shows it: there only an animal far longer than high has a midline.
+//! The method walks both sides of the outline from head to tail and pairs opposite points (after Walter &
+//! Couzin, TRex, eLife 2021). If that fails, the means of cross-sections replace it. In side view the body
+//! bends along the line of sight, where the outline does not show it. There only an animal much longer than
+//! high gets a midline.
 
 pub mod tail_beat;
 
@@ -19,16 +20,17 @@ use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
 use crate::raster::RgbaImage;
 
-/// Points of a midline, head and tail tip included.
+/// Number of points in a midline, including head and tail tip. Free choice.
 pub const N_POINTS: usize = 11;
-/// Seen from the side, an animal longer than this many heights has a midline too.
+/// Median ratio of length to height above which an animal in side view gets a midline. Free choice.
 const LONG: f64 = 3.0;
-/// A midline must reach this share of the silhouette's length from end to end of its way.
+/// Smallest length of a midline, as a share of the length of the silhouette. Free choice.
 const LEAST_REACH: f64 = 0.8;
-/// Where the ends lie across the heading (cosine below this), the frame before decides.
+/// Below this cosine between the heading and the line from end to end, the previous frame decides which end
+/// is the head. Free choice.
 const ACROSS: f64 = 0.25;
 
-/// Fills in the midline, from head to tail, and the bend of every pose whose heading is known.
+/// Sets the midline, from head to tail, and the bend of every pose with a known heading.
 pub fn trace(poses: &mut Poses, track: &Track) {
     if poses.view == View::Side && !is_long(&poses.frames) {
         return;
@@ -60,7 +62,7 @@ pub fn trace(poses: &mut Poses, track: &Track) {
     }
 }
 
-/// The angle of the last third of a midline against the first third, in (-pi, pi], image axes.
+/// Returns the angle from the first third of a midline to the last, in (-pi, pi], clockwise in the image.
 pub fn bend_rad(midline: &[[f64; 2]]) -> f64 {
     let thirds = resampled(midline, 4);
     if thirds.len() < 4 {
@@ -85,9 +87,10 @@ fn is_long(frames: &[Pose]) -> bool {
 }
 
 struct Traced {
-    /// From head to tail.
+    /// Points from head to tail, pixels.
     points: Vec<[f64; 2]>,
-    /// The heading says little about which end is the head.
+    /// True where the heading is nearly perpendicular to the line from end to end, so that it may name the
+    /// wrong head.
     unsure: bool,
 }
 
@@ -105,7 +108,7 @@ fn midline(sighting: &Sighting, image: &RgbaImage, pose: &Pose) -> Option<Traced
         true => (one, other),
         false => (other, one),
     };
-    // An eye may be sharper than the tail: the head is where it lies across from the tail.
+    // An eye may be sharper than the tail. The head is then the end opposite the tail.
     let head = if head == one {
         ends::across(&outline, tail)
     } else {
@@ -125,7 +128,7 @@ fn midline(sighting: &Sighting, image: &RgbaImage, pose: &Pose) -> Option<Traced
     })
 }
 
-/// Whether a midline runs the length of the animal without doubling back.
+/// Returns whether a midline is as long as the animal and does not double back.
 fn is_sound(points: &[[f64; 2]], pose: &Pose) -> bool {
     let length_px: f64 = points.windows(2).map(|p| distance(p[0], p[1])).sum();
     let doubles_back = points.windows(3).any(|p| {
@@ -140,7 +143,7 @@ fn is_sound(points: &[[f64; 2]], pose: &Pose) -> bool {
         && length_px >= LEAST_REACH * pose.length_px.unwrap_or(0.0)
 }
 
-/// `n` points at equal distances along a line, its ends included; empty for a line without length.
+/// Returns `n` points at equal distances along a line, including its ends; empty for a line without length.
 fn resampled(line: &[[f64; 2]], n: usize) -> Vec<[f64; 2]> {
     let mut along_px = vec![0.0];
     for pair in line.windows(2) {

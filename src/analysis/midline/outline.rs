@@ -1,21 +1,22 @@
-//! The outline of a matte at half alpha, by marching squares with the crossings interpolated, and
-//! smoothed by its first elliptic Fourier harmonics (ALGORITHMS.md 4, Midline; Kuhl & Giardina 1982).
+//! Computes the outline of a matte at half alpha: marching squares with interpolation, smoothed by elliptic
+//! Fourier harmonics (Kuhl & Giardina 1982; docs/explanation/algorithms.md, "Midline and tail beat").
 
 use std::f64::consts::TAU;
 
 use crate::geometry::Rect;
 
-/// Points of a smoothed outline.
+/// Number of points in a smoothed outline.
 pub(super) const N_POINTS: usize = 128;
-/// Harmonics that are kept.
+/// Number of harmonics kept.
 const N_HARMONICS: usize = 16;
-/// Half alpha, between 127 and 128 of 255.
+/// Alpha level of the outline, between 127 and 128 of 255.
 const LEVEL: f64 = 127.5;
 
-/// The longest-reaching outline of a matte as `N_POINTS` points, evenly spaced before smoothing,
-/// clockwise on the screen; pixels of the image in which `rect` lies. `None` when nothing is half opaque.
+/// Returns the outline that encloses the largest area, as `N_POINTS` points, clockwise on the screen.
 ///
-/// `alpha` holds one value a pixel of `rect`.
+/// `alpha` holds one value per pixel of `rect`. The points are in pixels of the image that contains `rect`.
+/// They are evenly spaced before smoothing. Returns `None` if no area above one pixel is at least half
+/// opaque.
 pub(super) fn outline(rect: Rect, alpha: &[u8]) -> Option<Vec<[f64; 2]>> {
     let grid = Grid::new(rect, alpha);
     let loops = grid.loops();
@@ -29,12 +30,13 @@ pub(super) fn outline(rect: Rect, alpha: &[u8]) -> Option<Vec<[f64; 2]>> {
                 _ => Some(next),
             },
         );
-    // Inside lies to the right of the way along it: holes run the other way and enclose less than 0.
+    // The inside is on the right of the outline. Holes run the other way and have a negative area.
     let (area, points) = largest?;
     (area > 1.0).then(|| smoothed(&evenly_spaced(&points)))
 }
 
-/// The area that a closed polygon encloses, positive when clockwise on the screen.
+/// Returns the area enclosed by a closed polygon, square pixels, positive when it runs clockwise on the
+/// screen.
 pub(super) fn enclosed_px(points: &[[f64; 2]]) -> f64 {
     let after = points.iter().cycle().skip(1);
     let twice: f64 = (points.iter().zip(after))
@@ -43,7 +45,7 @@ pub(super) fn enclosed_px(points: &[[f64; 2]]) -> f64 {
     twice / 2.0
 }
 
-/// Alpha with a clear border of one pixel around it.
+/// The alpha values with a transparent border of one pixel.
 struct Grid {
     width: usize,
     height: usize,
@@ -61,7 +63,7 @@ impl Grid {
                 *value = f64::from(a);
             }
         }
-        // The padded grid's pixel (1, 1) is the box's first, whose center is half a pixel in.
+        // Pixel (1, 1) of the padded grid is the first of `rect`. Its center lies half a pixel inside.
         let origin = [f64::from(rect.x) - 0.5, f64::from(rect.y) - 0.5];
         Grid {
             width,
@@ -71,8 +73,8 @@ impl Grid {
         }
     }
 
-    /// Every closed outline. An edge of the grid is numbered 2 k from pixel k to its right
-    /// neighbor, 2 k + 1 to the one below.
+    /// Returns every closed outline. Grid edge 2k connects pixel k with its right neighbor, edge 2k + 1 with
+    /// the pixel below.
     fn loops(&self) -> Vec<Vec<[f64; 2]>> {
         let mut next = vec![None; 2 * self.values.len()];
         for y in 0..self.height - 1 {
@@ -95,8 +97,11 @@ impl Grid {
         loops
     }
 
-    /// Notes which edges of the cell whose first corner is pixel `k` the outline joins. Walked
-    /// clockwise, it enters the cell where the corners change from inside to outside.
+    /// Records which edges of a grid cell the outline connects. Pixel `k` is the upper left corner of the
+    /// cell.
+    ///
+    /// In clockwise order of the corners, the outline enters the cell where they change from inside to
+    /// outside.
     fn cross_cell(&self, k: usize, next: &mut [Option<usize>]) {
         let corners = [k, k + 1, k + self.width + 1, k + self.width];
         let edges = [2 * k, 2 * (k + 1) + 1, 2 * (k + self.width), 2 * k + 1];
@@ -110,7 +115,7 @@ impl Grid {
                 let other = (side + step) % 4;
                 !inside[other] && inside[(other + 1) % 4]
             };
-            // Where two opposite corners are inside, the middle says whether they hang together.
+            // If only two opposite corners are inside, the mean decides whether they are connected.
             let step = match middle > LEVEL {
                 true => (1..4).find(leaves),
                 false => (1..4).rev().find(leaves),
@@ -135,7 +140,7 @@ impl Grid {
     }
 }
 
-/// `N_POINTS` points at equal distances along a closed polygon.
+/// Returns `N_POINTS` points at equal distances along a closed polygon.
 fn evenly_spaced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let at = |k: usize| points[k % points.len()];
     let lengths: Vec<f64> = (0..points.len())
@@ -156,7 +161,7 @@ fn evenly_spaced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// The curve of the first harmonics: what is finer than a 32nd of the way round is pixels, not animal.
+/// Returns the curve of the first harmonics. Finer detail comes from the pixel grid, not from the animal.
 fn smoothed(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let n = points.len();
     let wave: Vec<[f64; 2]> = (0..n)
@@ -188,7 +193,7 @@ fn smoothed(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 mod tests {
     use super::*;
 
-    /// A disc whose edge pixels are covered by their share.
+    /// Returns the alpha of a disc with antialiased edges.
     fn disc(center: [f64; 2], radius: f64) -> Vec<u8> {
         (0..64 * 64)
             .map(|k| {

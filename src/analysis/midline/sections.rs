@@ -1,13 +1,14 @@
-//! The plain midline, for an outline whose ends cannot be told: the means of the silhouette's
-//! cross-sections from front to back (ALGORITHMS.md 4, Midline, fallback).
+//! Fallback midline for outlines whose ends cannot be found: the means of the silhouette's cross-sections
+//! (docs/explanation/algorithms.md, "Midline and tail beat").
 
 use crate::geometry::Rect;
 
-/// Sections from the front to the back.
+/// Number of cross-sections. Free choice.
 const N_SECTIONS: usize = 12;
 
-/// The means of the cross-sections at right angles to `toward`, a unit vector to the head, front
-/// first; pixels. Empty sections are left out.
+/// Returns the means of the cross-sections perpendicular to `toward`, front first, in image pixels.
+///
+/// `toward` is a unit vector toward the head. Empty sections are omitted.
 pub(super) fn means(rect: Rect, alpha: &[u8], toward: [f64; 2]) -> Vec<[f64; 2]> {
     let solid = || {
         let width = rect.w.max(1) as usize;

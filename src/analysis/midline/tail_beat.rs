@@ -1,39 +1,39 @@
-//! How often the tail beats, and when that can be told (ALGORITHMS.md 4).
+//! Measures the frequency of the tail beat (docs/explanation/algorithms.md, "Midline and tail beat").
 //!
-//! From above the bend of the midline swings with the tail. From the side the body bends along the
-//! line of sight; what is left of the beat is that the length and the skew of the silhouette swing
-//! a little, at the beat's own rate while the fish is seen at an angle. Only a rate is given: the
-//! sign of that swing depends on which way the fish is turned, so no phase can be told.
+//! In top view the bend of the midline oscillates with the tail. In side view the body bends along the line
+//! of sight. The length and the skew of the silhouette then oscillate slightly, at the frequency of the beat,
+//! while the fish is seen at an angle. The sign of that oscillation depends on the direction of the fish, so
+//! only the frequency is reported, not the phase.
 //!
-//! Lomb-Scargle spectra over two seconds at a time (Zechmeister & Kürster 2009), against a floor of
-//! noise and of the animal's own wandering. One frequency is followed through all of them, and
-//! reported where it stands out.
+//! The method computes Lomb-Scargle spectra (Zechmeister & Kürster 2009) in windows of two seconds. It
+//! compares them with a floor of measurement noise and slow movements, and tracks one frequency with Viterbi.
+//! A beat is reported where its power exceeds the floor.
 
 use std::f64::consts::{LN_2, TAU};
 
 use crate::library::{BeatSpan, Poses, TailBeat, TailBeatMethod, View};
 
-/// Half the length of a window, seconds.
+/// Half the length of a window, seconds. Free choice.
 const HALF_S: f64 = 1.0;
-/// From one window to the next, seconds.
+/// Distance between windows, seconds. Free choice.
 const HOP_S: f64 = 0.25;
-/// The band that is searched, Hz; its end is also held below 0.45 of the frame rate.
+/// Range of frequencies, Hz. The upper end is also limited to 0.45 of the frame rate. Free choice.
 const BAND_HZ: [f64; 2] = [0.5, 12.0];
-/// From one frequency to the next, share.
+/// Logarithm of the ratio of neighboring frequencies. Free choice.
 const STEP: f64 = 0.04;
-/// Cost of a change of the frequency from window to window, per e-fold.
+/// Cost of a change in frequency between windows, per factor of e. Free choice.
 const CHANGE: f64 = 32.0;
-/// A beat is reported where its power exceeds the noise floor so many times.
+/// Smallest ratio of power to noise floor for which a beat is reported. Free choice.
 const LEVEL: f64 = 4.0;
-/// A beat that lasts less is not reported, windows.
+/// Smallest number of successive windows for which a beat is reported. Free choice.
 const LEAST_WINDOWS: usize = 4;
-/// Share of a window's frames that must be measured.
+/// Smallest share of measured frames in a window. Free choice.
 const LEAST_SHARE: f64 = 0.6;
-/// Fewest frames in a window: four for its cubic trend, two for the wave, three that can contradict both. Below
-/// 4 frames a second a window holds fewer, and no beat is measured.
+/// Smallest number of frames in a window: four for the cubic trend, two for the wave, three to test the fit.
+/// Below 4 frames per second a window has fewer, and no beat is measured.
 const LEAST_WINDOW_FRAMES: usize = 9;
 
-/// The tail beat of an animal, where it can be told; `None` where it nowhere can.
+/// Returns the tail beat, or `None` if no part of the footage shows one.
 pub fn measure(poses: &Poses) -> Option<TailBeat> {
     let bends = poses.frames.iter().any(|pose| pose.bend_rad.is_some());
     let (method, signals) = match (poses.view, bends) {
@@ -54,7 +54,7 @@ fn bend(poses: &Poses) -> Signal {
     poses.frames.iter().map(|pose| pose.bend_rad).collect()
 }
 
-/// The logarithm of the length: a swing is then a share of it at any distance.
+/// Returns the logarithm of the length. An oscillation is then relative to the length at any distance.
 fn length(poses: &Poses) -> Signal {
     let one = |pose: &crate::library::Pose| pose.length_px.filter(|&l| l > 0.0 && !pose.cut);
     (poses.frames.iter())
@@ -62,7 +62,7 @@ fn length(poses: &Poses) -> Signal {
         .collect()
 }
 
-/// The skew toward the head.
+/// Returns the skew, positive toward the head.
 fn skew(poses: &Poses) -> Signal {
     let one = |pose: &crate::library::Pose| {
         let toward = libm::cos(pose.heading_rad? - pose.axis_rad?).signum();
@@ -71,18 +71,18 @@ fn skew(poses: &Poses) -> Signal {
     poses.frames.iter().map(one).collect()
 }
 
-/// What one window says at every frequency of the band.
+/// The spectrum of one window.
 struct Window {
     middle: usize,
-    /// Logarithm of the power over the noise floor.
+    /// Logarithm of the ratio of power to noise floor, by frequency.
     evidence: Vec<f64>,
-    /// Amplitude of the first signal.
+    /// Amplitude of the first signal, by frequency.
     amplitude: Vec<f64>,
 }
 
 impl Window {
-    /// The frequency of the largest amplitude within a fifth of one: the floor slopes, and shifts the
-    /// peak of the ratio.
+    /// Returns the frequency with the largest amplitude within five steps of `k`. The sloped noise floor
+    /// shifts the peak of the ratio.
     fn strongest_near(&self, k: usize) -> usize {
         let last = self.amplitude.len() - 1;
         (k.saturating_sub(5)..=(k + 5).min(last)).fold(k, |best, other| {
@@ -114,14 +114,14 @@ fn spans(signals: &[Signal], fps: f64) -> Vec<BeatSpan> {
     spans
 }
 
-/// The frequencies, with their waves over one window.
+/// The frequencies and their waves over one window.
 struct Band {
     fps: f64,
     half: usize,
     frequencies_hz: Vec<f64>,
-    /// For each frequency cosine and sine at each frame of the window.
+    /// Cosine and sine at each frame of the window, by frequency.
     waves: Vec<Vec<[f64; 2]>>,
-    /// Hann.
+    /// Hann window.
     weights: Vec<f64>,
 }
 
@@ -148,7 +148,7 @@ impl Band {
         }
     }
 
-    /// The spectra of all signals about one frame, joined; `None` where too little was measured.
+    /// Returns the spectrum around one frame over all signals, or `None` with too few measured frames.
     fn look(&self, signals: &[Signal], middle: usize) -> Option<Window> {
         let mut evidence = vec![0.0; self.frequencies_hz.len()];
         let mut first = None;
@@ -171,8 +171,8 @@ impl Band {
         })
     }
 
-    /// The power of what is no beat: wandering, which falls with the square of the frequency and is
-    /// told from the lower half of the band, and noise, which does not, from the upper half.
+    /// Returns the noise floor, the larger of two parts: slow movements, which fall with the square of the
+    /// frequency (from the lower half of the band), and white noise (from the upper half).
     fn noise_floor(&self, power: &[f64]) -> Vec<f64> {
         let (low, high) = self.frequencies_hz.split_at(power.len() / 2);
         let squared = low.iter().zip(power).map(|(f, p)| f * f * p);
@@ -183,7 +183,7 @@ impl Band {
             .collect()
     }
 
-    /// A window less its weighted cubic trend, as (index, weight, value).
+    /// Returns the samples of a window as (index, weight, value), without their weighted cubic trend.
     fn detrended(&self, window: &[Option<f64>]) -> Option<Vec<(usize, f64, f64)>> {
         let mut samples: Vec<(usize, f64, f64)> = (window.iter().enumerate())
             .filter_map(|(k, value)| Some((k, self.weights[k], (*value)?)))
@@ -218,7 +218,7 @@ impl Band {
         Some(samples)
     }
 
-    /// Amplitude of the wave that fits the weighted samples best.
+    /// Returns the amplitude of the sinusoid that fits the weighted samples best.
     fn amplitude(&self, samples: &[(usize, f64, f64)], wave: &[[f64; 2]]) -> f64 {
         let [mut cc, mut cs, mut ss, mut yc, mut ys] = [0.0; 5];
         for &(k, w, y) in samples {
@@ -234,7 +234,7 @@ impl Band {
     }
 }
 
-/// The power of noise is spread exponentially: its mean is the median over ln 2.
+/// Returns the mean power of noise. Noise power is distributed exponentially: the mean is the median / ln 2.
 fn mean_of_noise(mut power: Vec<f64>) -> f64 {
     power.sort_by(f64::total_cmp);
     power
@@ -242,7 +242,7 @@ fn mean_of_noise(mut power: Vec<f64>) -> f64 {
         .map_or(0.0, |median| median / LN_2)
 }
 
-/// Follows one frequency through windows without a gap and adds the spans where it stands out.
+/// Tracks one frequency through successive windows and adds the spans in which it stands out.
 fn follow(run: &[Window], band: &Band, hop: usize, spans: &mut Vec<BeatSpan>) {
     let path = path(run);
     let stands_out = |k: usize| libm::exp(run[k].evidence[path[k]]) > LEVEL;
@@ -254,7 +254,7 @@ fn follow(run: &[Window], band: &Band, hop: usize, spans: &mut Vec<BeatSpan>) {
         if to - from >= LEAST_WINDOWS {
             let mut at = from;
             while at < to {
-                // A span holds windows of one frequency, give or take a step of the band.
+                // Within one span the frequency differs by at most one step.
                 let end = (at..to)
                     .find(|&k| path[k].abs_diff(path[at]) > 1)
                     .unwrap_or(to);
@@ -288,7 +288,7 @@ fn span(windows: &[Window], path: &[usize], band: &Band, hop: usize) -> BeatSpan
     }
 }
 
-/// The likeliest sequence of frequencies, as indices of the band.
+/// Returns the most probable sequence of frequencies, as indices into the band (Viterbi).
 fn path(run: &[Window]) -> Vec<usize> {
     let Some(n) = run.first().map(|window| window.evidence.len()) else {
         return Vec::new();
@@ -296,7 +296,7 @@ fn path(run: &[Window]) -> Vec<usize> {
     let mut gains = vec![0.0; n];
     let mut came_from: Vec<Vec<usize>> = Vec::with_capacity(run.len());
     for window in run {
-        // The cost grows with the distance: one sweep up and one down find each best predecessor.
+        // The cost grows with the distance, so one upward and one downward sweep find the best predecessors.
         let mut from: Vec<usize> = (0..n).collect();
         for k in 1..n {
             if gains[k - 1] - CHANGE * STEP > gains[k] {
@@ -325,7 +325,7 @@ mod tests {
     use crate::library::Pose;
     use crate::random;
 
-    /// Twenty seconds from above: wandering, noise, and a beat of `amplitude_rad` at `f` Hz.
+    /// Returns 20 s of bends in top view: slow movements, noise, and a beat of `amplitude_rad` at `f` Hz.
     fn bending(f: f64, amplitude_rad: f64, seed: u64) -> Poses {
         let mut wander = 0.0;
         let frames = (0..600u64).map(|k| {

@@ -1,4 +1,4 @@
-//! What a midline promises, on soft sausages bent by a known amount.
+//! Tests of the midline on synthetic tapered bodies with a known bend.
 
 use super::*;
 use crate::analysis::moments::moments;
@@ -9,8 +9,10 @@ use crate::scratch::{InMemory, Scratch};
 use proptest::prelude::*;
 use std::sync::Arc;
 
-/// A fish from above: a circular arc of length 80 that turns by `turn` over its length, thick ahead,
-/// tapering to the tail; the head at `start`, pointing against `away`.
+/// A fish in top view: a circular arc of length 80 that turns by `turn` over its length.
+///
+/// The body is thick in front and tapers to the tail. The head is at `start`; the body extends from there in
+/// direction `away`.
 struct Sausage {
     turn: f64,
     start: [f64; 2],
@@ -30,7 +32,7 @@ impl Sausage {
         p
     }
 
-    /// Half the thickness: round ahead, thin behind.
+    /// Half the thickness at share `s` of the length: round in front, thin behind.
     fn radius(s: f64) -> f64 {
         8.0 * (1.0 - s).powf(0.7) * (1.0 - (1.0 - s / 0.15).clamp(0.0, 1.0).powi(2)).sqrt() + 0.9
     }
@@ -77,7 +79,7 @@ impl Sausage {
         (sighting, image)
     }
 
-    /// The pose as the analysis would find it: heading along the major axis.
+    /// Returns the pose as the analysis would measure it, with the heading along the major axis.
     fn pose(&self) -> Pose {
         let axis = self.sighting().0.moments.major_rad.expect("it is long");
         let (head, tail) = (self.at(0.0), self.at(1.0));
@@ -101,7 +103,7 @@ impl Sausage {
             .points
     }
 
-    /// Root mean square distance of the found points from the true curve, led on to the surface.
+    /// Returns the root mean square distance of the points from the true curve, extended to the surface.
     fn error_px(&self, found: &[[f64; 2]]) -> f64 {
         let truth: Vec<[f64; 2]> = (-20..=410).map(|k| self.at(f64::from(k) / 400.0)).collect();
         let off = |p: &[f64; 2]| {
@@ -125,7 +127,7 @@ proptest! {
         prop_assert!(sausage.error_px(&found) < 1.0, "{} px", sausage.error_px(&found));
         prop_assert!(distance(found[0], sausage.at(-0.04)) < 4.0, "head first: {:?}", found[0]);
         prop_assert!(distance(found[10], sausage.at(1.0)) < 3.5, "tail last: {:?}", found[10]);
-        // Two thirds of the way lie between the middles of the outer thirds.
+        // The centers of the outer thirds are two thirds of the length apart.
         prop_assert!((bend_rad(&found) - turn * 2.0 / 3.0).abs() < 0.12, "{}", bend_rad(&found));
     }
 }
@@ -194,7 +196,7 @@ fn an_unknown_heading_leaves_the_midline_unknown() {
 
 #[test]
 fn an_outline_whose_ends_cannot_be_told_falls_back_to_its_cross_sections() {
-    // The measured length belies every short cut across the outline.
+    // The measured length of 1000 makes every midline from the outline look too short.
     let pose = Pose {
         length_px: Some(1000.0),
         ..BENT.pose()
@@ -216,7 +218,7 @@ fn a_line_bent_by_a_quarter_circle_says_so_and_a_straight_one_says_0() {
 
 #[test]
 fn a_head_broad_with_eyes_begins_between_them() {
-    // A hammer: two eyes at the corners of a blunt head, a long thin tail behind.
+    // A hammer-shaped head with an eye at each corner, and a long thin tail.
     let rect = Rect::of_size(120, 60);
     let mut image = RgbaImage::new(rect.w, rect.h);
     for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {

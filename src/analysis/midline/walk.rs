@@ -1,12 +1,13 @@
-//! Both sides of an outline walked from head to tail; the middles of the points that face each other
-//! are the midline (ALGORITHMS.md 4; Walter & Couzin, TRex, eLife 2021).
+//! Walks both sides of an outline from head to tail. The midpoints of paired points form the midline (Walter
+//! & Couzin, TRex, eLife 2021; docs/explanation/algorithms.md, "Midline and tail beat").
 
 use super::distance;
 
-/// How far ahead a side may be looked at for a nearer partner, of the outline.
+/// How far one side may run ahead to find a nearer partner, as a share of the outline.
 const WIGGLE: f64 = 0.025;
 
-/// The midline from `head` to `tail`, indices of a closed outline; unevenly spaced.
+/// Returns the midline from `head` to `tail`, two indices of a closed outline. The points are unevenly
+/// spaced.
 pub(super) fn walk(outline: &[[f64; 2]], head: usize, tail: usize) -> Vec<[f64; 2]> {
     let n = outline.len();
     let n_after = (tail + n - head) % n;
@@ -17,7 +18,7 @@ pub(super) fn walk(outline: &[[f64; 2]], head: usize, tail: usize) -> Vec<[f64; 
     let mut midline = vec![outline[head]];
     let (mut a, mut b) = (1, 1);
     while a < n_after && b < n_before {
-        // One side may run ahead by the wiggle to where it is nearest to the other.
+        // One side may run ahead by up to `wiggle` points to where it is nearest to the other.
         let ahead = (0..=wiggle)
             .map(|k| (a + k, b))
             .chain((1..=wiggle).map(|k| (a, b + k)))

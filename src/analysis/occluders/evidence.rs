@@ -1,4 +1,7 @@
-//! What the frames tell of each pixel that the animal covers.
+//! Evidence for an occluder at each pixel, summed over the frames in which the animal covers the pixel.
+//!
+//! Symbols: I is the frame's color at the pixel, B the background's. A and S are the means of frame and
+//! background over a ring of pixels around it. The formula of the share is in the header of `occluders`.
 
 use rayon::prelude::*;
 
@@ -9,42 +12,44 @@ use crate::analysis::track::sighting::Sighting;
 use crate::progress::Progress;
 use crate::raster::{Mask, RgbImage, RgbaImage};
 
-/// The animal must be known at so many pixels of a ring of 72.
+/// Least number of the ring's 72 pixels that must show the animal and no occluder. Free choice: a third.
 const LEAST_RING: i64 = 24;
-/// Pixels of mattes that are looked at at once, but for one frame.
+/// Matte pixels read into memory at a time, but at least one frame. Free choice.
 const BATCH_PX: u64 = 1 << 20;
-/// Means over rings are kept in parts of a level.
+/// Fractions per level in ring means: fixed-point sixteenths keep the sums exact.
 const PARTS: i64 = 16;
 
-/// What speaks for an occluder at a pixel.
+/// Conditions under which a pixel counts as an occluder.
 pub(super) struct Proof {
-    /// It takes at least this share of the pixel, beyond what a line behind the animal would feign.
+    /// Least share of the pixel, 0..=1, after subtraction of the share that a line behind the animal would
+    /// imitate.
     pub(super) share: f64,
-    /// The plate must have a line or a speck there, the other way than the animal is off the scene.
+    /// Whether the background must have a line or speck there, whose contrast is opposite to that of the
+    /// animal.
     pub(super) is_in_plate: bool,
-    /// With it, what is seen is off by at most this part of the squares that it is off without ...
+    /// Greatest ratio of the squared residual with the occluder to that without it.
     pub(super) unexplained: f64,
-    /// ... by so many squared levels less, for each channel, in the mean of frames: what is less is not seen ...
+    /// Least gain per frame: decrease of the squared residual per channel, squared levels.
     pub(super) gain: f64,
-    /// ... and in their sum: few frames must show more than many.
+    /// Least gain over all frames, squared levels: with few frames, each must show more.
     pub(super) gain_of_all: f64,
 }
 
-/// What frames tell of one pixel: sums over frames and channels, of levels times [`PARTS`].
+/// Evidence at one pixel: sums over frames and channels, of levels times [`PARTS`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Evidence {
     n_frames: i64,
-    /// (I - B)(A - S).
+    /// Sum of (I - B)(A - S).
     both: i64,
-    /// (A - S)^2.
+    /// Sum of (A - S)^2.
     around: i64,
-    /// (I - B)^2.
+    /// Sum of (I - B)^2.
     here: i64,
-    /// (I - A)^2.
+    /// Sum of (I - A)^2.
     unlike: i64,
-    /// (I - A) times what the plate is off its own ring.
+    /// Sum of (I - A)(B - S).
     alike: i64,
-    /// (A - S) times the same.
+    /// Sum of (A - S)(B - S).
     toward: i64,
 }
 
@@ -59,20 +64,21 @@ impl Evidence {
         self.toward += other.toward;
     }
 
-    /// The share of the pixel that something before the animal takes.
+    /// Returns the occluder's share of the pixel, 0..=1.
     pub(super) fn share(&self) -> f64 {
         let around = self.around.max(1) as f64;
         (1.0 - self.both as f64 / around).clamp(0.0, 1.0)
     }
 
-    /// Whether so much speaks for such a thing.
+    /// Returns whether the evidence meets all conditions of `proof`.
     pub(super) fn is(&self, proof: &Proof) -> bool {
         let share = self.share();
         let through = 1.0 - share;
         let left = self.here as f64 - 2.0 * through * self.both as f64
             + through * through * self.around as f64;
         let unlike = self.unlike as f64;
-        // A line behind the animal, seen through it, takes at most this share: just so much were the animal opaque.
+        // Share that a line behind an opaque animal would imitate (I = A). A line seen through the animal
+        // gives less.
         let feigned = (self.toward as f64 / self.around.max(1) as f64).max(0.0);
         let is_in_plate = self.alike > 0 && self.toward < 0;
         let gain = (unlike - left) / (3 * PARTS * PARTS) as f64;
@@ -84,15 +90,17 @@ impl Evidence {
     }
 }
 
-/// What is asked about all pixels of a box, and what is known already.
+/// The inputs that are common to all pixels of a box.
 pub(super) struct Question<'a> {
     pub(super) plate: &'a RgbImage,
-    /// Those that show something before the animal, so that rings go without them.
+    /// Pixels of the box that are already known to show an occluder. Rings leave them out.
     pub(super) found: &'a Mask,
 }
 
 impl Question<'_> {
-    /// What sightings tell of each pixel that they cover: its index in the box, and the sum over all. The order is the same for any number of threads.
+    /// Returns the evidence of all sightings, as pairs of pixel index in the box and sums over the frames.
+    ///
+    /// The order does not depend on the number of threads. Fails with `Cancelled` when `progress` says so.
     pub(super) fn answer(
         &self,
         track: &Track,
@@ -122,7 +130,7 @@ impl Question<'_> {
         Ok(sums)
     }
 
-    /// What one frame tells of the pixels that its animal covers.
+    /// Returns the evidence of one frame for the opaque pixels of its matte.
     fn of_frame(&self, seen: &Sighting, matte: &RgbaImage) -> Vec<(usize, Evidence)> {
         let (rect, of) = (seen.rect, self.found.rect);
         let columns = rect.w as usize;

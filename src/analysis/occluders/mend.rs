@@ -1,4 +1,7 @@
-//! Mattes without what stood before the animal: where it did, they are continued from the pixels around.
+//! Removes known occluders from the mattes of a track.
+//!
+//! A partly occluded pixel is solved for the animal's color. Any other pixel takes the weighted mean of the
+//! pixels around it.
 
 use rayon::prelude::*;
 
@@ -10,10 +13,14 @@ use crate::progress::Progress;
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
-/// An occluder that takes no more of a pixel is taken away from it; of what is left less would be noise.
+/// Greatest alpha of an occluder that is subtracted, 0..=255. Free choice: beyond a half, noise would
+/// dominate.
 const MOST_TAKEN_AWAY: u8 = 128;
 
-/// Mends every matte of a track that shows something of the occluders, and measures it anew.
+/// Mends every matte that overlaps an occluder, and measures its sighting again.
+///
+/// Only mattes in front of the main background are mended. Fails when the scratch is full, and with
+/// `Cancelled`.
 pub(super) fn mend(
     track: &mut Track,
     occluders: &RgbaImage,
@@ -53,8 +60,10 @@ fn remeasured(
     Ok(Some(mended))
 }
 
-/// Frees the pixels of a matte from what is before them; returns whether anything changed. Where that takes up to half of
-/// an opaque pixel, what is left is known; all others become the mean of those around.
+/// Removes the occluder from the pixels of a matte; returns whether any pixel changed.
+///
+/// An opaque pixel whose occluder takes up to half of it is solved for its color. All others take the mean of
+/// their surroundings.
 fn fill(image: &mut RgbaImage, occluder: impl Fn(usize, usize) -> [u8; 4]) -> bool {
     let (width, height) = (image.width as usize, image.height as usize);
     let is_found = |x: usize, y: usize| occluder(x, y)[3] > 0;
@@ -78,7 +87,7 @@ fn fill(image: &mut RgbaImage, occluder: impl Fn(usize, usize) -> [u8; 4]) -> bo
     has_changed
 }
 
-/// A = (I - w F) / (1 - w).
+/// Returns the animal's color A = (I - w F) / (1 - w), opaque.
 fn without(seen: [u8; 4], before: [u8; 4]) -> [u8; 4] {
     let share = f64::from(before[3]) / 255.0;
     let own = |c: usize| {
@@ -88,7 +97,7 @@ fn without(seen: [u8; 4], before: [u8; 4]) -> [u8; 4] {
     [own(0), own(1), own(2), 255]
 }
 
-/// The mean around a pixel, weighed by 1 / distance^4, so that an edge of the animal stays one.
+/// Returns the mean around a pixel without occluded pixels, weighted by 1 / distance^4 to keep edges sharp.
 fn around(
     image: &RgbaImage,
     [x, y]: [usize; 2],

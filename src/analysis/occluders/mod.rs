@@ -1,16 +1,14 @@
-//! What stands before the animal (the wires of a cage, a scratch of the pane) is found, taken out of the mattes, and kept
-//! to be drawn before whoever passes behind it. Without this the wires fly with the bird.
+//! Finds occluders in front of the animal (cage wires, scratches on a pane) and removes them from the mattes.
+//! They are returned as an image, to be drawn in front of the animals of a flock.
 //!
-//! Where an occluder of color F takes the share w of a pixel before a scene S, the plate shows B = w F + (1 - w) S, and a
-//! frame whose animal of color A is behind it I = w F + (1 - w) A. So I - B = (1 - w)(A - S): there the frame differs less
-//! from the plate than around. A - S is the mean of I - B over a ring of pixels that show the animal and nothing before it;
-//! over all frames the best w is 1 - sum (I - B)(A - S) / sum (A - S)^2.
+//! An occluder of color F and share w turns a scene S into the background B = w F + (1 - w) S. With an animal
+//! of color A behind it, the frame shows I = w F + (1 - w) A. Hence I - B = (1 - w)(A - S). A - S is measured
+//! as the mean of I - B over a ring of unoccluded pixels around. The least-squares share over all frames is
+//! w = 1 - sum (I - B)(A - S) / sum (A - S)^2.
 //!
-//! A marking of the coat may look like that for a while, so it is certain only where the plate has a line or a speck too, and
-//! only when that is bright and the animal darker than the scene, or the other way about: through an animal that lets
-//! light through, a dark line behind it looks as one before a dark animal would. From there it is followed to where
-//! less is enough. What has the color of the scene behind it all along, or is broader than a few pixels, is not found;
-//! what hides the animal wholly across its whole breadth tears the silhouette, of which one part alone is followed.
+//! A marking of the coat may look like an occluder for a while. So seed pixels need a line in the background,
+//! with a contrast opposite to the animal's. Weaker pixels count only when connected to a seed. Not found:
+//! occluders of the background's color, broad ones, and those that cut the silhouette in two.
 
 mod evidence;
 mod mend;
@@ -29,11 +27,11 @@ use crate::progress::Progress;
 use crate::raster::runs::{Component, components};
 use crate::raster::{Mask, RgbImage, RgbaImage};
 
-/// Where something may be before the animal the plate is off by at least so many levels ...
+/// Least deviation of a line in the background from both of its sides, levels of 255. Free choice.
 const STARK: i32 = 20;
-/// ... from what lies on both sides.
+/// Offsets to one side of a line in four directions, pixels; the other side is opposite.
 const ACROSS: [[i32; 2]; 4] = [[3, 0], [0, 3], [3, 3], [3, -3]];
-/// What is certain of a pixel by itself.
+/// Conditions for a seed pixel. Free choice.
 const CERTAIN: Proof = Proof {
     share: 0.2,
     is_in_plate: true,
@@ -41,7 +39,7 @@ const CERTAIN: Proof = Proof {
     gain: 100.0,
     gain_of_all: 1600.0,
 };
-/// What is enough of one that is joined to such: where the same wire is duller, and its blurred rim.
+/// Conditions for a pixel connected to a seed: duller parts of a wire and its blurred rim. Free choice.
 const ENOUGH: Proof = Proof {
     share: 0.08,
     is_in_plate: false,
@@ -49,17 +47,21 @@ const ENOUGH: Proof = Proof {
     gain: 16.0,
     gain_of_all: 0.0,
 };
-/// Fewer certain pixels that touch are chance.
+/// Least area of a connected group of seed pixels; smaller groups are chance. Free choice.
 const LEAST_AREA_PX: u64 = 3;
-/// Between two frames that are looked at the animal has moved by so many pixels: what rests shows the same again.
+/// Least distance of the centroid between two frames that are used, pixels. A resting animal adds no
+/// evidence.
 const APART_PX: f64 = 3.0;
-/// And at a place of that size it is looked at so often at most: who rocks to and fro shows two pictures, not many.
+/// Greatest number of frames per square of side [`APART_PX`]: a rocking animal repeats two pictures.
 const MOST_AT_PLACE: u32 = 3;
-/// More frames than these tell nothing new.
+/// Greatest number of frames used. Free choice: it bounds the time.
 const MOST_FRAMES: usize = 1024;
 
-/// Finds what stands before the animal and the main plate, and takes it out of the track's mattes, which are measured anew.
-/// The picture is of the footage's size: straight color F and alpha w; `None` when nothing was found.
+/// Finds occluders in front of the main background, removes them from the track's mattes, and measures those
+/// again.
+///
+/// Returns an image of the footage's size with the straight color F and alpha w, or `None` without occluders.
+/// Fails with `Cancelled` when `progress` says so, and when the scratch is full.
 pub fn take_out(
     track: &mut Track,
     plate: &Plate,
@@ -86,7 +88,7 @@ pub fn take_out(
     if found.area() == 0 {
         return Ok(None);
     }
-    // What was found is left out of rings now, so that they show the animal more truly.
+    // The second pass leaves the found pixels out of the rings, which makes their means more accurate.
     let (found, evidence) = judge(&found)?;
     if found.area() == 0 {
         return Ok(None);
@@ -96,7 +98,7 @@ pub fn take_out(
     Ok(Some(occluders))
 }
 
-/// Sightings between which the animal moved, few of them at one place.
+/// Returns the sightings to use: the animal moves between them, and few lie at one place.
 fn spaced(track: &Track) -> Vec<Sighting> {
     let (mut spaced, mut last) = (Vec::new(), None);
     let mut n_at: HashMap<[i64; 2], u32> = HashMap::new();
@@ -119,7 +121,7 @@ fn spaced(track: &Track) -> Vec<Sighting> {
     spaced.into_iter().step_by(step).collect()
 }
 
-/// The pixels of the plate within a box that stand out, in some direction, from what is on both sides.
+/// Returns the pixels in a box that are brighter, or darker, than the background on both sides of them.
 fn stark(plate: &RgbImage, within: Rect) -> Mask {
     let mut stark = Mask::new(within);
     let columns = within.w as usize;
@@ -146,14 +148,14 @@ fn stark(plate: &RgbImage, within: Rect) -> Mask {
     stark
 }
 
-/// The color of pixel `k` of a box of a picture.
+/// Returns the color of pixel `k` of a box of an image.
 fn color_at(picture: &RgbImage, rect: Rect, k: usize) -> [u8; 3] {
     let columns = rect.w as usize;
     let (x, y) = ((k % columns) as u32, (k / columns) as u32);
     picture.pixel(rect.x + x, rect.y + y)
 }
 
-/// Where something is before the animal: what is certain, where enough of it touches, and all that is joined to it.
+/// Returns the occluded pixels: groups of connected `ENOUGH` pixels that contain a group of seeds.
 fn judged(evidence: &[(usize, Evidence)], stark: &Mask) -> Mask {
     let (mut certain, mut enough) = (Mask::new(stark.rect), Mask::new(stark.rect));
     for (k, evidence) in evidence {
@@ -180,7 +182,7 @@ fn judged(evidence: &[(usize, Evidence)], stark: &Mask) -> Mask {
     found
 }
 
-/// The occluders' own color, F = (B - (1 - w) S) / w, with S that of the plate's ring, and their share.
+/// Returns the occluder image: color F = (B - (1 - w) S) / w, with S the background's ring mean, and alpha w.
 fn picture(plate: &RgbImage, found: &Mask, evidence: &[(usize, Evidence)]) -> RgbaImage {
     let within = found.rect;
     let known = |k: usize| i32::from(found.bits[k] == 0);

@@ -1,22 +1,23 @@
-//! Sums over the ring of pixels around a pixel, at the same cost for any ring.
+//! Sums over the ring of pixels around a pixel, in constant time by summed-area tables (Crow 1984).
 
 use crate::geometry::Rect;
 
-/// A ring is the pixels at most so many rows and columns away ...
+/// Outer radius of a ring in rows and columns, pixels. Free choice.
 pub(super) const OUTER_PX: usize = 4;
-/// ... but farther than this: what is seen at the pixel itself is blurred over its neighbors.
+/// Radius of the square left out in the middle, pixels: blur spreads the center pixel over its neighbors.
 const INNER_PX: usize = 1;
 
-/// A plane of numbers, any box of it summed by four of them (Crow 1984).
+/// A summed-area table: the sum over any box takes four look-ups.
 pub(super) struct SummedArea {
     width: usize,
     height: usize,
-    /// One row and one column more than the plane has. Sums may wrap around; those of a ring are small again.
+    /// Table with one row and one column more than the plane. Entries may wrap around; ring sums are small
+    /// and exact.
     sums: Vec<i32>,
 }
 
 impl SummedArea {
-    /// Of a plane of the size of `rect` whose value at index k is `value(k)`.
+    /// Builds the table of a plane of the size of `rect`, with `value(k)` at index k.
     pub(super) fn of(rect: Rect, value: impl Fn(usize) -> i32) -> SummedArea {
         let (width, height) = (rect.w as usize, rect.h as usize);
         let mut sums = vec![0i32; (width + 1) * (height + 1)];
@@ -35,7 +36,7 @@ impl SummedArea {
         }
     }
 
-    /// The sum over the ring around a pixel; there is nothing beyond the plane.
+    /// Returns the sum over the ring around a pixel. Pixels beyond the plane count as 0.
     pub(super) fn ring(&self, x: usize, y: usize) -> i32 {
         self.around(x, y, OUTER_PX)
             .wrapping_sub(self.around(x, y, INNER_PX))

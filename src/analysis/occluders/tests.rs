@@ -1,4 +1,4 @@
-//! A patterned disc that goes to and fro behind wires and before bars, in a film made on the spot.
+//! Tests on synthetic footage: a patterned disc moves to and fro behind wires and in front of bars.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ const SIZE: [u32; 2] = [192, 96];
 const N_FRAMES: usize = 60;
 const RADIUS_PX: f64 = 14.0;
 
-/// What is before the disc: the share of a pixel that it takes, and its level.
+/// Occluder at a pixel: its share of the pixel, 0..=1, and its level.
 type Wires = fn(u32, u32) -> (f64, f64);
 
-/// A wire that glitters in parts, and one of another brightness that covers half of two pixels.
+/// Wires: one with bright and dull parts, and one of another level that covers half of two rows.
 fn two_wires(x: u32, y: u32) -> (f64, f64) {
     match y {
         44 if x % 24 < 16 => (0.9, 230.0),
@@ -35,11 +35,11 @@ fn none(_: u32, _: u32) -> (f64, f64) {
 
 struct Film {
     wires: Wires,
-    /// How much of the disc lets what is behind it through.
+    /// Share of the disc's color that comes from behind it, 0..=1.
     clear: f64,
 }
 
-/// A gray wall with dark bars of two pixels and bright ones of one.
+/// Level of a gray wall with dark bars two pixels wide and bright bars one pixel wide.
 fn wall(x: u32) -> f64 {
     match x % 12 {
         0 | 1 => 105.0,
@@ -56,7 +56,7 @@ fn center_px(frame_idx: usize) -> [f64; 2] {
     ]
 }
 
-/// The disc's own level: spots that go with it.
+/// Level of the disc: a pattern of spots that moves with it.
 fn coat(u: f64, v: f64) -> f64 {
     let [u, v] = [u, v].map(|at| (at + 100.0) as u64 / 4);
     60.0 + 24.0 * random::unit(5, &[u, v])
@@ -76,7 +76,7 @@ impl Film {
         share * own + (1.0 - share) * level
     }
 
-    /// The track of the film, its plate, and what was found before the disc.
+    /// Returns the track of the film, its background and the occluders found.
     fn looked_at(&self) -> (Track, Plate, Option<RgbaImage>) {
         let params = Params::default();
         let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
@@ -138,11 +138,11 @@ fn wires_before_the_animal_are_found_and_bars_behind_it_are_not() {
     let (_, plate, found) = film.looked_at();
     let found = found.expect("two wires");
     let (mut n_right, mut n_wire, mut n_wrong) = (0, 0, 0);
-    // Where the disc passes fully.
+    // Rows and columns that the whole disc crosses.
     for (x, y) in (40..152).flat_map(|x| (40..56).map(move |y| (x, y))) {
         let (share, level) = two_wires(x, y);
         let [r, g, b, alpha] = found.pixel(x, y).map(f64::from);
-        // Crossings with bars are told less well.
+        // Shares are less accurate where a wire crosses a bar.
         let is_wire = share > 0.0 && wall(x) == 150.0;
         n_wire += usize::from(is_wire);
         match share > 0.0 {
@@ -186,7 +186,7 @@ fn mattes_are_the_animal_as_if_nothing_had_been_before_it() {
         assert!(libm::hypot(x - cx, y - cy) < 0.5, "{x}, {y}: {cx}, {cy}");
     }
     assert!(n_torn as f64 <= n / 50.0, "{n_torn} of {n}");
-    // The spots are 24 levels apart.
+    // The levels of the spots span 24.
     assert!(off / n < 5.0, "{}", off / n);
 }
 

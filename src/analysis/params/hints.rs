@@ -1,4 +1,4 @@
-//! What a person says of a film that it does not say itself: which part is measured, which thing is the animal, what is none.
+//! Hints from the user: the part of the footage to measure, the position of the animal, boxes to ignore.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -6,35 +6,35 @@ use utoipa::ToSchema;
 use super::Params;
 use crate::geometry::Rect;
 
-/// Boxes to ignore, at most.
+/// Largest number of boxes to ignore. Free choice.
 const MOST_IGNORED: usize = 64;
 
-/// Where the animal is in one frame.
+/// The position of the animal in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AnimalAtParam {
-    /// The frame, counted from 0.
+    /// Frame number, counted from 0.
     pub frame: u32,
-    /// A point of the animal, pixels.
+    /// A point on the animal, pixels.
     pub point: [f64; 2],
 }
 
-/// A box in which nothing is taken for the animal.
+/// A box in which nothing counts as the animal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IgnoreParam {
     /// Left, top, width and height, pixels.
     pub box_px: [u32; 4],
-    /// From when on, seconds; null = from the start.
+    /// Start time, seconds. null = from the start of the footage.
     #[serde(default)]
     pub from_s: Option<f64>,
-    /// Until when, seconds; null = to the end.
+    /// End time, seconds. null = to the end of the footage.
     #[serde(default)]
     pub to_s: Option<f64>,
 }
 
 impl Params {
-    /// The boxes in which nothing is the animal at a time, as far as they lie in a picture of the given size.
+    /// Returns the boxes to ignore at a time, clipped to an image of the given size.
     pub fn ignored_at(&self, time_s: f64, [width, height]: [u32; 2]) -> Vec<Rect> {
         let holds = |ignore: &&IgnoreParam| {
             ignore.from_s.is_none_or(|from_s| from_s <= time_s)
@@ -47,7 +47,7 @@ impl Params {
         self.ignore.iter().filter(holds).map(clipped).collect()
     }
 
-    /// Checks what says which part of the film is measured, and what in it.
+    /// Checks the hints. The error names the invalid parameter.
     pub(super) fn check_hints(&self) -> Result<(), String> {
         check_span("", self.from_s, self.to_s)?;
         if let Some(at) = self.animal_at
@@ -70,7 +70,7 @@ impl Params {
     }
 }
 
-/// Checks that a span of time, where both ends are set, is one.
+/// Checks that a time span is valid: 0 <= from < to.
 fn check_span(name: &str, from_s: Option<f64>, to_s: Option<f64>) -> Result<(), String> {
     let (from_s, to_s) = (from_s.unwrap_or(0.0), to_s.unwrap_or(f64::MAX));
     match 0.0 <= from_s && from_s < to_s && to_s.is_finite() {

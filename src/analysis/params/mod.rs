@@ -1,4 +1,5 @@
-//! What a person may set about an analysis. Every default is the value of ALGORITHMS.md.
+//! Parameters of an analysis: defaults, ranges and presets. docs/explanation/algorithms.md explains the
+//! defaults.
 
 mod hints;
 
@@ -11,77 +12,80 @@ use super::distance::Clip;
 use crate::geometry::Camera;
 use crate::library::{Animal, View};
 
-/// Parameters of an analysis; all have defaults.
+/// Parameters of an analysis. All have defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = AnalysisParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Frames a second, 0.01..=1000; null = as the file says. With a value every picture of the file is used once.
+    /// Frame rate, frames per second, 0.01..=1000. null = as the file says. When set, each picture of the
+    /// file is used once.
     pub fps: Option<f64>,
-    /// Width of a pixel over its height, 0.1..=10; null = as the file says.
+    /// Width of a pixel divided by its height, 0.1..=10. null = as the file says.
     pub pixel_aspect: Option<f64>,
-    /// Where the part that is measured begins, seconds from the file's first frame; null = there. All frames and times
-    /// are counted from this.
+    /// Start of the measured part, seconds from the first frame of the file. null = the first frame. Frame
+    /// numbers and times in the results count from here.
     pub from_s: Option<f64>,
-    /// Where the part that is measured ends, seconds from the file's first frame; null = at the last one.
+    /// End of the measured part, seconds from the first frame of the file. null = the last frame.
     pub to_s: Option<f64>,
-    /// Where the animal is in one frame: that thing is followed, whatever else moves.
+    /// Position of the animal in one frame. The analysis follows the object there, whatever else moves.
     pub animal_at: Option<AnimalAtParam>,
-    /// Boxes in which nothing is taken for the animal, at most 64.
+    /// Boxes in which nothing counts as the animal, at most 64.
     pub ignore: Vec<IgnoreParam>,
-    /// From where the animal is seen; guessed when absent.
+    /// View from which the animal was filmed. null = guessed.
     pub view: Option<ViewParam>,
-    /// The calibrated camera; without it nothing is given in metres.
+    /// Calibrated camera. null = no results in metres.
     pub camera: Option<CameraParams>,
-    /// The animal's known size; without it the depth is null.
+    /// Known size of the animal. null = no depth.
     pub animal: Option<AnimalParams>,
-    /// Least difference from the background, of 255, that counts as the animal: 1..=254.
+    /// Smallest difference from the background that counts as the animal, 1..=254 of 255.
     pub threshold: u8,
-    /// What to do when several animals move.
+    /// Behavior when several animals move.
     pub follow: Follow,
-    /// Whether sprites are cut out of an animal too small to be looked at.
+    /// Whether to cut out sprites of an animal that is too small to show.
     pub sprites: CutSprites,
-    /// At which size sprites are cut out.
+    /// Scale of the sprites.
     pub scale_mode: ScaleMode,
-    /// Where the head is, once and for all, in one frame: decides between head and tail.
+    /// Position of the head in one frame. It decides between head and tail.
     pub head: Option<HeadParam>,
-    /// Smooth positions and directions over time; off gives each frame's raw values.
+    /// Whether to smooth positions and directions over time. false = the raw values of each frame.
     pub smooth: bool,
-    /// f: frames in a clip, 1..=120; null = 8 at 30 frames a second, in proportion to the rate.
+    /// Clip length f, frames, 1..=120. null = 8 at 30 frames per second, in proportion to the frame rate.
     pub clip_frames: Option<u32>,
-    /// How much each frame of two clips counts in their distance.
+    /// Weights of the frames of a clip in the distance.
     pub clip_weights: ClipWeights,
-    /// Clips nearer than this are alike; null = kappa times the natural step.
+    /// Distance below which two clips are similar. null = `kappa` times the natural step.
     pub epsilon: Option<u64>,
-    /// Multiple of the natural step, > 0, when epsilon is null; larger ones are tried where it joins too little.
+    /// Multiple of the natural step that gives `epsilon` when that is null, > 0. If playback is then too
+    /// short, the analysis tries larger values.
     pub kappa: f64,
-    /// Whether only clips that look roughly alike are compared, which is faster above 50 000 frames and misses
-    /// some transitions: `stats.recall` says how many. Those found are transitions all the same.
+    /// Whether to compare only roughly similar clips. That is faster above 50,000 frames and misses some
+    /// transitions. Those found are correct; `stats.recall` reports their share.
     pub approximate: bool,
-    /// Largest difference of the mean headings of two like clips, degrees, 0..=180.
+    /// Largest difference between the mean headings of two similar clips in side view, degrees, 0..=180.
     pub heading_gate_deg: f64,
-    /// Sum over the color planes and alpha (`rgba`), or over the color planes alone (`rgb`, O 3).
+    /// Image planes that are compared: color and alpha (`rgba`), or color only (`rgb`, Okabe et al., equation
+    /// 3).
     pub planes: Planes,
-    /// Whether sprites may also be shown left-right mirrored.
+    /// Whether sprites may also be shown mirrored.
     pub mirror: bool,
-    /// How N (7) is read: `corrected`, or `printed` with its quotient upside down.
+    /// Reading of Nakajima et al., equation 7: `corrected`, or `printed`, with the quotient inverted.
     pub eq7: Eq7,
-    /// How axis and head are told: `corrected`, or as N and O are `printed`.
+    /// Method for the length axis and the head: `corrected`, or `printed` as in the two papers.
     pub axis_and_head: AxisAndHead,
 }
 
-/// At which size sprites are compared and exported (ALGORITHMS.md 5).
+/// Scale at which sprites are compared and exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScaleMode {
-    /// As filmed (O).
+    /// As filmed (Okabe et al.).
     Native,
-    /// In side view at one height, as if the animal had always been as far from the camera, so that what it does
-    /// far away compares with what it does near by. Enlarged at most 1.5 times. From above as filmed.
+    /// In side view, scaled to a constant height, so that near and far moments are comparable; enlarged at
+    /// most 1.5 times. In top view as filmed.
     Depth,
 }
 
-/// From where the animal is seen.
+/// View from which the animal was filmed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ViewParam {
@@ -91,85 +95,85 @@ pub enum ViewParam {
     Top,
 }
 
-/// A calibrated camera (N 5.1).
+/// A calibrated camera (Nakajima et al., section 5.1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraParams {
-    /// Distance from the camera to the front pane, metres.
+    /// Distance from the camera to the front pane, metres, > 0.
     pub z_min_m: f64,
-    /// Pixels per metre on the pane.
+    /// Pixels per metre on the pane, > 0.
     pub pane_px_per_m: f64,
-    /// The image point straight ahead; null = the middle of the image.
+    /// Image point on the optical axis, pixels. null = the center of the image.
     #[serde(default)]
     pub center_px: Option<[f64; 2]>,
-    /// Refractive index behind the pane: 1 (N) for air, 1.333 for water.
+    /// Refractive index behind the pane, > 0: 1 for air (Nakajima et al.), 1.333 for water.
     #[serde(default = "air")]
     pub medium_index: f64,
 }
 
-/// The animal's size.
+/// The size of the animal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AnimalParams {
-    /// From the nose to the tip of the tail, metres.
+    /// Length from the nose to the tip of the tail, metres, > 0.
     pub length_m: f64,
-    /// Height of the whole silhouette, fins included, metres.
+    /// Height of the silhouette, fins included, metres, > 0.
     pub height_m: f64,
 }
 
-/// Where the head is in one frame.
+/// The position of the head in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeadParam {
-    /// The frame.
+    /// Frame number, counted from 0.
     pub frame: u32,
-    /// A point nearer the head than the tail, pixels.
+    /// A point nearer to the head than to the tail, pixels.
     pub point: [f64; 2],
 }
 
-/// What to do when several animals move.
+/// Behavior when several animals move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Follow {
     /// Refuse the footage with `several_animals`.
     One,
-    /// Follow the largest.
+    /// Follow the largest animal.
     Largest,
 }
 
-/// Whether sprites are cut.
+/// Whether to cut out sprites.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CutSprites {
-    /// Unless the animal's median area is below 24 pixels: then the library holds poses alone, and a
-    /// flock of it is refused with `animal_too_small`.
+    /// Yes, unless the median area of the animal is below 24 square pixels. The library then contains poses
+    /// only, and a flock from it is refused with `animal_too_small`.
     Auto,
-    /// Of an animal of any size.
+    /// Yes, for an animal of any size.
     Always,
 }
 
-/// How much each frame of a clip counts.
+/// Weights of the frames of a clip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ClipWeights {
-    /// All the same: O (2).
+    /// Equal weights (Okabe et al., equation 2).
     Uniform,
-    /// Frame k of f by the binomial coefficient of k out of f - 1, so that the middle, where playback jumps,
-    /// counts most (Schoedl et al., Video Textures, 2000). f must be at most 24.
+    /// Frame k of f has the binomial coefficient of k out of f - 1 as weight. The middle, where playback
+    /// jumps, counts most (Schoedl et al., Video Textures, 2000). f is at most 24.
     Binomial,
 }
 
-/// Which planes are compared.
+/// Image planes that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Planes {
     /// Premultiplied R, G, B, and alpha.
     Rgba,
-    /// Premultiplied R, G, B: O (3).
+    /// Premultiplied R, G, B (Okabe et al., equation 3).
     Rgb,
 }
 
-/// How N (7) is read.
+/// Reading of Nakajima et al., equation 7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Eq7 {
@@ -179,14 +183,15 @@ pub enum Eq7 {
     Printed,
 }
 
-/// How the length axis and the head are told.
+/// Method for the length axis and the head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AxisAndHead {
-    /// The axis with memory, the head by one decision over the whole footage.
+    /// The axis follows from the previous frames, the head from one decision over the whole footage.
     Corrected,
-    /// N (4) and 5.3: the arctangent of a quotient gives the axis nearer the horizontal, each frame by
-    /// itself. O 3.3: the head is where it was in the frame before, in the first one at +axis.
+    /// Nakajima et al., equation 4 and section 5.3: the arctangent of a quotient gives the axis nearer to the
+    /// horizontal, for each frame separately. Okabe et al., section 3.3: the head stays at the end where it
+    /// was in the previous frame, and starts at the positive end of the axis.
     Printed,
 }
 
@@ -223,8 +228,8 @@ impl Default for Params {
 }
 
 impl Params {
-    /// What N and O say, as far as they say it: raw values, axis and head as printed,
-    /// RGB planes, no mirror.
+    /// Returns the preset `papers`, as far as the papers specify the parameters: raw values, axis and head as
+    /// printed, RGB planes, no mirroring.
     pub fn papers() -> Params {
         Params {
             smooth: false,
@@ -235,7 +240,8 @@ impl Params {
         }
     }
 
-    /// f for a footage of `fps`: as set, or 8 at 30 frames a second in proportion, at least 2.
+    /// Returns the clip length f for a frame rate, in frames: as set, or in proportion to 8 at 30 frames per
+    /// second, at least 2.
     pub fn clip_frames_at(&self, fps: f64) -> usize {
         match self.clip_frames {
             Some(frames) => frames as usize,
@@ -245,13 +251,13 @@ impl Params {
         }
     }
 
-    /// A clip of so many frames, weighed as asked for.
+    /// Returns a clip of `frames` frames with the chosen weights.
     pub fn clip(&self, frames: usize) -> Clip {
         let weights = self.clip_weights;
         Clip { frames, weights }
     }
 
-    /// The camera for an image of the given size, if one was set.
+    /// Returns the camera for an image of the given size, if one is set.
     pub fn camera(&self, width: u32, height: u32) -> Option<Camera> {
         self.camera.map(|camera| Camera {
             z_min_m: camera.z_min_m,
@@ -263,7 +269,7 @@ impl Params {
         })
     }
 
-    /// The animal's size, if it was set.
+    /// Returns the size of the animal, if it is set.
     pub fn animal(&self) -> Option<Animal> {
         self.animal.map(|a| Animal {
             length_m: a.length_m,
@@ -271,7 +277,7 @@ impl Params {
         })
     }
 
-    /// The view, if it was set.
+    /// Returns the view, if it is set.
     pub fn view(&self) -> Option<View> {
         self.view.map(|view| match view {
             ViewParam::Side => View::Side,
@@ -279,7 +285,8 @@ impl Params {
         })
     }
 
-    /// Binomial coefficients of longer clips would exceed what sums of distances hold.
+    /// Returns the largest clip length, frames. Binomial coefficients of longer clips would overflow the
+    /// distances.
     fn most_clip_frames(&self) -> u32 {
         match self.clip_weights {
             ClipWeights::Uniform => 120,
@@ -287,7 +294,7 @@ impl Params {
         }
     }
 
-    /// Checks every range; the sentence says which parameter is out of which range.
+    /// Checks all ranges. The error names the parameter and its range.
     pub fn check(&self) -> Result<(), String> {
         let positive = |name: &str, value: f64| {
             (value.is_finite() && value > 0.0)
@@ -332,7 +339,7 @@ impl Params {
     }
 }
 
-/// Checks that a value, where one is set, lies in a range.
+/// Checks that a value is in a range, if it is set.
 fn within(
     name: &str,
     value: Option<f64>,

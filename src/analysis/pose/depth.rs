@@ -1,15 +1,16 @@
-//! Position and direction in space from one frame alone (N 5.3 and 6, corrected as ALGORITHMS.md 1 says).
+//! Position and direction in space from one frame (Nakajima et al., sections 5.3 and 6, corrected).
 //!
-//! Depth from the height of the silhouette, the angle to the picture from how much of the known length
-//! is seen at that depth. N leaves open whether the animal comes or goes; alone, a frame can only be
-//! compared with the one before. These are the raw values; `direction` gives the best estimate.
+//! The height of the silhouette gives the depth. The visible share of the known length at that depth gives
+//! the angle to the image plane. The paper leaves open whether the animal swims away or toward the camera.
+//! Here the change of depth since the previous measured frame decides. These are the raw values; `direction`
+//! has the best estimate. See docs/explanation/algorithms.md, "Corrections to the papers".
 
 use crate::analysis::Params;
 use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
 use crate::library::{Animal, Poses, Raw};
 
-/// Fills in the raw heading of every pose, and with a camera and the animal's size its raw position and
+/// Writes the raw heading of every pose. With a camera and the animal's size, also the raw position and
 /// direction.
 pub fn measure_alone(poses: &mut Poses, params: &Params) {
     let calibrated = poses.camera.zip(poses.animal);
@@ -23,7 +24,7 @@ pub fn measure_alone(poses: &mut Poses, params: &Params) {
             ..Raw::default()
         };
         let sizes = pose.length_px.zip(pose.height_px);
-        // A silhouette cut by the border shows less than its height.
+        // A silhouette cut by the border shows only a part of its height.
         let whole = sizes.filter(|&(_, height)| height > 0.0 && !pose.cut);
         if let (Some((camera, animal)), Some(sizes), Some(centroid)) =
             (calibrated, whole, pose.centroid_px)
@@ -44,7 +45,8 @@ pub fn measure_alone(poses: &mut Poses, params: &Params) {
     }
 }
 
-/// The apparent depth, metres, by N (7), and the share of the length that is seen, by N (8), 0..=1.
+/// Returns the apparent depth (Nakajima et al., equation 7), metres, and the visible share of the length
+/// (equation 8), 0..=1.
 fn depth_and_cosine(
     camera: &Camera,
     animal: &Animal,

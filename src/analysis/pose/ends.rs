@@ -1,42 +1,47 @@
-//! Which end is the head, as both ends look in all frames of a film.
+//! Decides which end is the head, from the appearance of both ends in all frames of a film.
 //!
-//! What tells the ends apart (`track::asymmetry`) is one direction in the space of its numbers, the same in every frame but
-//! for the sign: the first principal axis of all frames, not centered. It needs neither motion nor a first guess. Which of
-//! its two ways is the head's is told once for the film, by the way the animal moves.
+//! The difference between the ends (`track::asymmetry`) is the same vector in every frame, except for its
+//! sign. It is estimated as the first principal axis of all frames, without centering. This needs neither
+//! motion nor a first guess. The direction of motion decides once per film which sign belongs to the head.
 
 use super::Axes;
 use crate::analysis::track::Tracked;
 use crate::analysis::track::asymmetry::{Asymmetry, N_NUMBERS};
 
-/// The standard deviations of a silhouette along and across its axis must be in this ratio at least.
+/// Least ratio of the standard deviations along and across the axis. Free choice: round silhouettes have no
+/// ends.
 const LONG: f64 = 1.25;
-/// Fewer frames do not tell what the ends look like.
+/// Least number of frames to estimate the difference between the ends. Free choice.
 const LEAST_FRAMES: usize = 8;
-/// Rounds of power iteration.
+/// Iterations of the power method. Free choice.
 const N_ROUNDS: usize = 64;
-/// What a single frame may say, half the logarithm of the odds.
+/// Greatest evidence of one frame, half the log-odds. Free choice.
 const MOST: f64 = 4.0;
-/// Scores spread by at least this share of their mean: no film is without light that plays on the animal.
+/// Least standard deviation of scores, as a share of their mean. Free choice: changing light varies every
+/// film.
 const LEAST_SPREAD: f64 = 0.25;
-/// Speeds count up to this one, lengths a second.
+/// Greatest speed that counts, body lengths per second. Free choice.
 const MOST_SPEED: f64 = 1.0;
-/// The sum over spans of this many seconds says how sure the direction of motion is.
+/// Length of the spans over which speeds are averaged, seconds. Their scatter gives the certainty. Free
+/// choice.
 const SPAN_S: f64 = 0.5;
 
-/// The length axis follows the axis of the moments; where it does not, the ends are not its own.
+/// Least |cosine| of the angle between the length axis and the axis of the moments. Free choice.
+///
+/// At larger angles, the ends of the moments are not those of the length axis.
 const SAME_AXIS: f64 = 0.7;
 
-/// What the ends of the animal say of its head.
+/// Evidence for the head from the appearance of the ends.
 pub(super) struct Ends {
-    /// For each frame half the logarithm of the odds that the head lies toward +axis.
+    /// Half the log-odds that the head lies toward +axis, for each frame; `None` when the ends say nothing.
     pub(super) evidence: Vec<Option<f64>>,
-    /// The probability that the animal moves head first on the whole, .5..=1: that all of `evidence` has the right sign.
-    /// `None` where the ends tell nothing.
+    /// Probability that the animal mostly moves head first, 0.5..=1: that `evidence` has the right sign.
+    /// `None` without evidence.
     certainty: Option<f64>,
 }
 
 impl Ends {
-    /// Tells heads from tails. `speed` is the speed along +axis in each frame, lengths a second.
+    /// Estimates the evidence of all frames. `speed` is the speed along +axis, body lengths per second.
     pub(super) fn tell(
         track: &[Tracked],
         axes: &[Option<Axes>],
@@ -87,12 +92,13 @@ impl Ends {
         }
         Ends {
             evidence,
-            // The logistic function of 1.7 t is the normal distribution's within .01.
+            // The logistic function of 1.7 t differs from the normal distribution by less than 0.01.
             certainty: Some(1.0 / (1.0 + libm::exp(-1.7 * forward.abs()))),
         }
     }
 
-    /// A probability that assumes the right sign of the evidence, without that assumption.
+    /// Returns a probability that assumes the right sign of the evidence, corrected for the risk of the wrong
+    /// sign.
     pub(super) fn tempered(&self, probability: f64) -> f64 {
         let certainty = self.certainty.unwrap_or(1.0);
         certainty * probability + (1.0 - certainty) * (1.0 - probability)
@@ -105,7 +111,7 @@ fn usable(tracked: &Tracked) -> Option<&Asymmetry> {
     sighting.asymmetry.as_ref().filter(|_| is_long)
 }
 
-/// The unit vector along which the numbers of all frames are largest, whatever their signs.
+/// Returns the unit vector with the greatest sum of squared projections of all frames.
 fn principal_axis(all: &[&Asymmetry]) -> [f64; N_NUMBERS] {
     let largest = all.iter().max_by(|a, b| {
         let square = |a: &Asymmetry| a.ends.iter().map(|v| v * v).sum::<f32>();
@@ -135,8 +141,10 @@ fn score(asymmetry: &Asymmetry, axis: &[f64; N_NUMBERS]) -> f64 {
         .sum()
 }
 
-/// How surely the animal moves toward the end that the evidence names: the sum over spans of the mean speed that way, over
-/// its standard deviation if both ways were as likely.
+/// Returns the t-statistic of motion toward the end that the evidence names.
+///
+/// It is the sum over spans of the mean speed toward that end, divided by its standard deviation if both
+/// directions were equally likely.
 fn forward(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f64 {
     let span = ((SPAN_S * fps).round() as usize).max(1);
     let spans = evidence
@@ -165,12 +173,12 @@ mod tests {
     const FPS: f64 = 30.0;
     const N_FRAMES: usize = 240;
 
-    /// Whether its head is at the left end: it turns every second.
+    /// Returns whether the head is at the left end; it changes every 30 frames.
     fn is_left(k: usize) -> bool {
         k / 30 % 2 == 1
     }
 
-    /// The ends of an animal that moves head first at `forward(k)` lengths a second.
+    /// Returns the ends of an animal that moves head first at `forward(k)` body lengths per second.
     fn told(forward: impl Fn(usize) -> f64) -> Ends {
         let look = |k| Look {
             is_left: is_left(k),
@@ -192,7 +200,7 @@ mod tests {
         Ends::tell(&track, &axes, &speed, FPS)
     }
 
-    /// How many frames have the head at the wrong end.
+    /// Returns the number of frames with the head at the wrong end.
     fn n_wrong(ends: &Ends) -> usize {
         let is_wrong = |k: &usize| ends.evidence[*k].is_none_or(|e| (e < 0.0) != is_left(*k));
         (0..N_FRAMES).filter(is_wrong).count()

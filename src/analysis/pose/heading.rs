@@ -1,32 +1,34 @@
-//! Which end is the head: one decision for the whole footage (ALGORITHMS.md 4; against O 3.3, where
-//! one early error lasts for ever).
+//! Decides which end is the head, in all frames together.
 //!
-//! Two states a frame, the head at either end of the length axis. A state is likely when the animal
-//! moves that way and when the ends look as they do in the other frames (`ends`); a change of state
-//! that turns the head by more than a quarter circle costs much while the animal is seen at length.
-//! The cheapest sequence is found by Viterbi, its certainty by the forward-backward algorithm.
+//! Each frame has two states: the head at either end of the length axis. Motion toward an end and the
+//! appearance of the ends (`ends`) are evidence for a state. A turn of the head by more than a quarter circle
+//! is expensive while the animal appears long. The Viterbi algorithm finds the cheapest sequence, the
+//! forward-backward algorithm its probability. Okabe et al., section 3.3, use only the previous frame, so
+//! that one early error lasts forever. See docs/explanation/algorithms.md, "Pose".
 
 use super::Axes;
 
-/// Speed at which the direction of motion decides, lengths a second.
+/// Speed along the axis that counts as evidence 1, body lengths per second. Free choice.
 const DECISIVE_SPEED: f64 = 0.45;
-/// Motion counts at most this much.
+/// Greatest evidence from motion, half the log-odds. Free choice.
 const MOST_MOTION: f64 = 3.0;
-/// Where the head is known, nothing else counts.
+/// Evidence where the user gave the head; it exceeds all other evidence.
 const PINNED: f64 = 1e6;
 
-/// The decision for one frame.
+/// The head in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Head {
-    /// The head lies toward +axis (the axis in (-pi/2, pi/2]).
+    /// Whether the head lies toward +axis, with the axis in (-pi/2, pi/2].
     pub forward: bool,
-    /// Posterior probability of that, 0.5..=1 where the decision is not against the odds.
+    /// Posterior probability of the chosen end, 0..=1; below 0.5 where the cheapest sequence contradicts it.
     pub confidence: f64,
 }
 
-/// Decides for every frame with an axis. `speed_along` is the speed toward +axis, lengths a second; `ends` what the look of
-/// both ends says for that way, half the logarithm of the odds; `pin` is a frame whose head is known to lie toward +axis
-/// (true) or -axis.
+/// Decides for every frame with an axis; other frames get `None`.
+///
+/// `speed_along` is the speed toward +axis, body lengths per second. `ends` is the evidence of the ends for
+/// +axis, half the log-odds. `pin` is a frame whose head is known to lie toward +axis (true) or -axis
+/// (false).
 pub fn decode(
     axes: &[Option<Axes>],
     speed_along: &[Option<f64>],
@@ -57,8 +59,9 @@ pub fn decode(
     heads
 }
 
-/// O 3.3 as it is printed: the head lies where it turns least from the frame before; in the first
-/// frame toward +axis. Nothing is known of how sure that is: the confidence is 0.5.
+/// Decides as Okabe et al., section 3.3, print it: the head turns least from the previous frame.
+///
+/// In the first frame it lies toward +axis. The rule gives no probability, so the confidence is 0.5.
 pub fn keep(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
     let mut last: Option<[f64; 2]> = None;
     let mut one = |axes: &Option<Axes>| {
@@ -73,7 +76,7 @@ pub fn keep(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
     axes.iter().map(&mut one).collect()
 }
 
-/// What speaks for the head toward +axis in each frame: minus the emission cost of that state.
+/// Returns the evidence for the head toward +axis in each frame: minus the emission cost of that state.
 fn evidence(
     axes: &[Option<Axes>],
     speed_along: &[Option<f64>],
@@ -99,7 +102,7 @@ fn evidence(
     (0..axes.len()).map(one).collect()
 }
 
-/// The speed along +axis of each frame, lengths a second.
+/// Returns the speed along +axis in each frame, body lengths per second.
 pub fn speed_along(
     axes: &[Option<Axes>],
     velocity_px: &[Option<[f64; 2]>],
@@ -112,13 +115,13 @@ pub fn speed_along(
     axes.iter().zip(velocity_px).map(of).collect()
 }
 
-/// The costs of (keeping, changing) the state from one axis to the next.
+/// Returns the costs of keeping and of changing the state between two axes.
 fn switch_costs(a: &Axes, b: &Axes) -> (f64, f64) {
     let (Some(u), Some(v)) = (a.direction(), b.direction()) else {
         return (0.0, 0.0);
     };
     let cost = 2.0 + 10.0 * (b.length_px / (2.5 * b.height_px.max(1.0))).clamp(0.0, 1.0);
-    // The axis itself may jump across the vertical: then keeping the state turns the head.
+    // The axis itself may flip across the vertical; then the head turns when the state is kept.
     if u[0] * v[0] + u[1] * v[1] >= 0.0 {
         (0.0, cost)
     } else {
@@ -126,7 +129,7 @@ fn switch_costs(a: &Axes, b: &Axes) -> (f64, f64) {
     }
 }
 
-/// True where the cheapest sequence has the head toward +axis.
+/// Returns the cheapest sequence: true where the head lies toward +axis.
 fn viterbi(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<bool> {
     let mut costs = [0.0f64; 2];
     let mut came_from: Vec<[usize; 2]> = Vec::with_capacity(emissions.len());
@@ -151,7 +154,7 @@ fn viterbi(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<bool> {
     path
 }
 
-/// The posterior probability of the head toward +axis in each frame, costs being negative logarithms.
+/// Returns the posterior probability of the head toward +axis in each frame. Costs are negative logarithms.
 fn forward_backward(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<f64> {
     let n = emissions.len();
     let log_sum = |a: f64, b: f64| a.max(b) + libm::log1p(libm::exp(-(a - b).abs()));
@@ -162,7 +165,7 @@ fn forward_backward(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<f64> {
             if step > 0 {
                 let (keep, change) = switch(k);
                 last = [0, 1].map(|s: usize| log_sum(last[s] - keep, last[1 - s] - change));
-                // Only the difference matters.
+                // Only the difference of the two states matters.
                 last = [last[0] - last[1], 0.0];
             }
             messages[k] = last;
@@ -190,7 +193,7 @@ mod tests {
     /// Headings, axes and velocities.
     type Circling = (Vec<f64>, Vec<Option<Axes>>, Vec<Option<[f64; 2]>>);
 
-    /// An animal that swims round a circle, 60 px long, seen as its axis alone.
+    /// An animal that swims in a circle, 60 px long, described by its axis only.
     fn circling(n: usize, speed_px_s: impl Fn(usize) -> f64) -> Circling {
         let heading = |k: usize| crate::geometry::wrap_rad(k as f64 * 0.05);
         let axis = |h: f64| {
@@ -227,7 +230,7 @@ mod tests {
         (headings, axes, velocity)
     }
 
-    /// By motion alone.
+    /// Decodes from motion only.
     fn decoded(
         axes: &[Option<Axes>],
         velocity: &[Option<[f64; 2]>],

@@ -1,5 +1,8 @@
-//! From sightings to poses: the length axis, the heading, and with a calibrated camera the position
-//! and direction in space (N 5 and 6, O 3.3, corrected as ALGORITHMS.md 1 and 4 say).
+//! Poses from sightings: length axis, heading and, with a calibrated camera, position and direction in space.
+//!
+//! The sources are Nakajima et al., sections 5 and 6, and Okabe et al., section 3.3, both corrected
+//! (docs/explanation/algorithms.md, "Corrections to the papers"). The rest is described in
+//! docs/explanation/algorithms.md, "Pose".
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
@@ -22,31 +25,32 @@ use crate::library::{Pose, Poses, View};
 use ends::Ends;
 use smooth::{Smoothed, smooth};
 
-/// The side view keeps its length axis unless the other one is nearer the horizontal by this much.
+/// Least lead of the other axis toward the horizontal for a change of the length axis in side view, radians.
+/// From docs/explanation/algorithms.md, "Corrections to the papers".
 const MEMORY_RAD: f64 = 10.0 * PI / 180.0;
 
-/// The length axis of one frame and what was measured along it.
+/// Length axis of one frame and measurements along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
-    /// In (-pi/2, pi/2]; `None` where the silhouette is round.
+    /// Angle in (-pi/2, pi/2]; `None` when the silhouette is round.
     pub axis_rad: Option<f64>,
-    /// Extent along the axis.
+    /// Extent along the axis, pixels.
     pub length_px: f64,
-    /// Extent across it.
+    /// Extent across the axis, pixels.
     pub height_px: f64,
-    /// Third standardised moment along it.
+    /// Third standardized moment along the axis, positive toward +axis.
     pub skew: f64,
 }
 
 impl Axes {
-    /// The unit vector of the axis.
+    /// Returns the unit vector of the axis; `None` without an axis.
     pub fn direction(&self) -> Option<[f64; 2]> {
         self.axis_rad
             .map(|angle| [libm::cos(angle), libm::sin(angle)])
     }
 }
 
-/// From where the animal is seen: as asked for, or guessed, with the probability that the guess is right, .5..=1.
+/// Returns the view: the given one, or a guess with the probability that it is right, 0.5..=1.
 pub fn view(track: &[Tracked], params: &Params) -> (View, Option<f64>) {
     match params.view() {
         Some(view) => (view, None),
@@ -57,7 +61,7 @@ pub fn view(track: &[Tracked], params: &Params) -> (View, Option<f64>) {
     }
 }
 
-/// The poses of a track.
+/// Returns the poses of a track, one per frame.
 pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &Params) -> Poses {
     let axes = length_axes(track, view, params.axis_and_head);
     let motion = Motion::of(track, format.fps);
@@ -120,7 +124,7 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
     poses
 }
 
-/// What one frame alone says is all there is.
+/// Takes position and direction from the raw values of the single frame.
 fn take_raw(pose: &mut Pose) {
     let Some(raw) = pose.raw else { return };
     pose.position_m = raw.position_m;
@@ -129,8 +133,9 @@ fn take_raw(pose: &mut Pose) {
     }
 }
 
-/// Replaces what single frames say of place and direction by what all frames together say. Without a
-/// camera or the animal's size the heading alone is given, by a usual camera.
+/// Writes position and direction as estimated from all frames together.
+///
+/// Without a camera or the animal's size, only the heading is written, computed with a typical camera.
 fn best_estimate(
     poses: &mut Poses,
     track: &[Tracked],
@@ -183,7 +188,7 @@ fn best_estimate(
     }
 }
 
-/// Writes a direction in space and the angles that say the same.
+/// Writes a direction in space, and its heading, yaw, pitch and angle to the image plane.
 fn point_along(pose: &mut Pose, forward: [f64; 3]) {
     let [x, y, z] = forward;
     pose.forward = Some(forward);
@@ -193,11 +198,11 @@ fn point_along(pose: &mut Pose, forward: [f64; 3]) {
     pose.gamma_rad = Some(libm::atan2(z.abs(), libm::hypot(x, y)));
 }
 
-/// The centroid's smoothed path.
+/// Smoothed path of the centroid, pixels.
 pub struct Motion {
-    /// Horizontal.
+    /// Horizontal coordinate.
     pub x: Smoothed,
-    /// Vertical.
+    /// Vertical coordinate.
     pub y: Smoothed,
 }
 
@@ -215,7 +220,7 @@ impl Motion {
         }
     }
 
-    /// Pixels a second.
+    /// Returns the velocity in each frame, pixels per second; `None` in gaps.
     pub fn velocity_px(&self) -> Vec<Option<[f64; 2]>> {
         self.x
             .rate
@@ -226,7 +231,7 @@ impl Motion {
     }
 }
 
-/// The animal's length in the image when it is seen at length: the 80th percentile, pixels.
+/// Returns the animal's full length in the image: the 80th percentile of its lengths, at least 1 pixel.
 pub fn reference_length_px(axes: &[Option<Axes>]) -> f64 {
     let mut lengths: Vec<f64> = axes.iter().flatten().map(|a| a.length_px).collect();
     if lengths.is_empty() {
@@ -254,12 +259,12 @@ fn seen(tracked: &Tracked) -> Pose {
     pose
 }
 
-/// The length axis of every sighting.
+/// Returns the length axis of every sighting.
 ///
-/// From above it is the axis of the body without its tail, which is carried to one side for seconds. From the side it is the one farther from the vertical (N 5.3),
-/// with memory: the axis nearest to the last frame's, unless the other one is nearer the
-/// horizontal by 10 degrees. A fish seen head-on is taller than long, one that pitches steeply has
-/// its major axis upright.
+/// In top view, it is the axis of the body without the tail, which may point to one side for seconds. In side
+/// view, it is the axis farther from the vertical (Nakajima et al., section 5.3). With memory, it is the axis
+/// nearest to the previous one, unless the other is nearer the horizontal by 10 degrees. A fish seen head-on
+/// is taller than long, and a steeply pitched fish has a vertical major axis.
 fn length_axes(track: &[Tracked], view: View, rule: AxisAndHead) -> Vec<Option<Axes>> {
     let mut last: Option<f64> = None;
     track
@@ -315,7 +320,7 @@ fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
     }
     let turned = moments.major_rad.map(|major| major + FRAC_PI_2);
     let axis_rad = turned.map(half_circle);
-    // The skew was taken along major + pi/2: the folded axis may point the other way.
+    // The skew refers to major + pi/2; folding may reverse the axis.
     let folded = turned.is_some_and(|turned| turned > FRAC_PI_2);
     let skew = if folded {
         -moments.skew[1]
@@ -330,7 +335,7 @@ fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
     }
 }
 
-/// An axis's angle folded into (-pi/2, pi/2].
+/// Returns the angle of an axis, folded into (-pi/2, pi/2].
 fn half_circle(angle_rad: f64) -> f64 {
     let folded = wrap_rad(2.0 * angle_rad) / 2.0;
     if folded <= -FRAC_PI_2 {

@@ -1,23 +1,23 @@
-//! An animal painted for tests: thick toward the head, a quarter of it dark.
+//! A synthetic animal for tests: thick near the head, with one side dark.
 
 use crate::analysis::track::Tracked;
 use crate::analysis::track::sighting::Sighting;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
 
-/// How it looks.
+/// Appearance of the animal.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
-    /// Its head is at the left end.
+    /// Whether the head is at the left end.
     pub(super) is_left: bool,
-    /// Its upper half is darker than its lower half.
+    /// Whether the upper half is darker than the lower half.
     pub(super) is_upper_dark: bool,
 }
 
 const WIDTH: u32 = 60;
 const HEIGHT: u32 = 30;
 
-/// The animal in one frame, with a little noise in its color.
+/// Returns the animal in one frame, with a little noise in its color.
 pub(super) fn fish(frame_idx: usize, look: Look) -> Tracked {
     let mut matte = RgbaImage::new(WIDTH, HEIGHT);
     for y in 0..HEIGHT {

@@ -1,32 +1,32 @@
-//! Smoothing over time: a constant-velocity Kalman filter and the Rauch-Tung-Striebel smoother, with
-//! Huber weights on large innovations (ALGORITHMS.md 4; Rauch, Tung & Striebel 1965).
+//! Smooths a time series: constant-velocity Kalman filter and Rauch-Tung-Striebel smoother (1965).
 //!
-//! Nothing is tuned by hand: the measurement noise comes from the second differences of the data, the
-//! process noise is the one under which the data are likeliest.
+//! Large innovations get Huber weights. Second differences of the data give the measurement noise. The
+//! process noise is the candidate with the greatest likelihood. See docs/explanation/algorithms.md, "Pose".
 
 /// A smoothed series.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Smoothed {
-    /// Values; `None` in gaps too long to bridge.
+    /// Smoothed values, one per measurement; `None` in long gaps and outside the measured range.
     pub value: Vec<Option<f64>>,
-    /// Their rates, per second.
+    /// Rates of change, per second; `None` where the value is.
     pub rate: Vec<Option<f64>>,
 }
 
-/// Innovations beyond this many standard deviations count less.
+/// Standard deviations beyond which an innovation counts less. Free choice.
 const HUBER: f64 = 2.5;
-/// Longest gap that is bridged, seconds.
+/// Longest gap that is bridged, seconds. Free choice.
 const BRIDGE_S: f64 = 0.5;
 
-/// Smooths measurements taken every `1 / fps` seconds; `None` where there is none. Gaps up to half a
-/// second are bridged, longer ones stay empty, and so does what lies before the first measurement
-/// and after the last.
+/// Smooths measurements taken every `1 / fps` seconds; `None` marks a missing one.
+///
+/// Gaps up to half a second are bridged. Longer gaps stay empty, as do the times before the first and after
+/// the last measurement.
 pub fn smooth(measured: &[Option<f64>], fps: f64) -> Smoothed {
     let noise = measurement_variance(measured);
     let dt = 1.0 / fps;
     let likelihood = |q: f64| filter(measured, dt, q, noise).log_likelihood;
-    // Accelerations from a hundredth to a hundred times what would move the value by its noise in
-    // a tenth of a second.
+    // Candidates: 1/100 to 100 times the acceleration noise that moves the value by its measurement noise in
+    // 0.1 s.
     let unit = noise / libm::pow(0.1, 3.0);
     let candidates = (0..=16).map(|k| unit * libm::pow(10.0, -2.0 + 0.25 * f64::from(k)));
     let best =
@@ -43,8 +43,9 @@ pub fn smooth(measured: &[Option<f64>], fps: f64) -> Smoothed {
     )
 }
 
-/// Variance of white noise on a smooth signal: second differences of such noise have six times its
-/// variance; their median absolute value makes it robust.
+/// Returns the variance of white noise on a smooth signal.
+///
+/// Second differences of such noise have six times its variance. Their median absolute value is robust.
 fn measurement_variance(measured: &[Option<f64>]) -> f64 {
     let mut seconds: Vec<f64> = measured
         .windows(3)
@@ -58,7 +59,7 @@ fn measurement_variance(measured: &[Option<f64>]) -> f64 {
     (1.4826 * median).powi(2).max(1e-12) / 6.0
 }
 
-/// State (value, rate) and its covariance.
+/// A state (value, rate) and its covariance.
 #[derive(Clone, Copy)]
 struct State {
     x: [f64; 2],
@@ -66,7 +67,7 @@ struct State {
 }
 
 struct Filtered {
-    /// Before and after each measurement.
+    /// States before and after each measurement.
     predicted: Vec<State>,
     updated: Vec<State>,
     log_likelihood: f64,
@@ -74,7 +75,7 @@ struct Filtered {
 
 fn filter(measured: &[Option<f64>], dt: f64, q: f64, r: f64) -> Filtered {
     let first = measured.iter().flatten().next().copied().unwrap_or(0.0);
-    // Broad at first: any value within reach of the data, any rate.
+    // A wide prior: any value near the data and any rate.
     let mut state = State {
         x: [first, 0.0],
         p: [[1e6 * r, 0.0], [0.0, 1e6 * r / dt]],
@@ -99,7 +100,7 @@ fn filter(measured: &[Option<f64>], dt: f64, q: f64, r: f64) -> Filtered {
                 sigmas * sigmas
             };
             filtered.log_likelihood -= 0.5 * (loss + libm::log(expected));
-            // Huber: a measurement too far off counts as one with more noise.
+            // Huber weight: a large innovation counts as a measurement with more noise.
             let weight = if sigmas > HUBER { HUBER / sigmas } else { 1.0 };
             let s = state.p[0][0] + r / weight;
             let k = [state.p[0][0] / s, state.p[1][0] / s];
@@ -120,7 +121,7 @@ fn filter(measured: &[Option<f64>], dt: f64, q: f64, r: f64) -> Filtered {
     filtered
 }
 
-/// One step of constant velocity with white acceleration of spectral density `q`.
+/// Returns the state one step later, for constant velocity and white acceleration of spectral density `q`.
 fn predict(state: &State, dt: f64, q: f64) -> State {
     let [[a, b], [c, d]] = state.p;
     State {
@@ -135,7 +136,7 @@ fn predict(state: &State, dt: f64, q: f64) -> State {
     }
 }
 
-/// The backward pass, and the gaps taken out.
+/// Runs the backward pass and removes the gaps longer than `bridge` frames.
 fn back(filtered: &Filtered, measured: &[Option<f64>], dt: f64, bridge: usize) -> Smoothed {
     let n = measured.len();
     let mut smoothed: Vec<[f64; 2]> = filtered.updated.iter().map(|s| s.x).collect();
@@ -174,7 +175,7 @@ fn back(filtered: &Filtered, measured: &[Option<f64>], dt: f64, bridge: usize) -
     }
 }
 
-/// True where there is a measurement, or a gap of at most `bridge` between two.
+/// Returns true for measurements and for gaps of at most `bridge` frames between two of them.
 fn bridged(measured: &[Option<f64>], bridge: usize) -> Vec<bool> {
     let mut known: Vec<bool> = measured.iter().map(Option::is_some).collect();
     let mut last = None;

@@ -1,4 +1,5 @@
-//! From where the animal is seen, when nobody says (ALGORITHMS.md 4).
+//! Guesses whether the animal is filmed from the side or from above, when the user does not say. See
+//! docs/explanation/algorithms.md, "Pose".
 
 use std::f64::consts::FRAC_PI_3;
 
@@ -7,23 +8,26 @@ use crate::analysis::track::sighting::Sighting;
 use crate::library::View;
 use crate::order::{median, percentile};
 
-/// A silhouette of this share of the 90th percentile of the lengths is seen at length.
+/// Least length of a usable silhouette, as a share of the 90th percentile of lengths. Free choice.
 const AT_LENGTH: f64 = 0.7;
-/// Standard deviations along and across the axis are in this ratio at least.
+/// Least ratio of the standard deviations along and across the axis. Free choice.
 const LONG: f64 = 1.3;
-/// Fewer frames than these say nothing.
+/// Least number of usable frames; with fewer the view is unknown. Free choice.
 const LEAST_FRAMES: usize = 8;
-/// The asymmetry at which both views are as likely, in standard deviations, squared. The labelled clips from above have .07
-/// to .7, those from the side 4 and more.
+/// Asymmetry at which both views are equally likely, standard deviations squared. On the labelled clips, it
+/// is 0.07 to 0.7 from above and at least 4 from the side.
 const EVEN: f64 = 1.7;
-/// Surer than this nobody can be from a silhouette.
+/// Greatest probability of a guess. Free choice.
 const MOST: f64 = 0.99;
 
-/// The guessed view and the probability that it is right, .5..=1.
+/// Returns the guessed view and the probability that it is right, 0.5..=1.
 ///
-/// From the side an animal has a back and a belly: its mass and its brightness differ from the upper to the lower side, the same
-/// way in all frames. From above it has a left and a right, which lie up and down by turns. So what counts is the mean of that
-/// difference over its spread. Frames that the border cuts, or that show the animal steeply or end-on, are left out.
+/// From the side, the animal has a back and a belly: mass and brightness differ between its upper and lower
+/// half, alike in all frames. From above, left and right are up and down in turn, so the differences change
+/// sign. The statistic is the median of each difference over its spread. Frames that are cut by the border,
+/// or show the animal steep or short, are left out.
+///
+/// Returns the side view at 0.5 with too few frames.
 pub(super) fn guess(track: &[Tracked]) -> (View, f64) {
     let whole = || {
         let sightings = track.iter().filter_map(|t| t.sighting.as_ref());
@@ -56,7 +60,7 @@ pub(super) fn guess(track: &[Tracked]) -> (View, f64) {
     }
 }
 
-/// The median of values over their spread; both ignore silhouettes that went wrong.
+/// Returns the median of values over their spread. Both are robust against failed silhouettes.
 fn constancy(values: Vec<f64>) -> f64 {
     let usual = median(values.iter().copied()).unwrap_or(0.0);
     let spread = median(values.iter().map(|value| (value - usual).abs())).unwrap_or(0.0);

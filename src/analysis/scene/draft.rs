@@ -1,4 +1,7 @@
-//! The plates of a scene while they are estimated, from its samples.
+//! Estimates the backgrounds of a scene from its samples (docs/explanation/algorithms.md, "Background").
+//!
+//! A [`Draft`] holds the backgrounds while [`super::estimate`] improves them. Each pixel comes from the
+//! samples that show the scene there. Where no sample does, `fill` continues the surroundings.
 
 use super::fill;
 use super::light;
@@ -16,36 +19,34 @@ use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 use crate::raster::{Frame, RgbImage};
 
-/// A pixel is known when it is free in at least this many samples of a plate; the median of three ignores one.
+/// Least number of free samples that repaint a part's pixel; a median of three ignores one outlier.
 const FREE_LEAST: u32 = 3;
-/// Decides from which of several like places a never-seen pixel is copied.
+/// Random seed of the texture synthesis.
 const FILL_SEED: u64 = 1;
-/// Frames examined for uneven light.
+/// Number of frames compared to detect uneven light. Free choice.
 const N_LIGHT: usize = 16;
-/// Where more than this share of the picture differs in most samples, higher thresholds are tried ...
+/// Median share of the picture that differs, from which higher thresholds are tried. Free choice.
 const BUSY: f64 = 0.03;
-/// ... and taken if the animal differs on average by as much as any of them asks for, and stands out more than at lower ones
-/// by this factor: without scenery that hung together with it.
+/// Factor by which a higher threshold must raise the starkness to be kept. Free choice.
 const MUCH_BETTER: f64 = 1.5;
-/// Medians of short windows are taken that explain the samples better than the commonest values by this factor.
+/// Factor by which medians must explain the samples better than commonest values do. Free choice.
 const FAR_BETTER: f64 = 3.0;
 
-/// The plates while they are made.
+/// The backgrounds of a scene during their estimation.
 pub(super) struct Draft {
-    /// The samples of each plate.
+    /// The samples of each background.
     pub(super) parts: Vec<Part>,
     pub(super) plates: Vec<Plate>,
-    /// The plate of each sample.
+    /// Index of each sample's background; `None` for a sample without one.
     pub(super) plate_of: Vec<Option<usize>>,
-    /// All samples filmed from the same place and in the same light as each part's: where a window of time shows too
-    /// little, these are asked.
+    /// All samples of each part's state, one bit each; used where a time window shows a pixel too rarely.
     wider: Vec<u64>,
-    /// Least difference that counts, levels of 255.
+    /// The parameter `threshold`: least difference that counts, levels of 255.
     threshold: u8,
 }
 
 impl Draft {
-    /// One plate for each state of the scene, the median of its samples, whose light is made even.
+    /// Returns one background for each state: the median of its samples, after their light is equalized.
     pub(super) fn of_states(samples: &mut Samples, params: &Params) -> Result<Draft, Error> {
         let parts = states::sort(samples)?;
         let mut plates = Vec::with_capacity(parts.len());
@@ -63,7 +64,7 @@ impl Draft {
         Ok(Draft::new(samples, parts, plates, params.threshold))
     }
 
-    /// The median of all samples as the only plate.
+    /// Returns the median of all samples as the only background.
     pub(super) fn of_all(samples: &Samples, params: &Params) -> Draft {
         let part = whole(samples);
         let median = samples.median_frame(part.samples);
@@ -71,7 +72,7 @@ impl Draft {
         Draft::new(samples, vec![part], vec![plate], params.threshold)
     }
 
-    /// The given picture as the only plate.
+    /// Returns the given picture as the only background. Fails if it differs in size from the frames.
     pub(super) fn given(
         image: &RgbImage,
         samples: &mut Samples,
@@ -109,9 +110,10 @@ impl Draft {
         }
     }
 
-    /// Surveys the samples. Where much of the picture differs, raised thresholds are tried too, and the one at which a
-    /// subject that is stark even there stands out much more is kept: a black mouse among bedding that it kicks about, which at
-    /// low thresholds hangs together with the bedding.
+    /// Surveys the samples and sets the threshold of the backgrounds. Where much of the picture differs,
+    /// thresholds twice and four times as high are tried. One is kept if the animal's contrast is at least
+    /// twice the threshold and its starkness grows. At a low threshold, a black mouse forms one component
+    /// with the bedding that it kicks about.
     pub(super) fn survey(&mut self, samples: &Samples) -> Survey {
         let usual = Threshold::usual(self.threshold);
         let mut best = (self.survey_at(usual, samples), usual);
@@ -145,11 +147,11 @@ impl Draft {
         plates.for_each(|plate| plate.set_threshold(threshold));
     }
 
-    /// The same parts in short windows of time, each with the median of its samples as its plate: in them an animal that
-    /// moves is seen, whatever changes over the film.
+    /// Returns the parts as short time windows with backgrounds of their own, and their survey. Short windows
+    /// show a moving animal even where the scene changes over time.
     pub(super) fn in_short_windows(&self, samples: &Samples) -> (Draft, Survey) {
-        // A mouse that rests for a while among bedding that it kicks about is commoner than any one color of the bedding; a large
-        // animal that hovers is in the median.
+        // The commonest values show a mouse that rests among bedding it kicks about. Medians show a large
+        // animal that hovers.
         let surveyed = |typical: fn(&Samples, u64) -> Frame| {
             let mut draft =
                 self.in_short_windows_of(|part| typical(samples, part), samples.frames.len());
@@ -183,8 +185,8 @@ impl Draft {
         }
     }
 
-    /// In which samples each pixel shows the scene, from the survey of short windows and the places at which the subject
-    /// rests for longer than one.
+    /// Returns the samples in which each pixel shows the scene. It combines the survey of short windows with
+    /// the places at which the subject rests for longer than one window.
     pub(super) fn occupancy_over_time(
         &self,
         short: &Draft,
@@ -208,7 +210,7 @@ impl Draft {
         seen
     }
 
-    /// Splits the parts of a scene that changes for good.
+    /// Splits the parts whose scene changes for good.
     pub(super) fn split_in_time(&mut self, samples: &Samples, seen: &Occupancy) {
         let thumbnails = samples.thumbnails();
         let first = &samples.frames[0];
@@ -231,7 +233,8 @@ impl Draft {
         (self.parts, self.wider, self.plates) = (parts, wider, plates);
     }
 
-    /// Paints the plates from the samples in which nothing stands before a pixel, and measures their noise.
+    /// Repaints the backgrounds from the samples that show the scene, and measures their noise. A given
+    /// background keeps its pixels.
     pub(super) fn paint(&mut self, samples: &Samples, seen: &Occupancy, is_given: bool) {
         if !is_given {
             let repaint = |(part, (plate, &wider)): (&Part, (&Plate, &u64))| {
@@ -270,8 +273,8 @@ impl Draft {
         }
     }
 
-    /// Continues the texture where nothing was ever seen, finds the second color where something sways, and measures the
-    /// noise of blocks.
+    /// Synthesizes texture where no sample shows the scene, and finds the second color of swaying scenery.
+    /// Then measures the noise of blocks and raises the thresholds.
     pub(super) fn finish(
         &mut self,
         samples: &Samples,
@@ -299,7 +302,7 @@ impl Draft {
         raise_thresholds(&mut self.plates, survey);
     }
 
-    /// Replaces the pixels of each plate that are free in no sample as `fill` says, and no others.
+    /// Applies `fill` to the pixels of each background that are free in no sample.
     fn fill_unknown(
         &mut self,
         samples: &Samples,
@@ -336,7 +339,7 @@ impl Draft {
     }
 }
 
-/// All samples, in one light.
+/// Returns one part with all samples.
 fn whole(samples: &Samples) -> Part {
     Part {
         samples: u64::MAX >> (64 - samples.frames.len()),
@@ -344,14 +347,14 @@ fn whole(samples: &Samples) -> Part {
     }
 }
 
-/// The plate of each sample.
+/// Returns the index of each sample's part; `None` for a sample in no part.
 fn plate_of(parts: &[Part], n_samples: usize) -> Vec<Option<usize>> {
     let of = |k: usize| parts.iter().position(|part| part.samples >> k & 1 == 1);
     (0..n_samples).map(of).collect()
 }
 
-/// The sample whose light is at the third quartile: dividing by more than one loses levels, and the brightest may be
-/// a flash.
+/// Returns the sample whose mean luma is the third quartile. A bright reference keeps gains low, because a
+/// gain above 1 loses levels. The brightest sample may be a flash.
 fn brightest(samples: &Samples, part: u64) -> usize {
     let mean = |k: usize| {
         let luma = samples.frames[k].luma();
@@ -363,7 +366,8 @@ fn brightest(samples: &Samples, part: u64) -> usize {
     by_light[by_light.len() * 3 / 4].1
 }
 
-/// Divides the samples of a part by their light relative to a plate.
+/// Divides the samples of a part by their light relative to a background. Sets `uneven_light` of the
+/// background.
 fn even_out_light(samples: &mut Samples, part: u64, plate: &mut Plate) {
     let members: Vec<usize> = states::bits(part).collect();
     let step = members.len().div_ceil(N_LIGHT).max(1);
@@ -377,8 +381,8 @@ fn even_out_light(samples: &mut Samples, part: u64, plate: &mut Plate) {
     samples.change(part, |frame| light::of(frame, plate).undo(frame));
 }
 
-/// Raises the core threshold of an animal that stands out starkly to a share of its contrast: what
-/// differs by less than that beside a black mouse on white paper is its shadow and its reflection.
+/// Raises the core thresholds to at least a quarter of the animal's contrast. Beside a black mouse on white
+/// paper, smaller differences are its shadow and its reflection.
 fn raise_thresholds(plates: &mut [Plate], survey: &Survey) {
     const SHARE: f64 = 0.25;
     let contrast = survey

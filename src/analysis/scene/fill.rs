@@ -1,12 +1,13 @@
-//! Pixels of the plate that the animal never left free, continued from the texture around them
-//! (ALGORITHMS.md 2.1; Efros & Leung, "Texture synthesis by non-parametric sampling", 1999).
+//! Fills background pixels that the animal never left free with the surrounding texture
+//! (docs/explanation/algorithms.md, "Background"). The source is Efros & Leung, "Texture synthesis by
+//! non-parametric sampling", 1999.
 //!
-//! From the rim inward each pixel takes the color of a place nearby that looks as what is known around
-//! the pixel does. Every place is compared (none that matters is skipped), in whole numbers.
+//! Each pixel, from the rim of the hole inward, copies the color of a nearby place with similar known
+//! surroundings. The search compares all places within `SURROUND_PX` in integer arithmetic.
 //!
-//! Left out on purpose: the paper's largest error, below which no match is taken. A plate must be
-//! whole, so the best there is is good enough. Past [`MOST_SAMPLED_PX`] what remains of a hole is
-//! filled smoothly ([`smooth`]): so large a hole is not a texture with a gap but a scene never seen.
+//! Two parts differ from the paper on purpose. There is no limit on the error of a match, because every pixel
+//! needs a color. Beyond [`MOST_SAMPLED_PX`] pixels [`smooth`] fills the rest: so large a hole is an unseen
+//! part of the scene, not a gap in a texture.
 
 use rayon::prelude::*;
 
@@ -14,20 +15,20 @@ use crate::geometry::Rect;
 use crate::random;
 use crate::raster::{Mask, RgbImage};
 
-/// Half side of the 7 x 7 window that is compared.
+/// Half side of the 7 x 7 window of surroundings that is compared, pixels.
 const RADIUS: i64 = 3;
-/// How far around the hole's rim its texture is looked for.
+/// Largest distance of a copied place from the rim of the hole along x and y, pixels. Free choice.
 const SURROUND_PX: i64 = 64;
-/// The paper's epsilon, as a quotient: what is at most 11/10 as far off as the best may be taken.
+/// Largest error of an eligible match relative to the best one, as a fraction: the paper's epsilon.
 const TOLERANCE: [u64; 2] = [11, 10];
-/// Gaussian weights of the paper (one standard deviation = 7 / 6.4 pixels) for offsets 0 to 3; so
-/// scaled that the sum over a window of 3 channels fits 32 bits.
+/// Gaussian weights for offsets 0 to 3 (standard deviation 7 / 6.4 pixels, from the paper). They are scaled
+/// so that the sum over a window of three channels fits 32 bits.
 const WEIGHTS: [u32; 4] = [52, 34, 10, 1];
-/// The most pixels that are sampled.
+/// Largest number of pixels filled with texture. Free choice.
 pub(super) const MOST_SAMPLED_PX: usize = 16_384;
 
-/// Replaces the pixels marked unknown by texture; the same bytes for the same seed. Leaves the image
-/// as it is when nothing is known.
+/// Replaces the pixels marked unknown by texture. Equal seeds give equal bytes. Leaves the image unchanged if
+/// no pixel is known.
 pub(super) fn sample_texture(image: &mut RgbImage, unknown: &[bool], seed: u64) {
     let mut hole = Hole::of(image, unknown);
     let mut n_sampled = 0;
@@ -44,7 +45,7 @@ pub(super) fn sample_texture(image: &mut RgbImage, unknown: &[bool], seed: u64) 
         n_sampled += rim.len();
         let before = rim;
         rim = hole.rim();
-        // Nothing around the rim is known well enough to be copied.
+        // No window near the rim is completely known.
         if rim == before {
             break;
         }
@@ -53,18 +54,18 @@ pub(super) fn sample_texture(image: &mut RgbImage, unknown: &[bool], seed: u64) 
     smooth(image, &left);
 }
 
-/// The image while its hole closes.
+/// The image while its hole is filled.
 struct Hole<'a> {
     image: &'a mut RgbImage,
     size: [i64; 2],
     known: Vec<bool>,
-    /// Pixels whose whole window was known from the start: what may be copied.
+    /// 1 for pixels whose whole window was known at the start: only these are copied.
     whole: Vec<u8>,
-    /// For each pixel where its color was taken from: itself, when it was known from the start.
+    /// Index of the pixel that each pixel's color was copied from; its own for pixels known at the start.
     copied_from: Vec<usize>,
 }
 
-/// One known pixel of the window around an unknown one.
+/// One known pixel in the window around an unknown pixel.
 struct Around {
     dx: i64,
     dy: i64,
@@ -87,7 +88,8 @@ impl<'a> Hole<'a> {
         }
     }
 
-    /// The unknown pixels beside a known one, those with the most known around them first.
+    /// Returns the unknown pixels with a known neighbor, those with the most known pixels in their window
+    /// first.
     fn rim(&self) -> Vec<usize> {
         let mut rim: Vec<(std::cmp::Reverse<usize>, usize)> = (0..self.known.len())
             .filter(|&px| !self.known[px] && self.known_within(px, 1).next().is_some())
@@ -97,8 +99,8 @@ impl<'a> Hole<'a> {
         rim.into_iter().map(|(_, px)| px).collect()
     }
 
-    /// The place to copy: drawn from those that look like the surroundings of the pixel almost as
-    /// much as the likest does. `None` when no window around the hole's rim is wholly known.
+    /// Returns the pixel to copy, drawn at random from the places whose error is close to the least. Returns
+    /// `None` when no window within `SURROUND_PX` is completely known.
     fn choose(&self, px: usize, seed: u64) -> Option<usize> {
         let around = self.around(px);
         let [w, h] = self.size;
@@ -107,7 +109,7 @@ impl<'a> Hole<'a> {
             (at - SURROUND_PX).max(RADIUS)..(at + SURROUND_PX + 1).min(length - RADIUS)
         };
         let (rows, columns) = (near(from / w, h), near(from % w, w));
-        // Where the neighbors came from, the pixel may well come from too: a bound to begin with.
+        // The places that continue the neighbors' sources give an upper bound of the least error.
         let bound = self
             .known_within(px, 1)
             .filter_map(|other| self.continued(other, px))
@@ -143,7 +145,7 @@ impl<'a> Hole<'a> {
         Some(likest[drawn as usize])
     }
 
-    /// The known pixels of the window, the weightiest first.
+    /// Returns the known pixels of the window, those of largest weight first.
     fn around(&self, px: usize) -> Vec<Around> {
         let mut around: Vec<Around> = self
             .known_within(px, RADIUS)
@@ -162,7 +164,7 @@ impl<'a> Hole<'a> {
         around
     }
 
-    /// Weighted sum of squared differences, or more than `bound` when it is more than that.
+    /// Returns the weighted sum of squared differences. Stops early once the sum exceeds `bound`.
     fn distance(&self, around: &[Around], place: usize, bound: u32) -> u32 {
         let mut sum = 0;
         for Around {
@@ -183,7 +185,8 @@ impl<'a> Hole<'a> {
         sum
     }
 
-    /// Where the pixel would be copied from if it continued what its neighbor was copied from.
+    /// Returns the source of a pixel if it continues the source of its neighbor; `None` if that cannot be
+    /// copied.
     fn continued(&self, neighbor: usize, px: usize) -> Option<usize> {
         let (dx, dy) = self.offset(neighbor, px);
         let from = self.copied_from[neighbor] as i64;
@@ -198,7 +201,7 @@ impl<'a> Hole<'a> {
         (to % w - from % w, to / w - from / w)
     }
 
-    /// The known pixels at most `radius` columns and rows away, row by row.
+    /// Returns the known pixels within `radius` columns and rows, row by row.
     fn known_within(&self, px: usize, radius: i64) -> impl Iterator<Item = usize> {
         let [w, h] = self.size;
         let (x, y) = (px as i64 % w, px as i64 / w);
@@ -214,8 +217,8 @@ fn tolerated(distance: u32) -> u32 {
     more.min(u64::from(u32::MAX)) as u32
 }
 
-/// Replaces the pixels marked unknown, nearest first: each round gives every unknown pixel with a known
-/// neighbor the mean of its known neighbors. Without texture. Leaves the image as it is when nothing
+/// Replaces the pixels marked unknown without texture, from the rim inward. In each round, every unknown
+/// pixel with a known neighbor gets the mean of its known neighbors. Leaves the image unchanged if no pixel
 /// is known.
 pub(super) fn smooth(image: &mut RgbImage, unknown: &[bool]) {
     let (w, h) = (image.width as i64, image.height as i64);
@@ -258,7 +261,7 @@ pub(super) fn smooth(image: &mut RgbImage, unknown: &[bool]) {
 mod tests {
     use super::*;
 
-    /// Slanted stripes, two pixels dark and four light.
+    /// Returns slanted stripes, two pixels dark and four pixels light.
     fn stripes() -> RgbImage {
         let mut image = RgbImage::new(72, 60);
         for y in 0..60 {
@@ -270,7 +273,7 @@ mod tests {
         image
     }
 
-    /// The image with a square of `side` pixels blackened, and which pixels these are.
+    /// Returns the image with a black square of `side` pixels, and a flag for each pixel inside it.
     fn with_hole(image: &RgbImage, side: u32) -> (RgbImage, Vec<bool>) {
         let mut holed = image.clone();
         let hole = Rect {

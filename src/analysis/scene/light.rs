@@ -1,9 +1,11 @@
-//! The light of a frame relative to the plate: exposure, flicker, white balance, mains banding and lamps dimmed
-//! from one side are undone by dividing the frame by its [`Light`] (ALGORITHMS.md 2.3).
+//! The light of a frame relative to its background (docs/explanation/algorithms.md, "Light and noise").
+//! Dividing a frame by its [`Light`] undoes exposure, flicker, white balance, mains banding and lamps that
+//! dim from one side.
 //!
-//! Light is a gain per color channel, the same for the whole picture. Where the film needs more, a luma factor per
-//! row and per column follows: their product describes the bands of a rolling shutter along either axis and a light
-//! that falls off in any direction. All are medians of pixel ratios, so that the animal does not count.
+//! Light is one gain per color channel for the whole picture. Where the footage needs more, luma factors for
+//! each row and each column follow. Their product describes the bands of a rolling shutter along either axis,
+//! and light that falls off in any direction. All gains and factors are medians of pixel ratios, so that the
+//! animal has no effect.
 
 use std::ops::Range;
 
@@ -12,42 +14,43 @@ use crate::order;
 use crate::random;
 use crate::raster::{Frame, RgbImage};
 
-/// Pixels compared per frame, at fixed places.
+/// Number of pixels compared in each frame, at fixed random places. Free choice.
 const N_SAMPLES: u64 = 4096;
-/// Ratios are counted in steps of 1 / 1024, from 0 to 4.
+/// Steps of the histogram of ratios per unit; it covers ratios from 0 to 4.
 const STEPS: usize = 1024;
-/// A channel of the plate at or below this level says nothing about light, levels of 255.
+/// Largest value of a background channel that is too dark to compare, levels of 255. Free choice.
 const DARKEST: u32 = 16;
-/// Where fewer of the pixels compared are bright enough (5 %), the animal may cover most of them: the light counts as
-/// that of the plate.
+/// Least number of bright pixels for a gain, 5 % of the pixels compared. With fewer, the animal may cover
+/// most of them. Free choice.
 const LEAST_PROBES: u32 = N_SAMPLES as u32 / 20;
-/// Gains that a light can have.
+/// Least gain accepted as light. Free choice.
 const DARKEST_GAIN: f32 = 0.2;
+/// Upper limit of gains accepted as light, exclusive. Free choice below 4, where the histogram ends.
 const BRIGHTEST_GAIN: f32 = 3.9;
-/// Pixels compared in a row or column, at most.
+/// Number of pixels compared in a row or column, at most. Free choice.
 const ALONG: usize = 160;
-/// Fewer bright pixels than this in a row or column say nothing about its light.
+/// Least number of bright pixels for the factor of a row or column. Free choice.
 const LEAST_ALONG: usize = 24;
-/// Light is colored where a channel's gain deviates from that of luma by this share.
+/// Light is colored if a channel's gain deviates from the luma gain by at least this share. Free choice.
 const COLORED: f32 = 0.02;
-/// Rows and columns whose factors are averaged, to either side. A 100 Hz lamp gives at most about ten bands a
-/// picture, far broader than this.
+/// Neighbors on either side whose factors are averaged. A 100 Hz lamp gives at most about ten bands in a
+/// picture, and they are far broader.
 const SMOOTH: usize = 2;
-/// Light is uneven where rows or columns deviate by more than this share at the 90th percentile ...
+/// Light is uneven if the 90th percentile of |factor - 1| of rows or columns exceeds this. Free choice.
 const UNEVEN: f64 = 0.012;
-/// ... in more than this share of the frames examined.
+/// Light of the footage is uneven if it is so in more than this share of the frames examined. Free choice.
 const UNEVEN_SHARE: f64 = 0.1;
 
-/// How much brighter a frame is than its plate.
+/// Brightness of a frame relative to its background.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
-    /// Gain of R, G and B; 1 where frame and plate are equally bright.
+    /// Gains of R, G and B; 1 where frame and background are equally bright.
     pub rgb: [f32; 3],
-    /// What remains, for luma; `None` where the light is even.
+    /// Further luma factors; `None` where the light is even.
     field: Option<Field>,
 }
 
-/// Luma factors on top of the gain: at (x, y) the light is `gain * rows[y] * columns[x]`.
+/// Luma factors in addition to the gain: at (x, y) the light is `gain * rows[y] * columns[x]`.
 #[derive(Clone, Debug, PartialEq)]
 struct Field {
     rows: Vec<f32>,
@@ -55,35 +58,35 @@ struct Field {
 }
 
 impl Light {
-    /// The light of the plate itself.
+    /// The light of the background itself.
     pub const SAME: Light = Light {
         rgb: [1.0; 3],
         field: None,
     };
 
-    /// The gain of luma, close enough for finding candidate places.
+    /// Returns the approximate gain of luma, exact enough to propose boxes.
     pub fn luma(&self) -> f32 {
         0.3 * self.rgb[0] + 0.59 * self.rgb[1] + 0.11 * self.rgb[2]
     }
 
-    /// 1 / gain per channel in 12-bit fixed point: `(value * factor + 2048) >> 12` is in the plate's light.
+    /// Returns 1 / gain of each channel in 12-bit fixed point: apply it as `(value * factor + 2048) >> 12`.
     pub fn to_plate(&self) -> [i32; 3] {
         self.rgb.map(|gain| (4096.0 / gain).round() as i32)
     }
 
-    /// Whether the light differs over the picture.
+    /// Returns whether the light varies over the picture.
     pub fn is_uneven(&self) -> bool {
         self.field.is_some()
     }
 
-    /// The luma factor at a pixel on top of the gain; 1 where the light is even.
+    /// Returns the luma factor at a pixel in addition to the gain; 1 where the light is even.
     pub fn factor(&self, x: usize, y: usize) -> f32 {
         let of = |field: &Field| field.rows[y] * field.columns[x];
         self.field.as_ref().map_or(1.0, of)
     }
 
-    /// Divides a frame by its light: luma pixel by pixel, chroma by the gain of luma; all channels one by one where the light is
-    /// colored.
+    /// Divides a frame by its light: luma by gain and factor of the pixel, chroma by the luma gain. If the
+    /// light is colored, each RGB channel is then divided by its remaining gain.
     pub fn undo(&self, frame: &mut Frame) {
         let gain = self.luma();
         self.undo_gain(frame, gain);
@@ -135,18 +138,19 @@ impl Light {
     }
 }
 
-/// A pixel whose light is compared in every frame.
+/// A pixel whose brightness is compared in every frame.
 pub struct Probe {
-    /// Indices of its luma and its chroma.
+    /// Index of its luma value.
     luma_at: u32,
+    /// Index of its chroma values in their planes.
     chroma_at: u32,
-    /// R, G, B of the plate.
+    /// R, G and B of the background.
     base: [u32; 3],
-    /// 2^32 / base, rounded up, so that division is a multiplication; 0 where the plate is too dark.
+    /// 2^32 / base, rounded up, to divide by multiplication; 0 where the background is too dark.
     inverse: [u32; 3],
 }
 
-/// The pixels compared with a plate, in the order of their places.
+/// Returns the pixels to compare with a background, in the order of their indices.
 pub fn probes(plate: &RgbImage) -> Vec<Probe> {
     let n_px = u64::from(plate.width) * u64::from(plate.height);
     let mut places: Vec<u32> = (0..N_SAMPLES)
@@ -170,7 +174,7 @@ pub fn probes(plate: &RgbImage) -> Vec<Probe> {
     places.into_iter().map(probe).collect()
 }
 
-/// The light of a frame: the gain alone, and rows and columns as well where the plate's film needs them.
+/// Returns the light of a frame. Measures rows and columns only if the background has `uneven_light`.
 pub fn of(frame: &Frame, plate: &Plate) -> Light {
     let mut light = Light {
         rgb: gain(frame, plate),
@@ -182,7 +186,7 @@ pub fn of(frame: &Frame, plate: &Plate) -> Light {
     light
 }
 
-/// Whether the light of a film differs over the picture, from some of its frames.
+/// Returns whether the light of the footage varies over the picture, measured on some of its frames.
 pub fn is_uneven<'a>(frames: impl ExactSizeIterator<Item = &'a Frame>, plate: &Plate) -> bool {
     let n_frames = frames.len();
     let deviates = |frame: &Frame| {
@@ -201,8 +205,8 @@ fn luma_of(rgb: [f32; 3]) -> f32 {
     Light { rgb, field: None }.luma()
 }
 
-/// The median ratio of the frame to the plate, per channel. Pixels that differ by more than a quarter from the median
-/// of all (the animal, wherever it is) do not count.
+/// Returns the median ratio of frame to background for each channel. Pixels whose ratio differs by more than
+/// a quarter from the median of all pixels, such as the animal's, do not count.
 fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
     let convert = frame.color.to_rgb();
     let (luma, (u, v)) = (frame.luma(), frame.chroma());
@@ -226,7 +230,7 @@ fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
         median_ratio(&counts[channel])
     };
     let gains = [0, 1, 2].map(median);
-    // A channel too dark to tell has the gain of the others.
+    // A channel of unknown gain takes the mean gain of the others.
     let known: Vec<f32> = gains.iter().flatten().copied().collect();
     let usual = match known.len() {
         0 => 1.0,
@@ -235,8 +239,8 @@ fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
     gains.map(|gain| gain.unwrap_or(usual))
 }
 
-/// The median of the counted ratios near their median; `None` when too few pixels are bright enough, or when they do
-/// not agree: then it is not light in which they differ.
+/// Returns the median of the counted ratios within a quarter of their median. Returns `None` when too few
+/// pixels are bright enough or when most ratios disagree, because then something other than light differs.
 fn median_ratio(counts: &[u16; 4 * STEPS]) -> Option<f32> {
     let n: u32 = counts.iter().map(|&count| u32::from(count)).sum();
     let middle = median_step(counts, 0..4 * STEPS);
@@ -248,7 +252,7 @@ fn median_ratio(counts: &[u16; 4 * STEPS]) -> Option<f32> {
     agree.then_some(gain)
 }
 
-/// The step at which half of the count within `steps` is reached.
+/// Returns the step at which the cumulative count within `steps` reaches half.
 fn median_step(counts: &[u16; 4 * STEPS], steps: Range<usize>) -> usize {
     let n: u32 = counts[steps.clone()].iter().map(|&c| u32::from(c)).sum();
     let mut below = 0;
@@ -261,7 +265,7 @@ fn median_step(counts: &[u16; 4 * STEPS], steps: Range<usize>) -> usize {
         .unwrap_or(steps.start)
 }
 
-/// The factors of rows, then of columns once the rows are divided out.
+/// Returns the factors of the rows, and of the columns after division by the rows.
 fn field(frame: &Frame, plate: &Frame, gain: f32) -> Field {
     let (width, height) = (frame.width as usize, frame.height as usize);
     let black = frame.color.black();
@@ -283,7 +287,7 @@ fn field(frame: &Frame, plate: &Frame, gain: f32) -> Field {
     Field { rows, columns }
 }
 
-/// The median of ratios that light can make; `None` of too few.
+/// Returns the median of the ratios that light can cause; `None` for fewer than `LEAST_ALONG`.
 fn median_factor(ratios: impl Iterator<Item = f32>) -> Option<f32> {
     let mut ratios: Vec<f32> = ratios.filter(|r| (0.4..2.5).contains(r)).collect();
     if ratios.len() < LEAST_ALONG {
@@ -293,7 +297,7 @@ fn median_factor(ratios: impl Iterator<Item = f32>) -> Option<f32> {
     Some(*ratios.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
-/// Each factor as the mean of itself and its neighbors; 1 where none is known.
+/// Replaces each factor by the mean of the known factors around it; 1 where none is known.
 fn smoothed(factors: impl Iterator<Item = Option<f32>>) -> Vec<f32> {
     let factors: Vec<Option<f32>> = factors.collect();
     let near = |k: usize| k.saturating_sub(SMOOTH)..(k + SMOOTH + 1).min(factors.len());
@@ -327,7 +331,7 @@ mod tests {
 
     #[test]
     fn a_dark_animal_does_not_move_the_median_of_the_light() {
-        // 3000 probes 10 % brighter with a spread, 1000 on a black animal.
+        // 3010 probes are on average 10 % brighter, and 1000 lie on a black animal.
         let mut counts = [0u16; 4 * STEPS];
         counts[100] = 1000;
         for k in 0..301 {
@@ -348,7 +352,7 @@ mod tests {
         let mut frame = plate.clone();
         for (k, value) in frame.planes[..160 * 120].iter_mut().enumerate() {
             let lit = (f64::from(*value) - 16.0) * light(k % 160, k / 160);
-            // An animal over a fifth of the rows.
+            // An animal covers a fifth of the rows.
             *value = if (40..64).contains(&(k / 160)) && k % 160 < 60 {
                 30
             } else {

@@ -1,38 +1,42 @@
-//! The animal's own image in the water's surface, in a pane, or in a mirror: a second thing that moves just as the animal does,
-//! mirrored about a line. Two animals do not.
+//! Detects the animal's mirror image in a water surface, a pane or a mirror.
+//!
+//! An image is a second object that moves as the animal does, mirrored about a horizontal or vertical line.
+//! Their coordinates across the line then have a constant sum. Two animals move independently, so the sum
+//! varies.
 
 use crate::analysis::subject::Look;
 use crate::geometry::Rect;
 use crate::order::median;
 use crate::raster::runs::{self, Component};
 
-/// Place and mirrored place agree to within this share of the animal's diagonal ...
+/// Largest deviation of an image from its expected place, as a share of the animal's diagonal. Free choice.
 const AGREEMENT: f64 = 0.15;
-/// ... in this share of the samples that show both.
+/// Least share of the pairs that must agree with the mirror, 0..=1. Free choice.
 const OFTEN: f64 = 0.8;
-/// Fewer samples do not tell.
+/// Least number of pairs for a decision. Free choice.
 const LEAST_PAIRS: usize = 6;
-/// The animal moves by more than this share of its diagonal meanwhile: what rests agrees with anything.
+/// Least range of the animal's motion, as a share of its diagonal. A resting pair agrees with any mirror.
+/// Free choice.
 const MOVES: f64 = 0.5;
 
-/// A line along an axis of the picture, and on which side of it images lie.
+/// A line along an axis of the picture, and the side of it on which images lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mirror {
     /// The coordinate that is mirrored: 0 for x, 1 for y.
     axis: usize,
-    /// Where the line is, pixels.
+    /// Coordinate of the line along `axis`, pixels.
     line_px: f64,
-    /// Images have the smaller coordinate.
+    /// Whether images have the smaller coordinate.
     is_before: bool,
 }
 
 impl Mirror {
-    /// Whether a thing that lies here is an image.
+    /// Returns whether an object with this centroid is an image.
     pub fn is_image(&self, centroid_px: [f64; 2]) -> bool {
         (centroid_px[self.axis] < self.line_px) == self.is_before
     }
 
-    /// A component in parts that lie on one side of the line each: the animal touches its image where it touches the mirror.
+    /// Splits a component at the line. The animal touches its image where it touches the mirror.
     pub fn parted(&self, component: Component) -> Vec<Component> {
         let rect = component.rect;
         let line = self.line_px.round().max(0.0) as u32;
@@ -67,7 +71,8 @@ impl Mirror {
             .collect()
     }
 
-    /// The mirror that explains pairs of things which samples show together; `None` where none does.
+    /// Returns the mirror that explains the pairs of objects seen together in samples; `None` where none
+    /// does. Prefers a horizontal line. `diagonal_px` is the animal's diagonal.
     pub(super) fn of(pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
         [1, 0]
             .into_iter()
@@ -91,7 +96,7 @@ impl Mirror {
             && agreeing.len() as f64 >= OFTEN * pairs.len() as f64
             && moved(0).max(moved(1)) > MOVES * diagonal_px;
         let line_px = usual / 2.0;
-        // An image is fainter than what it is the image of.
+        // An image has less contrast than its object.
         let fainter_before = |[a, b]: &&&[&Look; 2]| {
             let a_is_before = a.centroid_px[axis] < b.centroid_px[axis];
             (a.contrast < b.contrast) == a_is_before

@@ -1,14 +1,13 @@
-//! The scene without the animal: one plate for each of its states, and what the animal looks like, from frames spread
-//! through the film (ALGORITHMS.md 2.1 to 2.4).
+//! Estimates the scene of a footage from samples: frames spread evenly over it
+//! (docs/explanation/algorithms.md, "Background"). A scene has backgrounds and a subject, the animal.
 //!
-//! 1. The samples are sorted into states (`states`): the light was switched, the camera was moved. Black frames and
-//!    title cards belong to none.
-//! 2. Each state's plate is the median of its samples. What differs from the plates is surveyed (`survey`): components, their
-//!    looks, and the subject, which is the look that explains the most samples as one body.
-//! 3. Twice more: the plate is the median over the samples in which nothing stands before a pixel (`occupancy`). Where the
-//!    animal rested so long that the plate shows it, its pixels come from the samples in which its ghost is seen. A
-//!    scene that changes for good gets plates one after the other (`windows`).
-//! 4. Films that cannot become a library are refused (`refusal`), before any frame is tracked.
+//! 1. `states` groups the samples by light and camera position. Black frames and title cards join no group.
+//! 2. Short time windows of each group get provisional backgrounds. `survey` compares the samples with them
+//!    and selects the animal among the components that differ.
+//! 3. `windows` splits a group where its scene changes for good. Each piece gets its own background.
+//! 4. Two rounds repaint the backgrounds from the samples that show the scene at each pixel (`occupancy`).
+//!    Where a background shows the resting animal, only samples without the animal count there.
+//! 5. `refusal` rejects footage that cannot become a library, before any frame is tracked.
 
 use super::silhouette;
 use super::subject::Subject;
@@ -45,41 +44,44 @@ use refusal::Company;
 use samples::Samples;
 use survey::Survey;
 
-/// A frame in which more than this share of the blocks differs does not show the plate's scene.
+/// Largest share of blocks that may differ where a frame shows a background's scene, 0..=1. Free choice.
 const FOREIGN: f64 = 0.5;
 
-/// The scene of a film.
+/// The scene of a footage.
 pub struct Scene {
-    /// Its plates, the one of the most samples first.
+    /// The backgrounds, the one with the most samples first.
     pub plates: Vec<Plate>,
-    /// The samples' frames and plates, by frame: which plate is likely in between.
+    /// For each sample its frame index and the index of its background, ordered by frame. `place` first tries
+    /// the backgrounds of the samples around a frame.
     likely: Vec<(usize, Option<usize>)>,
-    /// The animal, as the samples show it.
+    /// Typical appearance of the animal in the samples.
     pub subject: Subject,
-    /// Something thin leads from the animal to the border of the picture: half the width up to which things are thin.
+    /// Half the width below which a part of the animal's component counts as thin, pixels. `None` where no
+    /// tether leads away from the animal.
     pub tether_px: Option<u32>,
-    /// Several animals move.
+    /// Whether several animals move.
     pub several_animals: bool,
-    /// Where the animal is mirrored, if it is.
+    /// The mirror that shows the animal's image; `None` without one.
     pub mirror: Option<Mirror>,
-    /// Every frame comes with a mask, which says what is the animal.
+    /// Whether every frame comes with a mask of the animal.
     pub is_masked: bool,
 }
 
-/// What a frame is compared with.
+/// A frame matched with the background that it shows.
 pub struct Placed<'a> {
-    /// Which plate.
+    /// Index of the background in `Scene::plates`.
     pub plate_idx: usize,
-    /// The plate.
+    /// The background.
     pub plate: &'a Plate,
-    /// The light of the frame.
+    /// Light of the frame relative to the background.
     pub light: Light,
-    /// Boxes that differ.
+    /// Boxes of the picture that may differ from the background.
     pub boxes: Vec<Rect>,
 }
 
 impl Scene {
-    /// The scene of finished plates, with the subject as they show it, and as the track will.
+    /// Builds the scene from finished backgrounds. A last survey yields the subject, under the same
+    /// thresholds as tracking.
     fn of(draft: Draft, samples: &Samples, company: Company) -> Result<Scene, Error> {
         let survey = Survey::of(samples, &draft.plates, &draft.plate_of);
         let frames = samples.frame_idx.iter().copied();
@@ -97,7 +99,8 @@ impl Scene {
         })
     }
 
-    /// The plate whose scene a frame shows; `None` when it shows none of them (a black frame, a title card).
+    /// Returns the background that a frame shows. Returns `None` where it matches none: a black frame or a
+    /// title card.
     pub fn place(&self, frame_idx: usize, frame: &Frame) -> Option<Placed<'_>> {
         if self.is_masked {
             return Some(Placed {
@@ -130,7 +133,7 @@ impl Scene {
         best.map(|(placed, _)| placed)
     }
 
-    /// The frame before a plate, and the share of blocks that differ.
+    /// Matches a frame with one background. Also returns the share of blocks that differ, 0..=1.
     fn compare(&self, plate_idx: usize, frame: &Frame) -> (Placed<'_>, f64) {
         let plate = &self.plates[plate_idx];
         let light = light::of(frame, plate);
@@ -145,10 +148,10 @@ impl Scene {
     }
 }
 
-/// Estimates the scene, or takes the picture given and estimates its noise alone.
+/// Estimates the scene. A `given` background keeps its pixels, and only its noise is measured.
 ///
-/// Fails when the given picture has another size than the footage, and with the reason when the footage cannot
-/// become a library.
+/// Fails if the given background differs in size from the footage, if the footage cannot become a library, or
+/// if `progress` is cancelled.
 pub fn estimate(
     source: &dyn FrameSource,
     given: Option<&RgbImage>,
@@ -184,7 +187,8 @@ pub fn estimate(
     Scene::of(draft, &samples, company)
 }
 
-/// The scene behind an animal that masks tell apart: whatever moves, dims or flickers there is no matter.
+/// Estimates the scene of footage with masks of the animal. Movement, dimming and flicker of the scene are no
+/// reason to refuse it.
 fn of_masked(
     samples: &mut Samples,
     given: Option<&RgbImage>,

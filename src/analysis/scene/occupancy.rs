@@ -1,4 +1,7 @@
-//! In which samples each pixel shows the scene, and in which something before it.
+//! Records for each pixel the samples that show the scene, and those in which something covers it.
+//!
+//! The foreground components of the survey mark their pixels as taken, as a ghost or as swaying scenery. A
+//! ghost is a place at which the background shows the resting animal and the sample does not.
 
 use super::plate::Plate;
 use super::samples::Samples;
@@ -7,21 +10,22 @@ use super::sway;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask};
 
-/// Pixels around a component that may still show some of it.
+/// Width of the margin around a component that may still show some of it, pixels. Free choice.
 const MARGIN_PX: u32 = 3;
 
-/// What the samples show at each pixel; bit k is sample k.
+/// Content of every pixel over the samples; in each word, bit k is sample k.
 pub(super) struct Occupancy {
-    /// Something stands before the scene.
+    /// Samples in which something covers the scene.
     pub(super) taken: Vec<u64>,
-    /// The plate shows the animal, the sample does not.
+    /// Samples that show the scene where the background shows the animal.
     pub(super) ghost: Vec<u64>,
-    /// Something of the scene sways here.
+    /// Whether scenery sways at the pixel.
     pub(super) scenery: Vec<bool>,
 }
 
 impl Occupancy {
-    /// The large components of every sample as the animal (or what is as large), its ghost, or swaying scenery.
+    /// Marks the pixels of all large components, and of ghosts of any size. With masks, components of any
+    /// size count.
     pub(super) fn of(
         samples: &Samples,
         plates: &[Plate],
@@ -40,7 +44,7 @@ impl Occupancy {
                 continue;
             };
             for (at, component) in components.iter().enumerate() {
-                // What is left of a ghost may be small.
+                // The remainder of a ghost may be small.
                 let is_small = component.area < least_area && !samples.are_masked();
                 if is_small && !survey.looks[k][at].is_ghost {
                     continue;
@@ -52,7 +56,7 @@ impl Occupancy {
                 if survey.is_scenery(k, at) {
                     let around = mask.dilated_by(MARGIN_PX);
                     pixels_of(&around, plate.width).for_each(|px| seen.scenery[px] = true);
-                    // An animal that rests before a plant hangs together with it.
+                    // An animal that rests in front of a plant forms one component with it.
                     mask = without_displaced(&mask, &samples.frames[k], plate);
                 }
                 let mask = mask.dilated_by(MARGIN_PX);
@@ -66,14 +70,15 @@ impl Occupancy {
         seen
     }
 
-    /// Marks the pixels of a component as taken in some samples.
+    /// Marks the pixels of a component and its margin as taken in `samples`.
     pub(super) fn take(&mut self, component: &Component, [width, height]: [u32; 2], samples: u64) {
         let mask = component.mask(component.rect.inflated(MARGIN_PX, width, height));
         let mask = mask.dilated_by(MARGIN_PX);
         pixels_of(&mask, width).for_each(|px| self.taken[px] |= samples);
     }
 
-    /// For each square cell of the picture the samples in which something stands before any of its pixels.
+    /// Returns for each square cell of the picture the samples in which something covers any of its pixels.
+    /// Cells have `side` pixels along each side and come row by row.
     pub(super) fn taken_in_cells(&self, side: usize, [width, height]: [u32; 2]) -> Vec<u64> {
         let (width, height) = (width as usize, height as usize);
         let columns = width.div_ceil(side);
@@ -87,7 +92,8 @@ impl Occupancy {
         cells
     }
 
-    /// The samples of `part` in which the pixel shows the scene.
+    /// Returns the samples of `part` in which a pixel shows the scene. If enough samples show a ghost there,
+    /// only those count, because in the others the animal covers the pixel.
     pub(super) fn free(&self, px: usize, part: u64) -> u64 {
         let ghost = self.ghost[px] & part;
         match ghost.count_ones() as usize >= GHOST_SAMPLES {
@@ -97,7 +103,7 @@ impl Occupancy {
     }
 }
 
-/// The indices in a picture `width` pixels wide of the set pixels of a mask.
+/// Returns the indices of the set pixels of a mask in a picture `width` pixels wide.
 fn pixels_of(mask: &Mask, width: u32) -> impl Iterator<Item = usize> {
     let set = mask.bits.iter().enumerate().filter(|&(_, &bit)| bit == 1);
     set.map(move |(at, _)| {
@@ -106,7 +112,7 @@ fn pixels_of(mask: &Mask, width: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// The mask less the pixels whose color the plate shows a little to the side.
+/// Returns the mask without the pixels whose color the background shows nearby, smoothed by a 3 x 3 majority.
 fn without_displaced(mask: &Mask, frame: &Frame, plate: &Frame) -> Mask {
     let mut rest = mask.clone();
     let pixels: Vec<usize> = pixels_of(mask, plate.width).collect();

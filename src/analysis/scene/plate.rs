@@ -1,52 +1,58 @@
-//! The plate: a picture of the scene without the animal, and how much each of its pixels wavers (ALGORITHMS.md 2.4).
+//! The background: a picture of the scene without the animal, and the noise of each of its pixels
+//! (docs/explanation/algorithms.md, "Light and noise").
+//!
+//! A [`Plate`] also holds all that a frame is compared by: thresholds, light probes and block means.
+//! Estimating the picture is the task of `draft`.
 
 use super::light;
 use crate::analysis::silhouette::Blocks;
 use crate::raster::{Frame, RgbImage};
 
-/// Least noise of a pixel, levels of 255. The background of a lossy codec looks steadier than it is.
+/// Least noise of a pixel, levels of 255. A lossy codec hides noise of the background. Free choice.
 pub(super) const SIGMA_FLOOR: f32 = 1.5;
 
-/// The scene without the animal.
+/// The background: the scene without the animal.
 pub struct Plate {
-    /// The picture, as the decoder would give it.
+    /// The picture, in the decoder's format.
     pub frame: Frame,
     /// The same picture in RGB.
     pub rgb: RgbImage,
-    /// The second color of pixels that something sways across, and the color of `rgb` everywhere else. Colors
-    /// between the two are no difference. `None` where nothing sways.
+    /// Second color of pixels that scenery sways across; equal to `rgb` elsewhere. Colors between the two
+    /// count as background. `None` where nothing sways.
     pub other: Option<RgbImage>,
-    /// Noise of each pixel (the largest over R, G, B), one standard deviation, levels of 255.
+    /// Noise of each pixel, levels of 255: one standard deviation in the noisiest of R, G and B.
     pub sigma: Vec<f32>,
-    /// Least difference that certainly is no background, levels of 255: max(threshold, 4 sigma).
+    /// Difference above which a pixel certainly is foreground, levels of 255: at least the threshold and 4
+    /// sigma. `draft` raises it for an animal of high contrast.
     pub core_threshold: Vec<u8>,
-    /// Pixels beside those count from this share of it on.
+    /// Share of `core_threshold` above which a pixel beside a certain one counts, 0..=1.
     pub weak_share: f32,
-    /// The pixels whose light is compared.
+    /// The pixels at which the light of frames is measured.
     pub probes: Vec<light::Probe>,
-    /// Means and noise of 4 x 4 blocks, to find places worth a closer look.
+    /// Means and noise of 4 x 4 blocks, which propose boxes for a full comparison.
     pub blocks: Blocks,
-    /// The light of frames differs over the picture.
+    /// Whether the light of frames varies over the picture.
     pub uneven_light: bool,
-    /// Which light it was filmed in; colors of one light are comparable.
+    /// Index of the light of the scene. Colors of backgrounds are comparable only in the same light.
     pub light: usize,
-    /// Pixels that the animal never left free. They continue the texture around them (Efros & Leung 1999).
+    /// Number of pixels that the animal never left free; `fill` computed them from their surroundings.
     pub never_seen_px: u64,
 }
 
-/// From which difference on a pixel counts.
+/// Rule for the difference from which a pixel counts as foreground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Threshold {
-    /// Least difference that certainly is no background, levels of 255; 4 sigma where that is more ...
+    /// Least core threshold, levels of 255. A pixel of more noise has 4 sigma instead.
     pub core: u8,
-    /// ... but at most this.
+    /// Largest core threshold, levels of 255.
     pub most: u8,
-    /// Share of it from which a pixel counts beside one that certainly does.
+    /// Share of the core threshold above which a pixel beside a certain one counts, 0..=1.
     pub weak_share: f32,
 }
 
 impl Threshold {
-    /// Half counts beside the whole: the blurred rim of the animal, a fin that lets light through.
+    /// The usual rule. Half the core threshold counts beside a certain pixel: the blurred rim, a translucent
+    /// fin.
     pub const fn usual(core: u8) -> Threshold {
         Threshold {
             core,
@@ -55,8 +61,9 @@ impl Threshold {
         }
     }
 
-    /// Where the scene differs by half as much, only the whole counts. The animal is known to differ by twice as much; a
-    /// higher threshold, where the scene was changed meanwhile, would make holes in it.
+    /// The rule for a busy scene and an animal of high contrast: there is no weak threshold, because the
+    /// scene itself differs by half as much. The limit is twice the core threshold, because the animal is
+    /// known to differ by that much. A higher one would make holes in the animal where the scene changed.
     pub const fn raised(core: u8) -> Threshold {
         Threshold {
             core,
@@ -67,7 +74,7 @@ impl Threshold {
 }
 
 impl Plate {
-    /// A plate from a picture and the noise of its pixels.
+    /// Returns a background from a picture and the noise of its pixels, under the usual threshold.
     pub(in crate::analysis) fn of(frame: Frame, sigma: Vec<f32>, threshold: u8) -> Plate {
         let rgb = frame.to_rgb();
         Plate {
@@ -85,19 +92,19 @@ impl Plate {
         }
     }
 
-    /// A plate from a picture alone, with the least noise.
+    /// Returns a background from a picture, with the least noise at every pixel.
     pub(super) fn without_noise(frame: Frame, threshold: u8) -> Plate {
         let n_px = frame.luma().len();
         Plate::of(frame, vec![SIGMA_FLOOR; n_px], threshold)
     }
 
-    /// Sets from which difference on a pixel counts.
+    /// Sets the thresholds of all pixels.
     pub(super) fn set_threshold(&mut self, threshold: Threshold) {
         self.core_threshold = core_thresholds(&self.sigma, threshold);
         self.weak_share = threshold.weak_share;
     }
 
-    /// Least difference of a pixel beside one that certainly is no background, levels of 255.
+    /// Returns the difference above which a pixel beside a certain one counts, levels of 255.
     pub fn weak_threshold(&self, px: usize) -> u8 {
         (f32::from(self.core_threshold[px]) * self.weak_share) as u8
     }

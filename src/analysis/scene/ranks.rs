@@ -1,31 +1,32 @@
-//! The value of a given rank among the samples of each pixel, for a whole row of pixels at once
-//! (ALGORITHMS.md 2.1: medians).
+//! Computes order statistics, such as the median, over the samples of each pixel, for a whole row of pixels
+//! (docs/explanation/algorithms.md, "Background").
 //!
-//! Bit by bit from the top, as a binary search for the value: how many samples lie below a candidate is
-//! counted for 64 neighboring pixels in step, in loops that the compiler makes vectors of. Samples left
-//! out are 255 while they are counted, above every candidate.
+//! A binary search finds the value of the wanted rank bit by bit, from the highest bit down. Each step counts
+//! the samples below a candidate, for 64 neighboring pixels at once, in loops that the compiler vectorizes.
+//! Samples that are left out hold 255, so no candidate exceeds them.
 
-/// Most samples: they fit the bits of a word.
+/// Largest number of samples: one bit each in a 64-bit word.
 pub(super) const MOST: usize = 64;
-/// Values of a scene that does not change lie this near to each other, levels of 255: noise, and what is left of flicker.
+/// Largest difference between values of an unchanged scene, levels of 255. It covers noise and residual
+/// flicker. Free choice.
 const NEAR: u8 = 10;
-/// Pixels searched in step.
+/// Pixels searched at once.
 const LANES: usize = 64;
 
-/// One sample's values of [`LANES`] pixels.
+/// Values of one sample at [`LANES`] neighboring pixels.
 type Lanes = [u8; LANES];
 
-/// Which samples of a pixel count, and which of them is wanted.
+/// The samples of a pixel that count, and the wanted rank among them.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Wanted {
-    /// Bit k for sample k.
+    /// The samples that count; bit k is sample k.
     pub(super) free: u64,
-    /// 0 for the least; below the number of free samples.
+    /// Rank of the wanted value: 0 for the smallest, below the number of free samples.
     pub(super) rank: u8,
 }
 
 impl Wanted {
-    /// The lower median of the free samples.
+    /// Returns the request for the lower median of the free samples.
     pub(super) fn median(free: u64) -> Wanted {
         Wanted {
             free,
@@ -34,8 +35,10 @@ impl Wanted {
     }
 }
 
-/// For each pixel of a row the wanted value of the samples; 255 where none is free. `samples` are the same
-/// row of each sample, at most [`MOST`]; with `bases`, one row a sample, the values are their distances from those.
+/// Writes the wanted value of each pixel to `row`; 255 where no sample is free.
+///
+/// `samples` holds the same row of each sample, at most [`MOST`]. With `bases`, one row for each sample, the
+/// absolute differences from `bases` are ranked instead.
 pub(super) fn ranked(
     samples: &[&[u8]],
     bases: Option<&[&[u8]]>,
@@ -64,9 +67,11 @@ pub(super) fn ranked(
     }
 }
 
-/// Of the free samples of each pixel keeps those that lie within `NEAR` levels of the value around which the most of them lie, and
-/// wants their median. A scene stays as it is while what passes before it varies, so this is the scene even where something
-/// stands before it more than half of the time.
+/// Narrows `wanted` to the free samples near the commonest value of each pixel, and asks for their median.
+///
+/// The center is the free sample with the most free samples within `NEAR` levels. Only those within `NEAR` of
+/// it stay. The scene keeps its color while passing objects vary, so this finds the scene even where objects
+/// cover it most of the time.
 pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
     for (start, wanted) in (0..).step_by(LANES).zip(wanted.chunks_mut(LANES)) {
         let mut values = [[0; LANES]; MOST];
@@ -101,7 +106,7 @@ pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
     }
 }
 
-/// Makes 255 of what is not free.
+/// Sets the values that do not count to 255.
 fn leave_out(values: &mut [Lanes], wanted: &[Wanted]) {
     let all = u64::MAX >> (MOST - values.len());
     if wanted.iter().all(|w| w.free == all) {
@@ -114,7 +119,7 @@ fn leave_out(values: &mut [Lanes], wanted: &[Wanted]) {
     }
 }
 
-/// The value of each lane's rank.
+/// Returns the value of the given rank in each lane.
 fn select(values: &[Lanes], ranks: &Lanes) -> Lanes {
     let mut found = [0; LANES];
     for bit in (0..8).rev() {
@@ -142,7 +147,8 @@ mod tests {
 
     #[test]
     fn what_stays_as_it_is_is_the_commonest_though_something_passes_more_often() {
-        // Twenty free samples of the scene, forty of which no ten are alike, and four that are not free.
+        // Of 60 free samples, 20 show the scene, and no ten of the other 40 are alike. Four samples are not
+        // free.
         let value = |k: usize| {
             if k.is_multiple_of(3) {
                 120 + (k % 4) as u8

@@ -1,4 +1,8 @@
-//! Films that cannot become a library, told from the samples before any tracking (ALGORITHMS.md 2.9).
+//! Rejects footage that cannot become a library, from its samples and before tracking
+//! (docs/explanation/algorithms.md, "Refused footage").
+//!
+//! The reasons checked here are: nothing moves, the scene moves, the animal is too large, or there are
+//! several animals. Moving cameras and changing light are found earlier, in `states`.
 
 use super::mirror::Mirror;
 use super::samples::Samples;
@@ -9,33 +13,37 @@ use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 use crate::order;
 
-/// Something must move in this share of the samples.
+/// Least share of the samples in which the animal must be found, 0..=1. Free choice.
 const MOVING_SHARE: f64 = 0.05;
-/// Where more than this share of the picture differs ...
+/// Share of the picture that may differ without being the animal, 0..=1. Free choice.
 const BUSY_AREA: f64 = 0.15;
-/// ... in more than this share of the samples, the scene moves. A second animal must be seen as often.
+/// Share of the samples, 0..=1. The scene moves if more of them exceed `BUSY_AREA`. A second animal must
+/// appear in more of them. Free choice.
 const OFTEN: f64 = 0.3;
-/// An animal that usually covers more than this share of the picture hides too much of the background. A free
-/// choice: of the films `large_animal` in `bench/cases.py`, which come near it, one is measured wrongly
-/// (docs/ACCURACY.md). Bedding that moves all over the cage and is taken for the animal is
-/// larger, and is refused for the same reason.
+/// Largest median area of the animal, as a share of the picture; a larger one hides too much of the
+/// background. The limit also refuses moving bedding that is mistaken for the animal.
+///
+/// Free choice: of the films `large_animal` in `bench/cases.py`, which come near it, one is measured wrongly
+/// (docs/measurements.md).
 const LARGE: f64 = 0.15;
-/// A second component of this share of the animal's area may be a second animal.
+/// Least area of a second animal, as a share of the animal's area. Free choice.
 const COMPARABLE: f64 = 0.5;
-/// It is an animal if it goes farther than this share of the animal's diagonal: a plant sways at its place.
+/// Least range of a second animal, as a share of the animal's diagonal. A swaying plant moves less. Free
+/// choice.
 const ROAMS: f64 = 0.5;
 
-/// What moves besides the animal and looks like it.
+/// Moving objects besides the animal that look like it.
 pub(super) enum Company {
-    /// Nothing, or too seldom to matter.
+    /// None, or too rarely to matter.
     None,
-    /// Its mirror image.
+    /// The animal's mirror image.
     Image(Mirror),
     /// Other animals.
     Animals,
 }
 
-/// Judges a film by the survey of its samples. Returns the animal's company, where that is no reason to refuse.
+/// Checks footage by the survey of its samples; fails with the reason to refuse it. Returns the objects that
+/// resemble the animal.
 pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Result<Company, Error> {
     let n_samples = survey.looks.len() as f64;
     let n_px = samples.n_px() as f64;
@@ -80,7 +88,7 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
     company(survey, samples, subject, params)
 }
 
-/// Judges a film whose masks are given: a scene that moves is no reason to refuse it.
+/// Checks footage with masks of the animal; a moving scene is allowed.
 pub(super) fn judge_masked(
     survey: &Survey,
     samples: &Samples,
@@ -95,7 +103,8 @@ pub(super) fn judge_masked(
     company(survey, samples, subject, params)
 }
 
-/// The animal's company, where that is no reason to refuse.
+/// Returns the objects that resemble the animal. Fails if they are animals and the parameters do not say
+/// which one to follow.
 fn company(
     survey: &Survey,
     samples: &Samples,
@@ -118,7 +127,7 @@ fn company(
         Some(_) if samples.are_masked() => Ok(Company::None),
         Some(mirror) => Ok(Company::Image(mirror)),
         None if params.follow == Follow::One && params.animal_at.is_none() => {
-            // A pair in the middle of those found: neither has only just come in.
+            // In a pair from the middle of the list, both animals are fully in view.
             let at = pairs.len() / 2;
             Err(Error::SeveralAnimals {
                 frame: samples.frame_idx[in_samples[at]],
@@ -129,7 +138,8 @@ fn company(
     }
 }
 
-/// Another component that looks like the subject, of comparable area, farther from the animal than either is long.
+/// Returns another component that resembles the subject and has a comparable area. The gap to the animal must
+/// exceed the length of the shorter one. Returns `None` if there is none.
 pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option<usize> {
     let first = &looks[animal];
     (0..looks.len()).find(|&at| {
@@ -144,7 +154,7 @@ pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option
     })
 }
 
-/// How far things lie apart along x or y, without the outermost tenth, pixels.
+/// Returns the range of the centroids without the outermost tenth, pixels: the larger of x and y.
 fn range_px(looks: &[&Look]) -> f64 {
     let along = |axis: usize| {
         let mut values: Vec<f64> = looks.iter().map(|look| look.centroid_px[axis]).collect();
@@ -158,7 +168,7 @@ pub(super) fn longest(rect: &Rect) -> u32 {
     rect.w.max(rect.h)
 }
 
-/// The distance between two boxes, the longer way of x and y; 0 where they meet.
+/// Returns the gap between two boxes, pixels: the larger of x and y; 0 where they touch or overlap.
 fn gap_px(a: &Rect, b: &Rect) -> u32 {
     let apart =
         |a0: u32, a1: u32, b0: u32, b1: u32| b0.saturating_sub(a1).max(a0.saturating_sub(b1));

@@ -1,8 +1,9 @@
-//! An animal that rests for long is in the median of its time, and is not scenery.
+//! Finds an animal that rests so long that the median of a time window shows it.
 //!
-//! The plates of short windows of time are compared with the plate of the whole state. A component in which one of them
-//! looks like the subject, and the other does not, is the animal at rest: in that window, or in the windows that
-//! look like the whole. There its pixels do not show the scene.
+//! Backgrounds of short windows are compared with the background of the whole state. The animal rests in a
+//! component that resembles it in one of the two backgrounds but not in the other. If the window's background
+//! shows the animal, its pixels count as taken in that window. Otherwise they count as taken in all windows
+//! that look like the whole.
 
 use super::fill;
 use super::light::Light;
@@ -16,14 +17,16 @@ use crate::analysis::subject::{FITS, Look, Subject};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
 
-/// A component below this share of the subject's area is none of it.
+/// Least area of a component, as a share of the subject's area. Free choice.
 const LEAST_SHARE: f64 = 0.3;
-/// Fewer samples than these without the animal tell nothing of where it is.
+/// Least number of consecutive samples without the animal, and of samples that show it elsewhere. Free
+/// choice.
 const LEAST_GAP: usize = 3;
-/// Two plates that differ by fewer levels than this on average show the same.
+/// Mean difference below which two backgrounds show the same, levels of 255. Free choice.
 const SAME_LEVELS: f64 = 10.0;
 
-/// Marks the samples and pixels in which the subject rests. `windows` are parts of the state that `whole` describes.
+/// Marks the samples and pixels in which the subject rests as taken. `windows` are parts of the state that
+/// `whole` describes, with their backgrounds.
 pub(super) fn mark(
     seen: &mut Occupancy,
     whole: &Plate,
@@ -55,8 +58,10 @@ pub(super) fn mark(
     }
 }
 
-/// Marks the pixels of an animal that was lost where it moved last, and rests there. What is behind it was never seen, so it is told
-/// from the scene continued across its place. An animal that went into a hole was seen elsewhere before, and that place without it.
+/// Marks the pixels of an animal that settles where it was last seen moving, and is then lost. No sample
+/// shows the scene behind it. Its surroundings, continued across its place, therefore serve as background.
+///
+/// An animal that hides in a hole differs: the samples in which it is elsewhere show that place without it.
 pub(super) fn mark_settled(
     seen: &mut Occupancy,
     whole: &Plate,
@@ -98,7 +103,7 @@ pub(super) fn mark_settled(
     }
 }
 
-/// A plate with the scene around a box continued across it.
+/// Returns a copy of the background in which a box is filled smoothly from its surroundings.
 fn without(plate: &Plate, rect: Rect) -> Plate {
     let mut rgb = plate.rgb.clone();
     let is_inside = |k: usize| {
@@ -115,7 +120,7 @@ fn without(plate: &Plate, rect: Rect) -> Plate {
     }
 }
 
-/// How unlike the subject a component of one plate looks before another.
+/// Returns how unlike the subject (`Subject::cost`) a component of `plate` looks in front of `behind`.
 fn cost(subject: &Subject, plate: &Plate, behind: &Plate, component: &Component) -> f64 {
     let difference = silhouette::difference(&plate.frame, behind, &Light::SAME, component.rect);
     let picture = [plate.frame.width, plate.frame.height];
@@ -132,7 +137,7 @@ fn cost(subject: &Subject, plate: &Plate, behind: &Plate, component: &Component)
     })
 }
 
-/// Whether two plates show the same within a component.
+/// Returns whether two backgrounds show the same within a component.
 fn is_same(plate: &Plate, other: &Plate, component: &Component) -> bool {
     let difference = silhouette::difference(&plate.frame, other, &Light::SAME, component.rect);
     let mask = component.mask(component.rect);

@@ -1,7 +1,9 @@
-//! Frames spread evenly through the footage, kept in memory while the plate is made of them.
+//! Samples: frames spread evenly over the footage, kept in memory to estimate the background
+//! (docs/explanation/algorithms.md, "Background").
 //!
-//! At most 64, so that a pixel's samples fit the bits of one word, and no more than fit a budget of
-//! memory: a 4K footage gets fewer.
+//! There are at most 64, so that one bit per sample fits a 64-bit word. Large frames get fewer, down to 16,
+//! to limit memory. The module also computes the median, the commonest value and the noise of each pixel over
+//! the samples.
 
 use std::ops::ControlFlow;
 
@@ -19,24 +21,28 @@ use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::Frame;
 
+/// Least number of samples, even where they exceed the memory budget. Free choice.
 const LEAST: usize = 16;
+/// Memory for the samples, bytes. Free choice.
 const BUDGET_BYTES: usize = 128 << 20;
 
+/// The samples of a footage.
 pub(super) struct Samples {
-    /// The frames.
+    /// The frames; `Draft` equalizes their light.
     pub(super) frames: Vec<Frame>,
-    /// Which frames of the footage they are.
+    /// Index of each sample in the footage.
     pub(super) frame_idx: Vec<usize>,
-    /// The boxes of each in which nothing is the animal.
+    /// For each sample the boxes that the parameter `ignore` excludes.
     pub(super) ignored: Vec<Vec<Rect>>,
-    /// A sample and a point in it at which the animal was said to be.
+    /// The sample and the point in it that the parameter `animal_at` gives, pixels.
     pub(super) pinned: Option<(usize, [f64; 2])>,
     fps: f64,
 }
 
 impl Samples {
-    /// Reads the footage once and keeps frames spread evenly over it. The frame in which the animal was pointed at is one of
-    /// them.
+    /// Reads the footage once and keeps frames spread evenly over it. The frame that `animal_at` names
+    /// replaces the sample nearest to it. Fails if the footage is too short, cannot be read or ends before
+    /// that frame, or if `progress` is cancelled.
     pub(super) fn spread(
         source: &dyn FrameSource,
         params: &Params,
@@ -80,17 +86,17 @@ impl Samples {
         })
     }
 
-    /// The time of a sample, seconds from the first frame.
+    /// Returns the time of a sample, seconds from the first frame.
     pub(super) fn time_s(&self, k: usize) -> f64 {
         self.frame_idx[k] as f64 / self.fps
     }
 
-    /// Whether each comes with a mask, which says what is the animal.
+    /// Returns whether every sample comes with a mask of the animal.
     pub(super) fn are_masked(&self) -> bool {
         self.frames.iter().all(|frame| frame.mask.is_some())
     }
 
-    /// Changes the samples of `part`.
+    /// Applies `change` to the samples of `part`, in parallel.
     pub(super) fn change(&mut self, part: u64, change: impl Fn(&mut Frame) + Sync) {
         let members = self.frames.par_iter_mut().enumerate();
         members
@@ -98,32 +104,32 @@ impl Samples {
             .for_each(|(_, frame)| change(frame));
     }
 
-    /// A thumbnail of every sample.
+    /// Returns a thumbnail of every sample.
     pub(super) fn thumbnails(&self) -> Vec<Thumbnail> {
         self.frames.par_iter().map(Thumbnail::of).collect()
     }
 
-    /// Pixels of a frame.
+    /// Returns the number of pixels of a frame.
     pub(super) fn n_px(&self) -> usize {
         self.frames[0].width as usize * self.frames[0].height as usize
     }
 
-    /// The median of the samples of `part`, of every plane.
+    /// Returns the median of the samples of `part`, value by value in each plane.
     pub(super) fn median_frame(&self, part: u64) -> Frame {
         self.each_row(part, None, false, |wanted, _, _| {
             wanted.fill(Wanted::median(part))
         })
     }
 
-    /// The commonest values of the samples of `part`.
+    /// Returns the commonest values of the samples of `part` (`ranks::want_commonest`).
     pub(super) fn commonest_frame(&self, part: u64) -> Frame {
         self.each_row(part, None, true, |wanted, _, _| {
             wanted.fill(Wanted::median(part))
         })
     }
 
-    /// The median over the samples of `part` in which the pixel is free; where it is free in fewer than `least`, as
-    /// before.
+    /// Returns the commonest values over the samples of `part` in which each value is free. Where it is free
+    /// in fewer than `least` samples, the value of `before` stays.
     pub(super) fn median_where_free(
         &self,
         part: u64,
@@ -138,7 +144,7 @@ impl Samples {
                 *wanted = Wanted::median(if enough { free } else { 0 });
             }
         });
-        // Where nothing is wanted the row holds 255.
+        // Values without a wanted sample are 255.
         self.each_place(|at, plane, x, y| {
             if result.planes[at] == 255
                 && self.free_at(plane, x, y, seen, part).count_ones() < least
@@ -149,10 +155,13 @@ impl Samples {
         result
     }
 
-    /// The noise of each pixel over its free samples in `part`, against each sample's own background: 1.4826 times the
-    /// median absolute deviation, luma and chroma added as they add in RGB, at least the floor (ALGORITHMS.md 2.4). Where
-    /// scenery sways the values gather at two places and the median says nothing: there it is what a normal distribution with
-    /// the same 90th percentile would have.
+    /// Returns the noise of each pixel over its free samples in `part`: one standard deviation, levels of
+    /// 255, at least `SIGMA_FLOOR` (docs/explanation/algorithms.md, "Light and noise").
+    ///
+    /// Each sample is compared with its own background. The noise is 1.4826 times the median absolute
+    /// deviation, with luma and chroma weighted by the conversion to RGB. Where scenery sways, the values
+    /// cluster around two colors, and a median would miss one. There the 90th percentile replaces it, scaled
+    /// by 0.41 as for a normal distribution.
     pub(super) fn noise(&self, part: u64, backgrounds: &[&Frame], seen: &Occupancy) -> Vec<f32> {
         let sways_anywhere = seen.scenery.contains(&true);
         let mut deviation = self.each_row(part, Some(backgrounds), false, |wanted, plane, row| {
@@ -190,8 +199,8 @@ impl Samples {
         sigma
     }
 
-    /// The samples in which a value is free; a chroma value stands for four pixels and is free where
-    /// all of them are.
+    /// Returns the samples of `all` in which a value is free. A chroma value is free where all its four
+    /// pixels are.
     fn free_at(&self, plane: Plane, x: usize, y: usize, seen: &Occupancy, all: u64) -> u64 {
         match plane {
             Plane::Luma => seen.free(y * self.frames[0].width as usize + x, all),
@@ -202,7 +211,7 @@ impl Samples {
         }
     }
 
-    /// Whether scenery sways at a value.
+    /// Returns whether scenery sways at any pixel of a value.
     fn sways(&self, plane: Plane, x: usize, y: usize, seen: &Occupancy) -> bool {
         match plane {
             Plane::Luma => seen.scenery[y * self.frames[0].width as usize + x],
@@ -223,7 +232,7 @@ impl Samples {
         [y0 * w + x0, y0 * w + x1, y1 * w + x0, y1 * w + x1]
     }
 
-    /// Calls `visit` with the index of every value, its plane, column and row in it.
+    /// Calls `visit` for every value of a frame with its index, plane, column and row.
     fn each_place(&self, mut visit: impl FnMut(usize, Plane, usize, usize)) {
         let mut at = 0;
         for (plane, width, n_rows) in self.planes() {
@@ -236,7 +245,7 @@ impl Samples {
         }
     }
 
-    /// Kind, width and number of rows of each plane, in the order of the frame's bytes.
+    /// Returns kind, width and number of rows of each plane, in the order of the frame's bytes.
     fn planes(&self) -> [(Plane, usize, usize); 3] {
         let frame = &self.frames[0];
         let (w, h) = (frame.width as usize, frame.height as usize);
@@ -244,8 +253,10 @@ impl Samples {
         [(Plane::Luma, w, h), chroma, chroma]
     }
 
-    /// A frame each of whose values is of the wanted rank among the values of the samples of `part` at the same place, or
-    /// among their distances from `bases`, one for each sample. `want` fills in what is wanted of a row.
+    /// Returns a frame of order statistics: each value has the wanted rank among the values of the samples of
+    /// `part`. With `bases`, one frame for each sample, the absolute differences from them are ranked
+    /// instead. `want` writes the wanted ranks of a row. `commonest` then narrows them by
+    /// `ranks::want_commonest`.
     fn each_row(
         &self,
         part: u64,
@@ -288,7 +299,8 @@ impl Samples {
     }
 }
 
-/// Puts the frame in which the animal was pointed at in place of the sample nearest to it; returns which one.
+/// Replaces the sample nearest to the frame of `animal_at` by that frame. Returns its index among the
+/// samples. Fails if the footage ends before it.
 fn pin(
     source: &dyn FrameSource,
     at: AnimalAtParam,
@@ -308,7 +320,7 @@ fn pin(
     Ok(k)
 }
 
-/// The bits of `free` at the set bits of `part`, packed together.
+/// Returns the bits of `free` at the set bits of `part`, packed into the low bits.
 fn packed(free: u64, part: u64) -> u64 {
     if free == part {
         return u64::MAX >> (64 - part.count_ones());
@@ -320,7 +332,7 @@ fn packed(free: u64, part: u64) -> u64 {
         .fold(0, |all, bit| all | bit)
 }
 
-/// Whether a value belongs to one pixel or to four.
+/// Kind of a plane: a luma value belongs to one pixel, a chroma value to four.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Plane {
     Luma,

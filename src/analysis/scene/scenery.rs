@@ -1,21 +1,22 @@
-//! Scenery that sways: a plant differs from the plate in many samples, always at the same place, while
-//! the animal is to be seen elsewhere (ALGORITHMS.md 2.4: its pixels get a large sigma and drop out).
+//! Detects swaying scenery: components that recur at one place in many samples while the animal is elsewhere
+//! (docs/explanation/algorithms.md, "Light and noise").
+//!
+//! Example: a plant. A sleeping animal recurs too, but does not appear elsewhere in the same sample.
 
 use crate::raster::runs::Component;
 
-/// Boxes with more than this in common are at the same place ...
+/// Overlap above which two boxes are at the same place (Jaccard index). Free choice.
 const MOSTLY_THERE: f64 = 0.5;
-/// ... and with more than this have not moved at all.
+/// Overlap above which a box has not moved at all (Jaccard index). Free choice.
 const JUST_THERE: f64 = 0.8;
 
-/// A place that differs in more than this share of the samples is not where an animal passes by ...
+/// Share of the samples above which a place recurs too often for a passing animal, 0..=1. Free choice.
 const RECURRENCE: f64 = 0.25;
-/// ... if in this share of them the animal is seen elsewhere.
+/// Least share of the recurrences in which the animal must appear elsewhere, 0..=1. Free choice.
 const COMPANY: f64 = 0.5;
 
-/// Whether a component is scenery, told from the components of all samples and from which of them is the animal.
-///
-/// An animal that sleeps recurs at its place too, but is not seen elsewhere meanwhile.
+/// Returns whether a component is swaying scenery. `found` holds the components of all samples, and `animal`
+/// the index of the animal among those of each sample.
 pub(super) fn is_scenery(
     found: &[Vec<Component>],
     animal: &[Option<usize>],
@@ -34,7 +35,8 @@ pub(super) fn is_scenery(
         && f64::from(n_in_company as u32) >= COMPANY * f64::from(n_times)
 }
 
-/// Whether a component is seen just where it is in so many samples, its own included.
+/// Returns whether at least `least` samples show a component at exactly the same place; its own sample
+/// counts.
 pub(super) fn recurs(found: &[Vec<Component>], component: &Component, least: usize) -> bool {
     let here = |components: &&Vec<Component>| {
         components
@@ -44,12 +46,12 @@ pub(super) fn recurs(found: &[Vec<Component>], component: &Component, least: usi
     found.iter().filter(here).take(least).count() == least
 }
 
-/// Whether the boxes of two components cover mostly the same pixels.
+/// Returns whether the boxes of two components share most of their pixels.
 fn same_place(a: &Component, b: &Component) -> bool {
     overlap(a, b) > MOSTLY_THERE
 }
 
-/// Jaccard's index of the boxes of two components, 0..=1.
+/// Returns the Jaccard index of the boxes of two components, 0..=1.
 fn overlap(a: &Component, b: &Component) -> f64 {
     let both = a.rect.intersection(&b.rect).area();
     both as f64 / (a.rect.area() + b.rect.area() - both) as f64

@@ -1,10 +1,10 @@
-//! Whether the camera moves: how far each sample is shifted against the plate (ALGORITHMS.md 2.9).
+//! Measures how far the camera moved between a reference frame and other samples
+//! (docs/explanation/algorithms.md, "Refused footage").
 //!
-//! Phase correlation (Kuglin & Hines 1975) of small tiles spread over the picture: it looks at
-//! structure alone, so that light may change. A plant that sways or water that glitters shifts its own
-//! tiles its own way; only what most tiles agree upon is the camera. The animal is not in the plate
-//! and only adds noise; tiles without structure say nothing. A shift beyond half a tile goes unseen here: then nearly
-//! everything differs from the plate, which the refusals notice by themselves.
+//! Phase correlation (Kuglin & Hines 1975) compares small tiles spread over the picture. It uses structure
+//! only, so light may change. Swaying plants and glittering water shift only their own tiles. The shift of
+//! the camera is the one on which most tiles agree. Shifts above half a tile are not found; then most of the
+//! picture differs, which `states` and `refusal` detect.
 
 use std::f64::consts::TAU;
 
@@ -13,36 +13,37 @@ use rayon::prelude::*;
 use crate::geometry::Rect;
 use crate::raster::Frame;
 
-/// Side of a tile, a power of two.
+/// Side of a tile, pixels; a power of two. Free choice.
 const SIDE: usize = 64;
-/// At most this many tiles along each side of the picture.
+/// Largest number of tiles along each side of the picture. Free choice.
 const MOST_ALONG: u32 = 5;
-/// Standard deviation of a tile's luma, levels of 255, below which it has no structure.
+/// Least standard deviation of a tile's luma, levels of 255; below it a tile has no structure. Free choice.
 const LEAST_DEVIATION: f64 = 3.0;
-/// Height of the peak, of that of two equal tiles, below which tiles are not the same scene.
+/// Least height of the correlation peak, as a share of the peak of equal tiles. Free choice.
 const LEAST_PEAK: f64 = 0.3;
-/// Fewer tiles than these do not speak for the picture.
+/// Least number of tiles with a peak for a shift. Free choice.
 const LEAST_TILES: usize = 4;
-/// A shift is the camera's when this share of the tiles agrees with it ...
+/// Least share of the tiles that must agree on a shift, 0..=1. Free choice.
 const AGREEMENT: f64 = 0.6;
-/// ... to within this, or to within this share of the shift: a tile fades to its edges, which holds a large
-/// shift back.
+/// Deviation within which a tile agrees, pixels. Free choice.
 const TOLERANCE_PX: f64 = 0.5;
+/// Deviation within which a tile agrees, as a share of the shift, if that is larger. Tiles fade to their
+/// edges, so large shifts are measured too small. Free choice.
 const TOLERANCE: f64 = 0.35;
-/// Spatial frequencies count by a Gaussian of this width, cycles a pixel ...
+/// Standard deviation of the Gaussian weight of spatial frequencies, cycles per pixel. Free choice.
 const BANDWIDTH: f64 = 0.2;
-/// ... and by how far they stand out of white noise of this many levels: only what is the scene's is
-/// brought to equal strength.
+/// Standard deviation of the white noise that damps weak frequencies, levels of 255. Only frequencies well
+/// above it are whitened to equal strength. Free choice.
 const NOISE: f64 = 8.0;
 
-/// The plate's tiles that have structure, with their spectra.
+/// The tiles of a reference frame that have structure, with their spectra.
 pub(super) struct Correlator {
     tiles: Vec<(Rect, Vec<Complex>)>,
     fourier: Fourier,
 }
 
 impl Correlator {
-    /// A correlator against a reference frame.
+    /// Returns a correlator against a reference frame.
     pub(super) fn of(plate: &Frame) -> Correlator {
         let fourier = Fourier::new();
         let tiles = tiles(plate.width, plate.height)
@@ -56,13 +57,14 @@ impl Correlator {
         Correlator { tiles, fourier }
     }
 
-    /// The shift of each chosen frame against the reference, pixels; `None` where the tiles do not agree.
+    /// Returns the shift of each chosen frame from the reference, pixels; `None` where the tiles do not
+    /// agree.
     pub(super) fn shifts_px(&self, frames: &[Frame], chosen: &[usize]) -> Vec<Option<[f64; 2]>> {
         let of = |&k: &usize| self.shift_px(&frames[k]);
         chosen.par_iter().map(of).collect()
     }
 
-    /// The shift that most tiles agree upon; `None` when they do not.
+    /// Returns the shift on which most tiles agree, pixels; `None` when they do not.
     fn shift_px(&self, frame: &Frame) -> Option<[f64; 2]> {
         let shifts: Vec<[f64; 2]> = self
             .tiles
@@ -89,7 +91,8 @@ impl Correlator {
     }
 }
 
-/// Tiles spread evenly over a picture; they overlap in a small one. None in one smaller than a tile.
+/// Returns tiles spread evenly over a picture. They overlap in a small picture; there are none in one smaller
+/// than a tile.
 fn tiles(width: u32, height: u32) -> Vec<Rect> {
     let side = SIDE as u32;
     let along = |length: u32| -> Vec<u32> {
@@ -123,15 +126,15 @@ enum Way {
     Back,
 }
 
-/// The Fourier transform of a tile (Cooley & Tukey 1965), and what it needs once.
+/// The Fourier transform of a tile (Cooley & Tukey 1965), with its constant tables.
 struct Fourier {
-    /// exp(-i tau k / SIDE).
+    /// exp(-i tau k / SIDE) for each k.
     roots: Vec<Complex>,
-    /// Hann's window.
+    /// Hann window.
     window: Vec<f64>,
-    /// How much each frequency counts.
+    /// Weight of each spatial frequency.
     weights: Vec<f64>,
-    /// What noise adds to the product of two spectra.
+    /// Contribution of noise to the product of two spectra.
     noise: f64,
 }
 
@@ -158,7 +161,7 @@ impl Fourier {
         }
     }
 
-    /// The tile's luma less its mean, fading to its edges; `None` where it has no structure.
+    /// Returns the luma of a tile minus its mean, faded to its edges; `None` where it has no structure.
     fn windowed(&self, frame: &Frame, rect: Rect) -> Option<Vec<Complex>> {
         let width = frame.width as usize;
         let level = |k: usize| {
@@ -178,7 +181,7 @@ impl Fourier {
         Some((0..SIDE * SIDE).map(value).collect())
     }
 
-    /// Rows, then columns.
+    /// Transforms the rows, then the columns, in place.
     fn transform(&self, tile: &mut [Complex], way: Way) {
         for row in tile.chunks_exact_mut(SIDE) {
             self.transform_line(row, way);
@@ -228,8 +231,8 @@ impl Fourier {
         }
     }
 
-    /// Where the phase correlation of two spectra has its peak: the shift of the first against the
-    /// second, pixels. `None` when the peak is low.
+    /// Returns the shift of the first spectrum from the second, pixels: the peak of their phase correlation,
+    /// refined below one pixel. Returns `None` when the peak is low.
     fn peak(&self, frame: &[Complex], plate: &[Complex]) -> Option<[f64; 2]> {
         let mut ideal = 0.0;
         let product = |k: usize| {
@@ -260,7 +263,8 @@ impl Fourier {
     }
 }
 
-/// Where the parabola through three neighbors, the middle one the highest, has its vertex: -0.5..=0.5.
+/// Returns the vertex of the parabola through three neighbors, -0.5..=0.5 from the middle one, which is the
+/// highest.
 fn vertex(before: f64, middle: f64, after: f64) -> f64 {
     let bend = before - 2.0 * middle + after;
     if bend < 0.0 {
@@ -276,7 +280,7 @@ mod tests {
     use crate::random;
     use crate::raster::ColorSpec;
 
-    /// A scene of soft blotches seen by a camera shifted by (dx, dy), in light of `gain`, with noise.
+    /// Returns soft blotches seen by a camera shifted by (dx, dy) in light of `gain`, with noise.
     fn scene(dx: f64, dy: f64, gain: f64, noise_key: u64) -> Frame {
         let mut frame = Frame::new(320, 240, ColorSpec::default());
         let blotch = |k: u64| {

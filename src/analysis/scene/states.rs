@@ -1,10 +1,10 @@
-//! Sorts the samples into the states of the scene: one for each light that was switched and for each place in which
-//! the camera stood. Each state gets a plate of its own. Samples that show no scene (black frames, title cards, a
-//! hand over the lens) belong to none.
+//! Groups the samples by state of the scene: one state for each light and for each camera position. Each
+//! state gets its own background (docs/explanation/algorithms.md, "Background").
 //!
-//! A state begins where two neighboring samples differ in much of the picture, after the light of one has been fitted
-//! to the other (gain, rows, columns). States that look alike are one state that recurs. Within a state, phase
-//! correlation (`shift`) tells whether the camera was moved.
+//! A state begins where two neighboring samples differ in much of the picture. Before the comparison, the
+//! light of one is fitted to the other by gains for the whole picture, rows and columns. States that look
+//! alike are merged. Phase correlation (`shift`) then splits a state by camera position. Samples without a
+//! scene join no state: black frames, title cards, a hand over the lens.
 
 use super::samples::Samples;
 use super::shift::Correlator;
@@ -12,36 +12,39 @@ use super::thumbnail::Thumbnail;
 use crate::analysis::Error;
 use crate::order;
 
-/// Neighboring samples that differ in more than this share of the picture show two states ...
+/// Share of differing cells above which two samples show different states, 0..=1. Free choice.
 const DIFFERENT: f64 = 0.35;
-/// ... if that is this many times the usual share. A large animal alone differs in twice its area.
+/// Neighboring samples must also differ by this multiple of the median share. A moving animal alone makes
+/// twice its area differ. Free choice.
 const UNUSUAL: f64 = 2.5;
-/// Fewer samples than this do not give a plate: the median of five still ignores two.
+/// Least number of samples for a background. Free choice; a median of five already ignores two outliers.
 pub(super) const LEAST_SAMPLES: u32 = 6;
-/// A place in which the camera stood for fewer samples than this was passed by on the way.
+/// Least number of samples at one of several camera positions; with fewer, the camera only passed. Free
+/// choice.
 const LEAST_IN_PLACE: u32 = 8;
-/// A camera that was moved more often than this never stands still.
+/// Extra camera positions above which the camera counts as never at rest. Free choice.
 const MOST_MOVES: usize = 3;
-/// States must hold this share of the samples, or the film has no scene that could be measured.
+/// Least share of the samples that must belong to a state, 0..=1; with fewer, the footage is refused. Free
+/// choice.
 const LEAST_SHARE: f64 = 0.5;
-/// A camera that moves by more than this between two samples has been moved, pixels. Smaller shifts are within the
-/// error of the correlation.
+/// Shift above which the camera has moved, pixels. Smaller shifts are within the error of the correlation.
 const MOVED_PX: f64 = 0.6;
-/// How many samples are checked for a shift before all are.
+/// Samples checked for a shift before all samples are. Free choice.
 const N_CHECKED: usize = 21;
 
-/// Samples of one state that one plate describes, a bit each.
+/// The samples of one state that one background describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Part {
-    /// The samples.
+    /// The samples; bit k is sample k.
     pub(super) samples: u64,
-    /// Which light they were filmed in; parts of one light are comparable.
+    /// Index of the light. Colors are comparable between parts of equal light.
     pub(super) light: usize,
 }
 
-/// Sorts the samples into parts, the longest first.
+/// Groups the samples into parts, those with the most samples first.
 ///
-/// Fails when most of them belong to none, with the reason and the time at which the trouble begins.
+/// Fails if more than half of the samples belong to no part, with the reason and the time at which the
+/// problem begins.
 pub(super) fn sort(samples: &Samples) -> Result<Vec<Part>, Error> {
     let thumbnails = samples.thumbnails();
     let segments = segments(&thumbnails);
@@ -73,7 +76,7 @@ pub(super) fn sort(samples: &Samples) -> Result<Vec<Part>, Error> {
     Ok(kept)
 }
 
-/// Runs of neighboring samples that show the scene in one state; blank samples are left out.
+/// Returns runs of neighboring samples in one state, as bits. Blank samples belong to no run.
 fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
     let steps: Vec<f64> = thumbnails
         .windows(2)
@@ -81,7 +84,7 @@ fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
         .collect();
     let usual = order::median(steps.iter().copied()).unwrap_or(0.0);
     let limit = DIFFERENT.max(UNUSUAL * usual);
-    // A film of a bare wall is blank wherever the animal is away: there blank is the scene.
+    // Footage of a bare wall looks blank without the animal. There, blank samples show the scene.
     let n_blank = thumbnails
         .iter()
         .filter(|thumbnail| thumbnail.is_blank())
@@ -104,7 +107,7 @@ fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
     segments
 }
 
-/// Joins the segments that look alike.
+/// Merges the segments that look alike.
 fn alike(thumbnails: &[Thumbnail], segments: Vec<u64>) -> Vec<u64> {
     let mut states: Vec<(u64, Thumbnail)> = Vec::new();
     for segment in segments {
@@ -120,7 +123,7 @@ fn alike(thumbnails: &[Thumbnail], segments: Vec<u64>) -> Vec<u64> {
     states.into_iter().map(|(samples, _)| samples).collect()
 }
 
-/// Splits the samples of a state by where the camera stood.
+/// Splits the samples of a state by camera position.
 fn places(samples: &Samples, state: u64) -> Vec<u64> {
     let members: Vec<usize> = bits(state).collect();
     let correlator = Correlator::of(&samples.frames[members[members.len() / 2]]);
@@ -141,7 +144,7 @@ fn places(samples: &Samples, state: u64) -> Vec<u64> {
         .zip(correlator.shifts_px(&samples.frames, &members))
     {
         let Some(shift) = shift else {
-            // A sample whose shift is unknown most likely shows what its neighbor shows.
+            // A sample with unknown shift most likely shares its neighbor's position.
             if let Some((samples, _)) = places.get_mut(here) {
                 *samples |= 1 << k;
             }
@@ -166,7 +169,7 @@ fn places(samples: &Samples, state: u64) -> Vec<u64> {
     places.into_iter().map(|(samples, _)| samples).collect()
 }
 
-/// Why too few samples show a measurable scene, and from when on.
+/// Returns the reason for which too few samples show a measurable scene, and the time of the first change.
 fn reason(samples: &Samples, thumbnails: &[Thumbnail], dropped: &[Part]) -> Error {
     let n_lights = dropped.iter().map(|part| part.light + 1).max().unwrap_or(0);
     let first_change = dropped
@@ -195,7 +198,7 @@ fn length([x, y]: [f64; 2]) -> f64 {
     libm::hypot(x, y)
 }
 
-/// The indices of the set bits.
+/// Returns the indices of the set bits, in ascending order.
 pub(super) fn bits(mask: u64) -> impl Iterator<Item = usize> + Clone {
     (0..64).filter(move |k| mask >> k & 1 == 1)
 }

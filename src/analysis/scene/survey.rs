@@ -1,4 +1,9 @@
-//! What differs from the plates in the samples: the components, their looks, and which of them is the animal.
+//! Finds the components of the samples that differ from the background, and decides which one is the animal
+//! (docs/explanation/algorithms.md, "Silhouette").
+//!
+//! [`Subject::learn`] derives the animal's typical appearance from all samples. The survey marks ghosts:
+//! places at which the background shows the animal and the sample does not. It also cuts off a tether, such
+//! as a cable.
 
 use rayon::prelude::*;
 
@@ -14,47 +19,48 @@ use crate::raster::{Frame, Mask, RgbImage};
 
 use super::light::Light;
 
-/// Components looked at in a sample, the largest ones. More are noise.
+/// Number of components kept per sample, largest first; further ones are noise. Free choice.
 const MOST_COMPONENTS: usize = 24;
 
-/// A ghost does not move: it is seen just where it is in at least this many samples. A ghost that hangs together with the
-/// animal moves, and is neither.
+/// Samples that must show a ghost at one place. If it touches the animal, both move as one component.
 pub(super) const GHOST_SAMPLES: usize = 3;
 
-/// The surroundings of a component begin this far outside it, for its rim is blurred, pixels; a free choice ...
+/// Gap between a component and its surroundings, pixels, because its rim is blurred. Free choice.
 const MARGIN_PX: u32 = 2;
-/// ... and are at least this wide, or a quarter of the root of its area.
+/// Least width of the surroundings, pixels. Large components use a quarter of the root of their area. Free
+/// choice.
 const RING_PX: u32 = 6;
 
-/// An animal is tethered that is led so in more than this share of the samples in which it is seen.
+/// Share of the animal's sightings that must show a tether, 0..=1. Free choice.
 const TETHERED: f64 = 0.5;
-/// A tether that the background hides in part seems to end inside the picture: always at the same place, which moves by less than
-/// this share of what the animal moves.
+/// A tether ends at a fixed place if the spread of its ends is below this share of the animal's spread. The
+/// background may hide the rest of such a tether. Free choice.
 const ANCHORED: f64 = 0.4;
 
-/// The components of every sample; samples that belong to no plate have none.
+/// The components of every sample that differ from its background; a sample without a background has none.
 pub(super) struct Survey {
-    /// Components, the largest first.
+    /// Components of each sample, largest first.
     pub(super) found: Vec<Vec<Component>>,
-    /// What they look like.
+    /// Appearance of each component of `found`.
     pub(super) looks: Vec<Vec<Look>>,
-    /// The animal as the samples show it.
+    /// Typical appearance of the animal; `None` where no component can be the animal.
     pub(super) subject: Option<Subject>,
-    /// How well the subject explains the samples; 0 without one.
+    /// How well the subject explains the samples (`Subject::worth`); 0 without a subject.
     pub(super) worth: f64,
-    /// Something thin leads from the animal to the border and is a component of its own: half the width up to which
-    /// things are thin, pixels (`silhouette::tether`).
+    /// Half the width below which a part of a component is thin, pixels (`silhouette::tether`). `None`
+    /// without a tether. With one, tethers are components of their own.
     pub(super) tether_px: Option<u32>,
-    /// Something is where the animal was said to be.
+    /// Whether a component lies at the point that the parameter `animal_at` gives.
     pub(super) is_pinned: bool,
-    /// Masks say what is the animal.
+    /// Whether every frame comes with a mask of the animal.
     is_masked: bool,
-    /// Which component of each sample is the animal.
+    /// Index of the animal's component in each sample; `None` where it is not found.
     pub(super) animal: Vec<Option<usize>>,
 }
 
 impl Survey {
-    /// Compares every sample with its plate. The light of the samples is even already.
+    /// Compares every sample with its background. The light of the samples must be equalized. If the animal
+    /// has a tether, cuts it off and repeats the survey.
     pub(super) fn of(samples: &Samples, plates: &[Plate], plate_of: &[Option<usize>]) -> Survey {
         let of_sample = |k: usize| {
             let plate = plate_of[k].map(|at| &plates[at]);
@@ -146,8 +152,9 @@ impl Survey {
         }
     }
 
-    /// Where something thin leads from the animal to the border, or to one and the same place, in most samples: half the width
-    /// up to which things are thin. The end of a tail goes where the animal goes.
+    /// Returns half the width below which a part is thin, pixels; `None` if few sightings show a tether. A
+    /// tether is a thin part that reaches the border or always ends at one place. The end of a tail moves
+    /// with the animal.
     fn thin_px(&self, samples: &Samples) -> Option<u32> {
         let first = &samples.frames[0];
         let picture = [first.width, first.height];
@@ -172,31 +179,32 @@ impl Survey {
         (n_tethered as f64 > TETHERED * animals.len() as f64).then_some(thin_px)
     }
 
-    /// How well the subject explains the samples, whatever its size: a threshold that is too low adds scenery to it.
+    /// Returns the subject's worth over the root of its area, and so without its size. A threshold that is
+    /// too low enlarges the animal by scenery.
     pub(super) fn starkness(&self) -> f64 {
         let area_px = self.subject.as_ref().map_or(1.0, Subject::area_px);
         self.worth / area_px.sqrt()
     }
 
-    /// How much differs in half of the samples, pixels.
+    /// Returns the total area of the components of a sample, pixels: the median over the samples.
     pub(super) fn differing_px(&self) -> f64 {
         let of = |looks: &Vec<Look>| looks.iter().map(|look| look.area_px).sum::<f64>();
         order::median(self.looks.iter().map(of)).unwrap_or(0.0)
     }
 
-    /// Whether a component is scenery that sways.
+    /// Returns whether component `at` of sample `k` is swaying scenery; always false with masks.
     pub(super) fn is_scenery(&self, k: usize, at: usize) -> bool {
         !self.is_masked && scenery::is_scenery(&self.found, &self.animal, &self.found[k][at])
     }
 
-    /// Area from which a component counts as something that moves, pixels.
+    /// Returns the least area of a moving object, pixels: 0.3 of the subject's, but at least `LEAST_AREA_PX`.
     pub(super) fn least_area_px(&self) -> u64 {
         let of = |subject: &Subject| (0.3 * subject.area_px()) as u64;
         self.subject.as_ref().map_or(0, of).max(LEAST_AREA_PX)
     }
 }
 
-/// The median distance of points from their median.
+/// Returns the median distance of points from their coordinate-wise median, pixels.
 fn spread_px(points: &[[f64; 2]]) -> f64 {
     let middle = [0, 1].map(|axis| order::median(points.iter().map(|p| p[axis])).unwrap_or(0.0));
     let off = points
@@ -225,7 +233,7 @@ fn look(frame: &Frame, plate: &Plate, component: &Component) -> Look {
     }
 }
 
-/// The component that a point lies in, or the nearest one whose box, widened by its size, holds the point.
+/// Returns the component at the point, or else the nearest one no farther away than its box is long.
 fn nearest_to(components: &[Component], point_px: [f64; 2]) -> Option<usize> {
     let gap_px = |component: &Component| {
         let rect = component.rect;
@@ -251,7 +259,7 @@ fn nearest_to(components: &[Component], point_px: [f64; 2]) -> Option<usize> {
     })
 }
 
-/// The color of a picture inside a component.
+/// Returns the color of a picture inside a component.
 pub(super) fn color_in(picture: &RgbImage, component: &Component) -> Color {
     let row = |run: &Run| {
         let first = run.y as usize * picture.width as usize;
@@ -260,9 +268,10 @@ pub(super) fn color_in(picture: &RgbImage, component: &Component) -> Color {
     Color::of(component.runs.iter().flat_map(row))
 }
 
-/// Whether the plate shows the thing and the frame does not. Two measures from -1 to 1, positive for something that is there,
-/// are added: whether its outline is in the frame or in the plate (ALGORITHMS.md 2.2), and whether its color is. The outline
-/// counts by how much stronger it is than the texture around it: before rough bedding the outline of a smooth mouse says little.
+/// Returns whether the background shows an object that the frame does not. The sum of two measures decides,
+/// each from -1 to 1 and positive for an object in the frame. One compares gradients along the outline
+/// (docs/explanation/algorithms.md, "Background"), the other colors. The outline counts less where the
+/// texture around it is stronger, as for a smooth mouse on rough bedding.
 fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
     let surroundings = Surroundings::of(frame, component);
     let [texture, of_frame, of_plate] = surroundings.gradients(frame, &plate.frame);
@@ -274,14 +283,14 @@ fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
     share * contrast(of_frame, of_plate) + (1.0 - share) * by_color < 0.0
 }
 
-/// A component and the ring around it, in a box that holds both.
+/// A component and a ring around it, as pixel indices into one box.
 struct Surroundings {
     rect: Rect,
-    /// The component.
+    /// The pixels of the component.
     inside: Mask,
-    /// Its outermost pixels.
+    /// The outermost pixels of the component.
     outline: Vec<usize>,
-    /// The ring, some pixels outside.
+    /// The pixels of the ring, which begins `MARGIN_PX` outside the component.
     around: Vec<usize>,
 }
 
@@ -303,7 +312,7 @@ impl Surroundings {
         }
     }
 
-    /// Mean gradients, levels: of the plate in the ring, and along the outline of the frame and of the plate.
+    /// Returns mean gradients of the background in the ring, and of frame and background on the outline.
     fn gradients(&self, frame: &Frame, plate: &Frame) -> [f64; 3] {
         let (w, h) = (frame.width as usize, frame.height as usize);
         let gradient = |luma: &[u8], k: usize| {
@@ -325,7 +334,7 @@ impl Surroundings {
         ]
     }
 
-    /// The colors of the frame inside the component and in the ring.
+    /// Returns the colors of the frame inside the component and in the ring.
     fn colors(&self, frame: &Frame) -> [Color; 2] {
         let rgb = frame.rgb(self.rect);
         let inside = (0..self.inside.bits.len()).filter(|&k| self.inside.bits[k] == 1);
@@ -337,7 +346,7 @@ impl Surroundings {
     }
 }
 
-/// The difference of two positive quantities as a share of their sum.
+/// Returns (a - b) / (a + b), -1..=1, for two quantities that are not negative.
 fn contrast(a: f64, b: f64) -> f64 {
     (a - b) / (a + b).max(1e-9)
 }
@@ -351,13 +360,14 @@ mod tests {
 
     const SIZE: u32 = 80;
 
-    /// How much of a disc with a soft edge covers a pixel.
+    /// Returns the share of a pixel that a disc with a soft edge covers, 0..=1.
     fn in_disc(x: u32, y: u32) -> f64 {
         let distance_px = libm::hypot(f64::from(x) - 40.0, f64::from(y) - 40.0);
         ((20.0 - distance_px) / 6.0).clamp(0.0, 1.0)
     }
 
-    /// A scene of chips two pixels wide, between the given levels, without or with a smooth dark disc before it.
+    /// Returns a scene of two-pixel chips with levels in the given range, with or without a smooth dark disc
+    /// on top.
     fn frame([darkest, brightest]: [f64; 2], has_disc: bool) -> Frame {
         let mut picture = RgbImage::new(SIZE, SIZE);
         for (y, x) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (y, x))) {

@@ -1,24 +1,25 @@
-//! Scenery that moves a little: a stalk in the current, a curtain (ALGORITHMS.md 2.4).
+//! Finds the second color of pixels that swaying scenery passes, such as a stalk in a current or a curtain
+//! (docs/explanation/algorithms.md, "Light and noise").
 //!
-//! A pixel that it passes shows two colors by turns, and no single noise describes that. The second color
-//! is known by where else it is: what sways only moves, so its color is found in the plate a little to the
-//! side. The animal's is not, however long it stays.
+//! Such a pixel alternates between two colors, which no single noise value describes. Scenery only moves a
+//! little, so its color occurs in the background nearby. The color of the animal does not, however long it
+//! rests.
 
 use rayon::prelude::*;
 
 use crate::raster::{Frame, RgbImage};
 
-/// Levels by which a sample must differ from the plate to show another color.
+/// Least difference from the background that shows another color, levels of 255. Free choice.
 const CLEARLY: u8 = 12;
-/// So many free samples must show it.
+/// Least number of samples that must show the other color. Free choice.
 const OFTEN: usize = 3;
-/// Levels within which a color is the same.
+/// Difference below which two values are equal, levels of 255. Free choice.
 const SAME: u8 = 10;
-/// How far scenery moves: this share of the picture's width, pixels.
+/// Largest distance that scenery moves, as a share of the picture's width. Free choice.
 const REACH: f64 = 1.0 / 40.0;
 
-/// The plate with, at every pixel that something sways across, the other color seen there; `None` where
-/// nothing sways. `free` tells in which samples, as bits, a pixel shows the scene.
+/// Returns the background in RGB with the second color at every pixel that scenery sways across. Returns
+/// `None` if nothing sways. `free` returns the samples in which a pixel shows the scene, one bit each.
 pub(super) fn other_color(
     samples: &[Frame],
     plate: &Frame,
@@ -50,7 +51,7 @@ pub(super) fn other_color(
     Some(other.to_rgb())
 }
 
-/// Whether a pixel of a frame shows something that the plate has a little to the side.
+/// Returns whether the background shows a pixel's color within the distance that scenery moves.
 pub(super) fn is_displaced(frame: &Frame, plate: &Frame, px: usize) -> bool {
     let color = places(frame, px).map(|at| frame.planes[at]);
     let (w, h) = (plate.width as usize, plate.height as usize);
@@ -68,7 +69,7 @@ pub(super) fn is_displaced(frame: &Frame, plate: &Frame, px: usize) -> bool {
     })
 }
 
-/// In how many samples each pixel of a row differs clearly in luma or chroma.
+/// Returns for each pixel of a row the number of samples that differ clearly in luma or chroma.
 fn times_different(samples: &[Frame], plate: &Frame, y: usize) -> Vec<u8> {
     let width = plate.width as usize;
     let chroma_width = plate.chroma_width() as usize;
@@ -98,7 +99,8 @@ fn times_different(samples: &[Frame], plate: &Frame, y: usize) -> Vec<u8> {
     counts
 }
 
-/// The free sample that shows the other color most clearly but for two: those may be chance.
+/// Returns the free sample with the third largest difference among those that show a displaced color. The two
+/// largest may be chance. Returns `None` if there are fewer.
 fn sample_of_other(samples: &[Frame], plate: &Frame, px: usize, free: u64) -> Option<usize> {
     let at = places(plate, px);
     let gap = |k: usize| {
@@ -114,7 +116,7 @@ fn sample_of_other(samples: &[Frame], plate: &Frame, px: usize, free: u64) -> Op
     shown.get(OFTEN - 1).map(|&(_, k)| k)
 }
 
-/// Where the three values of a pixel lie in the planes.
+/// Returns the indices of a pixel's three values in the planes.
 fn places(frame: &Frame, px: usize) -> [usize; 3] {
     let (width, n_luma) = (frame.width as usize, frame.luma().len());
     let chroma = px / width / 2 * frame.chroma_width() as usize + px % width / 2;
@@ -127,7 +129,8 @@ mod tests {
     use super::*;
     use crate::raster::ColorSpec;
 
-    /// A dark stalk three pixels wide on a bright wall, at a column; and a bright square that rests.
+    /// Returns a dark stalk three pixels wide at column `stalk_x` of a bright wall, optionally with a resting
+    /// bright square.
     fn scene(stalk_x: usize, animal: bool) -> Frame {
         let mut frame = Frame::new(128, 64, ColorSpec::default());
         frame.planes.fill(128);

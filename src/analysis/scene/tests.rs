@@ -1,5 +1,5 @@
-//! Each reason to refuse a footage, raised by a film made on the spot (ALGORITHMS.md 2.9), and films that
-//! come near it but are let pass.
+//! Tests the reasons to refuse footage on films drawn here, and films that come close to one but are accepted
+//! (docs/explanation/algorithms.md, "Refused footage").
 
 use std::sync::Arc;
 
@@ -17,18 +17,18 @@ use crate::scratch::{InMemory, Scratch};
 const WIDTH: u32 = 192;
 const HEIGHT: u32 = 144;
 
-/// Something that is drawn over the scene: a dark disc.
+/// A dark disc in front of the scene: an animal or another object.
 #[derive(Clone, Copy)]
 struct Disc {
     center_px: [f64; 2],
     radius_px: f64,
 }
 
-/// What one frame shows.
+/// The content of one frame.
 struct Picture {
-    /// How far the camera has moved.
+    /// Displacement of the camera, pixels.
     camera_px: [f64; 2],
-    /// How bright the light is.
+    /// Brightness of the light as a factor; 1 is normal.
     light: f64,
     discs: Vec<Disc>,
 }
@@ -84,7 +84,7 @@ impl<F: Fn(usize) -> Picture> FrameStream for Reel<'_, F> {
     }
 }
 
-/// A wall of gray stones, six pixels wide with soft edges, and the discs before it.
+/// Draws a wall of gray stones, six pixels wide with soft edges, and the discs in front of it.
 fn drawn(picture: &Picture, noise_key: u64) -> Frame {
     let mut frame = Frame::new(WIDTH, HEIGHT, ColorSpec::default());
     frame.planes.fill(128);
@@ -123,7 +123,7 @@ fn analyzed(
     analyze(&film, None, params, Level::detect(), &scratch, &Silent)
 }
 
-/// Why the film is refused.
+/// Returns the reason for which the film is refused. Panics if it is accepted.
 fn refusal(n_frames: usize, picture: impl Fn(usize) -> Picture + Send + Sync) -> (Code, String) {
     match analyzed(n_frames, &Params::default(), picture) {
         Ok(_) => panic!("the film was accepted"),
@@ -131,7 +131,7 @@ fn refusal(n_frames: usize, picture: impl Fn(usize) -> Picture + Send + Sync) ->
     }
 }
 
-/// A disc on its way around the middle of the picture.
+/// Returns a disc that circles the middle of the picture.
 fn swimmer(frame_idx: usize, turn: f64, radius_px: f64) -> Disc {
     let angle = frame_idx as f64 * 0.13 + turn;
     Disc {

@@ -1,24 +1,28 @@
-//! A sample made small: cell means of luma and chroma, and how much of the picture differs between two of them
-//! beyond light.
+//! Thumbnails of samples: the means of luma and chroma in square cells. Their comparison gives the share of
+//! the picture that differs for reasons other than light.
+//!
+//! Before a comparison, one thumbnail is fitted to the other by gains for the whole picture, its rows and its
+//! columns.
 
 use crate::order;
 use crate::raster::Frame;
 
-/// Cells along the longer side of the picture, about.
+/// Approximate number of cells along the longer side of the picture. Free choice.
 const ALONG: usize = 96;
-/// A cell differs when its luma is off by this many levels of 255 ...
+/// Luma difference above which a cell differs, levels of 255, in addition to `SHARE`. Free choice.
 const LEVELS: f32 = 6.0;
-/// ... and this share of its luma besides, or a chroma channel by this many levels.
+/// Further luma difference allowed, as a share of the cell's luma. Free choice.
 const SHARE: f32 = 0.1;
+/// Chroma difference above which a cell differs, levels of 255. Free choice.
 const CHROMA_LEVELS: f32 = 8.0;
-/// Darker cells say nothing about light, levels of 255.
+/// Largest luma of a cell that is too dark to measure light, levels of 255. Free choice.
 const DARK: f32 = 12.0;
-/// A picture whose cells all lie within this many levels of each other is blank.
+/// A picture is blank if its cells' luma varies by less than this, levels of 255. Free choice.
 const FLAT: f32 = 6.0;
-/// Light that a camera still follows, as a factor either way.
+/// Largest gain of light between two thumbnails, as a factor up or down. Free choice.
 const MOST_GAIN: f32 = 4.0;
 
-/// Means of Y (less black), U and V (less 128) of square cells.
+/// Means of Y (minus black), U and V (both minus 128) in square cells, row by row.
 #[derive(Clone, Debug)]
 pub(super) struct Thumbnail {
     columns: usize,
@@ -26,13 +30,13 @@ pub(super) struct Thumbnail {
 }
 
 impl Thumbnail {
-    /// Side of a cell in a picture of this size, pixels; even.
+    /// Returns the side of a cell for a picture of this size, pixels; always even.
     pub(super) fn cell_px(width: u32, height: u32) -> usize {
         let side = (width.max(height) as usize).div_ceil(ALONG);
         (side + side % 2).max(4)
     }
 
-    /// The thumbnail of a frame.
+    /// Returns the thumbnail of a frame.
     pub(super) fn of(frame: &Frame) -> Thumbnail {
         let side = Thumbnail::cell_px(frame.width, frame.height);
         let (w, h) = (frame.width as usize, frame.height as usize);
@@ -49,7 +53,7 @@ impl Thumbnail {
         }
     }
 
-    /// The cell-wise median of thumbnails of one size; at least one must be given.
+    /// Returns the median of each cell over thumbnails of one size. Panics if there are none.
     pub(super) fn median<'a>(all: impl Iterator<Item = &'a Thumbnail>) -> Thumbnail {
         let all: Vec<&Thumbnail> = all.collect();
         let cell = |k: usize| {
@@ -64,12 +68,12 @@ impl Thumbnail {
         }
     }
 
-    /// Number of cells.
+    /// Returns the number of cells.
     pub(super) fn len(&self) -> usize {
         self.cells.len()
     }
 
-    /// Whether nothing is to be seen: black, or without structure.
+    /// Returns whether the picture is blank: black, or without structure.
     pub(super) fn is_blank(&self) -> bool {
         let luma = || self.cells.iter().map(|cell| cell[0]);
         let most = luma().fold(f32::MIN, f32::max);
@@ -77,7 +81,7 @@ impl Thumbnail {
         most - least < FLAT
     }
 
-    /// The share of cells that differ from another thumbnail's, once its light is fitted: 0..=1.
+    /// Returns the share of cells that differ from another thumbnail after its light is fitted, 0..=1.
     pub(super) fn mismatch(&self, other: &Thumbnail) -> f64 {
         let fitted = self.in_light_of(other);
         let differs = |(a, b): &(&[f32; 3], &[f32; 3])| cells_differ(a, b);
@@ -90,12 +94,12 @@ impl Thumbnail {
         n as f64 / self.cells.len() as f64
     }
 
-    /// Whether cell `k` differs from the other thumbnail's, without any fit.
+    /// Returns whether cell `k` differs from that of another thumbnail, without a fit of the light.
     pub(super) fn differs_at(&self, other: &Thumbnail, k: usize) -> bool {
         cells_differ(&self.cells[k], &other.cells[k])
     }
 
-    /// Correlation of the luma of two thumbnails, -1..=1; 0 where one is flat.
+    /// Returns the correlation of the luma of two thumbnails, -1..=1; 0 where one is flat.
     pub(super) fn correlation(&self, other: &Thumbnail) -> f64 {
         let n = self.cells.len() as f64;
         let mean = |t: &Thumbnail| t.cells.iter().map(|c| f64::from(c[0])).sum::<f64>() / n;
@@ -113,8 +117,8 @@ impl Thumbnail {
         }
     }
 
-    /// The cells in the light of another thumbnail: divided by a gain, then by factors of rows and of columns, and with
-    /// chroma shifted by its median offset.
+    /// Returns the thumbnail in the light of another: its luma divided by gains for picture, rows and
+    /// columns, its chroma shifted by the median offset.
     fn in_light_of(&self, other: &Thumbnail) -> Thumbnail {
         let mut result = self.clone();
         let n_rows = self.cells.len() / self.columns;
@@ -129,7 +133,7 @@ impl Thumbnail {
         for c in 1..3 {
             let off = |(a, b): (&[f32; 3], &[f32; 3])| f64::from(a[c] - b[c]);
             let off = order::median(result.cells.iter().zip(&other.cells).map(off));
-            // Light of another color is another state.
+            // Light of a clearly different color is another state, so the shift is limited.
             let off = (off.unwrap_or(0.0) as f32).clamp(-CHROMA_LEVELS, CHROMA_LEVELS);
             for cell in &mut result.cells {
                 cell[c] -= off;
@@ -138,7 +142,8 @@ impl Thumbnail {
         result
     }
 
-    /// Divides the luma of some cells by its median ratio to the other's; the animal is less than half of them.
+    /// Divides the luma of some cells by their median ratio to the other thumbnail. The median ignores an
+    /// animal that covers less than half of them.
     fn divide(&mut self, cells: impl Iterator<Item = usize> + Clone, other: &Thumbnail) {
         let ratio = |k: usize| {
             let (a, b) = (self.cells[k][0], other.cells[k][0]);
@@ -146,7 +151,7 @@ impl Thumbnail {
         };
         let n_cells = cells.clone().count();
         let mut ratios: Vec<f64> = cells.clone().filter_map(ratio).collect();
-        // A few bright cells on black are the animal.
+        // Few bright cells on black are probably the animal.
         if 3 * ratios.len() < n_cells {
             return;
         }
@@ -163,7 +168,7 @@ fn cells_differ(a: &[f32; 3], b: &[f32; 3]) -> bool {
     luma || (1..3).any(|c| (a[c] - b[c]).abs() > CHROMA_LEVELS)
 }
 
-/// The means of square cells of a plane; the last ones of a row or column may be smaller.
+/// Returns the means of square cells of a plane; cells at the right and lower edge may be smaller.
 fn cell_means(plane: &[u8], [w, h]: [usize; 2], side: usize) -> Vec<f32> {
     let (columns, rows) = (w.div_ceil(side), h.div_ceil(side));
     let mut means = Vec::with_capacity(columns * rows);

@@ -1,23 +1,26 @@
-//! A scene that changes for good (bedding kicked about, a toy pushed aside, a light that goes down slowly) is
-//! described by several plates, one after the other in time. A part is split where two plates explain its samples much better
-//! than one does, told from thumbnails with the animal left out.
+//! Splits a scene that changes for good into parts, one after the other in time. Examples are bedding kicked
+//! about, a toy pushed aside and light that dims slowly.
+//!
+//! A part is split where two backgrounds explain its samples much better than one. Thumbnails measure this,
+//! without the cells that the animal covers. The module also cuts parts into short windows of equal size.
 
 use super::states::{LEAST_SAMPLES, Part, bits};
 use super::thumbnail::Thumbnail;
 
-/// Cells that differ from the typical ones, as a share of the picture, below which one plate is good enough.
+/// Share of differing cells below which one background is enough, 0..=1. Free choice.
 const GOOD: f64 = 0.004;
-/// A split is worth it when the two halves together differ in at most this share of what the whole differs in.
+/// Largest ratio of differing cells after a split to those before it. Free choice.
 const BETTER: f64 = 0.65;
 
-/// What is there for a smaller share of the samples is a visitor before the scene.
+/// Least share of a part's samples on each side of a split, 0..=1. A shorter change is a passing object. Free
+/// choice.
 const FOR_GOOD: f64 = 0.33;
 
-/// Samples of a short window.
+/// Target number of samples in a short window. Free choice.
 const SHORT: usize = 8;
 
-/// Splits a part in time as far as that is worth it. `is_free(k, cell)` tells whether a cell shows the scene in sample
-/// k. The parts are in the order of time.
+/// Splits a part in time, recursively, while a split explains the samples much better. `is_free(k, cell)`
+/// tells whether sample `k` shows the scene at a thumbnail cell. Returns the pieces in order of time.
 pub(super) fn split(
     part: Part,
     thumbnails: &[Thumbnail],
@@ -54,8 +57,8 @@ pub(super) fn split(
         .collect()
 }
 
-/// A part in windows of time of about equally many samples, short enough that an animal that moves is not in their
-/// median, in the order of time.
+/// Splits a part into short time windows with about equally many samples each, in order of time. They are so
+/// short that a moving animal rarely enters their median.
 pub(super) fn short(part: Part) -> Vec<Part> {
     let members: Vec<usize> = bits(part.samples).collect();
     let n_windows = (members.len() / SHORT).max(1);
@@ -67,7 +70,7 @@ pub(super) fn short(part: Part) -> Vec<Part> {
     (0..n_windows).map(of).collect()
 }
 
-/// How many free cells of the members differ from the median of the members.
+/// Returns the number of free cells, over all members, that differ from the members' median thumbnail.
 fn unexplained(
     members: &[usize],
     thumbnails: &[Thumbnail],

@@ -1,5 +1,8 @@
-//! Means of 4 x 4 blocks of luma (2 x 2 of chroma), compared with the plate's: a cheap look at the
-//! whole frame that says where a closer one is worth it (ALGORITHMS.md 3).
+//! Finds the boxes of a frame that may hold an animal, without a comparison of every pixel.
+//!
+//! Frame and background are summed over blocks of 4 x 4 luma and 2 x 2 chroma samples. Blocks whose sums
+//! differ by more than their threshold are joined into boxes. Only these boxes are compared pixel by pixel
+//! (`silhouette`). See docs/explanation/algorithms.md, "Tracking".
 
 use rayon::prelude::*;
 
@@ -8,16 +11,16 @@ use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{Frame, Mask, Range};
 
-/// Side of a block, pixels.
+/// Side of a block, luma pixels. Free choice; chroma blocks have half the side.
 pub const SIDE: usize = 4;
-/// A block is worth a look when the sum of its 16 luma differences exceeds 16 times this level ...
+/// Least mean luma difference of a block from the background, levels of 255. Free choice.
 const LUMA_LEVELS: i32 = 3;
-/// ... or the sum of its 4 differences of a chroma plane 4 times this one.
+/// Least mean chroma difference of a block from the background, levels of 255. Free choice.
 const CHROMA_LEVELS: i32 = 3;
-/// The sum of a block of gray chroma.
+/// Chroma sum of a gray block: 4 samples at level 128.
 const GRAY: i32 = 4 * 128;
 
-/// Block sums of the plate, and how large a difference each block needs.
+/// Block sums of the background (luma, U, V) and the least difference that counts, for each block.
 pub struct Blocks {
     columns: usize,
     rows: usize,
@@ -27,7 +30,7 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// The block sums of a plate, with the least thresholds.
+    /// Returns the block sums of a background image, with the least thresholds.
     pub fn of(plate: &Frame) -> Blocks {
         let (columns, rows) = grid(plate);
         let mut sums = vec![[0; 3]; columns * rows];
@@ -50,8 +53,11 @@ impl Blocks {
         }
     }
 
-    /// Raises each block's thresholds to four times its noise (1.4826 times the median absolute deviation) over the samples
-    /// of `part` in which nothing stands before it. `taken` says for each block in which samples something does, a bit each.
+    /// Raises each block's thresholds to four times its noise.
+    ///
+    /// The noise is 1.4826 times the median absolute deviation from the background, over the samples in which
+    /// nothing covers the block. `part` selects the samples, one bit each. `taken` has one word per block:
+    /// its bit k is set when something covers the block in sample k.
     pub fn measure_noise(&mut self, samples: &[Frame], part: u64, taken: &[u64]) {
         let plate = self.sums.par_chunks_exact(self.columns);
         let rows = self
@@ -89,8 +95,10 @@ impl Blocks {
             });
     }
 
-    /// The boxes worth a closer look: around connected blocks that differ, widened by `margin_px`, joined where they
-    /// meet; and the share of all blocks that differ, 0..=1.
+    /// Returns the boxes that need a comparison pixel by pixel, and the share of all blocks that differ,
+    /// 0..=1.
+    ///
+    /// The boxes surround connected differing blocks, widened by `margin_px`. Overlapping boxes are merged.
     pub fn proposals(&self, frame: &Frame, light: &Light, margin_px: u32) -> (Vec<Rect>, f64) {
         let [width, height] = [frame.width, frame.height];
         let differing = self.differing(frame, light);
@@ -103,7 +111,7 @@ impl Blocks {
         )
     }
 
-    /// The connected blocks that differ.
+    /// Returns the connected components of differing blocks, in units of blocks.
     fn differing(&self, frame: &Frame, light: &Light) -> Vec<Component> {
         let mut mask = Mask::new(Rect::of_size(self.columns as u32, self.rows as u32));
         let mut sums = vec![[0; 3]; self.columns];
@@ -141,7 +149,7 @@ impl Blocks {
     }
 }
 
-/// Boxes joined with those that they meet, from the top left.
+/// Merges overlapping boxes until none overlap; returns them by row, then by column.
 fn joined(mut boxes: Vec<Rect>) -> Vec<Rect> {
     let mut done: Vec<Rect> = Vec::new();
     while let Some(mut rect) = boxes.pop() {
@@ -157,7 +165,7 @@ fn joined(mut boxes: Vec<Rect>) -> Vec<Rect> {
     done
 }
 
-/// The pixels of a box of blocks; those of the last ones may hang over the edge.
+/// Returns the pixel box of a box of blocks; it may reach beyond the right and bottom edge of the frame.
 fn pixels_of(blocks: Rect) -> Rect {
     let side = SIDE as u32;
     Rect {
@@ -168,7 +176,7 @@ fn pixels_of(blocks: Rect) -> Rect {
     }
 }
 
-/// (columns, rows) of blocks; the last ones may hang over the edge.
+/// Returns the number of block columns and rows; the last ones may reach beyond the edge of the frame.
 fn grid(frame: &Frame) -> (usize, usize) {
     (
         (frame.width as usize).div_ceil(SIDE),
@@ -176,7 +184,7 @@ fn grid(frame: &Frame) -> (usize, usize) {
     )
 }
 
-/// Sums of luma, U and V of the blocks of one row. At the edges the last pixels are repeated.
+/// Writes the luma, U and V sums of one row of blocks. Beyond the edges the last pixel repeats.
 fn block_row(frame: &Frame, row: usize, sums: &mut [[i16; 3]]) {
     let (w, h) = (frame.width as usize, frame.height as usize);
     sums.fill([0; 3]);

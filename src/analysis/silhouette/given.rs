@@ -1,13 +1,14 @@
-//! The silhouettes of a mask that is given with the footage.
+//! Silhouettes from a mask that comes with the footage, in place of a comparison with the background.
 
 use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{GivenMask, Mask};
 
-/// Pixels that are the animal by this much are its silhouette, 0..=255: a half.
+/// Least alpha of a silhouette pixel, 0..=255: half covered by the animal.
 const INSIDE: u8 = 128;
 
-/// The components of a mask of the given size; nothing inside the `ignored` boxes counts.
+/// Returns the connected components of a mask of the given size. Pixels inside the `ignored` boxes are left
+/// out.
 pub(super) fn components(
     mask: &GivenMask,
     [width, height]: [u32; 2],

@@ -1,8 +1,9 @@
-//! Where a frame differs from the plate: components of foreground pixels (ALGORITHMS.md 2.4 to 2.6, 3).
+//! Silhouettes: connected components of the pixels of a frame that differ from the background.
 //!
-//! The means of 4 x 4 blocks propose boxes; only inside them is the frame converted to RGB and
-//! compared pixel by pixel. A pixel differs for certain above the core threshold; pixels above half
-//! of it count when they hang together with a certain one.
+//! Block sums propose boxes (`blocks`). Only inside them, the frame is converted to RGB and compared pixel by
+//! pixel. A pixel above the core threshold belongs to a component. A pixel above the weak threshold (usually
+//! half of it) belongs only to a component with a core pixel.
+//! See docs/explanation/algorithms.md, "Silhouette".
 
 pub mod blocks;
 mod given;
@@ -17,21 +18,22 @@ use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{Frame, Mask, RgbImage};
 
-/// How far a proposed box is widened before it is looked at.
+/// Margin added around a proposed box before the comparison, pixels. Free choice.
 pub const MARGIN_PX: u32 = 6;
-/// How far a box grows when a component runs into its edge.
+/// First growth of a box whose edge a component touches, pixels. Free choice; each further growth is twice as
+/// far.
 const GROWTH_PX: u32 = 16;
 
-/// The components of foreground pixels of a frame, from the top left; raw: neither holes nor ragged edges mended
-/// (`shaped` does). Nothing inside the `ignored` boxes counts.
+/// Returns the connected components of foreground pixels of a frame, in reading order of their first pixel.
 ///
-/// Where a mask is given they are those of the mask.
+/// Pixels inside the `ignored` boxes are left out. When the frame has a given mask, the components are those
+/// of the mask. Holes and ragged edges remain; [`shaped`] mends them.
 pub fn components(frame: &Frame, plate: &Plate, light: &Light, ignored: &[Rect]) -> Vec<Component> {
     let (boxes, _) = plate.blocks.proposals(frame, light, MARGIN_PX);
     components_of(frame, plate, light, boxes, ignored)
 }
 
-/// The same in boxes already proposed.
+/// Returns the components of foreground pixels as [`components`] does, from boxes that are already proposed.
 pub fn components_of(
     frame: &Frame,
     plate: &Plate,
@@ -54,27 +56,31 @@ pub fn components_of(
     found
 }
 
-/// A component as a silhouette: holes filled, edges smoothed by 3 x 3 majority; over its box and one
-/// pixel more. Empty when nothing of it is left.
+/// Returns the silhouette of a component: holes filled, edges smoothed by a 3 x 3 majority.
+///
+/// The mask covers the component's box and one pixel around it. It is empty when no pixel passes the
+/// majority.
 pub fn shaped(component: &Component, width: u32, height: u32) -> Mask {
     let mut mask = component.mask(component.rect.inflated(1, width, height));
     mask.fill_holes();
     mask.majority()
 }
 
-/// The difference of a box from the plate: the largest over R, G, B of |I / gain - B|; where something
-/// sways, from the nearest color between the two that are seen there.
+/// Difference of a box of a frame from the background.
+///
+/// A level is the largest of |I / gain - B| over R, G and B. Where something sways in the background, B is
+/// the nearest color between the two background colors of the pixel.
 pub struct Difference {
-    /// The box.
+    /// The box, in pixels of the frame.
     pub rect: Rect,
-    /// The frame's pixels in the plate's light.
+    /// The frame's pixels, divided by the light of the frame relative to the background.
     pub rgb: RgbImage,
-    /// Largest channel difference of each pixel.
+    /// Largest channel difference of each pixel, row by row, 0..=255.
     pub levels: Vec<u8>,
 }
 
 impl Difference {
-    /// Takes a box for no different, as far as it lies inside.
+    /// Sets the levels inside `ignored` to 0.
     fn clear(&mut self, ignored: Rect) {
         let common = self.rect.intersection(&ignored);
         if common.is_empty() {
@@ -92,7 +98,7 @@ impl Difference {
     }
 }
 
-/// Compares a box of a frame with the plate.
+/// Compares a box of a frame with the background.
 pub fn difference(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Difference {
     let mut rgb = frame.rgb(rect);
     let factors = light.to_plate();
@@ -139,8 +145,9 @@ pub fn difference(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Di
     Difference { rect, rgb, levels }
 }
 
-/// The largest channel difference of a color from the nearest one between two: what sways across a
-/// pixel covers a part of it.
+/// Returns the largest channel difference of a color from the nearest color on the line between two colors.
+///
+/// A swaying thing covers a pixel in part, so its pixel takes any color between the two.
 fn beside(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
     let gap = |a: &[u8], b: &[u8], c: usize| i32::from(a[c]) - i32::from(b[c]);
     let along: i32 = (0..3)
@@ -155,8 +162,8 @@ fn beside(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
     off(0).max(off(1)).max(off(2))
 }
 
-/// The components of one box, which grows to the sides where any of them runs into its edge, twice
-/// as far each time.
+/// Returns the components of one box. The box grows on each side that a component touches, by twice as many
+/// pixels each time.
 fn components_in(
     frame: &Frame,
     plate: &Plate,
@@ -189,7 +196,7 @@ fn components_in(
     }
 }
 
-/// Components of pixels above half the core threshold that hold a pixel above all of it.
+/// Returns the components of pixels above the weak threshold that contain a pixel above the core threshold.
 fn hysteresis(difference: &Difference, plate: &Plate) -> Vec<Component> {
     let rect = difference.rect;
     let width = plate.frame.width as usize;

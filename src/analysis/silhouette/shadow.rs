@@ -1,8 +1,8 @@
-//! Shadows that the animal casts: darker pixels of the same color and texture as the plate, taken out
-//! of the silhouette (ALGORITHMS.md 2.5; Horprasert et al. 1999).
+//! Removes cast shadows from silhouettes.
 //!
-//! Only weak pixels are ever taken out; and none when the animal is much darker than the scene,
-//! because a black mouse looks like its own shadow.
+//! A shadow pixel is darker than the background, but has its color and its texture (Horprasert et al. 1999).
+//! Only weak pixels are removed. None are removed when the animal is much darker than the background: a black
+//! mouse cannot be told from its own shadow. See docs/explanation/algorithms.md, "Silhouette".
 
 use std::ops::RangeInclusive;
 
@@ -11,16 +11,16 @@ use crate::analysis::scene::plate::Plate;
 use crate::raster::Mask;
 use crate::raster::runs::Component;
 
-/// Brightness ratios that a shadow may have.
+/// Brightness of a shadow as a share of the background's. Free choice.
 const RATIO: RangeInclusive<f32> = 0.45..=0.95;
-/// Half side of the patch whose texture is compared.
+/// Half side of the square whose texture is compared, pixels. Free choice.
 const RADIUS: i64 = 2;
-/// Least correlation of the patch with the plate's.
+/// Least correlation of a shadow's texture with the background's. Free choice.
 const CORRELATION: f32 = 0.9;
-/// An animal of less than this share of the scene's light is dark.
+/// An animal is dark below this share of the background's brightness. Free choice.
 const DARK: f32 = 0.45;
 
-/// Clears the weak pixels that are shadow and not core.
+/// Clears the weak pixels that are shadow. Core pixels stay set.
 pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Plate) {
     if is_dark(core, difference, plate) {
         return;
@@ -36,7 +36,8 @@ pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Pla
     }
 }
 
-/// Whether nearly all of a component looks like the plate, only darker. `difference` is that of its box.
+/// Returns whether at least 70 % of a component's pixels have the color of a shadow. `difference` covers its
+/// box.
 pub fn is_shadow_alone(difference: &Difference, plate: &Plate, component: &Component) -> bool {
     let mask = component.mask(component.rect);
     let width = mask.width();
@@ -46,7 +47,7 @@ pub fn is_shadow_alone(difference: &Difference, plate: &Plate, component: &Compo
     10 * like.count() as u64 >= 7 * component.area
 }
 
-/// Whether the certain pixels are, in the median, much darker than the plate behind them.
+/// Returns whether the median brightness of the core pixels is below [`DARK`] times the background's.
 fn is_dark(core: &Mask, difference: &Difference, plate: &Plate) -> bool {
     let rect = difference.rect;
     let mut ratios: Vec<f32> = (0..core.bits.len())
@@ -69,12 +70,12 @@ fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool
     has_shadow_color(difference, plate, x, y) && correlation(difference, plate, x, y) > CORRELATION
 }
 
-/// Darker than the plate within the range of a shadow, and of the same color.
+/// Returns whether a pixel has the background's color at a brightness that a shadow may have.
 fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
     has_darker_color(difference, plate, x, y, RATIO)
 }
 
-/// Of the plate's color, with a share of its brightness that lies in `ratios`.
+/// Returns whether a pixel has the background's color, at a share of its brightness within `ratios`.
 pub fn has_darker_color(
     difference: &Difference,
     plate: &Plate,
@@ -101,8 +102,9 @@ pub fn has_darker_color(
     dot(gap, gap) < (3.0 * sigma).powi(2)
 }
 
-/// Normalised correlation of the green channel around a pixel with the plate's, -1..=1; 1 where both
-/// are flat, for a shadow on an even wall has no texture to keep.
+/// Returns the normalized correlation of the green channel with the background's around a pixel, -1..=1.
+///
+/// Returns 1 where both are flat: a shadow on an even wall has no texture to compare.
 fn correlation(difference: &Difference, plate: &Plate, x: usize, y: usize) -> f32 {
     let rect = difference.rect;
     let (mut n, mut i1, mut b1, mut ii, mut bb, mut ib) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);

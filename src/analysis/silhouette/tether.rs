@@ -1,17 +1,22 @@
-//! A cable, a leash, a thread: something thin that leads from the animal to the border of the picture.
+//! Separates the animal from a tether: a thin cable, leash or thread that leads to the border of the picture.
+//!
+//! A distance transform finds the thin parts of a component. The largest thin part that touches the border,
+//! or is too long for a tail, is the tether.
 
 use crate::analysis::subject::touches_border;
 use crate::raster::Mask;
 use crate::raster::runs::{self, Component};
 
-/// What is thinner than this share of the animal's greatest width is thin.
+/// Greatest half width of a thin part, as a share of the component's greatest half width. Free choice.
 const THIN: f64 = 0.45;
-/// A tail is not longer than this many times half the width that is thin.
+/// A thin part with a diagonal above this multiple of the thin half width is too long for a tail. Free
+/// choice.
 const LONG: f64 = 6.0;
-/// The blurred rim of a thing that is not thin, pixels.
+/// Width of the blurred rim around the parts that are not thin, pixels. Free choice.
 const RIM_PX: u32 = 2;
 
-/// Half the width below which a part of a component is thin, pixels: a share of the component's own greatest.
+/// Returns the half width up to which parts of a component are thin, pixels: a share of its greatest half
+/// width.
 pub fn thin_px(component: &Component) -> u32 {
     let mut mask = component.mask(component.rect);
     mask.fill_holes();
@@ -19,8 +24,10 @@ pub fn thin_px(component: &Component) -> u32 {
     (THIN * f64::from(half_width)) as u32
 }
 
-/// A component without what is thin and leads to the border of a picture of the given size, or far enough that it would do
-/// so if the background did not show the rest of it; and that. `None` where nothing does.
+/// Splits a component into the animal and its tether.
+///
+/// A tether touches the border of a picture of the given size. It may also end before the border, when it is
+/// long: the background may hide the rest. Returns `None` when there is no tether.
 pub fn cut(component: &Component, thin_px: u32, picture: [u32; 2]) -> Option<[Component; 2]> {
     if thin_px == 0 {
         return None;
@@ -65,7 +72,7 @@ pub fn cut(component: &Component, thin_px: u32, picture: [u32; 2]) -> Option<[Co
     Some([animal, tether])
 }
 
-/// The end of a tether that is farthest from the animal.
+/// Returns the point of a tether that is farthest from the animal's centroid, pixels.
 pub fn end_px([animal, tether]: &[Component; 2]) -> [f64; 2] {
     let from = animal.centroid_px();
     let ends = tether
@@ -82,7 +89,7 @@ fn is_long(part: &Component, thin_px: u32) -> bool {
     diagonal_px > LONG * f64::from(thin_px)
 }
 
-/// The same as components: the animal and its tether, or the whole.
+/// Returns the animal and its tether as two components, or the whole component when there is no tether.
 pub fn cut_all(component: Component, thin_px: u32, picture: [u32; 2]) -> Vec<Component> {
     match cut(&component, thin_px, picture) {
         Some(parts) => parts.into(),

@@ -1,5 +1,5 @@
-//! What is worth knowing about a library: how much was found, how the animal moves, what it covers;
-//! and what to do about what it lacks (ALGORITHMS.md 5).
+//! Computes the statistics of a library: detections, motion of the animal, and playback. The submodule
+//! `advice` derives recommendations from them.
 
 mod advice;
 #[cfg(test)]
@@ -13,10 +13,10 @@ use super::transition::Connections;
 use crate::geometry::wrap_rad;
 use crate::library::{LibraryStats, Poses};
 
-/// Bins of the heading histogram: 10 degrees each, from -180.
+/// Number of bins in the heading histogram: 10 degrees each, starting at -180.
 const N_BINS: usize = 36;
 
-/// The statistics of a library; what the plate and the sprites tell is the caller's to add.
+/// Returns the statistics of a library. The caller adds the values about the scene and the sprites.
 pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
     let component = &connections.playback.component;
     let length_px = length_px(poses);
@@ -36,7 +36,8 @@ pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
     }
 }
 
-/// Length of the animal in the image when seen at length (80th percentile), pixels; `None` where it was never seen whole.
+/// Returns the length of the animal in the image when seen broadside (80th percentile), pixels; `None` if no
+/// frame shows it uncut.
 pub fn length_px(poses: &Poses) -> Option<f64> {
     let axes: Vec<Option<pose::Axes>> = poses
         .frames
@@ -67,7 +68,7 @@ fn histogram(poses: &Poses, component: &[u32]) -> Vec<u32> {
     bins
 }
 
-/// Speeds of the smoothed centroid, lengths a second: 5th percentile, median, 95th.
+/// Returns the 5th, 50th and 95th percentile of the smoothed centroid's speed, body lengths per second.
 fn speeds(poses: &Poses, length_px: f64) -> Option<[f64; 3]> {
     let along = |k: usize| -> Vec<Option<f64>> {
         poses
@@ -84,7 +85,7 @@ fn speeds(poses: &Poses, length_px: f64) -> Option<[f64; 3]> {
     (!speeds.is_empty()).then(|| [at(0.05), at(0.5), at(0.95)])
 }
 
-/// 95th percentile of how fast the heading turns, over a tenth of a second either way.
+/// Returns the 95th percentile of the turning rate, radians per second, over 0.1 s on each side of a frame.
 fn turn_rate(poses: &Poses) -> Option<f64> {
     let reach = ((poses.fps * 0.1).round() as usize).max(1);
     let rate = |pair: &[crate::library::Pose]| {

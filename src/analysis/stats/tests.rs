@@ -1,4 +1,4 @@
-//! What is said of libraries that lack something, and that nothing is said of a good one.
+//! Tests: libraries with a deficiency get the right advice, good libraries get none.
 
 use std::f64::consts::PI;
 
@@ -9,8 +9,8 @@ use crate::raster::RgbImage;
 
 const FPS: f64 = 30.0;
 
-/// A footage of 300 frames, all playable, in which the animal moves at one length a second and heads
-/// as told, with 30 jumps.
+/// Returns a library of 300 playable frames with 30 jumps. The animal moves at one body length per second
+/// with the given headings.
 fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
     let pose = |frame: usize| Pose {
         time_s: frame as f64 / FPS,
@@ -64,7 +64,7 @@ fn library(view: View, heading_rad: impl Fn(usize) -> f64) -> Library {
     }
 }
 
-/// Right, down, left, up, a quarter of the frames each.
+/// Right, down, left and up, for a quarter of the frames each.
 fn all_round(frame: usize) -> f64 {
     PI / 2.0 * (frame / 75) as f64
 }
@@ -107,7 +107,7 @@ fn mirrors_make_left_of_right() {
     assert_eq!(codes(&library, false), ["lacks_left"]);
     assert_eq!(codes(&library, true), [""; 0]);
     library.poses.view = View::Top;
-    // Four directions held, three sudden turns: from above headings are no matter.
+    // Four constant headings with three sudden turns. In top view the heading does not matter.
     assert!(
         codes(&library, true)
             .iter()

@@ -1,34 +1,35 @@
-//! How the two ends of an animal differ, and its upper from its lower side.
+//! Measures how the two ends of an animal differ, and its upper side from its lower side.
 //!
-//! The length of the animal is cut into bins. What each holds (mass, and how its color differs from the mean of the animal), less
-//! what the bin at the same distance from the other end holds, changes its sign with the direction of the head and
-//! nothing else; so all frames of a film together tell heads from tails (`pose::ends`), whichever way the animal moved.
+//! The animal's length is divided into bins. Each bin holds its mass and its color difference from the
+//! animal's mean. Subtracting the bin at the same distance from the other end leaves numbers that only change
+//! sign when the head changes ends. So all frames together can separate heads from tails (`pose::ends`).
 
 use super::super::moments::Moments;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
 
-/// Bins from the middle to one end.
+/// Number of bins from the centroid to one end. Free choice.
 const N_BINS: usize = 6;
-/// Standard deviations from the middle to the end of the last bin.
+/// Distance from the centroid to the end of the last bin, standard deviations along the axis. Free choice.
 const REACH: f64 = 2.5;
-/// Levels of color that count as much as all of the mass.
+/// Color difference that has the weight of all mass, levels of 255. Free choice.
 const COLOR_LEVELS: f64 = 60.0;
-/// Numbers that tell the ends apart: mass, R, G and B of each bin.
+/// Length of the vector that separates the ends: mass, R, G and B of each bin.
 pub const N_NUMBERS: usize = 4 * N_BINS;
 
-/// What tells the ends and the sides of an animal apart.
+/// Differences between the ends and between the sides of an animal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asymmetry {
-    /// Each bin toward +axis less the bin toward -axis, from the middle outward; the axis of the moments.
+    /// Each bin toward +axis minus its counterpart toward -axis, from the centroid outward. The axis is that
+    /// of the moments.
     pub ends: [f32; N_NUMBERS],
-    /// Correlation of brightness with the place across the axis, positive where what lies lower in the picture is
-    /// brighter, -1..=1.
+    /// Correlation of brightness with the position across the axis, -1..=1; positive when the lower side is
+    /// brighter.
     pub shade: f64,
 }
 
 impl Asymmetry {
-    /// The asymmetry of a matte that lies at `rect`; `None` where it has no axis.
+    /// Returns the asymmetry of a matte at `rect`; `None` when the moments have no axis.
     pub fn of(rect: Rect, matte: &RgbaImage, moments: &Moments) -> Option<Asymmetry> {
         let axis = moments.major_rad?;
         let (c, s) = (libm::cos(axis), libm::sin(axis));
@@ -71,7 +72,7 @@ impl Asymmetry {
     }
 }
 
-/// Adds a pixel to the two bins around its place, `at` standard deviations from the middle.
+/// Adds a pixel to the two bins around it; `at` is its distance in standard deviations along the axis.
 fn add(ends: &mut [f64; N_NUMBERS], weight: f64, at: f64, numbers: [f64; 4]) {
     let at = (at / REACH * N_BINS as f64).min(N_BINS as f64 - 0.5) - 0.5;
     let low = at.floor();

@@ -1,16 +1,16 @@
-//! The body of an animal without what is thin: tail, legs, antennae, fins.
+//! Removes thin parts (tail, legs, antennae, fins) from a silhouette, to find the axis of the body.
 //!
-//! The silhouette is opened by a share of its own greatest half width. A tail that is carried to one side turns the axis of
-//! all moments with it, always to that side; the axis of the body stays.
+//! The silhouette is opened by a share of its own greatest half width. A tail carried to one side turns the
+//! axis of all moments toward that side; the axis of the body is stable.
 
 use crate::raster::Mask;
 use crate::raster::runs;
 
-/// What is thinner than this share of the greatest width is no body. Labelled mice and flies are nearest to their body axis
-/// between .3 and .6; above .3 a slender fish loses its own tail.
+/// Parts are thin below this share of the greatest half width. Labelled mice and flies: 0.3 to 0.6 gives the
+/// most accurate body axis. Above 0.3, a slender fish loses its own tail.
 const THIN: f64 = 0.3;
 
-/// The largest part of a silhouette that is left when what is thin has gone; empty for an empty one.
+/// Returns the largest part of a silhouette without its thin parts; empty for an empty silhouette.
 pub(super) fn of(silhouette: &Mask) -> Mask {
     let depth = silhouette.depth_px();
     let half_width = depth.iter().copied().max().unwrap_or(0);

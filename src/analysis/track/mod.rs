@@ -1,9 +1,10 @@
-//! The animal followed through the film (N 4; ALGORITHMS.md 2.6, 3).
+//! Follows the animal through the footage (Nakajima et al., section 4).
 //!
-//! Every frame is compared with the plate of its scene, as a whole: means of 4 x 4 blocks say where a closer look is worth
-//! it, which costs less than N's spiral of probes around a predicted place. Each component that may be the subject becomes a
-//! candidate and is cut out. The path through the candidates of all frames is chosen at the end (`path`), so that whoever
-//! is there first is not taken for the animal; what else moved is reported (`movers`).
+//! Every whole frame is compared with the background of its scene, block by block. This costs less than the
+//! paper's spiral of probes around a predicted place. Each component that may be the animal becomes a
+//! candidate and is cut out. When all frames are read, `path` chooses one candidate per frame. So the first
+//! thing in view is not mistaken for the animal. `movers` reports everything else that moved. See
+//! docs/explanation/algorithms.md, "Tracking".
 
 use std::sync::Arc;
 
@@ -33,49 +34,50 @@ use crate::raster::runs::Component;
 use crate::raster::{Frame, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
-/// Candidates of a frame, at most.
+/// Greatest number of candidates per frame. Free choice.
 const MOST_CANDIDATES: usize = 3;
-/// A component of this many times the subject's usual area may be the animal and something else that it touches.
+/// A component above this multiple of the animal's median area is also tried in parts: it may be the animal
+/// and something that touches it. Free choice.
 const MERGED: f64 = 1.2;
-/// Cost of taking a part of a component for the animal instead of the whole.
+/// Extra cost of a candidate that is a part of a component. Free choice.
 const PART_COST: f64 = 2.0;
-/// The surroundings of the animal are kept of one in this many frames: a bound on the memory that they take.
+/// One frame in this many keeps the animal's surroundings. Free choice: it bounds the memory.
 const AROUND_EVERY: usize = 8;
-/// Something of this share of the subject's area that moves besides it is worth a word.
+/// Least area of a reported mover, as a share of the animal's median area. Free choice.
 const LEAST_OTHER: f64 = 0.2;
 
 /// One frame of the track.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tracked {
-    /// True time of the picture, seconds from the first frame.
+    /// Presentation time of the frame, seconds from the first frame.
     pub time_s: f64,
-    /// Which plate the frame was compared with; `None` where it shows no known scene.
+    /// Index of the background that the frame was compared with; `None` when the frame shows another scene.
     pub plate_idx: Option<usize>,
-    /// The animal, where it was found.
+    /// The animal; `None` when it was not found.
     pub sighting: Option<Sighting>,
 }
 
 impl Tracked {
-    /// The animal, where it was found before the main plate.
+    /// Returns the animal if it was found in front of the main background.
     pub fn before_main_plate(&self) -> Option<&Sighting> {
         let sighting = self.sighting.as_ref();
         sighting.filter(|_| self.plate_idx == Some(0))
     }
 }
 
-/// All frames of a footage, and where the pixels of the animal are kept.
+/// All frames of the footage, and the storage of their mattes.
 #[derive(Debug)]
 pub struct Track {
-    /// In order.
+    /// One entry per frame, in order.
     pub frames: Vec<Tracked>,
-    /// What moved besides the animal.
+    /// Things other than the animal that moved.
     pub movers: Vec<Mover>,
-    /// Holds the pixels of the animal.
+    /// Storage of the mattes' pixels.
     pub scratch: Arc<dyn Scratch>,
 }
 
 impl Track {
-    /// The animal cut out: straight alpha, of the size of the sighting's `rect`.
+    /// Reads the matte of a sighting: straight alpha, of the size of its `rect`.
     pub fn image(&self, sighting: &Sighting) -> RgbaImage {
         let mut image = RgbaImage::new(sighting.rect.w, sighting.rect.h);
         self.scratch.get(sighting.at, &mut image.pixels);
@@ -83,7 +85,7 @@ impl Track {
     }
 }
 
-/// What one frame shows.
+/// Candidates and other components of one frame.
 struct Seen {
     time_s: f64,
     plate_idx: Option<usize>,
@@ -91,10 +93,10 @@ struct Seen {
     others: Vec<Other>,
 }
 
-/// Follows the animal through the footage: one entry a frame.
+/// Follows the animal through the footage; returns one entry per frame.
 ///
-/// Fails when the footage is too short, when nothing is found in any frame, when the scratch is full, and with
-/// `Cancelled` soon after `progress` says so.
+/// Fails with `TooFewFrames`, with `NothingMoves` when no frame shows the animal, and when the scratch is
+/// full. Fails with `Cancelled` when `progress` says so.
 pub fn follow(
     batches: Batches,
     n_frames_hint: usize,
@@ -129,7 +131,7 @@ pub fn follow(
         let candidates = candidates.get(at.frame as usize)?;
         Some((at.frame as usize, nearest_to(candidates, at.point)?))
     });
-    // Who points at the animal follows that one.
+    // A pinned animal is followed even when a larger one is in view.
     let follow = if pin.is_some() {
         Follow::One
     } else {
@@ -165,7 +167,7 @@ pub fn follow(
     })
 }
 
-/// Looks at one frame: what differs from its plate, and which of it may be the animal.
+/// Compares one frame with its background and measures the candidates.
 fn look(
     frame_idx: usize,
     time_s: f64,
@@ -220,8 +222,9 @@ fn look(
     })
 }
 
-/// The components of a frame that may be the animal, and parts of them, with their looks and costs, the cheapest first;
-/// and all that are large enough to be told of if they are not.
+/// Returns the candidates of a frame and the components that may be movers.
+///
+/// Candidates are components, or parts of them, with their looks and costs; the cheapest come first.
 fn described(
     frame: &Frame,
     placed: &Placed<'_>,
@@ -274,7 +277,7 @@ fn described(
     (found, others)
 }
 
-/// The candidate whose middle is nearest to a point.
+/// Returns the index of the candidate whose centroid is nearest to a point; `None` without candidates.
 fn nearest_to(candidates: &[Candidate], point_px: [f64; 2]) -> Option<usize> {
     let off = |at: &usize| {
         let [x, y] = candidates[*at].look.centroid_px;

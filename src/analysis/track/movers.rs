@@ -1,14 +1,17 @@
-//! What moves besides the animal: where, when, and of what kind.
+//! Gathers the things that move besides the animal: place, time and kind.
+//!
+//! Components of successive frames with boxes close to each other form one mover. The kind is that of most of
+//! its sightings.
 
 use crate::analysis::subject::{FITS, Look, Subject};
 use crate::geometry::Rect;
 use crate::library::{Mover, MoverKind};
 
-/// A mover is seen for at least this long, seconds.
+/// Least duration of a mover, seconds. Free choice.
 const LEAST_S: f64 = 0.3;
-/// And in this many frames.
+/// Least number of frames of a mover. Free choice.
 const LEAST_SEEN: usize = 3;
-/// Two sightings of one mover lie at most this far apart, seconds.
+/// Longest gap between two sightings of one mover, seconds. Free choice.
 const GAP_S: f64 = 1.0;
 
 /// A component of one frame that may be a mover.
@@ -21,7 +24,7 @@ pub(super) struct Other {
 }
 
 impl Other {
-    /// What a look says of a mover.
+    /// Returns the component that `look` describes; `is_image` marks a mirror image of the animal.
     pub(super) fn of(look: &Look, subject: &Subject, is_image: bool) -> Other {
         Other {
             box_px: look.box_px,
@@ -32,7 +35,7 @@ impl Other {
     }
 }
 
-/// The others of a frame that are not the animal.
+/// Returns the components of which less than half lies in the animal's box.
 pub(super) fn beside(others: &[Other], animal: Option<Rect>) -> Vec<Other> {
     let apart = |other: &&Other| {
         animal.is_none_or(|animal| {
@@ -42,7 +45,7 @@ pub(super) fn beside(others: &[Other], animal: Option<Rect>) -> Vec<Other> {
     others.iter().filter(apart).cloned().collect()
 }
 
-/// A mover while it is followed.
+/// A mover that may continue in the next frame.
 struct Open {
     last: Rect,
     first_s: f64,
@@ -81,7 +84,7 @@ impl Open {
         self.n_images += usize::from(other.is_image);
     }
 
-    /// Whether something seen now is the same mover.
+    /// Returns whether a component of the next frame belongs to this mover.
     fn is_near(&self, other: &Other) -> bool {
         let margin = other.box_px.w.max(other.box_px.h);
         let reach = other.box_px.inflated(margin, u32::MAX / 2, u32::MAX / 2);
@@ -109,7 +112,7 @@ impl Open {
     }
 }
 
-/// The movers of a film, from what was seen besides the animal in each frame, by their first time.
+/// Returns the movers of a film by the time of their first sighting, from the other components of each frame.
 pub(super) fn gathered(frames: &[Vec<Other>], times_s: &[f64]) -> Vec<Mover> {
     let (mut open, mut done): (Vec<Open>, Vec<Open>) = (Vec::new(), Vec::new());
     for (others, &time_s) in frames.iter().zip(times_s) {
@@ -149,7 +152,7 @@ mod tests {
         }
     }
 
-    /// The movers of 90 frames that show what `seen` says.
+    /// Returns the movers of 90 frames with the components `seen(frame)`.
     fn of(seen: impl Fn(u32) -> Vec<Other>) -> Vec<Mover> {
         let frames: Vec<Vec<Other>> = (0..90).map(seen).collect();
         let times_s: Vec<f64> = (0..90).map(|k| f64::from(k) / FPS).collect();

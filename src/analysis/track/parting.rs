@@ -1,10 +1,9 @@
-//! Two things in one silhouette taken apart: the animal and its mirror image in a wall while they touch,
-//! or two animals (ALGORITHMS.md 2.6).
+//! Splits a component that holds two things: the animal and its mirror image in a wall, or two animals.
 //!
-//! Both stand out from the background for themselves, and where they meet there is less to be seen:
-//! blurred, the difference from the plate has two summits and a pass between them. A thin tail is no
-//! summit once blurred, and a fin only falls off from the body. Pixels go to the summit from which
-//! they are reached without climbing (watershed; Vincent & Soille 1991).
+//! Each of them differs strongly from the background, and less where they meet. So the blurred difference has
+//! two summits and a pass between them. A thin tail is no summit after the blur, and a fin only falls off
+//! from the body. A watershed assigns the other pixels to the summits (Vincent & Soille 1991). See
+//! docs/explanation/algorithms.md, "Silhouette".
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -13,18 +12,22 @@ use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;
 use crate::raster::runs::{self, Component};
 
-/// A summit is at least this large, as a share of the animal's usual area.
+/// Least area of a summit as a share of the animal's median area. Free choice.
 const LEAST_SHARE: f64 = 0.15;
-/// The pass lies below this share of the lower summit.
+/// Greatest height of the pass as a share of the lower summit. Free choice.
 const PASS: f64 = 0.7;
-/// They touch along at most so many sides of a square as large as the smaller: an animal and its image meet at a nose, a
-/// foot or a part of a flank, while an animal that is dull somewhere hangs together along a ragged line.
+/// Greatest contact length, in sides of a square with the area of the smaller part. Free choice.
+///
+/// An animal and its image touch at a nose, a foot or a part of a flank. A pale zone within one animal meets
+/// the rest along a long, ragged line.
 const CONTACT: f64 = 1.2;
-/// How many heights are tried for the pass.
+/// Number of heights tried for the pass. Free choice.
 const N_HEIGHTS: usize = 24;
 
-/// The parts of a component that shows several summits of difference, each touching the rest along a short line only;
-/// none where the component is one thing. `difference` is that of the component's box.
+/// Returns the parts of a component with several summits of difference.
+///
+/// Each part touches the rest along a short line only. The result is empty when the component is one thing.
+/// `difference` covers the component's box.
 pub(super) fn parts_of(
     component: &Component,
     difference: &Difference,
@@ -51,7 +54,8 @@ pub(super) fn parts_of(
     (0..summits.len()).filter_map(part).collect()
 }
 
-/// Along how many sides of a square as large as the smaller a part of a mask touches the rest.
+/// Returns the contact length of a part with the rest of a mask, in sides of a square with the area of the
+/// smaller.
 fn contact(part: &Mask, all: &Mask) -> f64 {
     let (w, n) = (all.width(), all.bits.len());
     let is_rest = |at: usize| all.bits[at] == 1 && part.bits[at] == 0;
@@ -67,7 +71,8 @@ fn contact(part: &Mask, all: &Mask) -> f64 {
     length / (smaller.max(1) as f64).sqrt()
 }
 
-/// The mask's differences, each the mean over a square of 2 `radius` + 1 pixels a side; 0 outside.
+/// Returns the differences within the mask, as means over squares of side 2 `radius` + 1, `radius` limited to
+/// 1..=4.
 fn blurred(mask: &Mask, difference: &Difference, radius: usize) -> Vec<f32> {
     let (w, h) = (mask.width(), mask.height());
     let radius = radius.clamp(1, 4);
@@ -75,7 +80,7 @@ fn blurred(mask: &Mask, difference: &Difference, radius: usize) -> Vec<f32> {
     let mut values: Vec<f32> = masked
         .map(|(&level, &bit)| f32::from(level * bit))
         .collect();
-    // Along rows, then along columns; past the edge the edge goes on, for the picture ends there.
+    // First along rows, then along columns. Beyond the edge, the edge value repeats.
     let mean = |line: &[f32], at: usize| {
         let sum: f32 = (0..=2 * radius)
             .map(|k| line[(at + k).saturating_sub(radius).min(line.len() - 1)])
@@ -97,8 +102,9 @@ fn blurred(mask: &Mask, difference: &Difference, radius: usize) -> Vec<f32> {
     values
 }
 
-/// The parts above the lowest height at which there are several large ones, all of which rise far
-/// above it; `None` when there is no such height.
+/// Returns the parts above the lowest height at which several large parts exist.
+///
+/// Returns `None` when there is no such height, or when a part does not rise far above it.
 fn summits(mask: &Mask, heights: &[f32], least_area: f64) -> Option<Vec<Component>> {
     let highest = heights.iter().copied().fold(0.0, f32::max);
     let above = |height: f32| {
@@ -125,13 +131,12 @@ fn summits(mask: &Mask, heights: &[f32], least_area: f64) -> Option<Vec<Componen
     None
 }
 
-/// For each pixel of the mask the summit that it belongs to: the highest pixels beside a labeled one
-/// are labeled first.
+/// Returns the index of each pixel's summit; pixels are labeled from their neighbors, the highest ones first.
 fn flooded(mask: &Mask, heights: &[f32], summits: &[Component]) -> Vec<Option<usize>> {
     let (w, h) = (mask.width(), mask.height());
     let mut labels: Vec<Option<usize>> = vec![None; mask.bits.len()];
     let mut open = BinaryHeap::new();
-    // Heights are never negative, so their bits are in their order.
+    // Heights are never negative, so their bit patterns sort like the numbers.
     let entry = |at: usize| (heights[at].to_bits(), Reverse(at));
     for (label, summit) in summits.iter().enumerate() {
         let bits = summit.mask(mask.rect).bits;
@@ -161,7 +166,7 @@ mod tests {
     use crate::geometry::Rect;
     use crate::raster::RgbImage;
 
-    /// What the difference is at each pixel of a picture 90 x 90, and the component of what is above 10.
+    /// A scene of 90 x 90 pixels with the given difference, and the largest component above level 10.
     fn scene(level: impl Fn(f64, f64) -> f64) -> (Component, Difference) {
         let rect = Rect::of_size(90, 90);
         let at = |k: u32| level(f64::from(k % 90), f64::from(k / 90)).clamp(0.0, 255.0) as u8;
@@ -182,7 +187,7 @@ mod tests {
         ellipse(x, y, [45.0, 60.0], [25.0, 12.0])
     }
 
-    /// The part that holds the middle of the animal.
+    /// Returns the part that contains the animal's center.
     fn animals_part(both: &Component, difference: &Difference, usual_area: f64) -> Component {
         let parts = parts_of(both, difference, usual_area);
         let mut holding = parts

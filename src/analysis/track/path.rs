@@ -1,9 +1,8 @@
-//! The animal's path: one candidate a frame, or none, over the whole film at once.
+//! Chooses the animal's path: at most one candidate per frame, for the whole film at once.
 //!
-//! The cheapest path by dynamic programming. A candidate costs how unlike the subject it looks; a step costs how far
-//! it leads beyond what the animal usually moves in so many frames, and how much its area changes; a frame without
-//! the animal has a fixed cost. So a hand that is seen first, a speck where the animal is gone, or the half of a
-//! silhouette are taken only where nothing fits better.
+//! Dynamic programming finds the cheapest path. A candidate costs its misfit to the subject. A step costs its
+//! excess over the usual distance, and its change of area. A frame without the animal has a fixed cost. So a
+//! hand, a speck or half a silhouette is chosen only where no candidate fits better.
 
 use super::confidence;
 use super::sighting::Sighting;
@@ -11,42 +10,44 @@ use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, Look, Subject};
 use crate::order;
 
-/// A look that costs more than this is not the animal.
+/// Cost from which a look is never a candidate. Free choice.
 pub(super) const MOST_COST: f64 = 24.0;
-/// Cost of a frame in which the animal is not seen.
+/// Cost of a frame without the animal. Free choice.
 const ABSENT: f64 = 10.0;
-/// Cost of the farthest step, in any time.
+/// Greatest cost of a step's distance. Free choice.
 const FARTHEST: f64 = 80.0;
-/// A step of more spreads than this is a leap ...
+/// A step is a leap beyond this many spreads of the distance. Free choice.
 const LEAP: f64 = 2.0;
-/// ... and leads to something else, where that was so many times nearer.
+/// A leap leads to another thing when that one was closer by this factor. Free choice.
 const NEARER: f64 = 3.0;
-/// Cost of a leap to something that was seen elsewhere before.
+/// Extra cost of a leap to a thing that was visible together with the start of the leap. Free choice.
 const TAKEN: f64 = 400.0;
-/// Weight of the cost of looks that fit.
+/// Weight of a candidate's cost up to `FITS`. Free choice.
 const FITTING: f64 = 0.05;
-/// Cost of the largest change of area.
+/// Greatest cost of a change of area. Free choice.
 const LARGEST_CHANGE: f64 = 3.0;
-/// Spread of the change of the logarithm of the area from one frame to the next.
+/// Standard deviation of the change of log area between successive frames. Free choice.
 const CHANGE_SPREAD: f64 = 0.3;
-/// What the path gains where a person has pointed at the animal: more than all else can cost.
+/// Reward of a candidate that the user pointed at; it exceeds the sum of all other costs.
 const PINNED: f64 = 1e9;
-/// Frames without the animal that a step may lead across; after more the animal may be anywhere.
+/// Greatest number of frames that a step spans; after a longer gap the animal may be anywhere. Free choice.
 const MOST_MISSED: usize = 30;
 
-/// What may be the animal in a frame.
+/// A component, or a part of one, that may be the animal in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Candidate {
-    /// What it looks like.
+    /// Its size, color and place.
     pub(super) look: Look,
-    /// How unlike the subject it looks.
+    /// Its misfit to the subject: see `Subject::cost`.
     pub(super) cost: f64,
-    /// The animal cut out and measured.
+    /// Its matte, measured.
     pub(super) sighting: Sighting,
 }
 
-/// Chooses a candidate, or none, for each frame. Where the largest of several animals is followed, a smaller one costs the
-/// logarithm of how many times smaller it is. `pin` is a frame and the candidate in it that is the animal.
+/// Chooses a candidate, or none, for each frame, with the probability that it is the animal.
+///
+/// With `Follow::Largest`, a candidate also costs the logarithm of its size ratio to the largest fitting one.
+/// `pin` is a frame and the index of its candidate that is known to be the animal.
 pub(super) fn choose(
     frames: &[&[Candidate]],
     subject: &Subject,
@@ -84,34 +85,36 @@ pub(super) fn choose(
     judged(&paths.cheapest(), frames, &paths.steps)
 }
 
-/// A candidate, by its frame and its number in it.
+/// A candidate: its frame and its index in the frame.
 type Node = (usize, usize);
 
 /// The cheapest path that ends at a candidate.
 #[derive(Clone, Copy)]
 struct Path {
     cost: f64,
-    /// The candidate before the last one.
+    /// The previous candidate of the path; `None` at its start.
     from: Option<Node>,
 }
 
-/// The cheapest paths to all candidates of the frames so far.
+/// The cheapest paths to all candidates of the frames processed.
 struct Paths<'a> {
     frames: &'a [&'a [Candidate]],
     steps: Steps,
     best: Vec<Vec<Path>>,
-    /// The cheapest of the paths whose ends lie too far back for a step, and of none; without the frames after it.
+    /// The cheapest path that ended too long ago for a step, or the empty path.
+    ///
+    /// Its cost is relative to missing the animal in all frames up to its end. Later frames are not included.
     forgotten: Path,
 }
 
 impl Paths<'_> {
-    /// Puts aside the paths from whose ends no step leads to frame `t` any more.
+    /// Updates `forgotten` with the paths that end just too far before frame `t` for a step.
     fn forget(&mut self, t: usize) {
         let Some(old) = t.checked_sub(MOST_MISSED + 1) else {
             return;
         };
         for (at, path) in self.best[old].iter().enumerate() {
-            // Compared as if both had missed all frames up to now.
+            // Subtracts the cost of missing all frames up to the end, to compare ends at different frames.
             let cost = path.cost - ABSENT * (old + 1) as f64;
             if cost < self.forgotten.cost {
                 let from = Some((old, at));
@@ -120,7 +123,7 @@ impl Paths<'_> {
         }
     }
 
-    /// The cheapest path that leads to a candidate of frame `t`, without what the candidate itself costs.
+    /// Returns the cheapest path to a candidate of frame `t`, without the candidate's own cost.
     fn to(&self, t: usize, candidate: &Candidate) -> Path {
         let afar = self.forgotten.from.map_or(0.0, |_| FARTHEST);
         let mut best = Path {
@@ -147,7 +150,7 @@ impl Paths<'_> {
         best
     }
 
-    /// The candidates of the cheapest path of all.
+    /// Returns the candidates of the cheapest path over all frames.
     fn cheapest(&self) -> Vec<Option<usize>> {
         let n = self.frames.len();
         let ends = self.best.iter().enumerate().flat_map(|(t, paths)| {
@@ -169,11 +172,11 @@ impl Paths<'_> {
     }
 }
 
-/// How sure each frame of the path is: its candidate, and the probability that it is the animal.
+/// Returns for each frame the candidate of the path and the probability that it is the animal.
 ///
-/// A stretch of the path that ends where the animal is not seen, at leaps and where the area changes at once, shows one
-/// thing, and is as sure as it is like the subject in most of its frames: near the lens, in the dark or cut by the border an
-/// animal is unlike itself for a while. What is probably wrong was not found.
+/// The path is divided at gaps, leaps and sudden changes of area, so that each stretch shows one thing. The
+/// probability follows from the stretch's median misfit: near the lens, in the dark or at the border, an
+/// animal differs from its usual look for a while. A stretch that is probably wrong is dropped.
 fn judged(
     chosen: &[Option<usize>],
     frames: &[&[Candidate]],
@@ -202,23 +205,24 @@ fn judged(
     judged
 }
 
-/// What a look costs in a path: nearly nothing while it fits, however well another may fit. Looks of neighboring frames are
-/// alike, so small differences say less than as many independent ones.
+/// Returns the cost of a look in a path: nearly 0 up to `FITS`, then half of the excess.
+///
+/// Looks of successive frames are alike, so small differences carry less information than independent ones.
 fn of_look(cost: f64) -> f64 {
     FITTING * cost.min(FITS) + 0.5 * (cost - FITS).max(0.0)
 }
 
-/// What a step from one look to another costs.
+/// Parameters of the cost of a step between two looks.
 struct Steps {
-    /// How far the animal moves in a frame, nine times of ten, pixels.
+    /// 90th percentile of the animal's movement from frame to frame, pixels.
     usual_px: f64,
-    /// Spread of what goes beyond that, pixels.
+    /// Standard deviation of movement beyond that, pixels.
     spread_px: f64,
 }
 
 impl Steps {
     fn of(frames: &[&[Candidate]], subject: &Subject) -> Steps {
-        // From the best candidate of a frame to the nearest one of the next: of several animals any may be the best.
+        // From the best candidate to the nearest of the next frame: of several animals, any may be the best.
         let fitting = |candidates: &&[Candidate]| -> Vec<[f64; 2]> {
             let mut fitting: Vec<&Candidate> =
                 candidates.iter().filter(|c| c.cost < FITS).collect();
@@ -244,7 +248,7 @@ impl Steps {
         self.far(a, b, n) + (0.5 * change * change).min(LARGEST_CHANGE)
     }
 
-    /// The share of the cost that is for the distance alone.
+    /// Returns the part of the cost that comes from the distance.
     fn far(&self, a: &Look, b: &Look, n: f64) -> f64 {
         let beyond = (distance(a.centroid_px, b.centroid_px) - self.usual_px * n).max(0.0);
         let far = beyond / (self.spread_px * n.sqrt());
@@ -255,14 +259,16 @@ impl Steps {
         distance(a.centroid_px, b.centroid_px) > LEAP * self.spread_px + self.usual_px
     }
 
-    /// Whether two looks in a row may be of two things: a leap lies between them, or one is far larger.
+    /// Returns whether two successive looks may belong to two things: they are a leap apart, or differ in
+    /// area.
     fn is_break(&self, a: &Look, b: &Look) -> bool {
         let change = libm::log(b.area_px / a.area_px).abs();
         self.is_leap(a, b) || change > LEAP * CHANGE_SPREAD
     }
 
-    /// What a leap from `a` to `b` costs besides, where one of the `others` seen together with `a` was far nearer to `b`: two
-    /// things seen at once are not the same.
+    /// Returns the extra cost of a leap from `a` to `b` when one of the `others` was much closer to `b`.
+    ///
+    /// The `others` were seen in the same frame as `a`, so the leap would join two different things.
     fn taken<'a>(&self, a: &Look, b: &Look, mut others: impl Iterator<Item = &'a Look>) -> f64 {
         let leap_px = distance(a.centroid_px, b.centroid_px);
         let nearer = |other: &Look| NEARER * distance(other.centroid_px, b.centroid_px) < leap_px;
@@ -284,7 +290,7 @@ mod tests {
     use crate::geometry::Rect;
     use crate::raster::RgbaImage;
 
-    /// Something of 20 x 10 pixels at a place, as unlike the subject as said.
+    /// A thing of 20 x 10 pixels at column `x` with the given misfit.
     fn candidate(x: f64, cost: f64) -> Candidate {
         let rect = Rect::of_size(20, 10);
         let mut image = RgbaImage::new(20, 10);
@@ -369,7 +375,7 @@ mod tests {
 
     #[test]
     fn a_thing_is_as_sure_as_it_is_like_the_subject_in_most_of_its_frames() {
-        // Two things, a leap apart; the second is unlike itself for a while.
+        // Two things, a leap apart; the second has a high misfit for ten frames.
         let frames: Vec<Vec<Candidate>> = (0..60)
             .map(|t| match t {
                 0..20 => vec![candidate(900.0, 2.0)],

@@ -1,4 +1,6 @@
-//! What is seen of the animal in one frame: cut out, put aside and measured (N 4; ALGORITHMS.md 2.7, 4).
+//! A sighting: the animal in one frame, cut out, stored and measured (Nakajima et al., sections 4 and 5.3).
+//!
+//! See docs/explanation/algorithms.md, "Pose". `matte` cuts the animal out.
 
 use super::asymmetry::Asymmetry;
 use super::body;
@@ -12,52 +14,55 @@ use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
-/// What was seen of the animal in one frame.
+/// The animal in one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sighting {
-    /// Where the animal cut out lies in the frame.
+    /// Box of the matte in the frame, pixels.
     pub rect: Rect,
-    /// Where its pixels are put aside.
+    /// Offset of the matte's pixels in the scratch storage.
     pub at: u64,
-    /// How far they reach from the centroid: horizontally, vertically, in any direction.
+    /// Greatest distance of the matte from the centroid: horizontal, vertical, in any direction, pixels.
     pub reach_px: [f64; 3],
     /// Probability that the centroid lies within a tenth of the body length of the true one (`confidence`).
     pub confidence: f64,
-    /// Its moments, weighed by alpha.
+    /// Moments of the matte, weighted by alpha.
     pub moments: Moments,
-    /// How its ends and its sides differ; `None` where it has no axis.
+    /// Differences between the ends and between the sides; `None` without an axis.
     pub asymmetry: Option<Asymmetry>,
-    /// The axis of the body without its tail and other thin parts, in (-pi/2, pi/2]; `None` where that is round.
+    /// Axis of the body without its tail and other thin parts, in (-pi/2, pi/2]; `None` when the body is
+    /// round.
     pub body_rad: Option<f64>,
-    /// Extents along the body's axis and across it, tail and all.
+    /// Extents along the body's axis and across it, thin parts included, pixels.
     pub body_extent_px: [f64; 2],
-    /// Extents along the major axis and across it, of the pixels that are more animal than background.
+    /// Extents along the major axis and across it, of pixels with alpha of at least one half, pixels.
     pub extent_px: [f64; 2],
-    /// Extent of the same pixels from the topmost to the lowest.
+    /// Vertical extent of the same pixels.
     pub upright_px: f64,
     /// Bounding box of the silhouette.
     pub box_px: Rect,
-    /// The silhouette touches the border of the frame or of a box that is not looked at.
+    /// Whether the silhouette touches the border of the frame or an ignored box.
     pub cut: bool,
-    /// The frame around the animal, in some frames.
+    /// The frame around the animal; `None` in most frames.
     pub around: Option<Around>,
 }
 
-/// A part of a frame that was put aside, in the light of the plate: RGB.
+/// A stored part of a frame: RGB, in the light of the background.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Around {
-    /// Where it lies in the frame.
+    /// Box in the frame, pixels.
     pub rect: Rect,
-    /// Where its pixels are put aside.
+    /// Offset of the pixels in the scratch storage.
     pub at: u64,
 }
 
-/// Room on every side of the animal, as a share of the diagonal of its box: a shadow is looked for there.
+/// Margin of `around` on each side, as a share of the box's diagonal: the search range for a shadow. Free
+/// choice.
 const ROOM: f64 = 0.3;
 
 impl Sighting {
-    /// What a matte that lies at `rect` tells by itself: neither where it is put aside, nor how sure it is, its
-    /// silhouette's box and whether that is cut. `None` when nothing of it is opaque.
+    /// Measures a matte at `rect`; returns `None` when all its pixels are transparent.
+    ///
+    /// `at`, `confidence`, `box_px`, `cut` and `around` get placeholders.
     pub(in crate::analysis) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
         let pixels = matte.pixels.as_chunks::<4>().0;
         let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
@@ -88,30 +93,30 @@ impl Sighting {
     }
 }
 
-/// The component taken for the animal in one frame, and its mended form.
+/// The component of a candidate and its silhouette.
 pub struct Choice {
-    /// As it was found.
+    /// The component as found.
     pub component: Component,
-    /// Without holes and specks.
+    /// The component without holes and specks.
     pub silhouette: Mask,
 }
 
-/// A frame before its plate.
+/// A frame with the background to compare it with.
 pub struct View<'a> {
-    /// The picture.
+    /// The frame.
     pub frame: &'a Frame,
-    /// The scene without the animal.
+    /// The background.
     pub plate: &'a Plate,
-    /// How much brighter than the plate the frame is.
+    /// Light of the frame relative to the background.
     pub light: &'a Light,
-    /// Boxes that are not looked at.
+    /// Boxes to ignore.
     pub ignored: &'a [Rect],
-    /// Whether what is around the animal is put aside too.
+    /// Whether to store the animal's surroundings.
     pub keeps_around: bool,
 }
 
 impl View<'_> {
-    /// Cuts the animal out, puts it aside and measures it; `None` when nothing of it is opaque.
+    /// Cuts the animal out, stores and measures it; returns `None` when all its pixels are transparent.
     pub fn look(&self, choice: &Choice, scratch: &dyn Scratch) -> Result<Option<Sighting>, Full> {
         let rect = choice.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
@@ -140,7 +145,7 @@ impl View<'_> {
         Ok(Around { rect, at })
     }
 
-    /// Whether a box reaches the border of what is looked at.
+    /// Returns whether a box touches the border of the frame or an ignored box.
     fn cuts(&self, rect: Rect) -> bool {
         let (width, height) = (self.frame.width, self.frame.height);
         let around = rect.inflated(1, width, height);
@@ -149,8 +154,8 @@ impl View<'_> {
     }
 }
 
-/// The pixels that are more animal than background. The silhouette itself is wider: its threshold is
-/// low, so that no fin is lost.
+/// Returns the pixels with alpha of at least one half. The silhouette is larger, as its low threshold keeps
+/// fins.
 fn solid(rect: Rect, matte: &RgbaImage) -> Mask {
     let bits = matte
         .pixels
@@ -160,14 +165,15 @@ fn solid(rect: Rect, matte: &RgbaImage) -> Mask {
     Mask { rect, bits }
 }
 
-/// How far the alpha reaches from the centroid: horizontally, vertically, in any direction.
+/// Returns the greatest distance of pixels with alpha from the centroid: horizontal, vertical, in any
+/// direction.
 fn reach_px(rect: Rect, matte: &RgbaImage, [cx, cy]: [f64; 2]) -> [f64; 3] {
     let mut most = [0.0f64; 3];
     let columns = rect.w.max(1) as usize;
     let rows = matte.pixels.as_chunks::<4>().0.chunks_exact(columns);
     let inside = |rgba: &[u8; 4]| rgba[3] > 0;
     for (row, y) in rows.zip(rect.y..) {
-        // The ends of a row lie farthest from any centroid.
+        // The ends of a row are its farthest pixels from any centroid.
         let ends = row
             .iter()
             .position(inside)

@@ -1,5 +1,6 @@
-//! The heading gate: clips may only be joined when the animal points the same way, O 3.3, or, seen
-//! from above where any heading can be shown by rotation, when it turns alike (ALGORITHMS.md 5).
+//! The heading gate. In side view, two clips may be joined only if the animal points in the same direction
+//! (Okabe et al., section 3.3). In top view, sprites are rotated to any heading, so the gate compares turning
+//! rates (docs/explanation/algorithms.md, "Transitions and playback").
 
 use std::f64::consts::TAU;
 
@@ -8,31 +9,34 @@ use crate::analysis::distance::Marks;
 use crate::geometry::angle::{mean_rad, mirrored_rad, wrap_rad};
 use crate::library::{Poses, View};
 
-/// Largest difference of turning rates in top view, radians a second: 20 degrees.
+/// Largest difference between turning rates in top view, radians per second: 20 degrees per second. Free
+/// choice.
 const TURN_GATE_RAD_PER_S: f64 = TAU / 18.0;
 
-/// Lets pairs of clips pass.
+/// Decides which pairs of clips pass.
 pub(super) struct Gate {
     mean_heading_rad: Vec<Option<f64>>,
     turn_rate_rad_per_s: Vec<Option<f64>>,
     view: View,
     heading_gate_rad: f64,
-    /// What the view's gate compares, in parts of a circle that wrap; 0 where it is unknown.
+    /// The compared quantity of each clip as a fraction of a circle, 2^32 units to the circle, so that
+    /// differences wrap. Headings in side view, scaled turning rates in top view; 0 where unknown.
     parts: Vec<u32>,
-    /// Clips further apart than this never pass.
+    /// Largest difference that may pass, in the same units, with a margin for rounding.
     most_parts: u32,
 }
 
-/// Parts of a circle: so many that what rounding does is far below any gap that matters.
+/// Units per radian. Rounding errors are far below any relevant difference.
 const PARTS_PER_RAD: f64 = 4_294_967_296.0 / TAU;
-/// Faster turns than this, radians a second, are taken for it: half a circle's parts stay apart.
+/// Turning rates are clamped to this, radians per second, so that scaled rates differ by less than half a
+/// circle.
 const FASTEST_RAD_PER_S: f64 = 1000.0;
-/// Radians of those parts for a radian a second: the fastest two ways are less than a circle apart by more
-/// than the gate.
+/// Scale from turning rates to angles, radians per (radian per second). The difference between the two
+/// extreme rates then stays below half a circle.
 const RATE_SCALE: f64 = 1e-3;
 
 impl Gate {
-    /// For every clip of the footage.
+    /// Computes the gate for every clip of the footage.
     pub(super) fn new(poses: &Poses, clip_frames: usize, params: &Params) -> Gate {
         let headings: Vec<Option<f64>> = poses.frames.iter().map(|pose| pose.heading_rad).collect();
         let of_clips = |value: fn(&[f64]) -> Option<f64>| -> Vec<Option<f64>> {
@@ -66,11 +70,13 @@ impl Gate {
         }
     }
 
-    /// Marks which pairs of clip `i` may pass: entry k is (i, i + k). Every pair that passes is marked, and
-    /// hardly any other. Whole numbers, because every pair of a footage is asked.
+    /// Marks the pairs of clip `i` that may pass: entry k is the pair (i, i + k).
+    ///
+    /// Every pair that passes is marked, and few others. The test uses integers, because it runs on every
+    /// pair of the footage.
     pub(super) fn mark(&self, i: usize, mirrored: bool, row: &mut Marks) {
         let turned = match (self.view, mirrored) {
-            // Of half a circle less the heading, and of the rate the other way.
+            // Mirroring turns a heading h into pi - h and reverses a turning rate.
             (_, false) => |parts: u32| parts,
             (View::Side, true) => |parts: u32| (1u32 << 31).wrapping_sub(parts),
             (View::Top, true) => |parts: u32| parts.wrapping_neg(),
@@ -82,10 +88,11 @@ impl Gate {
         });
     }
 
-    /// The difference of the clips' mean headings, 0..=pi, if the pair may pass.
+    /// Returns the difference between the mean headings of two clips, 0..=pi, or `None` if the pair does not
+    /// pass.
     ///
-    /// A mirrored pair compares heading i with pi - heading j, and turning rate i with minus that
-    /// of j. A clip with an unknown heading never passes.
+    /// A mirrored pair compares heading i with pi - heading j, and turning rate i with minus turning rate j.
+    /// A clip with an unknown heading never passes.
     pub(super) fn pass(&self, i: usize, j: usize, mirrored: bool) -> Option<f64> {
         let (a, b) = (self.mean_heading_rad[i]?, self.mean_heading_rad[j]?);
         let gap_rad = wrap_rad(a - if mirrored { mirrored_rad(b) } else { b }).abs();
@@ -100,7 +107,7 @@ impl Gate {
     }
 }
 
-/// A heading, or a rate of turning, in parts of a circle.
+/// Returns a heading or a turning rate in units of a circle.
 fn parts(view: View, value: f64) -> u32 {
     let rad = match view {
         View::Side => value,
@@ -109,7 +116,7 @@ fn parts(view: View, value: f64) -> u32 {
     (rad * PARTS_PER_RAD).round() as i64 as u32
 }
 
-/// Slope of the line fitted to the unwrapped headings, radians a frame; 0 for a single frame.
+/// Returns the slope of a line fitted to the unwrapped headings, radians per frame; 0 for a single frame.
 fn turn_rate(headings_rad: &[f64]) -> f64 {
     let middle = (headings_rad.len() as f64 - 1.0) / 2.0;
     let mut heading = headings_rad[0];
@@ -152,7 +159,7 @@ mod tests {
 
     #[test]
     fn from_the_side_clips_must_point_the_same_way() {
-        // Mean headings of the clips: 1, 90 and 178 degrees where the pairs below look.
+        // Mean headings of the clips: 1, 7.5, 16, 98.5 and 178 degrees.
         let gate = gate(View::Side, &[0.0, 2.0, 13.0, 19.0, 178.0, 178.0]);
         let gap_deg = gate
             .pass(0, 1, false)
@@ -176,14 +183,15 @@ mod tests {
 
     #[test]
     fn from_above_clips_must_turn_alike_wherever_they_point() {
-        // Rates in degrees a second: +30 across the seam, then +40 and -30 elsewhere.
+        // Turning rates, degrees per second: +30 across the seam at 180 degrees, then +40 and -30.
         let gate = gate(View::Top, &[179.0, 182.0, 10.0, 14.0, 50.0, 47.0]);
         assert!(gate.pass(0, 2, false).is_some());
         assert!(gate.pass(0, 4, false).is_none());
         assert!(gate.pass(0, 4, true).is_some());
     }
 
-    /// How much more than the gate allows a pair of clips is apart, radians or radians a second.
+    /// Returns the difference of a pair minus the gate, radians or radians per second. Positive pairs do not
+    /// pass.
     fn beyond(gate: &Gate, (i, j): (usize, usize), mirrored: bool) -> f64 {
         let of = |values: &[Option<f64>], k: usize| values[k].expect("every heading is known");
         if gate.view == View::Top {
@@ -206,7 +214,7 @@ mod tests {
             headings_deg in proptest::collection::vec(-179f64..180.0, 3..40),
             whole: bool, from_above: bool, mirrored: bool,
         ) {
-            // Whole degrees lie on the gate's edge now and then.
+            // Whole degrees sometimes lie exactly on the limit of the gate.
             let headings: Vec<f64> = match whole {
                 true => headings_deg.iter().map(|h| h.round()).collect(),
                 false => headings_deg,

@@ -1,24 +1,24 @@
-//! Which pairs of clips may be joined at all, whatever their distance (ALGORITHMS.md 5, candidates), and which
-//! of those an approximate search compares (above 50 000 frames).
+//! Selects the pairs of clips that may be joined, independent of their distance, and those that an
+//! approximate search compares (docs/explanation/algorithms.md, "Transitions and playback").
 
 use super::Search;
 use crate::analysis::distance::{Asked, Lists, Marks, Side};
 use crate::random;
 
-/// Clips whose pairs recall is measured on.
+/// Number of clips in the sample that measures recall. Free choice.
 const N_SAMPLED: usize = 256;
-/// Of the numbers that choose them.
+/// Random seed of the sample.
 const SEED: u64 = 0x5eed;
 
-/// What an approximate search leaves out, and how that is measured.
+/// An approximate search: its candidate lists, and the sample that measures what it misses.
 pub(super) struct Approximate {
     pub(super) lists: Lists,
-    /// The clips that are compared with all later ones, to see what the lists miss.
+    /// True for the clips of the sample. They are compared with all later clips.
     pub(super) sampled: Vec<bool>,
 }
 
 impl Approximate {
-    /// A search by these lists among so many clips.
+    /// Creates the search for a number of clips.
     pub(super) fn new(lists: Lists, n_clips: usize) -> Approximate {
         let mut clips: Vec<usize> = (0..n_clips).collect();
         clips.sort_unstable_by_key(|&i| (random::bits(SEED, &[i as u64]), i));
@@ -31,7 +31,7 @@ impl Approximate {
     }
 }
 
-/// The pairs of clips that may be joined, whatever their distance.
+/// The pairs of clips that may be joined, independent of their distance.
 pub(super) struct Joinable<'a> {
     pub(super) search: &'a Search<'a>,
     pub(super) side: Side,
@@ -39,14 +39,14 @@ pub(super) struct Joinable<'a> {
 }
 
 impl Joinable<'_> {
-    /// Of two clips at least the least gap apart.
+    /// Returns whether two clips may be joined. The caller checks the minimum gap between them.
     pub(super) fn holds(&self, i: usize, j: usize) -> bool {
         let usable = &self.search.clips.usable;
         let mirrored = self.side == Side::Mirrored;
         usable[i] && usable[j] && self.search.gate.pass(i, j, mirrored).is_some()
     }
 
-    /// Of two such clips, whether they are compared.
+    /// Returns whether the search compares two joinable clips. An exact search compares all.
     pub(super) fn is_compared(&self, i: usize, j: usize) -> bool {
         let approximate = self.search.approximate.as_ref();
         approximate.is_none_or(|found_by| found_by.lists.holds(self.side, i, j))

@@ -1,10 +1,10 @@
-//! Which moments look alike: from the distances between clips to transitions and the playback
-//! graph (ALGORITHMS.md 5; O 3.2 and 3.3).
+//! Finds transitions: pairs of similar clips, and the playback graph that they form
+//! (docs/explanation/algorithms.md, "Transitions and playback"; Okabe et al., sections 3.2 and 3.3).
 //!
-//! A frame can be shown when its sprite is present and uncut and its heading known; a clip can be
-//! used when all its frames can be shown. Plain pairs must be max(f, 0.5 s) apart: nearer ones are
-//! the same moment. Mirrored pairs need no such gap, because a clip is not its own mirror image:
-//! where it nearly is, seen head-on, turning over on the spot is just what is wanted.
+//! A frame can be shown if its sprite is present and uncut and its heading is known. A clip is usable if all
+//! its frames can be shown. Unmirrored pairs must be at least max(f, 0.5 s) apart: closer pairs are the same
+//! moment. Mirrored pairs need no gap, because a clip differs from its own mirror image. Seen head-on it
+//! differs little; a flip on the spot is then a useful transition.
 
 mod gate;
 mod joinable;
@@ -22,48 +22,50 @@ use crate::cpu::Level;
 use crate::library::{Patch, Playback, Poses, Sprites, Transition};
 use crate::progress::Progress;
 
-/// Larger multiples of the natural step, tried where the component holds too little.
+/// Multiples of the natural step that are tried after `kappa` where the component is too small. Free choice.
 const KAPPA_LADDER: [f64; 3] = [2.5, 3.0, 4.0];
-/// Beyond them each multiple is so many times the one before.
+/// Factor between further multiples. Free choice.
 const KAPPA_GROWTH: f64 = 1.5;
-/// A component that lasts shorter than this is too little.
+/// Shortest sufficient component, seconds. Free choice.
 const LEAST_COMPONENT_S: f64 = 2.0;
-/// So is one that holds less than this share of the frames that the largest multiple joins.
+/// Smallest sufficient share of the frames that the largest multiple joins. Free choice.
 const LEAST_SHARE: f64 = 0.75;
-/// Plain pairs of clips are at least this far apart.
+/// Smallest distance between the clips of an unmirrored pair, seconds. Free choice.
 const LEAST_GAP_S: f64 = 0.5;
 
-/// What the distances say about a footage.
+/// The transitions of a footage and the playback they allow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connections {
-    /// f.
+    /// Clip length f, frames.
     pub clip_frames: usize,
-    /// Clips nearer than this (strictly) are alike.
+    /// Distance below which (strictly) two clips are similar.
     pub epsilon: u64,
-    /// The median of D(i, i+1) over clips whose sprites are all present, of an even number the
-    /// lower one; 0 when there are none.
+    /// Median of D(i, i+1) over the clips with all sprites present; the lower median for an even number, 0
+    /// without clips.
     pub natural_step: u64,
-    /// The multiple of the natural step that epsilon is, rounded up; `None` when epsilon was given.
+    /// Multiple of the natural step that gave epsilon (rounded up); `None` if epsilon was given.
     pub kappa_used: Option<f64>,
-    /// Pairs i < j of clips that may be joined and have D < epsilon, before only the nearest around are kept.
+    /// Number of compared unmirrored pairs i < j with D < epsilon that may be joined, before the selection of
+    /// local minima.
     pub n_candidates: u64,
-    /// Share of such pairs that a search by lists finds, measured on the pairs of 256 clips, 0..=1; `None` where
-    /// every pair was looked at.
+    /// Share of similar pairs that the approximate search compares, measured on the pairs of 256 clips,
+    /// 0..=1; `None` for an exact search.
     pub recall: Option<f64>,
-    /// By (from, to, mirrored).
+    /// Sorted by (from, to, mirrored).
     pub transitions: Vec<Transition>,
-    /// What may follow what.
+    /// The jumps, and the component in which playback never ends.
     pub playback: Playback,
-    /// The runs of sprites between jumps.
+    /// The runs of frames between jumps.
     pub patches: Vec<Patch>,
-    /// Share of the footage's frames that lie in the component, 0..=1.
+    /// Share of the footage's frames in the component, 0..=1.
     pub component_share: f64,
 }
 
-/// Compares all clips and joins those alike.
+/// Compares all clips and joins similar ones.
 ///
-/// A footage without any two moments alike is no error: its component is empty. Fails only when
-/// cancelled. The result is the same at every level and with any number of threads.
+/// A footage without similar moments is not an error: its component is empty. Fails when cancelled or when
+/// the temporary storage is full. The result is the same at every instruction level and with any number of
+/// threads.
 pub fn connect(
     sprites: &Sprites,
     poses: &Poses,
@@ -75,7 +77,7 @@ pub fn connect(
     connect_compared(&pixels, (sprites, poses), params, cpu, progress)
 }
 
-/// As [`connect`], of sprites that are laid out for comparison already.
+/// Works like [`connect`], on sprites already laid out for comparison.
 pub fn connect_compared(
     pixels: &ComparedSprites,
     (sprites, poses): (&Sprites, &Poses),
@@ -113,8 +115,10 @@ pub fn connect_compared(
     strictest_enough(&rungs(params, steps), &clips, poses.fps, at)
 }
 
-/// What the strictest epsilon joins whose component lasts long enough and holds most of what the widest joins: a
-/// wider one costs jumps that are seen more, and is worth it only where much more can be played.
+/// Returns the connections of the strictest sufficient epsilon.
+///
+/// An epsilon is sufficient if its component lasts long enough and holds most of the frames that the widest
+/// one joins. A wider epsilon gives more visible jumps, so it must add many playable frames.
 fn strictest_enough(
     rungs: &[Rung],
     clips: &Clips,
@@ -130,7 +134,7 @@ fn strictest_enough(
         return Ok(strictest);
     }
     let widest = at(rungs[last])?;
-    // What is nearest around at the widest epsilon is so at every stricter one.
+    // A local minimum at the widest epsilon is also one at every stricter epsilon above its distance.
     let is_enough = |rung: &Rung| {
         let nearer = widest
             .transitions
@@ -147,7 +151,7 @@ fn strictest_enough(
     }
 }
 
-/// Which frames and clips can be used.
+/// The frames that can be shown and the clips that can be used.
 struct Clips {
     clip_frames: usize,
     shown: Vec<bool>,
@@ -184,7 +188,7 @@ impl Clips {
     }
 }
 
-/// How much the animal changes from one frame to the next.
+/// Change of the animal from one frame to the next: percentiles of D(i, i+1).
 #[derive(Clone, Copy)]
 struct NaturalSteps {
     median: u64,
@@ -209,16 +213,17 @@ fn natural_steps(steps: Vec<u64>, clips: &Clips, weights: &[u64]) -> NaturalStep
     }
 }
 
-/// An epsilon to try, and the kappa that it comes from.
+/// A candidate for epsilon, with the kappa that gave it.
 #[derive(Clone, Copy)]
 struct Rung {
     kappa: Option<f64>,
     epsilon: u64,
 }
 
-/// The epsilons to try, the strictest first. An animal that rests most of the time has a natural step
-/// of nearly nothing: for it they grow up to the 99th percentile of its steps, what it changes by
-/// when it moves.
+/// Returns the candidates for epsilon, the strictest first.
+///
+/// An animal that rests most of the time has a natural step near 0. The candidates then grow up to the 99th
+/// percentile of its steps, the change while it moves.
 fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
     if let Some(epsilon) = params.epsilon {
         return vec![Rung {
@@ -235,13 +240,13 @@ fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
         .chain((liveliest > highest).then_some(liveliest))
         .map(|kappa| Rung {
             kappa: Some(kappa),
-            // D is whole: D < kappa * step is D < the next whole number.
+            // D is an integer, so D < x is equivalent to D < ceil(x).
             epsilon: (kappa * steps.median as f64).ceil() as u64,
         })
         .collect()
 }
 
-/// All that decides which pairs become transitions.
+/// The criteria that decide which pairs become transitions.
 struct Search<'a> {
     distances: Distances<'a>,
     clips: &'a Clips,
@@ -252,13 +257,13 @@ struct Search<'a> {
     approximate: Option<Approximate>,
 }
 
-/// What a search found below an epsilon.
+/// The result of a search below one epsilon.
 #[derive(Default)]
 struct Found {
     transitions: Vec<Transition>,
-    /// Raw pairs.
+    /// Number of pairs before the selection of local minima.
     n_candidates: u64,
-    /// Of the clips that an approximate search samples: pairs that are alike, and those of them that it compares.
+    /// Similar pairs of the sampled clips, and how many of them the approximate search compares.
     n_alike: u64,
     n_compared: u64,
 }
@@ -313,8 +318,10 @@ impl Search<'_> {
         }
     }
 
-    /// A local minimum, if it may be joined. Around a pair that is compared so is all that it competes with; what was
-    /// looked at for that alone is none.
+    /// Returns the transition of a local minimum, or `None` if the pair may not be joined.
+    ///
+    /// An approximate search also measures the neighbors of a compared pair. They compete as local minima,
+    /// but do not become transitions.
     fn transition(&self, pair: ClipPair, asked: &Joinable<'_>) -> Option<Transition> {
         let mirrored = asked.side == Side::Mirrored;
         let heading_gap_rad = self.gate.pass(pair.from, pair.to, mirrored)?;
@@ -332,7 +339,7 @@ impl Search<'_> {
 }
 
 impl Found {
-    /// Counts the pairs of a clip that are alike and may be joined.
+    /// Counts the similar pairs of a clip that may be joined.
     fn count(&mut self, i: usize, pairs: &[ClipPair], asked: &Joinable<'_>) {
         let later = pairs
             .iter()
@@ -354,7 +361,7 @@ impl Found {
         }
     }
 
-    /// What these transitions make of the footage.
+    /// Builds the playback graph of the transitions.
     fn connections(
         self,
         rung: Rung,

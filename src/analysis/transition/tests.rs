@@ -1,4 +1,4 @@
-//! Transitions of small films whose likenesses are known.
+//! Tests of transitions on small synthetic films with known similar moments.
 
 use std::sync::Arc;
 
@@ -14,11 +14,12 @@ use libm::{cos, sin};
 
 const FPS: f64 = 10.0;
 
-/// What the animal does in a frame: a phase of its stroke in 0..1, and its heading.
+/// Phase of the stroke, 0..1, and heading, radians.
 type Moment = (f64, f64);
 
-/// A bright dot that circles about the middle of a 16 x 16 sprite by the phase of the stroke,
-/// left-right mirrored where the animal heads left. `None` where it was not found.
+/// Returns sprites of a bright dot that circles in a 16 x 16 image by the phase of the stroke.
+///
+/// The dot is mirrored where the animal heads left. `None` gives a missing sprite.
 fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
     let draw = |frame_idx: usize, rgba: &mut [u8]| {
         let Some((phase, heading_rad)) = moments[frame_idx] else {
@@ -54,7 +55,7 @@ fn film(moments: &[Option<Moment>]) -> (Sprites, Poses) {
     (sprites, poses)
 }
 
-/// Strokes of 20 frames, all alike, at one heading.
+/// Returns identical strokes of 20 frames at one heading.
 fn strokes(n_frames: usize, heading_rad: f64) -> Vec<Option<Moment>> {
     let phase = |k: usize| (k % 20) as f64 / 20.0;
     (0..n_frames)
@@ -98,14 +99,14 @@ fn candidates_are_counted_before_only_the_nearest_are_kept() {
         ..params()
     };
     let found = connections(&still, &params);
-    // Seven clips, all equal: three pairs are half a second apart, and the first of them is kept.
+    // The seven clips are equal. Three pairs are half a second apart; the first one is kept.
     assert_eq!((found.n_candidates, found.kappa_used), (3, None));
     let plain = found.transitions.iter().filter(|t| !t.mirrored);
     let pairs: Vec<_> = plain.map(|t| (t.from, t.to)).collect();
     assert_eq!(pairs, [(0, 5)]);
 }
 
-/// The transitions by the definition: all distances, the minima among them, and only then the gate.
+/// Returns the transitions from the definition: all distances, then local minima, then the gate.
 fn by_definition(
     sprites: &Sprites,
     poses: &Poses,
@@ -160,7 +161,7 @@ fn by_definition(
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(40))]
 
-    /// An animal that turns and strokes at random, now and then lost, cut or headless.
+    /// An animal that turns and strokes at random, and is sometimes missing, cut, or without a heading.
     #[test]
     fn with_the_gate_first_the_transitions_are_those_of_all_distances(
         (n_frames, f, seed) in (1usize..230, 1u32..6, any::<u64>()),
@@ -192,7 +193,7 @@ proptest! {
     }
 }
 
-/// An animal whose stroke drifts, so that no two moments are quite the same.
+/// Returns an animal whose stroke drifts, so that no two moments are identical.
 fn drifting(n_frames: u64) -> (Sprites, Poses) {
     let mut phase = 0.0f64;
     let moments: Vec<Option<Moment>> = (0..n_frames)
@@ -221,7 +222,7 @@ fn what_an_approximate_search_finds_is_true_and_what_it_misses_is_told() {
     assert_eq!((all.recall, all.epsilon), (None, some.epsilon));
     assert!(!some.transitions.is_empty());
     assert!(some.transitions.iter().all(|t| all.transitions.contains(t)));
-    // So few clips are all in the sample.
+    // All clips are in the sample, because there are fewer than 256.
     let share = some.n_candidates as f64 / all.n_candidates as f64;
     assert_eq!(some.recall, Some(share));
     assert!((0.8..1.0).contains(&share), "{share}");
@@ -325,7 +326,7 @@ fn no_clip_with_a_missing_cut_or_headless_frame_is_joined() {
 
 #[test]
 fn epsilon_grows_while_the_component_is_short() {
-    // Never the same twice: one stroke that takes longer than the footage.
+    // No moment repeats: one stroke takes longer than the footage.
     let moments: Vec<_> = (0..60).map(|k| Some((f64::from(k) / 70.0, 0.0))).collect();
     let found = connections(&moments, &params());
     assert_eq!(found.kappa_used, Some(4.0));
@@ -335,8 +336,8 @@ fn epsilon_grows_while_the_component_is_short() {
 
 #[test]
 fn epsilon_grows_where_much_more_is_joined_by_it() {
-    // Two seconds of strokes that come again, and as much that is like them at a wider epsilon only: it turns the
-    // other way, and faster.
+    // Two strokes, then three seconds of faster strokes in the other direction. These are similar to the
+    // first part only at a wider epsilon.
     let mut moments = strokes(41, 0.0);
     moments.extend((0..30).map(|k| Some(((1.0 - 0.18 * f64::from(k)).rem_euclid(1.0), 0.0))));
     let grown = connections(&moments, &params());

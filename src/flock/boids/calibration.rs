@@ -1,61 +1,62 @@
-//! What a boid may do is what the animal was seen to do: speeds, turn rates, and in side view how
-//! steeply it points (ALGORITHMS.md 7, "from the footage").
+//! Limits of boids, measured on the animal: speeds, turn rates, and in side view slopes
+//! (docs/explanation/algorithms.md, "Boids").
 
 use super::tank::Tank;
 use crate::flock::motion::FrameMotion;
 use crate::library::{Library, View};
 use crate::order::percentile;
 
-/// The limits of a boid, in body lengths and seconds.
+/// Limits of a boid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Calibration {
-    /// The speed it returns to.
+    /// Cruising speed, body lengths per second.
     pub cruise_bl_per_s: f64,
-    /// Least and greatest speed.
+    /// Least and greatest speed, body lengths per second.
     pub speed_limits_bl_per_s: [f64; 2],
-    /// Greatest turn rate.
+    /// Greatest turn rate, radians per second.
     pub turn_rad_per_s: f64,
-    /// Root mean square of the turn rate.
+    /// Root mean square of the turn rate, radians per second.
     pub wander_rad_per_s: f64,
-    /// In side view with depth. `None` where every direction can be shown.
+    /// Slopes in side view. `None` in top view and without depth, where every direction can be shown.
     pub slopes: Option<Slopes>,
 }
 
-/// How steeply the animal swims: vertical to level speed, positive downward.
+/// Slopes at which the animal swims: vertical over horizontal speed, positive downward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slopes {
-    /// Greatest slope upward (positive) and downward.
+    /// Greatest slope upward and downward, both positive.
     pub limits: [f64; 2],
-    /// The median.
+    /// Median slope.
     pub usual: f64,
-    /// Standard deviation, from the middle two thirds.
+    /// Standard deviation of the slope, from the middle two thirds of the frames.
     pub spread: f64,
-    /// Greatest slope in the picture, upward and downward: an animal may be seen to rise often and hardly ever to sink.
-    /// Who swims nearly along the line of sight is seen to head steeply when it rises a little, or keeps its height far
-    /// above the camera or below.
+    /// Greatest slope in the image, upward and downward, both positive. A boid that swims nearly along the
+    /// line of sight is seen at a steep slope if it rises a little. The same holds if it keeps its height far
+    /// above or below the camera.
     pub in_picture: [f64; 2],
 }
 
-/// Share of the frames that may rise more steeply than a boid, and of those that may sink so.
+/// Share of frames that rise more steeply than the upward limit, and of frames that sink more steeply than
+/// the downward limit. Free choice.
 const STEEPER: f64 = 0.02;
-/// Share of the frames that rise more steeply in the picture than a boid may be seen to, and of those that sink so: few
-/// frames, for which no plan finds one that follows.
+/// The same share for slopes in the image. For steeper boids, plans would find too few frames. Free choice.
 const STEEPER_IN_PICTURE: f64 = 0.15;
-/// Share of the frames that are slower, or turn less, than a boid may at most.
+/// Share of frames below the greatest speed, and below the greatest turn rate
+/// (docs/explanation/algorithms.md, "Boids").
 const FASTEST: f64 = 0.95;
-/// No boid turns faster.
+/// Largest value of the greatest turn rate, radians per second. Free choice.
 const FASTEST_TURN_RAD_PER_S: f64 = 6.0;
-/// Greatest radius of a turn, as a share of half the width of the tank. A free choice: a boid that swims along the middle can
-/// turn round before either wall.
+/// Largest radius of a turn at cruising speed, as a share of half the width of the tank. Free choice. A boid
+/// in the middle can turn round before either wall.
 const TURNED_IN: f64 = 0.5;
-/// And of those that are slower than it must be.
+/// Share of frames below the least speed (docs/explanation/algorithms.md, "Boids").
 const SLOWEST: f64 = 0.05;
-/// A boid may point this steeply whatever was seen.
+/// Least and greatest angle of a slope limit, radians. Free choices.
 const LEAST_STEEP_RAD: f64 = 0.05;
 const MOST_STEEP_RAD: f64 = 1.2;
 
 impl Default for Calibration {
-    /// Of an animal that nothing is known of: it goes straight on.
+    /// Returns the limits for an unknown animal, which swims straight ahead.
     fn default() -> Calibration {
         Calibration {
             cruise_bl_per_s: 1.0,
@@ -68,8 +69,8 @@ impl Default for Calibration {
 }
 
 impl Calibration {
-    /// Measured on the frames that may be shown. `flat`: without depth, where there is no way to turn round
-    /// but through the vertical.
+    /// Returns the limits measured on the frames that may be shown. `flat` means that the tank has no depth.
+    /// Boids can then turn round only through the vertical, so slopes have no limits.
     pub fn of(library: &Library, motion: &[FrameMotion], flat: bool) -> Calibration {
         let shown = || (library.playback.component.iter()).map(|&frame| &motion[frame as usize]);
         let mut paces: Vec<f64> = shown().filter_map(|m| m.pace_bl_per_s).collect();
@@ -77,7 +78,7 @@ impl Calibration {
         let (cruise, [slow, fast]) = (unknown.cruise_bl_per_s, unknown.speed_limits_bl_per_s);
         let [slow, cruise, fast] = [(SLOWEST, slow), (0.5, cruise), (FASTEST, fast)]
             .map(|(share, usual)| percentile(&mut paces, share).unwrap_or(usual));
-        // An animal that mostly sits still would make a flock of statues: a quarter of its best.
+        // The boids of an animal that mostly rests still cruise at a quarter of its greatest speed.
         let cruise = cruise.max(0.25 * fast).max(0.05);
         let mut swings: Vec<f64> = shown().filter_map(|m| m.swing_rad_per_s).collect();
         let turn_rad_per_s = percentile(&mut swings, FASTEST)
@@ -97,8 +98,8 @@ impl Calibration {
         }
     }
 
-    /// The same with a turn rate that lets a boid turn round in the tank at cruising speed. A short film may never show the
-    /// animal turning.
+    /// Returns the limits with a turn rate at which a boid can turn round in the tank at cruising speed.
+    /// Short footage may never show the animal turning.
     pub fn in_tank(self, tank: &Tank) -> Calibration {
         let [x, y, z] = tank.reach_bl;
         let narrow_bl = if tank.is_flat() { x.min(y) } else { x.min(z) };
@@ -109,20 +110,22 @@ impl Calibration {
         }
     }
 
-    /// The usual acceleration: what turns half again as fast as the animal does on average, at cruising speed.
+    /// Returns the usual acceleration: that of a turn at 1.5 times the root mean square of the turn rate, at
+    /// cruising speed.
     pub fn usual_acceleration_bl_per_s2(&self) -> f64 {
         let usual = 1.5 * self.wander_rad_per_s;
         self.cruise_bl_per_s * usual.min(self.turn_rad_per_s)
     }
 
-    /// The greatest acceleration: what turns at the greatest rate at cruising speed.
+    /// Returns the greatest acceleration: that of a turn at the greatest rate, at cruising speed.
     pub fn acceleration_bl_per_s2(&self) -> f64 {
         self.cruise_bl_per_s * self.turn_rad_per_s
     }
 }
 
 impl Slopes {
-    /// Of an animal seen at these pitches in space, and at these angles to the horizontal in the picture; positive downward.
+    /// Returns the slopes for pitches in space and for angles to the horizontal in the image, radians,
+    /// positive downward.
     fn of(mut pitches: Vec<f64>, mut elevations: Vec<f64>) -> Slopes {
         let limits = |angles: &mut Vec<f64>, steeper: f64| {
             let [up, down] = [steeper, 1.0 - steeper].map(|share| percentile(angles, share));
@@ -141,7 +144,7 @@ impl Slopes {
     }
 }
 
-/// Of values up to `most`: what was measured beyond is noise.
+/// Returns the root mean square of values cut to `most`. Larger values are noise.
 fn root_mean_square(values: &[f64], most: f64) -> f64 {
     let squares: f64 = values.iter().map(|v| v.min(most) * v.min(most)).sum();
     (squares / values.len().max(1) as f64).sqrt()

@@ -1,30 +1,32 @@
-//! Motion that is imposed on boids in addition to their rules: the speed and the turn rate of the filmed animal (the rules then
-//! choose the direction alone), and in a loop the positions to return to.
+//! Motion imposed on boids besides their rules. The speed and the turn rate of the filmed animal leave only
+//! the direction to the rules. A loop adds the positions to return to.
 
 use super::Boids;
 use super::lanes::{self, Lanes};
 use super::step::Pace;
 use super::vector::{Vec3, add_scaled, minus, norm, scaled, unit};
 
-/// Time constant with which a boid approaches the position that it must reach.
+/// Time constant with which a boid approaches the position to reach, seconds. Free choice.
 const MEETING_S: f64 = 0.6;
 
-/// How a filmed animal gets on, whatever the rules wish.
+/// Speed and turn rate of the filmed animal, imposed on a boid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gait {
-    /// Its speed, body lengths a second. Who is slower than usual is turned less by its rules, and who rests not at all.
+    /// Speed, body lengths per second. Below cruising speed the rules turn the boid less, and at rest not at
+    /// all.
     pub speed_bl_per_s: f64,
-    /// How fast it turns by itself, in the plane of the picture.
+    /// Turn rate in the image plane, radians per second. It adds to the turns by the rules, in a flat tank
+    /// only.
     pub turn_rad_per_s: f64,
 }
 
 impl Boids<'_> {
-    /// Has everybody get on as filmed from now on, by id: their rules say where to, the film says how.
+    /// Imposes speeds and turn rates, by id, from the next step on.
     pub fn go_as(&mut self, gaits: Vec<Gait>) {
         self.gaits = gaits;
     }
 
-    /// The velocity at which one gets on, body lengths a second.
+    /// Returns the velocity at which a boid moves, body lengths per second.
     pub fn motion(&self, id: usize) -> Vec3 {
         self.at_filmed_speed::<f64>(
             &[id as u32; lanes::MOST],
@@ -33,7 +35,8 @@ impl Boids<'_> {
         )
     }
 
-    /// cos and sin of the widest turn of each: who is slower than usual turns less, and who rests does not turn.
+    /// Returns cosine and sine of the greatest turn of each boid in one step. It shrinks with an imposed
+    /// speed below cruising speed, to 0 at rest.
     #[inline(always)]
     pub(super) fn widest_turn<L: Lanes>(&self, ids: &[u32; lanes::MOST], pace: &Pace) -> (L, L) {
         if self.gaits.is_empty() {
@@ -51,7 +54,7 @@ impl Boids<'_> {
         )
     }
 
-    /// The velocity of each, turned as it was filmed to turn by itself.
+    /// Returns the velocities turned at the imposed turn rates.
     #[inline(always)]
     pub(super) fn turned_as_filmed<L: Lanes>(
         &self,
@@ -71,8 +74,7 @@ impl Boids<'_> {
         [cos * x - sin * y, sin * x + cos * y, z]
     }
 
-    /// The velocity at which each gets on: in the direction that it swims in, as fast as it was filmed; in flight at
-    /// least as fast as it would.
+    /// Returns the velocities at the imposed speeds. In flight the speed is at least that of the boid itself.
     #[inline(always)]
     pub(super) fn at_filmed_speed<L: Lanes>(
         &self,
@@ -90,17 +92,17 @@ impl Boids<'_> {
     }
 }
 
-/// Where everybody is to be a frame later and how fast, by id: places in body lengths and velocities.
+/// Positions and velocities that boids are to reach one frame later.
 #[derive(Clone, Debug)]
 pub struct Meeting {
-    /// How much of each wish it is, 0..=1.
+    /// Weight against the other wishes, 0..=1.
     pub share: f64,
-    /// Place and velocity.
+    /// Position, body lengths, and velocity, body lengths per second, by id.
     pub places: Vec<(Vec3, Vec3)>,
 }
 
 impl Meeting {
-    /// The velocity wished for instead of `wished`.
+    /// Returns the wanted velocity. `wished` is the one without the meeting.
     pub(super) fn wish(&self, id: usize, position: Vec3, wished: Vec3) -> Vec3 {
         let (place, velocity) = self.places[id];
         let there = add_scaled(velocity, 1.0 / MEETING_S, minus(place, position));

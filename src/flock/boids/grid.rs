@@ -1,63 +1,63 @@
-//! Who is near whom, in time proportional to the number of boids: small cells filled by a counting sort, positions
-//! and velocities laid out in cell order (ALGORITHMS.md 7), so that a row of cells is one run of memory.
-//! `nearest` searches it.
+//! Grid for neighbor searches in time proportional to the number of boids
+//! (docs/explanation/algorithms.md, "Boids"). A counting sort brings positions and velocities into the order
+//! of small cells, so that a row of cells is one run of memory.
 
 use rayon::prelude::*;
 
 use super::CHUNK;
 use super::vector::Vec3;
 
-/// Cells to the reach of the farthest rule, where there are boids enough to fill them.
+/// Cells per reach of the farthest rule, if there are enough boids to fill them. Free choice.
 const FINEST: f64 = 6.0;
-/// Cells to a boid, at most.
+/// Largest number of cells per boid. Free choice.
 const CELLS_PER_BOID: f64 = 0.6;
 
-/// So many positions can be looked at from any slot on.
+/// Number of positions that may be read from any slot on. The arrays of `along` are padded by as many.
 pub const BLOCK: usize = 4;
 
-/// Boids sorted by cell.
+/// Boids sorted by cell. A slot is an index in this order.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
     least: Vec3,
-    /// Cells to a body length along each axis.
+    /// Cells per body length along each axis; 0 along an axis in which all boids are equal.
     cells_per_bl: Vec3,
     n_cells: [usize; 3],
-    /// `first[c]..first[c + 1]` are the boids of cell c.
+    /// The boids of cell c have the slots `first[c]..first[c + 1]`.
     first: Vec<u32>,
-    /// The cell of each boid as they were given; then where it stands in cell order.
+    /// Slot of each boid, in the order given. During the sort, its cell.
     slots: Vec<u32>,
-    /// The way back: whom of those given each slot holds.
+    /// Index in the order given, by slot.
     given: Vec<u32>,
     boids: Vec<Boid>,
-    /// Their positions once more, axis by axis.
+    /// Positions by slot, axis by axis.
     axes: [Vec<f64>; 3],
 }
 
-/// A boid where its cell is, all in one line of the cache, position and velocity first.
+/// A boid in one cache line, with position and velocity first.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub struct Boid {
-    /// Body lengths.
+    /// Position, body lengths.
     pub position: Vec3,
-    /// Body lengths a second.
+    /// Velocity, body lengths per second.
     pub velocity: Vec3,
-    /// Its number.
+    /// Id.
     pub id: u32,
 }
 
-/// Rows of cells beside one another.
+/// Iterator over the rows of cells in a box.
 pub struct Rows<'a> {
     grid: &'a Grid,
     from: [usize; 3],
     to: [usize; 3],
-    /// y and z of the next one.
+    /// y and z of the next row.
     next: [usize; 2],
 }
 
 impl Iterator for Rows<'_> {
     type Item = (usize, usize);
 
-    /// The first slot of a row and one past its last.
+    /// Returns the first slot of a row and one past its last.
     #[inline(always)]
     fn next(&mut self) -> Option<(usize, usize)> {
         let [y, z] = self.next;
@@ -77,8 +77,8 @@ impl Iterator for Rows<'_> {
 }
 
 impl Grid {
-    /// Sorts boids into cells for rules that reach so far; what was sorted before is forgotten. It is the faster the
-    /// nearer to one another they are given.
+    /// Sorts boids into cells for rules of this reach. The sort is faster if boids that are near each other
+    /// are given one after another.
     pub fn sort(&mut self, boids: &[Boid], reach_bl: f64) {
         self.lay_cells(boids, reach_bl);
         self.count(boids);
@@ -101,45 +101,46 @@ impl Grid {
             });
     }
 
-    /// Whom of those given each slot holds, in the order of cells: who follows whom here is near it.
+    /// Returns the index in the order given, by slot. Boids in successive slots are near each other.
     #[inline(always)]
     pub fn given(&self) -> &[u32] {
         &self.given
     }
 
-    /// Where each boid stands in the order of cells, as they were given.
+    /// Returns the slot of each boid, in the order given.
     pub fn slots(&self) -> &[u32] {
         &self.slots
     }
 
-    /// Everybody, in the order of cells.
+    /// Returns all boids, by slot.
     #[inline(always)]
     pub fn boids(&self) -> &[Boid] {
         &self.boids
     }
 
-    /// Whoever stands at `slot`.
+    /// Returns the boid at `slot`.
     #[inline(always)]
     pub fn at(&self, slot: usize) -> &Boid {
         &self.boids[slot]
     }
 
-    /// All positions along an axis, in the order of cells, and `BLOCK` infinite ones.
+    /// Returns all positions along an axis, by slot, followed by `BLOCK` infinite ones.
     #[inline(always)]
     pub fn along(&self, axis: usize) -> &[f64] {
         &self.axes[axis]
     }
 
-    /// Whether all are in one plane across the third axis.
+    /// Returns whether all boids have the same z.
     #[inline(always)]
     pub fn is_flat(&self) -> bool {
         self.cells_per_bl[2] == 0.0
     }
 
-    /// The slots of every row of cells that holds whoever may be within `radius_bl` of a place, and more.
+    /// Returns the slots of each row of cells that may hold a boid within `radius_bl` of `place`. The rows
+    /// may hold farther boids too.
     #[inline(always)]
     pub fn rows(&self, place: Vec3, radius_bl: f64) -> Rows<'_> {
-        // Nobody is lost by rounding.
+        // The margin covers rounding.
         let out = radius_bl * (1.0 + 1e-9) + 1e-9;
         let from = self.cell_of([place[0] - out, place[1] - out, place[2] - out]);
         let to = self.cell_of([place[0] + out, place[1] + out, place[2] + out]);
@@ -152,7 +153,7 @@ impl Grid {
         }
     }
 
-    /// Cells as wide along each axis, as small as the reach asks for and the number of boids allows.
+    /// Chooses cubic cells, as small as the reach asks for and the number of boids allows.
     fn lay_cells(&mut self, boids: &[Boid], reach_bl: f64) {
         let nowhere = || ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let both = |a: (Vec3, Vec3), b: (Vec3, Vec3)| {
@@ -174,7 +175,7 @@ impl Grid {
         self.cells_per_bl = span.map(|bl| if bl > 0.0 { 1.0 / cell_bl } else { 0.0 });
     }
 
-    /// Where each boid stands, and where cells begin.
+    /// Computes the slot of each boid and the first slot of each cell.
     fn count(&mut self, boids: &[Boid]) {
         let mut slots = std::mem::take(&mut self.slots);
         let cell = |boid: &Boid| self.index(self.cell_of(boid.position)) as u32;
@@ -190,7 +191,7 @@ impl Grid {
             sum += *first;
             *first = sum;
         }
-        // From the last boid of a cell to the first; then each cell begins where its first boid stands.
+        // Each cell is filled from its last slot to its first, so that `first` ends at the first one.
         for slot in slots.iter_mut().rev() {
             let next = &mut self.first[*slot as usize];
             *next -= 1;

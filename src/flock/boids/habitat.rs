@@ -1,4 +1,5 @@
-//! What is in the tank besides the flock: goals, obstacles and a predator (ALGORITHMS.md 7), in body lengths.
+//! Goals, obstacles and predator in the tank (docs/explanation/algorithms.md, "Boids"). Lengths are in body
+//! lengths.
 
 use super::calibration::Calibration;
 use super::lanes::{self, Lanes, by_lane, in_lane, splat3};
@@ -8,17 +9,17 @@ use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, 
 use crate::flock::lens::Lens;
 use crate::flock::params::Params;
 
-/// Between a boid and an obstacle.
+/// Distance between a boid and an obstacle, body lengths. Free choice.
 const CLEARANCE_BL: f64 = 0.3;
-/// Whoever is this near a goal is there.
+/// Distance from a goal below which a boid slows down, body lengths. Free choice.
 const THERE_BL: f64 = 2.0;
-/// A hunter's speed and turn rate, in those of the flock's animal.
+/// Speed and turn rate of a hunting predator, as multiples of those of the animal. Free choices.
 const HUNTER_PACE: f64 = 1.3;
 const HUNTER_TURN: f64 = 1.5;
-/// How urgent it is to flee.
+/// Weight of fleeing (docs/explanation/algorithms.md, "Boids").
 const FLEE_WEIGHT: f64 = 3.0;
 
-/// Goals and obstacles, and how the picture tells where they are.
+/// Goals, obstacles and predator, with the tank and its projection.
 #[derive(Clone, Debug)]
 pub struct Habitat<'a> {
     pub(super) lens: &'a Lens,
@@ -28,16 +29,16 @@ pub struct Habitat<'a> {
     predator: Option<&'a Predator>,
 }
 
-/// The predator at a moment.
+/// State of the predator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hunter {
-    /// Where it is.
+    /// Position, body lengths.
     pub position: Vec3,
     velocity: Vec3,
 }
 
 impl<'a> Habitat<'a> {
-    /// What the parameters put into a tank.
+    /// Returns the habitat that the parameters describe.
     pub fn new(params: &'a Params, lens: &'a Lens, tank: &'a Tank) -> Habitat<'a> {
         Habitat {
             lens,
@@ -48,7 +49,8 @@ impl<'a> Habitat<'a> {
         }
     }
 
-    /// The course to the goals of a time, in cruising speeds; nothing when there are none.
+    /// Returns the sum of the wishes for all goals at `time_s`, in cruising speeds. A wish is the wanted
+    /// velocity minus the current one. Without a goal the sum is 0.
     #[inline(always)]
     pub fn toward_goals<L: Lanes>(
         &self,
@@ -71,7 +73,8 @@ impl<'a> Habitat<'a> {
         sum
     }
 
-    /// Pushes away from obstacles that would be met within `horizon_s`, growing to 1 where they begin.
+    /// Returns pushes away from obstacles that a boid would reach within `horizon_s`. A push grows to 1 at
+    /// the obstacle.
     #[inline(always)]
     pub fn push<L: Lanes>(&self, position: [L; 3], velocity: [L; 3], horizon_s: f64) -> [L; 3] {
         if self.obstacles.is_empty() {
@@ -96,14 +99,15 @@ impl<'a> Habitat<'a> {
         })
     }
 
-    /// Whether a position is clear of all obstacles.
+    /// Returns whether a position is clear of all obstacles.
     pub fn is_clear(&self, position: Vec3) -> bool {
         (self.obstacles.iter()).all(|obstacle| self.room(obstacle, position).0 >= -1e-9)
     }
 
-    /// Puts a position out of the obstacles and inside the tank, and turns back what leads in or out.
+    /// Moves a position out of the obstacles and into the tank. Reflects the part of the velocity that leads
+    /// into an obstacle or out of the tank.
     pub fn keep_out(&self, position: &mut Vec3, velocity: &mut Vec3) {
-        // Between an obstacle and a wall it may take a few rounds; the tank has the last word.
+        // Between an obstacle and a wall this may take a few rounds. Each round ends with the tank.
         for _ in 0..4 {
             for obstacle in self.obstacles {
                 let (room, outward) = self.room(obstacle, *position);
@@ -119,13 +123,13 @@ impl<'a> Habitat<'a> {
         }
     }
 
-    /// Whether `keep_out` may change any of these positions.
+    /// Returns whether `keep_out` may change any of these positions.
     #[inline(always)]
     pub fn may_hold_off<L: Lanes>(&self, position: [L; 3]) -> bool {
         !self.obstacles.is_empty() || self.tank.is_left_by_any(position)
     }
 
-    /// The predator at the start.
+    /// Returns the predator at the start, if there is one.
     pub fn hunter(&self) -> Option<Hunter> {
         let predator = self.predator?;
         let far_off = [
@@ -143,7 +147,7 @@ impl<'a> Habitat<'a> {
         })
     }
 
-    /// The predator a step later: along its path, or after the nearest of the flock.
+    /// Moves the predator by one step: along its path, or toward the nearest boid.
     pub fn advance(
         &self,
         hunter: &mut Hunter,
@@ -171,7 +175,8 @@ impl<'a> Habitat<'a> {
         self.keep_out(&mut hunter.position, &mut hunter.velocity);
     }
 
-    /// The wish of each to get away from a hunter, growing as it comes near; nothing from beyond the reach.
+    /// Returns the wish to flee from the predator. It grows as the predator comes near and is 0 beyond its
+    /// reach.
     #[inline(always)]
     pub fn flight<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> [L; 3] {
         let Some((away, share)) = self.away(position, hunter) else {
@@ -181,7 +186,7 @@ impl<'a> Habitat<'a> {
         scaled(L::splat(FLEE_WEIGHT) * urgency, unit(away))
     }
 
-    /// Who is within the reach of a hunter.
+    /// Returns which boids are within the reach of the predator.
     #[inline(always)]
     pub fn flees<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> L::Mask {
         match self.away(position, hunter) {
@@ -190,7 +195,7 @@ impl<'a> Habitat<'a> {
         }
     }
 
-    /// From a hunter to each, and how much of its reach that is.
+    /// Returns the vector from the predator to each boid, and its length as a share of the reach.
     #[inline(always)]
     fn away<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> Option<([L; 3], L)> {
         let away = minus(position, splat3(hunter?.position));
@@ -220,7 +225,8 @@ impl<'a> Habitat<'a> {
         self.lens.place_bl(at_px, depth)
     }
 
-    /// How far a position is from an obstacle with its clearance, negative within, and the unit vector away from it.
+    /// Returns the distance of a position from an obstacle and its clearance, negative inside, and the unit
+    /// vector away from it.
     fn room(&self, obstacle: &Obstacle, position: Vec3) -> (f64, Vec3) {
         let place = |px| self.lens.place_bl(px, position[2]);
         let px_per_bl = self.lens.px_per_bl(position[2]);

@@ -1,19 +1,20 @@
-//! Who leads: a boid at the rim of its neighbors, with few of them ahead, may go its own way for a
-//! while, and the others follow by alignment (Hartman & Benes 2006; ALGORITHMS.md 7).
+//! Leadership: a boid at the edge of its neighbors, with few of them ahead, may choose its own course for
+//! some time. The others follow by alignment (Hartman & Benes 2006; docs/explanation/algorithms.md, "Boids").
 
 use super::vector::{Vec3, dot, norm, plus, scaled};
 use crate::random;
 
-/// Farther out than this share of the cohesion radius is the rim.
+/// Eccentricity above which a boid is at the edge, in cohesion radii.
 const RIM: f64 = 0.7;
-/// How often a boid at the rim takes the lead.
+/// Rate at which a boid at the edge takes the lead, per second.
 const RATE_PER_S: f64 = 0.1;
-/// A lead lasts between these.
+/// Least and greatest duration of a lead, seconds.
 const SPAN_S: [f64; 2] = [1.0, 3.0];
-/// At most this share of the neighbors may be ahead.
+/// Largest share of the neighbors that may be ahead of a leader. Free choice.
 const MOST_AHEAD: f64 = 0.25;
 
-/// Seconds of lead that a boid begins with in this step, by the ways to its neighbors; `None` when it does not.
+/// Returns the duration of the lead that a boid takes in this step, seconds, or `None` if it takes none.
+/// `offsets` are the vectors to its neighbors.
 pub fn taken(
     seed: u64,
     key: [u64; 3],

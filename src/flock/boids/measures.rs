@@ -1,34 +1,35 @@
-//! How a flock moves as a whole: polarization, milling, distances, groups (ALGORITHMS.md 7; Tunstrom et al. 2013).
+//! Collective order of a flock: polarization, milling, distances and groups
+//! (docs/explanation/algorithms.md, "Boids"; Tunstrom et al. 2013).
 
 use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
 
-/// Who is this near to another has a neighbor.
+/// Distance within which another boid is a neighbor, body lengths (docs/explanation/algorithms.md, "Boids").
 const NEIGHBOR_BL: f64 = 3.0;
-/// Two this near belong to one group.
+/// Distance within which two boids are in one group, body lengths (docs/explanation/algorithms.md, "Boids").
 const GROUP_BL: f64 = 4.0;
 
-/// The order of one moment.
+/// Collective order at one moment.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Order {
-    /// |sum of unit velocities| / N: 1 when all point one way.
+    /// Polarization |sum of unit velocities| / N, 0..=1. It is 1 if all boids swim in one direction.
     pub polarization: f64,
-    /// |sum of u x r| / N, r the unit vectors from the centroid, both seen along the axis about which boids turn: 1
-    /// when all circle one way.
+    /// Milling |sum of u x r| / N, 0..=1. u are the unit velocities and r the unit vectors from the centroid.
+    /// Both are projected along the axis about which boids turn. It is 1 if all boids circle in one sense.
     pub milling: f64,
-    /// Mean distance to the nearest other, body lengths; 0 for one alone.
+    /// Mean distance to the nearest neighbor, body lengths; 0 for a single boid.
     pub nearest_bl: f64,
-    /// Share of those that have another within 3 body lengths.
+    /// Share of boids with a neighbor within 3 body lengths.
     pub neighbor_share: f64,
-    /// Groups that no chain of others, each within 4 body lengths of the next, connects (single linkage).
+    /// Number of groups by single linkage: boids within 4 body lengths of each other are in one group.
     pub n_groups: u32,
-    /// How many are beyond a wall or within an obstacle.
+    /// Number of boids beyond a wall or within an obstacle.
     pub n_outside: u32,
-    /// Pairs nearer to each other than they may be.
+    /// Number of pairs nearer to each other than boids may be.
     pub n_overlaps: u32,
 }
 
-/// The order of boids at `positions` (body lengths) with `velocities`, who turn about `up`, a unit vector, and may be
-/// as near to each other as `overlap_bl`. Whether any is outside is not known here.
+/// Returns the order of boids at `positions`, body lengths, that turn about `up`, a unit vector, and keep a
+/// distance of `overlap_bl`. `n_outside` is 0.
 pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64) -> Order {
     let n = positions.len() as f64;
     let level = |v: Vec3| add_scaled(v, -dot(v, up), up);
@@ -52,7 +53,7 @@ pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64)
     }
 }
 
-/// The mean distance to the nearest other, body lengths; 0 for one alone.
+/// Returns the mean distance to the nearest neighbor, body lengths; 0 for a single boid.
 pub fn nearest_bl(positions: &[Vec3]) -> f64 {
     match positions.len() {
         0 | 1 => 0.0,
@@ -67,7 +68,7 @@ pub fn nearest_bl(positions: &[Vec3]) -> f64 {
     }
 }
 
-/// How far all point one way: 0 to 1.
+/// Returns the polarization, 0..=1.
 pub fn polarization(velocities: &[Vec3]) -> f64 {
     norm(sum(velocities.iter().map(|&v| unit(v)))) / velocities.len() as f64
 }
@@ -76,12 +77,12 @@ fn sum(vectors: impl Iterator<Item = Vec3>) -> Vec3 {
     vectors.fold([0.0; 3], |sum, v| add_scaled(sum, 1.0, v))
 }
 
-/// The pairs of ids nearer to each other than `bl`, of each the smaller first.
+/// Returns the pairs of ids nearer to each other than `bl`, the smaller id first.
 pub fn pairs_nearer(positions: &[Vec3], bl: f64) -> Vec<[usize; 2]> {
     Row::of(positions).pairs_nearer(bl).collect()
 }
 
-/// Positions along x: who is too far off along x is too far off.
+/// Positions sorted along x. Boids that are far apart along x are not compared.
 struct Row<'a> {
     positions: &'a [Vec3],
     by_x: Vec<usize>,
@@ -94,7 +95,7 @@ impl Row<'_> {
         Row { positions, by_x }
     }
 
-    /// The square of each one's distance to the nearest other; infinite for one alone.
+    /// Returns the squared distance of each boid to its nearest neighbor; infinite for a single boid.
     fn nearest_bl2(&self) -> Vec<f64> {
         let (positions, by_x) = (self.positions, &self.by_x);
         let mut nearest_bl2 = vec![f64::INFINITY; positions.len()];
@@ -111,7 +112,7 @@ impl Row<'_> {
         nearest_bl2
     }
 
-    /// Pairs nearer to each other than `bl`.
+    /// Returns the pairs nearer to each other than `bl`.
     fn pairs_nearer(&self, bl: f64) -> impl Iterator<Item = [usize; 2]> {
         let Row { positions, by_x } = self;
         let offset = |one: usize, other: usize| minus(positions[other], positions[one]);
@@ -126,9 +127,10 @@ impl Row<'_> {
     }
 }
 
-/// Groups by single linkage: two within `link_bl` are of one group, and so is who is of the group of one of them.
+/// Returns the number of groups by single linkage: boids within `link_bl` of each other are in one group.
 ///
-/// Space is cut into cells in which all are within that of each other; cells are joined where any two are.
+/// Space is cut into cells so small that all boids of a cell are in one group. Two cells are joined if any of
+/// their boids are within `link_bl`.
 fn n_groups(positions: &[Vec3], link_bl: f64) -> u32 {
     let side_bl = link_bl / 3f64.sqrt() * (1.0 - 1e-9);
     let cell = |position: Vec3| position.map(|x| (x / side_bl).floor() as i64);
@@ -138,7 +140,7 @@ fn n_groups(positions: &[Vec3], link_bl: f64) -> u32 {
     let mut group: Vec<usize> = (0..cells.len()).collect();
     let mut n_groups = cells.len() as u32;
     for (one, here) in cells.iter().enumerate() {
-        // What is before has been looked at from there; three cells off all are too far.
+        // Earlier cells were compared with this one already. Cells three or more apart are too far.
         let off = |k: usize, axis: usize| (cells[k][0].0[axis] - here[0].0[axis]).abs();
         let after = (one + 1..cells.len()).take_while(|&k| off(k, 0) <= 2);
         for other in after.filter(|&k| off(k, 1) <= 2 && off(k, 2) <= 2) {
@@ -154,7 +156,7 @@ fn n_groups(positions: &[Vec3], link_bl: f64) -> u32 {
     n_groups
 }
 
-/// Follows who belongs to whom to its end, and shortens the way for whoever comes next.
+/// Returns the first cell of a group, and shortens the chain that leads to it (union-find).
 fn first_of_group(group: &mut [usize], mut cell: usize) -> usize {
     while group[cell] != cell {
         group[cell] = group[group[cell]];

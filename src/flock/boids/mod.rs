@@ -1,10 +1,9 @@
-//! Boids: simulated individuals that move as a flock and never ask for what the animal was not seen
-//! to do (O 4; Reynolds 1987; ALGORITHMS.md 7).
+//! Boids: simulated individuals that move as a flock, within the limits measured on the animal. Sources:
+//! Okabe et al., section 4; Reynolds 1987; docs/explanation/algorithms.md, "Boids".
 //!
-//! In top view they swim in the plane of the picture. In side view they swim in a shallow tank behind
-//! it, so that they turn round as the animal does: through the depth, not through the vertical.
-//! One step an output frame, less where a step would be long; every number is the same for any
-//! number of threads.
+//! In top view boids swim in the image plane. In side view they swim in a tank behind it. There they turn
+//! through the depth, as the animal does, and not through the vertical. An output frame takes one step, or
+//! several if a step would be long. All numbers are the same for any number of threads.
 
 pub mod calibration;
 mod gait;
@@ -36,20 +35,21 @@ use super::params::Params;
 use crate::cpu::Level;
 use crate::random;
 
-/// The longest way in one step, body lengths.
+/// Greatest distance covered in one step, body lengths (docs/explanation/algorithms.md, "Boids").
 const LONGEST_STEP_BL: f64 = 0.2;
-/// Boids nearer than this are pushed apart after each step, where the tank has room.
+/// Distance below which boids are pushed apart after each step, body lengths, if the tank has room.
 const OVERLAP_BL: f64 = 0.5;
-/// How far they swim before the first frame, so that the flock has formed, and for how long at least and at most.
+/// Distance that boids swim before the first frame while the flock forms, body lengths. Free choice.
 const WARM_UP_BL: f64 = 10.0;
+/// Least and greatest time in which the flock forms, seconds. Free choice.
 const WARM_UP_S: [f64; 2] = [10.0, 60.0];
-/// Who align have formed when they are polarized by this much. A slow school before a wall takes the whole of a short film
-/// to turn, all the while of two courses.
+/// Polarization at which a school has formed. A slow school in front of a wall may take a whole short video
+/// to turn, and swims in two directions until then. Free choice.
 const FORMED: f64 = 0.9;
-/// Boids of one unit of parallel work.
+/// Boids per unit of parallel work. Free choice.
 const CHUNK: usize = 64;
 
-/// What a random number is for.
+/// Purposes of random numbers, as words of their keys.
 mod draw {
     pub(super) const START: u64 = 1;
     pub(super) const WANDER: u64 = 2;
@@ -60,7 +60,7 @@ mod draw {
 
 /// Boids in their tank.
 pub struct Boids<'a> {
-    /// With radii that fit the tank.
+    /// Parameters with radii that fit the tank.
     params: Params,
     overlap_bl: f64,
     calibration: &'a Calibration,
@@ -70,13 +70,13 @@ pub struct Boids<'a> {
     n_substeps: u32,
     n_frames_before: usize,
     step_idx: u64,
-    /// Decides how fast it goes and nothing else.
+    /// Vector instructions in use. They affect the speed, not the result.
     cpu: Level,
-    /// Of the film; negative before it.
+    /// Time of the video, seconds; negative before its start.
     time_s: f64,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
-    /// How each gets on, by id; when empty, as it swims.
+    /// Imposed speed and turn rate, by id. If empty, the rules choose both.
     gaits: Vec<Gait>,
     room: Room,
     hunter: Option<Hunter>,
@@ -84,7 +84,7 @@ pub struct Boids<'a> {
 }
 
 impl<'a> Boids<'a> {
-    /// Boids that have swum until they have formed.
+    /// Returns boids that have formed a flock.
     pub fn new(
         params: &'a Params,
         calibration: &'a Calibration,
@@ -96,7 +96,8 @@ impl<'a> Boids<'a> {
         boids
     }
 
-    /// Boids at random places, all of one course as far as they align, before they have formed.
+    /// Returns boids at random positions that have not formed a flock yet. The stronger the alignment, the
+    /// more similar their first headings.
     pub fn at_random(
         params: &'a Params,
         calibration: &'a Calibration,
@@ -136,12 +137,14 @@ impl<'a> Boids<'a> {
         boids
     }
 
-    /// Frames in which they form, before the first of the film; a school may take as many again.
+    /// Returns the number of frames before the video in which a flock forms. A school may take up to twice as
+    /// many.
     pub fn n_frames_before(&self) -> usize {
         self.n_frames_before
     }
 
-    /// Has them swim until they have formed. Before each frame `go_on` may refuse: then its error comes back.
+    /// Simulates until the flock has formed. `go_on` is called before each frame; its error ends the
+    /// simulation.
     pub fn form<E>(&mut self, mut go_on: impl FnMut() -> Result<(), E>) -> Result<(), E> {
         for _ in 0..self.n_frames_before {
             go_on()?;
@@ -164,32 +167,32 @@ impl<'a> Boids<'a> {
         !is_school || measures::polarization(&self.velocities) >= FORMED
     }
 
-    /// Where the predator is, if there is one.
+    /// Returns the position of the predator, if there is one.
     pub fn predator(&self) -> Option<Vec3> {
         Some(self.hunter?.position)
     }
 
-    /// Where everybody is, by id, body lengths.
+    /// Returns the positions, by id, body lengths.
     pub fn positions(&self) -> &[Vec3] {
         &self.positions
     }
 
-    /// How fast everybody is, by id, body lengths a second.
+    /// Returns the velocities, by id, body lengths per second.
     pub fn velocities(&self) -> &[Vec3] {
         &self.velocities
     }
 
-    /// Lets the film begin so many frames later.
+    /// Delays the start of the video by `n_frames`.
     pub fn set_back(&mut self, n_frames: usize) {
         self.time_s -= n_frames as f64 * f64::from(self.n_substeps) * self.step_s;
     }
 
-    /// What they wish for from now on, besides their rules.
+    /// Sets the positions and velocities to steer toward, besides the rules, from the next step on.
     pub fn meet(&mut self, meeting: Meeting) {
         self.meeting = Some(meeting);
     }
 
-    /// Puts everybody into a moment, by id.
+    /// Sets positions and velocities, by id, and the position of the predator.
     pub fn show(&mut self, positions: Vec<Vec3>, velocities: Vec<Vec3>, hunter: Option<Vec3>) {
         (self.positions, self.velocities) = (positions, velocities);
         self.swim_from_here();
@@ -198,7 +201,7 @@ impl<'a> Boids<'a> {
         }
     }
 
-    /// How they move as a whole at this moment.
+    /// Returns the collective order at this moment.
     pub fn order(&self) -> measures::Order {
         let up = self.tank.up();
         let is_outside =
@@ -209,28 +212,28 @@ impl<'a> Boids<'a> {
         }
     }
 
-    /// How near they may be to each other, body lengths.
+    /// Returns the distance that boids keep from each other, body lengths.
     pub fn overlap_bl(&self) -> f64 {
         self.overlap_bl
     }
 
-    /// The greatest speed that the animal was seen at.
+    /// Returns the greatest speed of the calibration, body lengths per second.
     pub fn fastest_bl_per_s(&self) -> f64 {
         self.calibration.speed_limits_bl_per_s[1]
     }
 
-    /// The place nearest to another at which one may be.
+    /// Returns a position moved into the tank and out of obstacles.
     pub fn inside(&self, mut place: Vec3) -> Vec3 {
         self.habitat.keep_out(&mut place, &mut [0.0; 3]);
         place
     }
 
-    /// The depth of the tank's front, body lengths from the camera.
+    /// Returns the depth of the front of the tank, body lengths from the camera.
     pub fn front_bl(&self) -> f64 {
         self.tank.corners[0][2]
     }
 
-    /// One output frame.
+    /// Advances by one output frame.
     pub fn advance(&mut self) {
         for _ in 0..self.n_substeps {
             self.step();
@@ -239,7 +242,7 @@ impl<'a> Boids<'a> {
 
     fn start(&mut self) {
         let [least, greatest] = self.tank.corners;
-        // Who aligns starts aligned: a school takes long to form, and is wanted from the first frame.
+        // Boids that align start aligned, because a school takes long to form.
         let course =
             std::f64::consts::PI * (2.0 * random::unit(self.params.seed, &[draw::COURSE])).floor();
         let spread = std::f64::consts::PI / (1.0 + 4.0 * self.params.rules.alignment);
@@ -263,7 +266,7 @@ impl<'a> Boids<'a> {
     }
 }
 
-/// Frames in which a flock forms.
+/// Returns the number of frames in which a flock forms.
 fn n_frames_before(calibration: &Calibration, fps: f64) -> usize {
     let [least_s, most_s] = WARM_UP_S;
     let warm_up_s = (WARM_UP_BL / calibration.cruise_bl_per_s).clamp(least_s, most_s);

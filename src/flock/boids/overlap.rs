@@ -1,8 +1,8 @@
-//! Nobody lies upon another: who is too near is pushed away after each step (ALGORITHMS.md 7), and so are those
-//! that they are pushed upon, until nobody is.
+//! Overlap resolution (docs/explanation/algorithms.md, "Boids"). After each step, boids nearer than the least
+//! distance are pushed apart, and then those that they are pushed onto, until none overlap.
 //!
-//! Who may overlap is found in the cells that boids had before the step: none has gone farther since than the
-//! one that went farthest.
+//! Candidates are found in the cells that boids had before the step. The search radius grows by the longest
+//! displacement since then.
 
 use rayon::prelude::*;
 
@@ -10,29 +10,32 @@ use super::room::Room;
 use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled};
 use super::{Boids, CHUNK};
 
-/// At most so many push one.
+/// Largest number of neighbors that push a boid. Free choice.
 const MOST: usize = 16;
-/// Rounds of pushes after one step, at most, and without fewer pushed than ever before: where there is no room they
-/// would never end.
+/// Largest number of rounds of pushes after one step. In a tank without room they would never end. Free
+/// choice.
 const ROUNDS: usize = 500;
+/// Number of successive rounds without fewer pushed boids than ever before, after which pushes end. Free
+/// choice.
 const PATIENCE: usize = 150;
-/// So much farther apart than they have to be, for between others and at walls only a part of the way is gone at once.
+/// Factor on the least distance, because a boid between others or at a wall moves only a part of the way in a
+/// round. Free choice.
 const FARTHER: f64 = 1.01;
 
-/// Whoever is pushed back by more than this share of its way turns round.
+/// Share of its displacement by which a boid is pushed back before it turns round. Free choice.
 const BLOCKED: f64 = 0.5;
 
-/// Somebody too near: the square of the distance, where it stands, and the way to it.
+/// A boid that is too near: squared distance, slot, and vector to it.
 type Near = (f64, usize, Vec3);
 
-/// Where one that was pushed stands, and its position and velocity after that.
+/// Slot of a pushed boid, and its new position and velocity.
 type Pushed = (usize, Vec3, Vec3);
 
 impl Boids<'_> {
-    /// Has pairs that overlap move apart, each by half of what is missing, until there are none. Nobody has moved
-    /// farther than `farthest_bl` since the cells were filled.
+    /// Moves overlapping pairs apart, each boid by half of the missing distance, until none overlap. No boid
+    /// has moved farther than `farthest_bl` since the grid was filled.
     pub(super) fn push_apart(&self, room: &mut Room, mut farthest_bl: f64) {
-        // Who was farther off from all than two come nearer in a step overlaps with nobody.
+        // Boids farther apart than this before the step cannot overlap after it.
         let most_bl = (self.overlap_bl + 2.0 * farthest_bl) * (1.0 + 1e-9);
         let everybody = (0..room.next.boids.len()).into_par_iter();
         let may_overlap = |slot: usize| room.next.inners[slot].nearest_bl2 <= most_bl * most_bl;
@@ -55,7 +58,7 @@ impl Boids<'_> {
         self.put(room, &pushed);
     }
 
-    /// Those among `slots` that others are too near to, pushed.
+    /// Returns the boids among `slots` that others are too near to, with new positions and velocities.
     fn pushed(
         &self,
         slots: impl IndexedParallelIterator<Item = usize>,
@@ -76,7 +79,7 @@ impl Boids<'_> {
         chunks.flatten_iter().collect()
     }
 
-    /// Puts those that were pushed where they are now; the longest way of one.
+    /// Moves the pushed boids to their new positions. Returns the length of the longest push.
     fn put(&self, room: &mut Room, pushed: &[Pushed]) -> f64 {
         let mut longest_bl = 0.0;
         for &(slot, position, velocity) in pushed {
@@ -92,7 +95,7 @@ impl Boids<'_> {
         longest_bl
     }
 
-    /// Where those stand who overlap now with one that was pushed, and the pushed themselves.
+    /// Returns the slots of pushed boids that still overlap, and of the boids that they overlap with.
     fn touched(&self, pushed: &[Pushed], (room, farthest_bl): (&Room, f64)) -> Vec<usize> {
         let around = |&(slot, ..): &Pushed| {
             let near = self.too_near(slot, room, farthest_bl);
@@ -106,7 +109,8 @@ impl Boids<'_> {
         touched
     }
 
-    /// The others that overlap with whoever stands at `slot`, nearest first, equal distances by id.
+    /// Returns the boids that overlap with the one at `slot`: the nearest first, equal distances by id, at
+    /// most `MOST`.
     fn too_near(&self, slot: usize, room: &Room, farthest_bl: f64) -> Vec<Near> {
         let boids = &room.next.boids;
         let place = boids[slot].position;
@@ -129,7 +133,7 @@ impl Boids<'_> {
         near
     }
 
-    /// Where one goes that others are too near to.
+    /// Returns the new position and velocity of a boid that others are too near to.
     fn apart(&self, slot: usize, near: &[Near], room: &Room) -> (Vec3, Vec3) {
         let boid = &room.next.boids[slot];
         let (mut position, mut reflected) = (boid.position, boid.velocity);
@@ -137,7 +141,7 @@ impl Boids<'_> {
             let distance = square_bl2.sqrt();
             let away = match distance > 1e-9 {
                 true => scaled(-1.0 / distance, offset),
-                // In one place: apart along x, by id.
+                // At the same position: apart along x, by id.
                 false => [
                     if boid.id < room.next.boids[other].id {
                         -1.0
@@ -198,7 +202,7 @@ mod tests {
         );
     }
 
-    /// The share of boids and seconds in which one never gets 0.15 of its way from where it was.
+    /// Returns the share of boids and seconds in which a boid gets no farther than 0.15 of its path.
     fn jammed(preset: &str, seed: u64) -> f64 {
         let params = Params {
             count: Some(12),
@@ -236,7 +240,7 @@ mod tests {
     fn nobody_pushes_others_forever() {
         for preset in ["school", "swarm", "mill"] {
             let jams: f64 = (1..=20).map(|seed| jammed(preset, seed)).sum();
-            // 0.016 in the mean of sixty seeds of a school; 0.19 when nobody turns round.
+            // Measured for a school over sixty seeds: 0.016 on average; 0.19 if boids do not turn round.
             assert!(jams / 20.0 < 0.025, "{preset} {}", jams / 20.0);
         }
     }

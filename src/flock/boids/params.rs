@@ -1,116 +1,123 @@
-//! What a person may set about boids: how they steer, and what else is in the tank. Defaults are those of
-//! ALGORITHMS.md 7, but for a stronger alignment, without which a school forms slowly, and a
-//! weaker wander.
+//! Steering parameters of boids, and the goals, obstacles and predator in the tank
+//! (docs/explanation/algorithms.md, "Boids").
+//!
+//! The default weight of alignment is high because a school otherwise forms slowly.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::flock::params::within;
 
-/// How the boids steer (ALGORITHMS.md 7). Weights 0..=20, radii in body lengths 0.1..=50.
+/// Steering of the boids (docs/explanation/algorithms.md, "Boids"). Weights are 0..=20, radii 0.1..=50 body
+/// lengths.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rules {
-    /// Weight of separation.
+    /// Weight of separation: boids move away from near neighbors.
     pub separation: f64,
-    /// Weight of alignment.
+    /// Weight of alignment: boids match the velocity of their neighbors.
     pub alignment: f64,
-    /// Weight of cohesion.
+    /// Weight of cohesion: boids move toward their neighbors.
     pub cohesion: f64,
-    /// Weight of the walls (ALGORITHMS.md 7 has 4: with it slow ones jam at walls that turn nobody at once).
+    /// Weight of avoiding walls and obstacles. At 4, slow boids jam at walls, because a wall turns them only
+    /// gradually.
     pub walls: f64,
-    /// Weight of the wander: 1 = turn rates as varied as the animal's own.
+    /// Weight of random turns. 1 = turn rates vary as much as those of the animal.
     pub wander: f64,
-    /// Weight of circling about the middle of the tank.
+    /// Weight of circling around the middle of the tank.
     pub circling: f64,
-    /// Neighbors nearer than this push apart.
+    /// Radius of separation, body lengths.
     pub separation_bl: f64,
-    /// Neighbors nearer than this in the picture push apart in the picture, however far one is behind the other; 0 = none.
+    /// Radius of separation in the image, body lengths. Neighbors nearer than this in the image push each
+    /// other apart there, whatever their difference in depth. 0 = off.
     pub picture_separation_bl: f64,
-    /// Neighbors nearer than this are aligned with.
+    /// Radius of alignment, body lengths.
     pub alignment_bl: f64,
-    /// Neighbors nearer than this attract.
+    /// Radius of cohesion, body lengths.
     pub cohesion_bl: f64,
     /// Field of view, degrees, 1..=360.
     pub view_deg: f64,
-    /// At most this many nearest neighbors count, 1..=2000.
+    /// Largest number of neighbors that count, the nearest first, 1..=2000.
     pub neighbors: u32,
-    /// Couzin et al. 2002 in place of separation, alignment, cohesion and wander.
+    /// Zonal model of Couzin et al. 2002, which replaces separation, alignment, cohesion, circling and
+    /// wander. null = off.
     pub zones: Option<Zones>,
 }
 
-/// Three zones around every boid (Couzin et al. 2002). Whoever is nearer than the first is turned away from, and
-/// then nothing else counts; otherwise the course is that of those in the second and toward those in the third.
+/// Three zones around each boid (Couzin et al. 2002). A boid turns away from neighbors in the zone of
+/// repulsion and then ignores all others. Otherwise it takes the direction of neighbors in the zone of
+/// orientation and heads toward those in the zone of attraction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Zones {
     /// Radius of the zone of repulsion, body lengths, 0.1..=50.
     pub repulsion_bl: f64,
-    /// Width of the zone of orientation around it, body lengths, 0..=50.
+    /// Width of the zone of orientation outside the zone of repulsion, body lengths, 0..=50.
     pub orientation_bl: f64,
-    /// Width of the zone of attraction around that, body lengths, 0..=50.
+    /// Width of the zone of attraction outside the zone of orientation, body lengths, 0..=50.
     pub attraction_bl: f64,
-    /// Spread of the error of every course, radians, 0..=1.
+    /// Standard deviation of the random error of each course, radians, 0..=1.
     pub noise_rad: f64,
 }
 
-/// A place that the flock is drawn to for a while; several in a row are waypoints.
+/// Place that attracts the flock for some time. Several goals one after another act as waypoints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Goal {
-    /// Where, in the footage's picture, pixels.
+    /// Position in the image of the footage, x and y, pixels.
     pub at_px: [f64; 2],
-    /// How far behind the front of the tank, body lengths; null = half way.
+    /// Distance behind the front of the tank, body lengths, 0..=100. null = the middle of its depth.
     #[serde(default)]
     pub depth_bl: Option<f64>,
-    /// From when, seconds of the film.
+    /// Start time, seconds of the video.
     #[serde(default)]
     pub from_s: f64,
-    /// Until when; null = to the end.
+    /// End time, seconds of the video. null = the end of the video.
     #[serde(default)]
     pub until_s: Option<f64>,
-    /// How strongly, 0..=20.
+    /// Weight, 0..=20.
     #[serde(default = "usual_weight")]
     pub weight: f64,
 }
 
-/// What nobody swims through: it is as deep as the tank.
+/// Obstacle that boids avoid. It extends over the whole depth of the tank.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Obstacle {
-    /// A disk in the footage's picture.
+    /// Disk in the image of the footage.
     Circle {
-        /// Its middle, pixels.
+        /// Center, x and y, pixels.
         center_px: [f64; 2],
-        /// Its radius, pixels, above 0.
+        /// Radius, pixels, at least 0.5.
         radius_px: f64,
     },
-    /// A box in the footage's picture: x, y, width and height, pixels.
+    /// Rectangle in the image of the footage.
     Box {
-        /// Its corner, width and height, above 0.
+        /// Left edge, top edge, width and height, pixels. Width and height are at least 0.5.
         box_px: [f64; 4],
     },
 }
 
-/// What the flock flees from. It is not drawn; flock.json tells where it is.
+/// Predator that the flock flees from. It is not drawn. flock.json holds its track.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Predator {
-    /// Where it is when, in order of time; straight between. Without it, it hunts: always for the nearest.
+    /// Positions of the predator in order of time, at most 1000. It moves in straight lines between them. If
+    /// empty, it hunts the nearest boid.
     pub path: Vec<Waypoint>,
-    /// Nearer than this it is fled from, body lengths, 0.1..=50.
+    /// Distance within which boids flee, body lengths, 0.1..=50. null = 5.
     pub flee_bl: Option<f64>,
 }
 
-/// A place at a time.
+/// Position of the predator at a time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Waypoint {
-    /// Seconds of the film.
+    /// Time, seconds of the video.
     pub time_s: f64,
-    /// Where, in the footage's picture, pixels.
+    /// Position in the image of the footage, x and y, pixels.
     pub at_px: [f64; 2],
-    /// How far behind the front of the tank, body lengths; null = half way.
+    /// Distance behind the front of the tank, body lengths, 0..=100. null = the middle of its depth.
     #[serde(default)]
     pub depth_bl: Option<f64>,
 }
@@ -151,7 +158,7 @@ impl Default for Zones {
 }
 
 impl Rules {
-    /// How far the farthest rule looks.
+    /// Returns the largest radius of all rules, body lengths.
     pub fn reach_bl(&self) -> f64 {
         match &self.zones {
             Some(zones) => zones.radii_bl()[2],
@@ -162,7 +169,7 @@ impl Rules {
         }
     }
 
-    /// The same rules at another distance of all from all.
+    /// Returns the rules with all radii multiplied by `share`.
     pub fn closer(&self, share: f64) -> Rules {
         let mut rules = self.clone();
         let zones = rules.zones.iter_mut();
@@ -212,7 +219,7 @@ impl Rules {
 }
 
 impl Zones {
-    /// The outer radii of the three zones.
+    /// Returns the outer radii of the three zones, body lengths.
     pub fn radii_bl(&self) -> [f64; 3] {
         let orientation = self.repulsion_bl + self.orientation_bl;
         [
@@ -266,7 +273,8 @@ impl Obstacle {
 }
 
 impl Predator {
-    /// Nearer than this it is fled from (ALGORITHMS.md 7: 5 BL).
+    /// Returns the distance within which boids flee, body lengths. The default is 5
+    /// (docs/explanation/algorithms.md, "Boids").
     pub fn flee_bl(&self) -> f64 {
         self.flee_bl.unwrap_or(5.0)
     }
@@ -288,8 +296,9 @@ impl Predator {
     }
 }
 
-/// Farther off the picture, and later, nothing is.
+/// Largest coordinate, pixels. Free choice.
 const MOST_PX: f64 = 100_000.0;
+/// Latest time, seconds. Free choice.
 const MOST_S: f64 = 1e6;
 
 fn place(name: &str, at_px: [f64; 2], depth_bl: Option<f64>) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! What the presets are known by: order, in tanks wide and narrow, of animals fast and slow.
+//! Tests of the presets: order in wide and narrow tanks, of fast and slow animals.
 
 use super::calibration::Slopes;
 use super::measures::Order;
@@ -11,10 +11,11 @@ fn preset(name: &str) -> Params {
     Params::preset(name).expect("a known preset")
 }
 
-/// Cruising and slowest and fastest speed of a lively animal and of one that mostly sits, BL/s.
+/// Cruising speed, and least and greatest speed, of a lively animal and of one that mostly rests, body
+/// lengths per second.
 const ANIMALS: [(f64, [f64; 2]); 2] = [(1.0, [0.5, 1.5]), (0.2, [0.05, 0.8])];
 
-/// From above, behind a pane, and where there is little depth.
+/// Sizes of tanks, body lengths: one in top view, and three in side view with less and less room.
 const TANKS: [[f64; 3]; 4] = [
     [12.0, 9.0, 0.0],
     [16.0, 6.0, 5.0],
@@ -22,7 +23,7 @@ const TANKS: [[f64; 3]; 4] = [
     [7.0, 4.0, 3.0],
 ];
 
-/// The mean order over 15 s.
+/// Returns the mean order over 15 s.
 fn order(
     (name, count, seed): (&str, u32, u64),
     (cruise_bl_per_s, speed_limits_bl_per_s): (f64, [f64; 2]),
@@ -57,7 +58,7 @@ fn order(
     mean
 }
 
-/// Where something does not hold of so many.
+/// Returns the tanks, animals and seeds for which `holds` is false.
 fn exceptions(name: &str, count: u32, holds: fn(&Order) -> bool) -> Vec<String> {
     exceptions_of(&ANIMALS, &TANKS, (name, count), holds)
 }
@@ -89,7 +90,8 @@ fn a_school_is_polarized() {
     assert!(none.is_empty(), "{none:#?}");
 }
 
-/// It takes its time to turn where walls meet, and while it does points every way: now and then for all of 15 s.
+/// A slow school takes long to turn in a corner and points in all directions meanwhile, sometimes for all
+/// 15 s.
 #[test]
 fn a_school_of_slow_animals_is_polarized_in_the_mean() {
     for tank in TANKS {
@@ -124,7 +126,7 @@ fn a_mill_turns_about_its_middle_and_is_as_full_all_the_way_round() {
     assert!(none.is_empty(), "{none:#?}");
 }
 
-/// Boids in the open sea, as Couzin et al. have them: 3 units a second, 40 degrees a second.
+/// Boids in open water, with the parameters of Couzin et al.: 3 units per second, 40 degrees per second.
 fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
     let mut params = Params {
         count: Some(100),
@@ -147,7 +149,8 @@ fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
     (params, calibration, Tank::new([-1e4; 3], [1e4; 3]))
 }
 
-/// Polarization and rotation about the group's own axis, after `n_frames` from one heap.
+/// Returns polarization and rotation about the axis of the group, mean over the second half of `n_frames`.
+/// The boids start in a small cube.
 fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
     let (params, calibration, tank) = at_sea(orientation_bl);
     let lens = Lens::flat(40.0);

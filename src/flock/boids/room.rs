@@ -1,42 +1,44 @@
-//! All boids as they lie in memory, from step to step.
+//! Working state of all boids from step to step, in the order of the grid.
 
 use super::grid::{Boid, Grid};
 
-/// What of a boid nobody sees.
+/// State of a boid that other boids do not perceive.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Inner {
-    /// The wandering turn rate, and the wished slope in standard deviations.
+    /// Wandering turn rate, radians per second, and wanted slope in standard deviations from the usual one.
     pub(super) wander: [f64; 2],
-    /// Seconds; 0 when it does not lead.
+    /// Remaining time of its lead, seconds; 0 if it does not lead.
     pub(super) leads_for_s: f64,
-    /// How far off the last neighbor was that counted. It only tells where to look first.
+    /// Distance of the farthest neighbor that counted, body lengths. It only sets the first search radius.
     pub(super) sight_bl: f64,
-    /// How far off the nearest other was before the step, squared; the reach when there was none.
+    /// Squared distance of the nearest neighbor before the step, at most the squared reach.
     pub(super) nearest_bl2: f64,
-    /// Others pushed it back by more than half of its way: it turns round, to the side that it wanders to.
+    /// Whether others pushed it back by more than half of its displacement. It then turns round, to the side
+    /// to which it wanders.
     pub(super) is_blocked: bool,
 }
 
-/// Boids, and what goes on in each.
+/// Boids and their inner states.
 #[derive(Default)]
 pub(super) struct Crowd {
     pub(super) boids: Vec<Boid>,
     pub(super) inners: Vec<Inner>,
 }
 
-/// All boids, in the order of the cells that they were in a step ago: who is near whom in the tank is so in memory.
+/// All boids, in the order of the cells of the previous step. Boids that are near each other are near in
+/// memory.
 #[derive(Default)]
 pub(super) struct Room {
     pub(super) now: Crowd,
-    /// Where each stands in `now`, by id.
+    /// Index of each boid in `now`, by id.
     pub(super) places: Vec<u32>,
-    /// In the order of the cells that they are in before the step.
+    /// Boids after the step, in the order of their cells before it.
     pub(super) next: Crowd,
     pub(super) grid: Grid,
 }
 
 impl Room {
-    /// Boids that have not swum yet, by id.
+    /// Returns the state of boids before their first step, in order of id.
     pub(super) fn of(n: usize) -> Room {
         let boid = |id| Boid {
             id,
@@ -53,7 +55,7 @@ impl Room {
     }
 }
 
-/// Some of a crowd, to be filled.
+/// Part of a crowd, to be filled.
 pub(super) type Part<'a> = (&'a mut [Boid], &'a mut [Inner]);
 
 impl Default for Inner {

@@ -1,5 +1,6 @@
-//! One step of all boids (ALGORITHMS.md 7): who is near, what each wishes, how far it may turn and how fast it may
-//! swim. It is worked out in the order of cells, where neighbors lie side by side, and put back by id.
+//! One step of all boids (docs/explanation/algorithms.md, "Boids"): neighbors, wanted velocities, and limits
+//! of turn rate and speed. Boids are processed in the order of the grid's cells, where neighbors are adjacent
+//! in memory, and written back by id.
 
 use rayon::prelude::*;
 
@@ -16,22 +17,24 @@ use super::{Boids, CHUNK, draw, leadership};
 use crate::cpu::Level;
 use crate::random::{self, Row};
 
-/// Time constant of the wandering turn rate.
+/// Time constant of the wandering turn rate, seconds. Free choice.
 const WANDER_S: f64 = 1.0;
-/// In flight the greatest speed is so many times the animal's.
+/// Greatest speed in flight, as a multiple of that of the animal (docs/explanation/algorithms.md, "Boids").
 const FLIGHT_PACE: f64 = 1.6;
-/// The farthest neighbor that counts is looked for a little farther out than it was found a step ago.
+/// Factor on the distance of the farthest neighbor of the previous step, for the first search radius. It
+/// affects the speed, not the result. Free choice.
 const FARTHER: f64 = 1.03;
 
-/// What is the same for all in one step.
+/// Values of one step that all boids share.
 pub(super) struct Pace<'a> {
     steering: Steering<'a>,
-    /// The widest turn at the animal's own speed, and cos and sin of it.
+    /// Greatest turn in one step, radians, and its cosine and sine.
     pub(super) turn_rad: f64,
     pub(super) cos_sin: (f64, f64),
-    /// The share of what wanders that is kept, and the spread of what is added, in its own spreads.
+    /// Share of the wander that is kept in one step, and standard deviation of what is added, relative to
+    /// that of the wander.
     wander: [f64; 2],
-    /// What is added to the turn and to the slope, by id.
+    /// Random numbers added to turn rate and slope, by id.
     kicks: [Row; 2],
     reach_bl: f64,
 }
@@ -68,7 +71,7 @@ impl Boids<'_> {
         self.step_idx += 1;
     }
 
-    /// Has everybody swim on from where `positions` and `velocities` say.
+    /// Copies `positions` and `velocities` to the working state of all boids.
     pub(super) fn swim_from_here(&mut self) {
         for boid in &mut self.room.now.boids {
             let id = boid.id as usize;
@@ -99,14 +102,15 @@ impl Boids<'_> {
         }
     }
 
-    /// What they are after the step, in as many lanes as there are here; the square of the longest way.
+    /// Computes all boids after the step, with the widest vectors of this machine. Returns the squared length
+    /// of the longest displacement.
     fn all_go_on(&self, next: &mut Crowd, before: (&[Inner], &Grid), pace: &Pace) -> f64 {
         match self.cpu {
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 if is_x86_feature_detected!("avx512f") => {
                 by_chunks(next, |first, next, search| {
                     #[expect(unsafe_code, reason = "the same code, compiled for AVX-512 F")]
-                    // SAFETY: it was just made sure of AVX-512 F, which is all that the callee asks for.
+                    // SAFETY: the match guard found AVX-512 F, which includes AVX2. The callee needs both.
                     unsafe {
                         self.go_on_avx512(first, next, (before, search), pace)
                     }
@@ -116,7 +120,7 @@ impl Boids<'_> {
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
                 by_chunks(next, |first, next, search| {
                     #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
-                    // SAFETY: it was just made sure of AVX2, which is all that the callee asks for.
+                    // SAFETY: the match guard found AVX2, which is all that the callee needs.
                     unsafe {
                         self.go_on_avx2(first, next, (before, search), pace)
                     }
@@ -152,7 +156,8 @@ impl Boids<'_> {
         self.go_on(first, next, near, pace)
     }
 
-    /// What they are after the step who stand at `first` and after it; the square of the longest way.
+    /// Computes the boids from slot `first` on after the step. Returns the squared length of the longest
+    /// displacement.
     #[inline(always)]
     fn go_on<L: Lanes>(
         &self,
@@ -165,7 +170,7 @@ impl Boids<'_> {
         let mut farthest_bl2 = L::splat(0.0);
         let groups = boids.chunks_mut(L::N).zip(inners.chunks_mut(L::N));
         for (group, next) in groups.enumerate() {
-            // Where there are not enough of them the last one stands in.
+            // Lanes without a boid repeat the last one.
             let mut slots = [0; lanes::MOST];
             for lane in 0..L::N {
                 slots[lane] = (first + group * L::N + lane).min(last) as u32;
@@ -177,7 +182,7 @@ impl Boids<'_> {
         squares_bl2[..L::N].iter().copied().fold(0.0, f64::max)
     }
 
-    /// What they are after the step who stand at `slots`; the way of each.
+    /// Computes the boids at `slots` after the step. Returns their displacements, body lengths.
     #[inline(always)]
     fn next<L: Lanes>(
         &self,
@@ -212,7 +217,7 @@ impl Boids<'_> {
         let way = self.at_filmed_speed(&ids, position, next);
         let place = add_scaled(position, L::splat(self.step_s), way);
         let (place, next) = self.kept_in(place, (velocity, next));
-        // A slanting wall reflects more steeply than the animal swims.
+        // A slanted wall may reflect to a steeper slope than the animal swims.
         let next = self.within_limits(next, position, velocity);
         for (lane, boid) in boids.iter_mut().enumerate() {
             *boid = Boid {
@@ -225,7 +230,7 @@ impl Boids<'_> {
         minus(place, position)
     }
 
-    /// What goes on in each after the step.
+    /// Returns the inner state of each boid after the step.
     #[inline(always)]
     fn next_inners<L: Lanes>(
         &self,
@@ -255,7 +260,7 @@ impl Boids<'_> {
         inners
     }
 
-    /// The velocity that each wishes for.
+    /// Returns the velocity that each boid wants, body lengths per second.
     #[inline(always)]
     fn wished<L: Lanes>(
         &self,
@@ -284,8 +289,8 @@ impl Boids<'_> {
         by_lane(|lane| wishes[lane])
     }
 
-    /// Speed and slope as the animal was seen to have them, in flight faster; the direction of `before` when it
-    /// stands.
+    /// Limits slope and speed to those of the animal. In flight the greatest speed is higher. A velocity near
+    /// 0 gets the direction of `before`.
     #[inline(always)]
     pub(super) fn within_limits<L: Lanes>(
         &self,
@@ -310,7 +315,7 @@ impl Boids<'_> {
         scaled(speed.clamp(L::splat(least), most), unit(direction))
     }
 
-    /// The error of a course with zones, in each direction.
+    /// Returns the random error of each course in the zonal model, along each axis.
     #[inline(always)]
     fn noise<L: Lanes>(&self, ids: &[u32; lanes::MOST]) -> [L; 3] {
         let Some(zones) = &self.params.rules.zones else {
@@ -331,8 +336,9 @@ impl Boids<'_> {
         })
     }
 
-    /// Ornstein-Uhlenbeck: a level turn rate, at weight 1 as varied as the animal's own, and a standard normal
-    /// number, which is how far its slope is to be off the usual one. In a flat tank there is no slope.
+    /// Returns the next values of two Ornstein-Uhlenbeck processes. The first is a turn rate, at weight 1 as
+    /// varied as that of the animal. The second is the wanted slope, in standard deviations from the usual
+    /// one. A flat tank has no slope.
     fn next_wander(&self, (id, before): (usize, &Inner), pace: &Pace) -> [f64; 2] {
         let [keep, fresh] = pace.wander;
         let next = |k: usize, spread: f64| {
@@ -367,7 +373,7 @@ impl Boids<'_> {
     }
 }
 
-/// Does some work for every chunk, with the number of its first; the greatest of what comes of it.
+/// Calls `work` for each chunk with the index of its first boid. Returns the greatest result.
 fn by_chunks<L: Lanes + Send>(
     next: &mut Crowd,
     work: impl Fn(usize, Part, &mut Search<L>) -> f64 + Sync,

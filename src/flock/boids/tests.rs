@@ -1,4 +1,4 @@
-//! What a flock of boids promises: walls, limits, and the same numbers on any threads. `presets` has their order.
+//! Tests of boids: walls, limits, and equal numbers for any number of threads. `presets` tests their order.
 
 use super::calibration::Slopes;
 use super::vector::{angle_between, norm, unit};
@@ -9,7 +9,7 @@ use crate::flock::params::{Goal, Obstacle, Predator};
 use crate::flock::synthetic;
 use crate::library::{Library, View};
 
-/// Every frame's positions and velocities of `n_frames`.
+/// Returns the positions and velocities of `n_frames` frames.
 fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Vec<Vec3>>) {
     let library = synthetic::library(view);
     let calibration = calibrated(&library, params);
@@ -56,7 +56,7 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
     }
 }
 
-/// A preset's flock in a tank, for 200 frames: how many were outside, and how many pairs too near.
+/// Returns how many boids of a preset's flock were outside, and how many pairs too near, in 200 frames.
 fn violations(name: &str, count: u32, greatest: Vec3) -> (u32, u32) {
     let params = Params {
         count: Some(count),
@@ -147,12 +147,12 @@ fn in_side_view_nobody_is_seen_more_steeply_than_most_frames_unless_it_would_hav
         let [up, down] = slopes.in_picture.map(|slope| slope * across);
         let highest = (level - up).clamp(-limits[0], limits[1]);
         let lowest = (level + down).clamp(-limits[0], limits[1]);
-        // The place is that after the step.
+        // `p` is the position after the step.
         assert!(v[1] > highest - 0.02 && v[1] < lowest + 0.02, "{p:?} {v:?}");
     }
 }
 
-/// One boid that swims at 1 BL/s, in turns of mostly less than 1 rad/s.
+/// Returns one boid that swims at 1 BL/s and turns mostly by less than 1 rad/s.
 fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
     let mut params = Params {
         count: Some(1),
@@ -191,7 +191,7 @@ fn who_align_take_longer_to_form_while_they_are_of_two_courses_and_the_film_begi
     assert!((one_course.1 - two_courses.1).abs() < 1e-9);
 }
 
-/// At the edges of the picture lines of sight lead along the walls.
+/// At the edges of the image, lines of sight run along the walls.
 #[test]
 fn a_slow_school_is_polarized_behind_a_camera_too() {
     let library = synthetic::library(View::Side);
@@ -225,7 +225,7 @@ fn a_slow_school_is_polarized_behind_a_camera_too() {
 fn who_heads_for_a_wall_turns_aside_and_does_not_dawdle_before_it() {
     let (params, calibration) = alone(None);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
-    // Head-on, and on a slant either way.
+    // Head-on, and obliquely from either side.
     for y_speed in [0.0, 0.5, -0.5] {
         let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
         boids.show(vec![[9.0, 4.5, 0.0]], vec![unit([1.0, y_speed, 0.0])], None);
@@ -304,7 +304,7 @@ fn another_seed_gives_another_flock() {
     assert_eq!(seeded(1), seeded(1));
 }
 
-/// The flock in a tank with something else in it, at every frame.
+/// Returns the positions and the predator of `n_frames` frames, in a tank with a habitat.
 fn with(params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Option<Vec3>>) {
     let library = synthetic::library(View::Top);
     let calibration = calibrated(&library, params);
@@ -361,7 +361,7 @@ fn a_flock_comes_to_its_goal_and_leaves_it_when_the_time_is_over() {
         ..preset("school")
     };
     let (positions, _) = with(&params, 900);
-    // An animal that cannot stand still passes its goal again and again.
+    // A boid that cannot stop passes its goal again and again.
     let nearest = |frames: std::ops::Range<usize>, place: Vec3| {
         let off = |frame: usize| {
             let all = positions[frame]

@@ -1,9 +1,9 @@
-//! Three numbers as a vector: what steering needs and no more, of one boid or of several side by side. In a flat tank
-//! the third stays 0.
+//! Vectors of three numbers, for one boid or for several in the lanes of a vector register. In a flat tank
+//! the third number stays 0.
 
 use super::lanes::{Lanes, select3};
 
-/// x right, y down, z away.
+/// x right, y down, z away from the camera.
 pub type Vec3 = [f64; 3];
 
 /// a . b
@@ -42,7 +42,7 @@ pub fn scaled<L: Lanes>(k: L, a: [L; 3]) -> [L; 3] {
     [k * a[0], k * a[1], k * a[2]]
 }
 
-/// a / |a|, and nothing for (nearly) nothing.
+/// a / |a|, or 0 if |a| is nearly 0.
 #[inline(always)]
 pub fn unit<L: Lanes>(a: [L; 3]) -> [L; 3] {
     let length = norm(a);
@@ -51,7 +51,7 @@ pub fn unit<L: Lanes>(a: [L; 3]) -> [L; 3] {
     scaled(share, a)
 }
 
-/// The angle between two directions, 0..=pi.
+/// Returns the angle between two directions, 0..=pi.
 pub fn angle_between(a: Vec3, b: Vec3) -> f64 {
     libm::atan2(norm(cross(a, b)), dot(a, b))
 }
@@ -66,8 +66,8 @@ pub fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
     ]
 }
 
-/// `to` turned back toward `from` until the angle between them is at most that of (cos, sin); the
-/// length stays that of `to`. Opposite directions turn toward `aside`.
+/// Returns `to`, turned toward `from` until the angle between them is at most the one with this (cos, sin).
+/// The length of `to` is kept. Opposite directions turn toward `aside`.
 #[inline(always)]
 pub fn turned_at_most<L: Lanes>(
     from: [L; 3],

@@ -1,17 +1,18 @@
-//! What walls and obstacles do to whoever swims into them: they hold it off, and turn it no faster than it turns
-//! (ALGORITHMS.md 7).
+//! Effect of walls and obstacles on boids that swim into them (docs/explanation/algorithms.md, "Boids"). They
+//! stop the boid and turn it no faster than it can turn.
 
 use super::Boids;
 use super::lanes::{self, Lanes, by_lane, in_lane};
 use super::vector::{Vec3, cross, dot, norm, scaled, turned_at_most, unit};
 
-/// Whoever is reflected into a direction of less than this cosine to its own is thrown back.
+/// Cosine between a velocity and its reflection below which a boid is thrown back. Free choice.
 const THROWN_BACK: f64 = -0.7;
-/// Whoever turns by more than this share of what it may means to.
+/// Share of the greatest turn above which a boid turns on purpose. Free choice.
 const TURNING: f64 = 0.3;
 
 impl Boids<'_> {
-    /// Places and velocities after `before`, as the habitat allows: a wall turns nobody faster than they turn.
+    /// Returns positions and velocities as the habitat allows. `before` is the velocity before the step. A
+    /// wall turns no boid faster than it can turn.
     #[inline(always)]
     pub(super) fn kept_in<L: Lanes>(
         &self,
@@ -35,8 +36,9 @@ impl Boids<'_> {
         (by_lane(|lane| kept[lane].0), by_lane(|lane| kept[lane].1))
     }
 
-    /// Where to turn who is thrown back: on to the side to which it was turning. In a corner the shorter way to what is
-    /// reflected leads to the other side, and step by step it would turn to and fro and never get out.
+    /// Returns the velocity to turn toward after a reflection. A boid that is thrown back continues to the
+    /// side to which it turned. In a corner, the shorter turn to the reflection leads to the other side, so
+    /// the boid would alternate and never get out.
     fn onward(&self, before: Vec3, velocity: Vec3, reflected: Vec3) -> Vec3 {
         let is_thrown_back = dot(reflected, velocity) < THROWN_BACK * dot(velocity, velocity);
         let side = unit(cross(self.tank.up(), before));
@@ -49,8 +51,8 @@ impl Boids<'_> {
         }
     }
 
-    /// What a wall makes of a velocity: from what it was before the step, turned toward what is reflected as far as they
-    /// turn.
+    /// Returns the velocity after a wall: that before the step, turned toward the reflected one as far as
+    /// possible in a step.
     pub(super) fn turned(&self, before: Vec3, reflected: Vec3) -> Vec3 {
         let turn_rad = self.calibration.turn_rad_per_s * self.step_s;
         let cos_sin = (libm::cos(turn_rad), libm::sin(turn_rad));

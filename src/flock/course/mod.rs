@@ -1,5 +1,5 @@
-//! How a simulation goes, frame by frame, as files hold it (ALGORITHMS.md 7): straight through, or so that
-//! its end plays into its beginning.
+//! Simulation of a flock frame by frame, recorded as in files: straight through, or as a loop
+//! (docs/explanation/algorithms.md, "Boids").
 
 mod passing;
 mod seam;
@@ -15,20 +15,21 @@ use super::lens::Lens;
 use crate::geometry::Turns;
 use crate::progress::Progress;
 
-/// A simulation from its first frame to its last.
+/// A recorded simulation.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
-    /// By id.
+    /// Tracks of the boids, by id.
     pub(super) tracks: Vec<BoidTrack>,
-    /// By frame.
+    /// Collective order, by frame.
     pub(super) orders: Vec<Order>,
-    /// By frame; empty without one.
+    /// Position of the predator, by frame. Empty without a predator.
     pub(super) predator_px: Vec<[f64; 3]>,
-    /// As whom each goes on after the last frame; none, where the film ends there.
+    /// In a loop, the id of the individual as which each one continues after the last frame. `None` outside
+    /// loops.
     pub(super) heirs: Option<Vec<u32>>,
 }
 
-/// Has boids form, and simulates `n_frames`.
+/// Lets the boids form a flock, then simulates `n_frames` frames. Fails if the job is cancelled.
 pub(super) fn simulate(
     mut boids: Boids,
     lens: &Lens,
@@ -48,7 +49,8 @@ pub(super) fn simulate(
     Ok(course)
 }
 
-/// The same, of which the last plays into the first.
+/// Simulates a loop of `n_frames` frames, whose last frame leads into the first (`seam`). Fails if the job is
+/// cancelled.
 pub(super) fn simulate_loop(
     mut boids: Boids,
     lens: &Lens,
@@ -96,7 +98,8 @@ pub(super) fn simulate_loop(
     Ok(course)
 }
 
-/// To be called before each of so many frames, or some more.
+/// Returns a function to call before each frame. It reports progress, and fails if the job is cancelled.
+/// `n_frames` is the expected number of calls; more are allowed.
 pub(super) fn steps(n_frames: usize, progress: &dyn Progress) -> impl FnMut() -> Result<(), Error> {
     let mut gone = 0;
     move || {
@@ -134,7 +137,7 @@ impl Course {
 }
 
 impl Course {
-    /// Goes on with another.
+    /// Appends a later simulation.
     pub(super) fn append(&mut self, later: Course) {
         for (track, later) in self.tracks.iter_mut().zip(later.tracks) {
             track.append(later);
@@ -144,7 +147,7 @@ impl Course {
     }
 }
 
-/// An order, rounded as files hold it.
+/// Returns the order, rounded as in files.
 fn as_told(order: Order) -> Order {
     let told = |value| rounded(value, 4);
     Order {
@@ -156,14 +159,14 @@ fn as_told(order: Order) -> Order {
     }
 }
 
-/// A place in the picture, and how far behind the front of the tank: pixels.
+/// Returns the position in the image and the distance behind the front of the tank, pixels.
 fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
     let [x, y] = lens.picture_px(place);
     let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
     [x, y, behind_px].map(|px| rounded(px, 2))
 }
 
-/// A boid's moment, as it is seen.
+/// Appends the current position, direction and speed of a boid to its track.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
     let (place, velocity) = (boids.positions()[id], boids.motion(id));
     track.position_px.push(seen(place, lens, boids));

@@ -1,5 +1,8 @@
-//! Nobody passes through anybody while a film's end is led into its beginning (ALGORITHMS.md 7, loop): two that would
-//! meet too near go aside, across the way on which they pass, and come back.
+//! Collision avoidance where the end of a loop is led into its beginning
+//! (docs/explanation/algorithms.md, "Boids").
+//!
+//! Two boids that would pass too near to each other move aside, across their relative motion, and then back.
+//! Pairs that would have to swim too fast for that are left as they are.
 
 use rayon::prelude::*;
 
@@ -7,26 +10,28 @@ use super::seam::{Moment, slope, smooth};
 use crate::flock::boids::measures::pairs_nearer;
 use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus, norm, scaled, unit};
 
-/// How long going aside takes, and coming back; longer where that were too fast.
+/// Times in which a boid moves aside, and in which it comes back, seconds. The shortest is taken that is not
+/// too fast to swim. Free choices.
 const ASIDE_S: [f64; 3] = [0.8, 1.6, 3.2];
-/// So many times as fast as the fastest seen somebody may swim for it.
+/// Greatest speed while moving aside, as a multiple of the greatest speed seen. Free choice.
 const HASTE: f64 = 1.3;
-/// Whoever goes aside may come too near to others: at most so often all is looked at anew.
+/// Largest number of passes over all pairs. A boid that moves aside may come too near to others. Free choice.
 const N_PASSES: usize = 60;
-/// So much farther apart than they have to be, for files round.
+/// Factor on the distance to keep. It covers the rounding of positions in files.
 const FARTHER: f64 = 1.01;
 
-/// From a frame on, in each how far aside two are, 0..=1, and how fast they go there, a frame.
+/// First frame of an avoidance, and by frame the share of the full displacement, 0..=1, and its change per
+/// frame.
 type Course = (usize, Vec<(f64, f64)>);
 
-/// Some frames after each other in which two are too near.
+/// A run of frames in which two boids are too near to each other.
 struct Encounter {
     ids: [usize; 2],
-    /// The first frame and the last.
+    /// First and last frame.
     frames: [usize; 2],
 }
 
-/// How near they may be, how fast they were seen to swim, and frames a second.
+/// Least distance between boids, greatest speed seen, and frames per second.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
     pub(super) apart_bl: f64,
@@ -34,8 +39,8 @@ pub(super) struct Limits {
     pub(super) fps: f64,
 }
 
-/// Has all keep apart, but for those who would have to swim too fast for it. `inside` tells the place nearest to one
-/// at which a boid may be.
+/// Moves boids apart that are too near, except those that would have to swim too fast for it. `inside`
+/// returns the nearest position that a boid may have.
 pub(super) fn go_aside(moments: &mut [Moment], limits: Limits, inside: impl Fn(Vec3) -> Vec3) {
     for _ in 0..N_PASSES {
         let mut is_done = true;
@@ -62,7 +67,7 @@ pub(super) fn go_aside(moments: &mut [Moment], limits: Limits, inside: impl Fn(V
     }
 }
 
-/// All of them, by ids and frames.
+/// Returns all encounters, ordered by ids and frames.
 fn encounters(moments: &[Moment], apart_bl: f64) -> Vec<Encounter> {
     let near = |t: usize| {
         let pairs = pairs_nearer(&moments[t].positions, apart_bl);
@@ -80,7 +85,8 @@ fn encounters(moments: &[Moment], apart_bl: f64) -> Vec<Encounter> {
 }
 
 impl Encounter {
-    /// What has to be added to the way from the first to the second, so that they pass each other `apart_bl` apart.
+    /// Returns the vector to add to the offset from the first to the second boid, so that they pass
+    /// `apart_bl` apart.
     fn aside(&self, moments: &[Moment], apart_bl: f64) -> Vec3 {
         let [a, b] = self.ids;
         let between = |t: usize| minus(moments[t].positions[b], moments[t].positions[a]);
@@ -93,7 +99,7 @@ impl Encounter {
         let across = add_scaled(between, -dot(between, passing), passing);
         let side = match (norm(across) > 1e-6, passing) {
             (true, _) => unit(across),
-            // Straight through each other.
+            // The boids pass straight through each other.
             (_, [x, y, _]) if x != 0.0 || y != 0.0 => unit([-y, x, 0.0]),
             _ => [1.0, 0.0, 0.0],
         };
@@ -101,12 +107,12 @@ impl Encounter {
         scaled(missing_bl.max(0.0), side)
     }
 
-    /// Both, and how much of what is missing each goes.
+    /// Returns both boids with the share of the displacement that each takes.
     fn sides(&self) -> [(usize, f64); 2] {
         [(self.ids[0], -0.5), (self.ids[1], 0.5)]
     }
 
-    /// Whether neither swims too fast on a course `aside`.
+    /// Returns whether neither boid swims too fast on a course with the displacement `aside`.
     fn can_swim(
         &self,
         (start, course): &Course,
@@ -127,8 +133,8 @@ impl Encounter {
             })
     }
 
-    /// Goes aside in `n_aside` frames and comes back in as many; fewer where the film begins or ends, and not at all
-    /// where there are none.
+    /// Returns a course that moves aside in `n_aside` frames and back in as many, or fewer at the start and
+    /// the end of the video. The course is empty if the video starts or ends with the encounter.
     fn course(&self, n_frames: usize, n_aside: usize) -> Course {
         let [first, last] = self.frames;
         let [before, after] = [first, n_frames - 1 - last].map(|n| n.min(n_aside));
@@ -162,7 +168,7 @@ mod tests {
         fps: FPS,
     };
 
-    /// Straight ways from somewhere to somewhere else in 60 frames, after 30 of rest and before 30.
+    /// Straight paths that take 60 frames, with 30 frames of rest before and after.
     fn moments(ways: &[[Vec3; 2]]) -> Vec<Moment> {
         let moment = |t: usize| {
             let gone = (t as f64 - 30.0) / 60.0;
@@ -204,7 +210,7 @@ mod tests {
             for end in [0, 119] {
                 assert_eq!(film[end].positions, before[end].positions);
             }
-            // But for when they start and stop at once.
+            // Not at the frames at which boids start and stop abruptly.
             for t in (1..120).filter(|t| ![30, 31, 90, 91].contains(t)) {
                 for id in 0..2 {
                     let step = minus(film[t].positions[id], film[t - 1].positions[id]);
@@ -220,7 +226,7 @@ mod tests {
         fn nobody_passes_through_anybody_in_a_tank(
             ways in prop::collection::vec(prop::array::uniform2(prop::array::uniform3(0.0..5.0)), 2..7),
         ) {
-            // Apart at the ends, one above another.
+            // At both ends the boids are apart, one above the other.
             let apart = |(k, way): (usize, &[Vec3; 2])| way.map(|[x, _, z]| [x, 0.6 * k as f64, z]);
             let mut ways: Vec<[Vec3; 2]> = ways.iter().enumerate().map(apart).collect();
             let n = ways.len();

@@ -1,39 +1,39 @@
-//! A flock that repeats without a seam: the last frame plays into the first (ALGORITHMS.md 7, loop).
+//! Seam of a loop: the last frame leads into the first (docs/explanation/algorithms.md, "Boids").
 //!
-//! Some seconds before the first frame are simulated as well. Before the end each individual is told
-//! whom it becomes, by the least distance, for individuals are interchangeable; from there on its wish
-//! turns by and by into meeting that one's moments before the first frame, as they pass. Its speed, its
-//! turns and the tank limit it as ever. What is still missing then is blended away, so that the frame
-//! after the last is the first.
+//! Some seconds before the first frame are simulated too: the lead. Some time before the end, each individual
+//! is assigned its heir: the individual as which it continues after the last frame. Individuals are
+//! interchangeable, so heirs are chosen by least distance. From there on each individual is steered toward
+//! the positions of its heir in the lead, within the usual limits. The remaining difference is blended away.
 
 use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus};
 use crate::flock::boids::{Boids, Meeting};
 
-/// How long meeting may take; at most four fifths of the film.
+/// Length of the lead, seconds, at most four fifths of the video. Free choice.
 const MEETING_S: f64 = 8.0;
-/// A difference of velocity counts as much as what it amounts to in this time.
+/// Time by which a difference in velocity is multiplied to compare it with a distance, seconds. Free choice.
 const AHEAD_S: f64 = 1.0;
-/// At most so many times all pairs are looked at for swaps.
+/// Largest number of passes in which pairs of individuals swap heirs. Free choice.
 const N_PASSES: usize = 20;
 
-/// Where everybody is and how fast.
+/// Positions and velocities of all boids at one moment, by id.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Moment {
-    /// Body lengths.
+    /// Positions, body lengths.
     pub(super) positions: Vec<Vec3>,
-    /// Body lengths a second.
+    /// Velocities, body lengths per second.
     pub(super) velocities: Vec<Vec3>,
-    /// The predator's place.
+    /// Position of the predator, body lengths.
     pub(super) hunter: Option<Vec3>,
 }
 
-/// How many frames before the first, and before the end, are needed for a film of `n_frames`.
+/// Returns the number of frames of the lead for a video of `n_frames` frames. As many frames at the end are
+/// steered.
 pub(super) fn n_meeting_frames(n_frames: u32, fps: f64) -> usize {
     ((MEETING_S * fps).round() as usize).min(4 * n_frames as usize / 5)
 }
 
-/// Whom each individual becomes. `end`: where they are when meeting begins; `lead`: the moments before
-/// the first frame. Each is somebody else's heir, or its own.
+/// Returns the heir of each individual, a permutation of the ids. `end` holds the boids when steering begins,
+/// `lead` the moments before the first frame.
 pub(super) fn heirs(end: &Moment, lead: &[Moment]) -> Vec<u32> {
     let Some(first) = lead.first() else {
         return (0..end.positions.len() as u32).collect();
@@ -45,8 +45,10 @@ pub(super) fn heirs(end: &Moment, lead: &[Moment]) -> Vec<u32> {
     })
 }
 
-/// One target for each of `n`, the sum of squares such that no swap of two lowers it. Ties go to the
-/// smaller ids.
+/// Returns a permutation of `n` targets with a small sum of squares.
+///
+/// The nearest pairs are assigned first, ties to the smaller ids. Then pairs swap targets until no swap
+/// lowers the sum, at most `N_PASSES` times.
 fn least_pairs(n: usize, square: impl Fn(usize, usize) -> f64) -> Vec<u32> {
     let mut pairs: Vec<(f64, u32, u32)> = (0..n as u32)
         .flat_map(|from| (0..n as u32).map(move |to| (from, to)))
@@ -79,13 +81,13 @@ fn least_pairs(n: usize, square: impl Fn(usize, usize) -> f64) -> Vec<u32> {
     heirs
 }
 
-/// Whom everybody is to meet, `left` frames before the film's end: the first frame comes after the last of
-/// `lead`.
+/// Returns the positions and velocities to reach, `left` frames before the end of the video. The first frame
+/// follows the last moment of `lead`.
 pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> Meeting {
     let moment = &lead[lead.len() - left];
     let n_frames = lead.len() as f64;
     Meeting {
-        // All of the wish from a third on.
+        // Full weight after a third of the lead.
         share: smooth(3.0 * (n_frames - left as f64) / n_frames),
         places: (heirs.iter())
             .map(|&heir| {
@@ -96,7 +98,7 @@ pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> Meeting {
     }
 }
 
-/// Blends the last moments of a film into those before its first.
+/// Blends the last moments of a video into the lead.
 pub(super) fn close(moments: &mut [Moment], lead: &[Moment], heirs: &[u32], fps: f64) {
     let first = moments.len() - lead.len();
     let n_frames = lead.len() as f64;
@@ -118,7 +120,7 @@ pub(super) fn close(moments: &mut [Moment], lead: &[Moment], heirs: &[u32], fps:
 }
 
 impl Moment {
-    /// The boids' present one.
+    /// Returns the current moment of the boids.
     pub(super) fn of(boids: &Boids) -> Moment {
         Moment {
             positions: boids.positions().to_vec(),
@@ -128,13 +130,13 @@ impl Moment {
     }
 }
 
-/// From 0 to 1 with no speed nor acceleration at either end; constant outside.
+/// Rises from 0 to 1 over shares 0 to 1, with zero slope and curvature at both ends. Constant outside.
 pub(super) fn smooth(share: f64) -> f64 {
     let s = share.clamp(0.0, 1.0);
     s * s * s * (10.0 - s * (15.0 - 6.0 * s))
 }
 
-/// Its derivative.
+/// Returns the derivative of `smooth`.
 pub(super) fn slope(share: f64) -> f64 {
     let s = share.clamp(0.0, 1.0);
     30.0 * s * s * (1.0 - s) * (1.0 - s)

@@ -1,5 +1,5 @@
-//! Headings and positions of an individual from the filmed steps of the frames that it shows, each corrected a little toward its
-//! boid.
+//! Headings and positions of individuals with `position: film`: the filmed steps of the frames shown, each
+//! corrected a little toward the boid.
 
 use rayon::prelude::*;
 
@@ -10,30 +10,30 @@ use crate::flock::placement::{Before, Stage, is_jump};
 use crate::geometry::wrap_rad;
 use crate::library::View;
 
-/// Time constant with which an individual is drawn to its boid.
+/// Time constant with which an individual is drawn to its boid, seconds. Free choice.
 const PULL_S: f64 = 0.5;
-/// The correction of a step is at most this share of its length: below the quarter up to which shown and filmed speeds count as
-/// the same (`bench/flocks.py`).
+/// Largest correction of a step, as a share of its length. It stays below the quarter up to which
+/// `bench/flocks.py` counts shown and filmed speeds as equal.
 const WARP: f64 = 0.2;
-/// A step of an animal that hovers may be short although the animal moves. There the same share of the mean speed around the
-/// frame is allowed, up to this speed. An animal at rest has no such speed, and is not moved.
+/// A hovering animal has short steps although it moves. The mean speed around the frame then sets the limit
+/// of the correction, up to this speed, body lengths per second. Free choice.
 const HOVERING_BL_PER_S: f64 = 0.2;
-/// Half the time over which that mean is taken.
+/// Time before and after a frame over which that mean is taken, seconds. Free choice.
 const AROUND_S: f64 = 0.25;
-/// An animal that lies upon another is drawn to a place this far aside of its boid, body lengths.
+/// Distance beside the boid to which an animal that avoids others is drawn, body lengths. Free choice.
 const ASIDE_BL: f64 = 1.0;
-/// From above, the course to follow is the sum of the boid's direction, the way to the boid, at this weight for each body
-/// length ...
+/// Top view: weight of the way to the boid in the wanted course, per body length. The direction of the boid
+/// has weight 1. Free choice.
 const PURSUED_PER_BL: f64 = 1.0;
-/// ... and the way aside from the others, at this weight. Both weights are free choices.
+/// Top view: weight of the avoidance of others in the wanted course. Free choice.
 const EVADED: f64 = 2.0;
-/// Time constant with which headings follow that course. From above alone: from the side headings are filmed ones.
+/// Top view: time constant with which headings follow the wanted course, seconds. Free choice.
 const TURN_S: f64 = 0.25;
-/// From above, headings are corrected toward the boid at up to this share of the greatest turn rate of the boids, in proportion
-/// to the speed below cruising speed: an animal at rest is not turned.
+/// Top view: largest correction of the heading, as a share of the greatest turn rate of boids. It shrinks
+/// with the speed below cruising speed, so that an animal at rest is not turned. Free choice.
 const STEERED: f64 = 1.0;
 
-/// Headings and positions of an individual, by frame.
+/// Headings, radians, and positions, pixels, of an individual by frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Advanced {
     pub(super) heading_rad: Vec<f64>,
@@ -47,7 +47,7 @@ impl Advanced {
     }
 }
 
-/// Where a boid is and points, and the size of its animal.
+/// Position and heading of a boid, and the size of its animal.
 #[derive(Clone, Copy, Debug)]
 struct Goal {
     centroid_px: [f64; 2],
@@ -67,7 +67,7 @@ impl Goal {
         }
     }
 
-    /// The same at a seat, where there is one.
+    /// Returns the goal at a resting place, if there is one.
     fn or_at(self, seat: Option<[f64; 2]>) -> Goal {
         Goal {
             centroid_px: seat.unwrap_or(self.centroid_px),
@@ -77,8 +77,8 @@ impl Goal {
 }
 
 impl Stage<'_> {
-    /// Headings and positions of all individuals over the frames `shown`, which follow `before`, by id. From the side, those that
-    /// come to rest come to `perches`.
+    /// Returns headings and positions of all individuals over the frames `shown`, which follow `before`, by
+    /// id. In side view, individuals that come to rest are led to `perches`.
     pub(super) fn advance(
         &self,
         shown: &[Vec<(u32, bool)>],
@@ -146,7 +146,7 @@ impl Stage<'_> {
         advanced
     }
 
-    /// For each individual the direction in which it avoids the others, weighted by how near they come.
+    /// Returns the avoidance vector of each individual.
     fn asides(&self, last: &[Option<Before>]) -> Vec<[f64; 2]> {
         let movers: Vec<Mover> = last
             .iter()
@@ -167,7 +167,7 @@ impl Stage<'_> {
         company::asides(&movers)
     }
 
-    /// The position after a filmed step and its correction.
+    /// Returns the position after a filmed step and its correction, pixels.
     fn carried_centroid(
         &self,
         (state, heading_rad): ((u32, bool), f64),
@@ -199,7 +199,7 @@ impl Stage<'_> {
             .map(|px| rounded(px, 2))
     }
 
-    /// The filmed step as it is shown, rotated and scaled, without a correction.
+    /// Returns the filmed step as shown, rotated and scaled, without a correction, pixels.
     fn shown_step_px(
         &self,
         before: (u32, bool),
@@ -214,7 +214,7 @@ impl Stage<'_> {
         )
     }
 
-    /// From the side, the way that is left to the next rest, by frame; none from above.
+    /// Returns the remaining way to the next rest, by frame. Empty in top view.
     fn ways_to_rest(
         &self,
         (shown, size): (&[(u32, bool)], f64),
@@ -240,7 +240,7 @@ impl Stage<'_> {
         )
     }
 
-    /// Where individuals begin that begin at rest: on perches.
+    /// Returns the resting place of each individual that starts at rest, else `None`.
     fn seats(
         &self,
         shown: &[Vec<(u32, bool)>],
@@ -261,7 +261,7 @@ impl Stage<'_> {
             .collect()
     }
 
-    /// A heading in top view: the one before, plus the filmed turn, plus the correction toward the boid's course and aside.
+    /// Returns a heading in top view, radians: the previous one, the filmed turn and a correction.
     fn carried_heading(
         &self,
         state: (u32, bool),
@@ -291,7 +291,7 @@ impl Stage<'_> {
         )
     }
 
-    /// The filmed turn from one state to the next. At a jump, where it was not filmed: the turn rate at the target, for a frame.
+    /// Returns the filmed turn, radians. At a jump, the turn rate at the target over one frame.
     fn filmed_turn_rad(&self, before: (u32, bool), state: (u32, bool)) -> f64 {
         if !is_jump(before, state) {
             return wrap_rad(self.source_heading(state) - self.source_heading(before));
@@ -300,7 +300,7 @@ impl Stage<'_> {
         if state.1 { -rate } else { rate }
     }
 
-    /// The filmed step from one state to the next, pixels. At a jump: the velocity at the target, for a frame.
+    /// Returns the filmed step, pixels. At a jump, the velocity at the target over one frame.
     fn filmed_step_px(&self, before: (u32, bool), state: (u32, bool)) -> [f64; 2] {
         let poses = &self.library.poses.frames;
         let [from, to] = [before, state].map(|state| poses[state.0 as usize].centroid_px);
@@ -314,7 +314,7 @@ impl Stage<'_> {
         if state.1 { [-step[0], step[1]] } else { step }
     }
 
-    /// The mean speed in the frames around one, body lengths a second.
+    /// Returns the mean speed in the frames around `frame`, body lengths per second.
     fn speed_around(&self, frame: u32) -> f64 {
         let reach = (AROUND_S * self.library.poses.fps).round() as usize;
         let frame = frame as usize;
@@ -324,7 +324,7 @@ impl Stage<'_> {
         speeds.sum::<f64>() / n
     }
 
-    /// A position within the tank: `place` itself, or the point at which the way from the boid to it leaves the tank.
+    /// Returns `place`, or the point at which the line from the boid to it leaves the tank.
     fn kept_in(&self, place: [f64; 2], goal: [f64; 2], depth_bl: f64) -> [f64; 2] {
         let [from, to] = [goal, place].map(|px| self.lens.place_bl(px, depth_bl));
         match self.tank.holds(to) {
@@ -334,7 +334,7 @@ impl Stage<'_> {
     }
 }
 
-/// A step rotated and scaled.
+/// Returns a step, rotated and scaled.
 fn turned(step: [f64; 2], turn_rad: f64, scale: f64) -> [f64; 2] {
     let (cos, sin) = (scale * libm::cos(turn_rad), scale * libm::sin(turn_rad));
     [cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]]

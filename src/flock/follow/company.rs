@@ -1,24 +1,25 @@
-//! Collision avoidance for animals seen from above (Reynolds 1999, unaligned collision avoidance): each one predicts where the
-//! others will be nearest to it and steers away from that place.
+//! Collision avoidance in top view (Reynolds 1999, unaligned collision avoidance). Each animal predicts the
+//! nearest approach of every other one and steers away from it.
 
 use rayon::prelude::*;
 
-/// How far ahead collisions are predicted. A free choice: about the time in which a mouse turns aside.
+/// Time over which approaches are predicted, seconds. Free choice: about the time in which a mouse turns
+/// aside.
 const AHEAD_S: f64 = 0.6;
-/// Centroids nearer than this are avoided. A free choice between the width and the length of a body.
+/// Distance to keep between centroids, body lengths. Free choice between the width and the length of a body.
 pub(in crate::flock) const CLEAR_BL: f64 = 0.8;
 
-/// Position and velocity of an animal seen from above.
+/// Position and velocity of an animal in top view.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Mover {
     pub(super) position_bl: [f64; 2],
     pub(super) velocity_bl_per_s: [f64; 2],
-    /// It has a position; an animal that has none yet is avoided by nobody.
+    /// Whether the animal has a position yet. Without one, others ignore it.
     pub(super) is_there: bool,
 }
 
-/// For each animal the sum of the ways away from the others that it is about to come too near to. Each way is at most 1 long:
-/// longer the nearer and the sooner.
+/// Returns the avoidance vector of each animal: the sum over the others that are about to come too near. Each
+/// term is at most 1 long, and longer for a nearer and earlier approach.
 pub(super) fn asides(movers: &[Mover]) -> Vec<[f64; 2]> {
     let mut by_x: Vec<usize> = (0..movers.len())
         .filter(|&id| movers[id].is_there)
@@ -39,7 +40,7 @@ pub(super) fn asides(movers: &[Mover]) -> Vec<[f64; 2]> {
     movers.par_iter().with_min_len(64).map(of).collect()
 }
 
-/// The way of one animal away from another.
+/// Returns the term of the avoidance vector that `other` adds.
 fn aside(one: &Mover, other: &Mover) -> [f64; 2] {
     let offset = [0, 1].map(|k| one.position_bl[k] - other.position_bl[k]);
     let relative = [0, 1].map(|k| one.velocity_bl_per_s[k] - other.velocity_bl_per_s[k]);
@@ -56,7 +57,7 @@ fn aside(one: &Mover, other: &Mover) -> [f64; 2] {
         return [0.0; 2];
     }
     let strength = (1.0 - distance_bl / CLEAR_BL) * (1.0 - 0.5 * after_s / AHEAD_S);
-    // Two that would meet head on both go to their left.
+    // Two animals that approach head-on both turn to their left.
     let way = match distance_bl > 0.05 {
         true => then,
         false => [-offset[1], offset[0]],
@@ -77,7 +78,7 @@ mod tests {
         }
     }
 
-    /// The least distance of two animals that steer along their `asides`, body lengths.
+    /// Returns the least distance of two animals that steer along their `asides`, body lengths.
     fn nearest_bl(mut movers: [Mover; 2]) -> f64 {
         const STEP_S: f64 = 0.05;
         let mut nearest_bl = f64::INFINITY;

@@ -1,9 +1,9 @@
-//! Flocks whose motion comes from the film (`position: film`). Boids choose directions; speeds and steps are filmed ones.
+//! Flocks with `position: film`: boids choose directions, while speeds and steps are filmed ones.
 //!
-//! A flock is made segment by segment. At the beginning of a segment each boid is put at the position of its animal. It moves
-//! at the speeds of the animal's natural continuation (`natural`). The plan of the segment follows it from the frame shown last
-//! (`plan::segment`). The animal then moves by the filmed steps of the planned frames, corrected a little toward the boid
-//! (`advance`).
+//! A flock is made segment by segment. Each boid starts a segment at the position of its animal. It moves at
+//! the speeds of the animal's natural continuation (`natural`). The plan of the segment starts from the frame
+//! shown last (`plan::segment`). The animal then moves by the filmed steps of the planned frames, corrected a
+//! little toward the boid (`advance`).
 
 mod advance;
 pub(super) mod company;
@@ -26,10 +26,11 @@ use super::plan::{Model, Plan, Planner};
 use crate::library::View;
 use crate::progress::Progress;
 
-/// Default length of a segment. From the side a turn takes about a second and pays only after it, so plans must look beyond it.
+/// Default length of a segment, seconds. In side view a turn takes about a second and pays off only after it,
+/// so plans must look beyond it.
 const SEGMENT_S: f64 = 3.0;
 
-/// The first frame of each segment, and at the end the number of frames.
+/// Returns the first frame of each segment, and as the last entry the number of frames.
 pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -> Vec<usize> {
     let n = segment_frames.map_or((SEGMENT_S * fps).round() as usize, |n| n as usize);
     let mut ends: Vec<usize> = (0..n_frames).step_by(n.max(2)).collect();
@@ -37,7 +38,7 @@ pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -
     ends
 }
 
-/// All individuals up to the present segment, by id.
+/// All individuals up to the current segment, by id.
 struct Flock {
     course: Course,
     plans: Vec<Plan>,
@@ -45,7 +46,8 @@ struct Flock {
     standings: Vec<Standing>,
 }
 
-/// Makes a flock with boids that have not formed yet: the tracks of boids, plans and placements, by id.
+/// Makes a flock from boids that have not formed yet. Returns the simulation, plans and placements, by id.
+/// Fails if the job is cancelled or playback cannot continue.
 pub(super) fn play(
     mut boids: Boids,
     (model, stage): (&Model, &Stage),
@@ -101,7 +103,7 @@ pub(super) fn play(
 }
 
 impl Flock {
-    /// The natural continuation of each individual over a segment.
+    /// Returns the states of the natural continuation of each individual over a segment.
     fn natural_states(
         &self,
         boids: &Boids,
@@ -132,7 +134,7 @@ impl Flock {
         }
     }
 
-    /// Appends the plans of a segment and places them.
+    /// Appends the plans of a segment and places their frames.
     fn go_on(
         &mut self,
         (model, stage, perches): (&Model, &Stage, &Perches),
@@ -160,8 +162,8 @@ impl Flock {
         }
     }
 
-    /// Puts each boid at the position of its animal. From above a boid also takes its animal's heading; from the side it keeps
-    /// its own, since the animal can show only headings that were filmed.
+    /// Moves each boid to the position of its animal. In top view the boid also takes the heading of its
+    /// animal. In side view it keeps its own, since the animal can show only filmed headings.
     fn draw_back(&self, boids: &mut Boids, stage: &Stage) {
         let mut positions = boids.positions().to_vec();
         let mut velocities = boids.velocities().to_vec();

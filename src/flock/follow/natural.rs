@@ -1,33 +1,34 @@
-//! The natural continuation of an animal: the frames that follow the one it shows in the film, and at the end of a run a random
-//! jump.
+//! Natural continuation of an animal: the frames that follow the one shown, and a random jump where a run
+//! ends.
 //!
-//! A boid takes its speeds from this continuation. So it asks for speeds that the film has, in the order in which the film has
-//! them: a rest lasts as long as the animal rested.
+//! A boid takes its speeds from this continuation. Its speeds are thus those of the footage, in the order of
+//! the footage. A rest lasts as long as the animal rested.
 
 use crate::flock::boids::Gait;
 use crate::flock::motion::FrameMotion;
 use crate::flock::plan::Model;
 use crate::random;
 
-/// Random states of which an individual begins with the cheapest. A free choice: more of them point more as the boid does, and
-/// show rest and motion less in the shares of the film.
+/// Number of random states, of which an individual starts with the cheapest. Free choice. More states give a
+/// heading nearer to that of the boid, but distort the shares of rest and motion.
 const N_DRAWN: u64 = 24;
-/// A jump that costs this many turns more is e times as rare. A free choice: a sixth of the cost of a jump at D = epsilon.
+/// Additional cost at which a jump is e times as rare, turns. Free choice: a quarter of the default cost of a
+/// jump at D = epsilon.
 const RARER_TURNS: f64 = 3000.0;
 
-/// What random numbers are for.
+/// Purposes of random numbers, as words of their keys.
 mod draw {
     pub(super) const BEGIN: u64 = 21;
     pub(super) const JUMP: u64 = 22;
 }
 
-/// Continuations of all states of a trellis.
+/// Natural continuations from all states of a trellis.
 pub(super) struct Natural<'a> {
     model: &'a Model,
     seed: u64,
-    /// By source state: (target state, cost in turns) of each jump.
+    /// Target state and cost, turns, of each jump, by source state.
     jumps: Vec<Vec<(u32, u32)>>,
-    /// By state.
+    /// Speed and turn rate, by state.
     gaits: Vec<Gait>,
 }
 
@@ -59,8 +60,9 @@ impl<'a> Natural<'a> {
         }
     }
 
-    /// The first state of individual `id`: of some random states, which show rest and motion in the shares of the film, the one
-    /// with the least `cost`. `None` if playback cannot continue from any state.
+    /// Returns the first state of individual `id`: the one with the least `cost` among some random states.
+    /// Random states show rest and motion in the shares of the footage. Returns `None` if playback cannot
+    /// continue from any state.
     pub(super) fn beginning(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
         let goes_on: Vec<u32> = (0..self.jumps.len() as u32)
             .filter(|&state| {
@@ -75,7 +77,8 @@ impl<'a> Natural<'a> {
         drawn.min_by_key(|&state| cost(state as usize))
     }
 
-    /// The states of the `n` frames after `state`. A jump may come after `held` frames at the earliest.
+    /// Returns the states of the `n` frames after `state`. No jump is made in the first `held` frames, unless
+    /// the run ends.
     pub(super) fn states(
         &self,
         (mut state, mut held): (u32, usize),
@@ -101,7 +104,8 @@ impl<'a> Natural<'a> {
         states
     }
 
-    /// The target of a random jump from a state; dearer jumps are rarer. `None` without a jump.
+    /// Returns the target of a random jump from a state, or `None` if it has no jump. Expensive jumps are
+    /// rarer.
     fn jump(&self, state: u32, key: [u64; 4]) -> Option<u32> {
         let jumps = &self.jumps[state as usize];
         let least = jumps.iter().map(|jump| jump.1).min()?;
@@ -115,7 +119,7 @@ impl<'a> Natural<'a> {
         Some(chosen.or(jumps.last())?.0)
     }
 
-    /// Speed and turn rate of the animal in a state.
+    /// Returns speed and turn rate of the animal in a state.
     pub(super) fn gait(&self, state: u32) -> Gait {
         self.gaits[state as usize]
     }

@@ -1,47 +1,50 @@
-//! Animals seen from the side rest where the animal was seen to rest: a bird on a perch, a dog on the floor. An animal that comes to
-//! rest within a segment is led to the nearest such place. The corrections are as small as those toward a boid.
+//! Resting places in side view. Animals rest where the filmed animal rested: a bird on a perch, a dog on the
+//! floor.
+//!
+//! An animal that comes to rest within a segment is led to the nearest resting place. The corrections are as
+//! small as those toward a boid.
 
 use crate::flock::lens::Lens;
 use crate::flock::motion::FrameMotion;
 use crate::library::{Library, View};
 
-/// An animal slower than this rests, body lengths a second.
+/// Speed below which the animal rests, body lengths per second. Free choice.
 const REST_BL_PER_S: f64 = 0.1;
-/// A rest is at least this long. A free choice: fish pause for shorter times in open water.
+/// Least duration of a rest, seconds. Free choice: fish pause for shorter times in open water.
 pub(super) const REST_S: f64 = 0.7;
-/// Places of rest nearer to each other than this are one.
+/// Distance below which two resting places count as one, body lengths. Free choice.
 const SAME_BL: f64 = 0.1;
 
-/// Where the animal rested.
+/// Resting places of the filmed animal.
 #[derive(Clone, Debug, Default)]
 pub(in crate::flock) struct Perches {
-    /// Places in the picture, pixels; none from above, where the whole floor is one.
+    /// Positions in the image, pixels. Empty in top view, where the animal may rest anywhere.
     places_px: Vec<[f64; 2]>,
-    /// The share of the film for which it rested.
+    /// Share of the frames in which the animal rests, 0..=1.
     rest_share: f64,
 }
 
-/// The way to the next rest of the same segment, if there is one.
+/// Way to the next rest of the segment, or `None` if there is none.
 pub(super) type Way = Option<ToRest>;
 
-/// The way from the position before a frame to the next rest.
+/// Way from the position before a frame to the next rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct ToRest {
-    /// Its vector.
+    /// Displacement, pixels.
     way_px: [f64; 2],
-    /// The length along the way.
+    /// Length along the way, pixels.
     length_px: f64,
-    /// The length of the frame's own step.
+    /// Length of the step of this frame, pixels.
     step_px: f64,
 }
 
-/// Whether the animal rests.
+/// Returns whether the animal rests.
 pub(super) fn rests(moved: &FrameMotion) -> bool {
     moved.speed_bl_per_s < REST_BL_PER_S
 }
 
-/// The ways to the next rest of at least `n_rest` frames. `steps`: by frame, whether the animal rests and its step from the
-/// frame before, pixels.
+/// Returns the way to the next rest of at least `n_rest` frames, by frame. `steps` holds, by frame, whether
+/// the animal rests and its step from the previous frame, pixels.
 pub(super) fn ways(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Way> {
     let mut ways = vec![None; steps.len()];
     let mut ahead: Way = None;
@@ -64,7 +67,7 @@ pub(super) fn ways(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Way> {
 }
 
 impl Perches {
-    /// Those of a library's animal, in a picture of which `lens` knows the scale.
+    /// Returns the resting places of a library's animal. `lens` gives the body length in pixels.
     pub(in crate::flock) fn of(library: &Library, motion: &[FrameMotion], lens: &Lens) -> Perches {
         let mut perches = Perches::default();
         let poses = &library.poses;
@@ -92,8 +95,9 @@ impl Perches {
         perches
     }
 
-    /// How many animals have a place where they rest, `clear_px` apart, when each rests for as much of the time as the filmed one;
-    /// `None` for an animal that was not seen to rest.
+    /// Returns the number of animals that find a resting place at least `clear_px` from the others. Each is
+    /// assumed to rest for as much of the time as the filmed one. Returns `None` if the filmed animal never
+    /// rested.
     pub(in crate::flock) fn room_for(&self, clear_px: f64) -> Option<u32> {
         let mut clear: Vec<[f64; 2]> = Vec::new();
         for place in &self.places_px {
@@ -104,7 +108,7 @@ impl Perches {
         (self.rest_share > 0.0).then(|| (clear.len() as f64 / self.rest_share).ceil() as u32)
     }
 
-    /// The nearest place that is clear of others by `clear_px`.
+    /// Returns the nearest resting place that is at least `clear_px` from all others, or `None`.
     pub(super) fn nearest(
         &self,
         from_px: [f64; 2],
@@ -124,8 +128,9 @@ fn gap(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 }
 
 impl ToRest {
-    /// The correction of the frame's step, pixels. The sum of all corrections leads from the end of the way to the nearest perch
-    /// that is clear of `others`. Longer steps are corrected by more.
+    /// Returns the correction of the step of this frame, pixels. The corrections of all steps together lead
+    /// from the end of the way to the nearest resting place clear of `others`. Each is proportional to the
+    /// length of its step. Returns `None` if no resting place is clear.
     pub(super) fn correction(
         &self,
         place_px: [f64; 2],

@@ -1,9 +1,10 @@
-//! Cross-fades at jumps: a second sprite that shows the continuation of the old run, or the beginning of the new one.
+//! Cross-fades at jumps: a second sprite shows the continuation of the old run, or the beginning of the new one
+//! (docs/explanation/algorithms.md, "Placement").
 
 use super::{Placed, Stage, is_jump};
 use crate::flock::individual::{BoidTrack, Fade, rounded};
 
-/// What fades are made of: what is shown when, pointing where, at which depth and size.
+/// Inputs of fades: the states shown, with headings, depths and size.
 pub(super) struct Way<'a> {
     pub(super) shown: &'a [(u32, bool)],
     pub(super) heading_rad: &'a [f64],
@@ -12,7 +13,7 @@ pub(super) struct Way<'a> {
 }
 
 impl Stage<'_> {
-    /// The fades of all individuals, those at the end going on in their heirs.
+    /// Returns the fades of a loop, by id. A fade across its end continues in the heir.
     pub(super) fn fades_across(
         &self,
         shown: &[&[(u32, bool)]],
@@ -46,7 +47,7 @@ impl Stage<'_> {
         fades
     }
 
-    /// The fades at the jumps up to frame `n_frames`, the one after the last.
+    /// Returns the fades at the jumps up to frame `n_frames`, the first one after the end.
     pub(super) fn fades(&self, way: &Way, n_frames: usize) -> Vec<Fade> {
         let shown = way.shown;
         let jumps: Vec<usize> = (1..shown.len())
@@ -68,8 +69,8 @@ impl Stage<'_> {
         fades
     }
 
-    /// The `half` frames before the jump at `t`, under which comes what follows, and the `half`
-    /// after it, under which goes what was; `None` when the footage lacks one of them.
+    /// Returns the halves of a fade at the jump at `t`, `half` frames each: those before the new frame, and
+    /// those after the old one. Returns `None` if a sprite is missing.
     fn fade(&self, way: &Way, t: usize, half: usize) -> Option<[Fade; 2]> {
         let (old, new) = (way.shown[t - 1], way.shown[t]);
         let mut sides: [Fade; 2] = [(t - half, new.1), (t, old.1)].map(|(start, mirrored)| Fade {

@@ -1,5 +1,5 @@
-//! Where and how each frame of a plan is shown: rotation within the budget, position along the shown
-//! heading on a leash to the boid, cross-fades at jumps (ALGORITHMS.md 8; O 5.2).
+//! Placement of planned frames (Okabe et al., section 5.2; docs/explanation/algorithms.md, "Placement"):
+//! rotations, positions near the boid, and cross-fades at jumps. `follow` is for `position: film`.
 
 mod fades;
 
@@ -18,56 +18,56 @@ use crate::geometry::wrap_rad;
 use crate::library::{Library, View};
 use crate::random;
 
-/// Time constant with which an individual is drawn to its boid.
+/// Time constant with which an individual is drawn to its boid, seconds. Free choice.
 const LEASH_S: f64 = 0.5;
-/// The leash's length.
+/// Largest distance of an individual from its boid, body lengths. Free choice.
 const LEASH_BL: f64 = 0.5;
 
-/// A loop is gone round so many times before rotation and leash are as they were a round before.
+/// Rounds in which a loop is placed, so that its start follows from its end. Free choice.
 const N_ROUNDS: usize = 4;
 
-/// A sprite is drawn no smaller and no larger than this.
+/// Least and greatest scale of a sprite. Free choices.
 const LEAST_SCALE: f64 = 0.2;
 const GREATEST_SCALE: f64 = 1.5;
-/// First word of the keys of random sizes; boids use other words.
+/// First word of the random keys for body sizes. Boids use other words.
 const SIZE: u64 = 0x517e;
 
-/// Everything that placing depends on besides the individual.
+/// Inputs of placement that all individuals share.
 pub struct Stage<'a> {
-    /// The library shown.
+    /// Library whose sprites are shown.
     pub library: &'a Library,
-    /// The motion of its frames.
+    /// Motion of the animal at each frame of the footage.
     pub motion: &'a [FrameMotion],
-    /// What was asked for.
+    /// Parameters of the flock.
     pub params: &'a Params,
-    /// How the tank is seen.
+    /// Projection of the tank.
     pub lens: &'a Lens,
-    /// Where individuals may be.
+    /// Tank that limits positions.
     pub tank: &'a Tank,
-    /// What the animal was seen to do.
+    /// Limits measured on the animal.
     pub calibration: &'a Calibration,
 }
 
-/// How an individual is shown.
+/// Placement of an individual. Lists have one entry per output frame, except `fades`.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Placed {
-    /// The sprite's rotation.
+    /// Rotation of the sprite, radians.
     pub rotation_rad: Vec<f64>,
-    /// The direction of its head.
+    /// Heading as shown, radians.
     pub heading_rad: Vec<f64>,
-    /// Its centroid.
+    /// Position of the centroid, pixels.
     pub centroid_px: Vec<[f64; 2]>,
-    /// The direction in space, where the tank has depth.
+    /// Direction in space, a unit vector. `None` if the tank has no depth.
     pub forward: Option<Vec<[f64; 3]>>,
-    /// Its size relative to the footage.
+    /// Size relative to the footage.
     pub scale: Vec<f64>,
-    /// Its depth in the camera's frame, where metres are known.
+    /// Depth in the camera frame, metres. `None` if the scale in metres is unknown.
     pub depth_m: Option<Vec<f64>>,
     /// Second sprites around jumps.
     pub fades: Vec<Fade>,
 }
 
-/// How the frame before the first is shown, in a loop or by the segment before.
+/// Frame shown before the first one: the end of the preceding segment, or in a loop the last frame.
 #[derive(Clone, Copy)]
 pub(super) struct Before {
     pub(super) state: (u32, bool),
@@ -75,13 +75,13 @@ pub(super) struct Before {
     pub(super) centroid_px: [f64; 2],
 }
 
-/// Whether something else than the next frame is shown after `before`.
+/// Returns whether `after` is not the next frame on the same mirror side.
 pub fn is_jump(before: (u32, bool), after: (u32, bool)) -> bool {
     after != (before.0 + 1, before.1)
 }
 
 impl Stage<'_> {
-    /// Places all individuals of a film, by id; of a loop with the heir of each.
+    /// Places all individuals, by id. In a loop, individual `id` continues as `heirs[id]`.
     pub fn placed(
         &self,
         shown: &[Vec<(u32, bool)>],
@@ -101,7 +101,7 @@ impl Stage<'_> {
             .collect()
     }
 
-    /// Places all individuals, by id, so that the last frame of each plays into the first of its heir.
+    /// Places a loop, by id. The last frame of each individual leads into the first of its heir.
     fn place_loop(
         &self,
         shown: &[&[(u32, bool)]],
@@ -146,7 +146,7 @@ impl Stage<'_> {
         self.with_fades((shown, size), boid, (heading_rad, centroid_px))
     }
 
-    /// An individual of that size with these headings and positions.
+    /// Returns the placement of an individual with these headings and positions.
     pub(super) fn with_fades(
         &self,
         (shown, size): (&[(u32, bool)], f64),
@@ -187,18 +187,18 @@ impl Stage<'_> {
         }
     }
 
-    /// How far from the camera is what lies so far behind the tank's front.
+    /// Returns the distance from the camera, body lengths, for a distance behind the front of the tank.
     pub(super) fn depth_bl(&self, behind_px: f64) -> f64 {
         self.tank.corners[0][2] + behind_px / self.lens.length_px
     }
 
-    /// The size of an individual relative to the filmed animal.
+    /// Returns the random size of an individual relative to the filmed animal.
     pub(super) fn size(&self, id: usize) -> f64 {
         let spread = 2.0 * random::unit(self.params.seed, &[SIZE, id as u64]) - 1.0;
         rounded(1.0 + self.params.variation * spread, 3)
     }
 
-    /// The scale at which an individual of that size shows a frame at another depth (ALGORITHMS.md 8).
+    /// Returns the scale at which an individual of this size shows a source frame at a given depth.
     pub(super) fn scale(&self, frame: u32, depth_bl: f64, size: f64) -> f64 {
         if self.lens.is_flat() {
             return size;
@@ -208,7 +208,7 @@ impl Stage<'_> {
         rounded(scale.clamp(LEAST_SCALE, GREATEST_SCALE), 4)
     }
 
-    /// The heading of a source frame on its mirror side.
+    /// Returns the heading of a source frame on its mirror side, radians.
     pub(super) fn source_heading(&self, (frame, mirrored): (u32, bool)) -> f64 {
         let heading = self.motion[frame as usize].heading_rad;
         if mirrored {
@@ -218,7 +218,7 @@ impl Stage<'_> {
         }
     }
 
-    /// The direction in space of a source frame on its mirror side, turned in the picture.
+    /// Returns the direction in space of a source frame on its mirror side, rotated in the image.
     fn forward(&self, (frame, mirrored): (u32, bool), turn_rad: f64) -> [f64; 3] {
         let [x, y, z] = self.motion[frame as usize].forward;
         let x = if mirrored { -x } else { x };
@@ -226,7 +226,7 @@ impl Stage<'_> {
         [cos * x - sin * y, sin * x + cos * y, z].map(|part| rounded(part, 5))
     }
 
-    /// The rotation that shows a source frame with a heading, as far as the view allows.
+    /// Returns the rotation that shows a source frame at a heading, within `rho_deg` in side view.
     pub(super) fn rotation(&self, state: (u32, bool), heading_rad: f64) -> f64 {
         let gap = wrap_rad(heading_rad - self.source_heading(state));
         match self.library.poses.view {
@@ -238,8 +238,8 @@ impl Stage<'_> {
         }
     }
 
-    /// The headings shown. In top view the boid's own. In side view the frame's, rotated toward the
-    /// boid's; the rotation follows slowly, and at a jump takes up what it can of the step.
+    /// Returns the headings shown: in top view those of the boid, in side view those of the frames, rotated
+    /// smoothly toward the boid. A jump changes the heading as little as the limit allows.
     pub(super) fn headings(
         &self,
         shown: &[(u32, bool)],
@@ -306,7 +306,7 @@ impl Stage<'_> {
         places
     }
 
-    /// Within the leash of the boid at `goal`, and inside the tank.
+    /// Returns the point nearest to `place` on the leash to `goal`, cut at the walls of the tank.
     fn near(&self, place: [f64; 2], goal: [f64; 2], depth_bl: f64) -> [f64; 2] {
         let off = [place[0] - goal[0], place[1] - goal[1]];
         let distance = (off[0] * off[0] + off[1] * off[1]).sqrt();

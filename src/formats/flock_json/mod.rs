@@ -1,10 +1,10 @@
-//! flock.json: everything about a flock but its pixels (DESIGN.md, a library on disk).
+//! flock.json: all data of a flock except its pixels (docs/reference/formats.md, "flock.json").
 //!
-//! A flock holds its numbers rounded already, so reading gives back exactly what was written, and
-//! anyone can recompute each plan's cost from this file and the library (ALGORITHMS.md 6, proof c).
+//! A flock holds rounded numbers, so reading returns exactly what was written. Each plan's cost can be
+//! recomputed from this file and the library (docs/explanation/algorithms.md, "Planning").
 
-mod space; // where boids may be, and how that is seen
-mod stats; // how good the flock is, and how it moves frame by frame
+mod space; // the tank and how it is seen
+mod stats; // quality of the flock, and its order in every frame
 
 use std::io::{self, Write};
 
@@ -14,17 +14,18 @@ use self::space::SpaceFile;
 use self::stats::StatsFile;
 use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 
-/// The schema's name and version.
+/// Name and version of the schema.
 pub const SCHEMA: &str = "flockreel/flock@1";
 
-/// Returns the flock as JSON, one line for each individual.
+/// Returns the flock as JSON, one line per individual.
 pub fn write(flock: &Flock) -> Vec<u8> {
     let mut bytes = Vec::new();
     write_to(flock, &mut bytes).expect("memory takes all bytes");
     bytes
 }
 
-/// Writes the flock as JSON, one number at a time: a long film has hundreds of megabytes of them. `out` should be buffered.
+/// Writes the flock as JSON, piece by piece, because a long film has hundreds of megabytes. `out` should be
+/// buffered.
 pub fn write_to(flock: &Flock, out: &mut impl Write) -> io::Result<()> {
     let file = FlockFile {
         schema: SCHEMA.into(),
@@ -49,7 +50,7 @@ pub fn write_to(flock: &Flock, out: &mut impl Write) -> io::Result<()> {
     out.write_all(b"\n]}\n")
 }
 
-/// Reads what `write` wrote.
+/// Parses the output of `write`.
 pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
     let file: FlockFile<Vec<IndividualFile>> = serde_json::from_slice(bytes)?;
     Ok(Flock {
@@ -78,11 +79,11 @@ struct FlockFile<Individuals> {
     fps: f64,
     image_size_px: [u32; 2],
     length_px: f64,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     space: Option<SpaceFile>,
     stats: StatsFile,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     predator: Vec<[f64; 3]>,
     individuals: Individuals,
@@ -94,7 +95,7 @@ struct IndividualFile {
     source_frame: Vec<u32>,
     mirrored: Vec<bool>,
     rotation_rad: Vec<f64>,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     continues_as: Option<u32>,
     fade: Vec<FadeFile>,
@@ -117,11 +118,11 @@ struct FadeFile {
     weight: Vec<f64>,
 }
 
-/// `position`: x, y and depth behind the tank's front, pixels; `speed`: body lengths a second.
+/// `position`: x, y and depth behind the front of the tank, pixels; `speed`: body lengths per second.
 #[derive(Serialize, Deserialize)]
 struct BoidFile {
     position: Vec<[f64; 3]>,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     forward: Option<Vec<[f64; 3]>>,
     heading_rad: Vec<f64>,
@@ -135,11 +136,11 @@ struct CostFile {
     speed: f64,
     transition: f64,
     crowd: f64,
-    /// Absent in files of before.
+    /// Absent in older files.
     #[serde(default)]
     repetition: f64,
     lower_bound: f64,
-    /// Every plan is the cheapest of its segments: true.
+    /// Always true: the plan of each segment is optimal.
     exact: bool,
 }
 
@@ -279,7 +280,7 @@ mod tests {
         assert_ne!(short, text);
         let error = read(short.as_bytes()).unwrap_err();
         assert!(error.to_string().contains("stats.per_frame"), "{error}");
-        // Files of before have none.
+        // Older files have none.
         let (from, to) = (text.find(r#","per_frame""#), text.find(r#"},"predator""#));
         let (from, to) = (from.unwrap(), to.unwrap());
         let before = [&text[..from], &text[to..]].concat();

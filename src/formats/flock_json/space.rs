@@ -1,8 +1,10 @@
-//! `space` of flock.json: how the tank is seen, and where it ends, body lengths (ALGORITHMS.md 7).
+//! `space` of flock.json: the camera and the walls of the tank, in body lengths (docs/reference/formats.md,
+//! "flock.json").
 //!
-//! A boid at `position` (x, y, behind) is z = `front_bl` + behind / `length_px` body lengths from the camera, and
-//! (x - cx) / px to its right, y alike, with px = `focal_px` / (`pane_bl` + (z - `pane_bl`) / `medium_index`) and cx of
-//! `center_px`; without a camera px = `length_px`, and the center is 0.
+//! A boid at `position` (x, y, behind) is at depth z = `front_bl` + behind / `length_px` body lengths from
+//! the camera. It is (x - cx) / px body lengths to the right of the camera, and likewise in y. With a camera,
+//! cx is from `center_px` and px = `focal_px` / (`pane_bl` + (z - `pane_bl`) / `medium_index`). Without one,
+//! cx is 0 and px = `length_px`.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +12,7 @@ use crate::flock::Space;
 use crate::flock::boids::tank::Wall;
 use crate::flock::lens::{Lens, Pinhole};
 
-/// `camera` is null where every place is seen at the same size.
+/// `camera` is null if the size in the picture does not depend on the position.
 #[derive(Serialize, Deserialize)]
 pub(super) struct SpaceFile {
     camera: Option<CameraFile>,
@@ -25,11 +27,11 @@ struct CameraFile {
     center_px: [f64; 2],
     pane_bl: f64,
     medium_index: f64,
-    /// Null where metres are not known.
+    /// Metres per body length; null if unknown.
     m_per_bl: Option<f64>,
 }
 
-/// Inside is where `outward` . place <= `offset_bl`.
+/// A point is inside if `outward` . point <= `offset_bl`.
 #[derive(Serialize, Deserialize)]
 struct WallFile {
     outward: [f64; 3],
@@ -57,7 +59,7 @@ impl SpaceFile {
         }
     }
 
-    /// Of a file of before, which tells none, a plane without walls.
+    /// Returns the space; for an older file without one, a plane without walls.
     pub(super) fn into_space(file: Option<SpaceFile>, length_px: f64) -> Space {
         let Some(file) = file else {
             return Space {

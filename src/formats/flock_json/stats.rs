@@ -1,4 +1,4 @@
-//! The `stats` of flock.json: how good the flock is, and the order of its boids in the mean and in every frame.
+//! `stats` of flock.json: quality of the flock, and order of its boids on average and in every frame.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,23 +9,23 @@ pub(super) struct StatsFile {
     heading_error_median_rad: f64,
     heading_error_p90_rad: f64,
     jumps_per_100_frames: f64,
-    /// Absent in files of before; 0 then.
+    /// Absent in older files; then 0.
     #[serde(default)]
     repeats_per_100_frames: f64,
     path_deviation_p95_bl: f64,
     slip_median_rad: f64,
     clone_share: f64,
-    /// Absent in files of before; 0 then.
+    /// Absent in older files; then 0.
     #[serde(default)]
     distinct_looks: u32,
-    /// Absent in files of before; 0 then.
+    /// Absent in older files; then 0.
     #[serde(default)]
     room_for: u32,
     variety: f64,
     polarization: f64,
     milling: f64,
     nearest_neighbor_bl: f64,
-    /// This and what follows: absent in files of before; 0 and empty then.
+    /// This field and the following ones are absent in older files; then 0 or empty.
     #[serde(default)]
     spacing_bl: f64,
     #[serde(default)]
@@ -46,7 +46,7 @@ pub(super) struct StatsFile {
     per_frame: OrdersFile,
 }
 
-/// The order of every frame, measure by measure.
+/// The order of every frame, one list per measure.
 #[derive(Default, Serialize, Deserialize)]
 struct OrdersFile {
     polarization: Vec<f64>,
@@ -86,7 +86,7 @@ impl StatsFile {
         }
     }
 
-    /// The order of every frame; refused when a measure has not as many frames as the others.
+    /// Returns the order of every frame. Fails if the lists differ in length.
     pub(super) fn orders(&self) -> Result<Vec<Order>, serde_json::Error> {
         self.per_frame.orders()
     }

@@ -1,8 +1,8 @@
-//! The virtual fish as one GLB file: mesh, skin of 8 joints, animation (ALGORITHMS.md 4; ECOSYSTEM.md
-//! 9). No errors in the Khronos validator.
+//! The virtual fish as one GLB file: mesh, skin of 8 joints and animation (docs/reference/formats.md,
+//! "Virtual fish"). The Khronos validator reports no errors.
 //!
-//! glTF is y up and right-handed: a camera-frame point (x, y, z) becomes (x, -y, -z), half a turn
-//! about x. The filming camera then stands at the origin and looks along -z, as glTF wants it.
+//! glTF is right-handed with y up. The point (x, y, z) in camera coordinates becomes (x, -y, -z), a rotation
+//! by pi about the x axis. The filming camera is then at the origin and looks along -z, as glTF requires.
 
 mod pack;
 
@@ -19,7 +19,7 @@ use crate::fish::Motion;
 use crate::fish::mesh::{Mesh as FishMesh, Vertex};
 use crate::fish::spine::{N_JOINTS, about_y, joint_at_rest_m};
 
-/// The motion as the bytes of a GLB file.
+/// Returns the motion as the bytes of a GLB file.
 pub fn write(motion: &Motion) -> Vec<u8> {
     let fish = FishMesh::goldfish(motion.size, motion.palette);
     let mut packer = Packer::default();
@@ -47,7 +47,7 @@ pub fn write(motion: &Motion) -> Vec<u8> {
     packer.into_glb()
 }
 
-/// The node that is moved through space: the first of all nodes.
+/// Index of the node that carries the motion of the whole fish: the first node.
 const ROOT: u32 = 0;
 
 fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
@@ -103,7 +103,7 @@ fn add_material(packer: &mut Packer, name: &str, alpha: AlphaMode, rough: f32) -
     })
 }
 
-/// The root and the chain of joints below it, each at rest; returns the first joint.
+/// Adds the root and the chain of joints below it, all at rest. Returns the first joint.
 fn add_skeleton(packer: &mut Packer, motion: &Motion) -> u32 {
     let child = |node: u32| Some(vec![Index::new(node)]);
     let start = motion.frames.first();
@@ -152,7 +152,7 @@ fn add_skin(packer: &mut Packer, motion: &Motion, first_joint: u32) -> Index<Ski
     })
 }
 
-/// The filming camera, where glTF can say it: straight ahead is the middle of the image, no
+/// Adds the filming camera if glTF can represent it: principal point in the middle of the image and no
 /// refraction.
 fn add_camera(packer: &mut Packer, motion: &Motion) -> Option<Index<Node>> {
     let (camera, [width, height]) = (&motion.camera, motion.image_size_px.map(f64::from));
@@ -243,7 +243,7 @@ fn add_animation(packer: &mut Packer, motion: &Motion, first_joint: u32) {
     });
 }
 
-/// Channels that share one list of times.
+/// Animation channels that share one list of times.
 struct Tracks {
     times: Index<gltf_json::Accessor>,
     channels: Vec<Channel>,
@@ -282,13 +282,13 @@ impl Tracks {
     }
 }
 
-/// From the camera frame to glTF's.
+/// Converts a point from camera coordinates to glTF coordinates.
 fn y_up([x, y, z]: [f64; 3]) -> [f32; 3] {
-    // Adding zero turns -0 into 0.
+    // Adding 0.0 turns -0 into 0.
     [x as f32 + 0.0, 0.0 - y as f32, 0.0 - z as f32]
 }
 
-/// The same turn seen from glTF's frame: conjugated with half a turn about x.
+/// Converts a rotation from camera coordinates to glTF coordinates.
 fn turned(rotation: glam::DQuat) -> [f32; 4] {
     let q = rotation.normalize();
     [
@@ -312,7 +312,7 @@ fn weights(vertex: &Vertex) -> [f32; 4] {
     [1.0 - vertex.share, vertex.share, 0.0, 0.0]
 }
 
-/// Encoded sRGB to the linear values of glTF's vertex colors; alpha as it is.
+/// Converts encoded sRGB to the linear values of glTF's vertex colors; alpha is unchanged.
 fn linear([r, g, b, a]: [f32; 4]) -> [u16; 4] {
     let whole = |v: f64| (v.clamp(0.0, 1.0) * 65535.0).round() as u16;
     let decode = |v: f32| {

@@ -1,19 +1,19 @@
-//! Packs numbers into the one buffer of a GLB file, and frames the file: every accessor starts at a
-//! multiple of four bytes and is described next to its bytes.
+//! Packs numbers into the buffer of a GLB file and writes the file. Each accessor starts at a multiple of
+//! four bytes.
 
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::buffer::{Buffer, Target, View};
 use gltf_json::validation::{Checked::Valid, USize64};
 use gltf_json::{Accessor, Index, Root, Value};
 
-/// A GLB under construction.
+/// A GLB file under construction.
 #[derive(Default)]
 pub(super) struct Packer {
     pub(super) root: Root,
     bytes: Vec<u8>,
 }
 
-/// What an accessor says of its numbers.
+/// The element type of an accessor.
 struct Kind {
     component: ComponentType,
     shape: Type,
@@ -35,18 +35,18 @@ impl Kind {
 const VERTICES: Option<Target> = Some(Target::ArrayBuffer);
 
 impl Packer {
-    /// Vertex positions, with the bounds that glTF demands.
+    /// Adds vertex positions, with the bounds that glTF requires.
     pub(super) fn positions(&mut self, points: &[[f32; 3]]) -> Index<Accessor> {
         let accessor = self.vectors(points);
         self.bound(accessor, points)
     }
 
-    /// Vertex normals.
+    /// Adds vertex normals.
     pub(super) fn vectors(&mut self, vectors: &[[f32; 3]]) -> Index<Accessor> {
         self.floats(vectors, Type::Vec3, VERTICES)
     }
 
-    /// Vertex colors: 65535 is 1.
+    /// Adds vertex colors; 65535 is 1.
     pub(super) fn colors(&mut self, colors: &[[u16; 4]]) -> Index<Accessor> {
         let bytes = colors
             .iter()
@@ -57,18 +57,18 @@ impl Packer {
         self.add(bytes, colors.len(), kind)
     }
 
-    /// The joints of each vertex.
+    /// Adds the joints of each vertex.
     pub(super) fn joints(&mut self, joints: &[[u8; 4]]) -> Index<Accessor> {
         let kind = Kind::of(ComponentType::U8, Type::Vec4, VERTICES);
         self.add(joints.concat(), joints.len(), kind)
     }
 
-    /// The weights of those joints.
+    /// Adds the weights of those joints.
     pub(super) fn weights(&mut self, weights: &[[f32; 4]]) -> Index<Accessor> {
         self.floats(weights, Type::Vec4, VERTICES)
     }
 
-    /// Triangles.
+    /// Adds triangles.
     pub(super) fn indices(&mut self, triangles: &[[u32; 3]]) -> Index<Accessor> {
         let bytes = triangles
             .iter()
@@ -80,29 +80,29 @@ impl Packer {
         self.add(bytes, 3 * triangles.len(), kind)
     }
 
-    /// Column-major matrices.
+    /// Adds column-major matrices.
     pub(super) fn matrices(&mut self, matrices: &[[f32; 16]]) -> Index<Accessor> {
         self.floats(matrices, Type::Mat4, None)
     }
 
-    /// Times of keys, rising, with the bounds that glTF demands.
+    /// Adds key times in increasing order, with the bounds that glTF requires.
     pub(super) fn times(&mut self, times_s: &[f32]) -> Index<Accessor> {
         let rows: Vec<[f32; 1]> = times_s.iter().map(|&t| [t]).collect();
         let accessor = self.floats(&rows, Type::Scalar, None);
         self.bound(accessor, &rows)
     }
 
-    /// Keys of translation or scale.
+    /// Adds keys of translation or scale.
     pub(super) fn keys(&mut self, values: &[[f32; 3]]) -> Index<Accessor> {
         self.floats(values, Type::Vec3, None)
     }
 
-    /// Keys of rotation.
+    /// Adds keys of rotation.
     pub(super) fn turns(&mut self, values: &[[f32; 4]]) -> Index<Accessor> {
         self.floats(values, Type::Vec4, None)
     }
 
-    /// The whole file: header, JSON padded with spaces, buffer padded with zeros.
+    /// Returns the whole file: header, JSON padded with spaces, buffer padded with zeros.
     pub(super) fn into_glb(mut self) -> Vec<u8> {
         self.root.buffers.push(Buffer {
             byte_length: USize64::from(self.bytes.len()),

@@ -1,5 +1,4 @@
-//! The file is read back by its bytes alone: what a loader would make of it is where the renderer
-//! puts the fish.
+//! Reads the file back and compares the pose of the fish in a glTF viewer with that in the renderer.
 
 use glam::{DMat4, DQuat, DVec3};
 use gltf_json::Root;
@@ -19,7 +18,7 @@ fn motion(n_frames: usize) -> Motion {
     film.motion().clone()
 }
 
-/// The two chunks of a GLB.
+/// Returns the two chunks of a GLB.
 fn open(file: &[u8]) -> (Root, Vec<u8>) {
     let word =
         |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("four bytes")) as usize;
@@ -33,7 +32,7 @@ fn open(file: &[u8]) -> (Root, Vec<u8>) {
     (root, file[bin_at + 8..].to_vec())
 }
 
-/// The floats of an accessor.
+/// Returns the floats of an accessor.
 fn floats(root: &Root, bytes: &[u8], accessor: usize) -> Vec<f32> {
     let view = root.accessors[accessor].buffer_view.expect("it has bytes");
     let view = &root.buffer_views[view.value()];

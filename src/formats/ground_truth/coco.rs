@@ -1,5 +1,5 @@
-//! coco.json: one annotation for every individual and frame in which it can be seen, with track ids and
-//! what else is known as further fields (COCO's format; ALGORITHMS.md 8).
+//! coco.json in the COCO format: one annotation for each individual and frame in which it is visible. Track
+//! ids and other known values are additional fields (docs/reference/formats.md, "Ground truth").
 
 use std::io::{self, Write};
 
@@ -11,7 +11,7 @@ use crate::flock::composite::truth::{FrameTruth, Seen};
 use crate::formats::poses_json::round;
 use crate::geometry::Rect;
 
-/// A coco.json being written.
+/// Writes a coco.json.
 pub struct Coco<W: Write> {
     out: W,
     n_annotations: u64,
@@ -47,7 +47,7 @@ struct Annotation {
     mirrored: bool,
 }
 
-/// `size` is [height, width], as COCO has it.
+/// `size` is [height, width], as in COCO.
 #[derive(Serialize)]
 struct RunLengths {
     size: [u32; 2],
@@ -55,7 +55,7 @@ struct RunLengths {
 }
 
 impl<W: Write> Coco<W> {
-    /// Begins the file: all that is known without looking at a frame.
+    /// Starts the file with everything known before the first frame.
     pub fn begin(mut out: W, film: &FilmShape) -> io::Result<Coco<W>> {
         let version = env!("CARGO_PKG_VERSION");
         write!(
@@ -84,7 +84,7 @@ impl<W: Write> Coco<W> {
         })
     }
 
-    /// Adds everyone who can be seen in a frame.
+    /// Adds the annotations of all visible individuals in a frame.
     pub fn add(&mut self, flock: &Flock, frame_idx: usize, truth: &FrameTruth) -> io::Result<()> {
         for (individual, seen) in everyone(flock, truth) {
             let Some(visible_box) = seen.visible_box else {
@@ -116,7 +116,7 @@ impl<W: Write> Coco<W> {
         Ok(())
     }
 
-    /// Ends the file.
+    /// Completes the file.
     pub fn end(mut self) -> io::Result<()> {
         self.out.write_all(b"\n]}\n")?;
         self.out.flush()

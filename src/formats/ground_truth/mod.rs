@@ -1,9 +1,9 @@
-//! The ground truth of a flock as the field's tools read it (ALGORITHMS.md 8): COCO with run lengths,
-//! MOTChallenge, label pictures, one table. Written frame by frame, so that memory does not grow with
-//! the film.
+//! Ground truth of a flock in common formats (docs/reference/formats.md, "Ground truth"): COCO, MOTChallenge,
+//! label pictures and a CSV table. It is written frame by frame, so memory does not grow with the length of
+//! the video.
 //!
-//! Everything is in pixels of the film. A `track_id`, a label and a MOTChallenge identity are the id of
-//! flock.json + 1, because 0 is the background.
+//! Coordinates are pixels of the video. A `track_id`, a label and a MOTChallenge identity are the id of
+//! flock.json plus 1, because 0 is the background.
 
 pub mod coco;
 pub mod mot;
@@ -13,23 +13,23 @@ pub mod tracks;
 use crate::flock::composite::truth::{FrameTruth, Seen};
 use crate::flock::{Flock, Individual};
 
-/// The film that a ground truth speaks of.
+/// Size and length of the video that the ground truth describes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilmShape {
-    /// Width and height.
+    /// Width and height, pixels.
     pub size_px: [u32; 2],
-    /// Frames.
+    /// Number of frames.
     pub n_frames: usize,
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
 }
 
-/// The file name of a frame's label picture, and of the frame when it is a picture.
+/// Returns the file name of a frame's label picture, and of the frame in a picture sequence.
 pub fn frame_name(frame_idx: usize) -> String {
     format!("{frame_idx:06}.png")
 }
 
-/// Everyone in a frame, by id.
+/// Yields all individuals with their truth in a frame, by id.
 fn everyone<'a>(
     flock: &'a Flock,
     truth: &'a FrameTruth,
@@ -37,7 +37,7 @@ fn everyone<'a>(
     flock.individuals.iter().zip(&truth.seen)
 }
 
-/// What the files mean, for whoever unpacks them.
+/// Explanation of the files, for users who unpack them.
 pub const README: &str = "\
 The ground truth of a flock made by flockreel, told by the compositor itself.
 

@@ -1,5 +1,5 @@
-//! MOTChallenge: gt/gt.txt and seqinfo.ini. Frames, identities and places count from 1, as its tools
-//! expect; boxes are those of the whole animal (ALGORITHMS.md 8).
+//! MOTChallenge files gt/gt.txt and seqinfo.ini. Frames, identities and coordinates count from 1, as its
+//! tools expect; boxes are amodal (docs/reference/formats.md, "Ground truth").
 
 use std::io::{self, Write};
 
@@ -8,7 +8,7 @@ use crate::flock::Flock;
 use crate::flock::composite::truth::FrameTruth;
 use crate::formats::poses_json::round;
 
-/// The lines of one frame: everyone of whom anything is in the picture.
+/// Writes the lines of one frame, for all individuals at least partly in the picture, hidden or not.
 ///
 /// The columns are frame, identity, left, top, width, height, 1 (counts), 1 (class), visibility.
 pub fn write_frame(
@@ -37,7 +37,7 @@ pub fn write_frame(
     Ok(())
 }
 
-/// seqinfo.ini.
+/// Returns seqinfo.ini.
 pub fn sequence(film: &FilmShape) -> String {
     let [width, height] = film.size_px;
     format!(

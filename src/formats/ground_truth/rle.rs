@@ -1,13 +1,15 @@
-//! COCO's run lengths: how many pixels are clear, then set, then clear..., down the columns; and the
-//! text that pycocotools makes of them (its `maskApi`: differences to the count before the last, six
-//! bits a letter, the lowest first).
+//! Run lengths of COCO masks: alternating counts of clear and set pixels, column by column, and their text
+//! encoding.
+//!
+//! Source: `maskApi` of pycocotools. Each count is stored as its difference to the count two places before,
+//! in base-32 digits, lowest first.
 
 use std::iter::once;
 
 use crate::geometry::Rect;
 
-/// The counts of a mask in a picture of `size_px`, of which pixels outside `rect` are clear. The first
-/// count is of clear pixels; all add up to the picture.
+/// Returns the counts of a mask in a picture of `size_px`. Pixels outside `rect` are clear. The first count
+/// is of clear pixels; the sum is the number of pixels of the picture.
 pub fn counts(size_px: [u32; 2], rect: Rect, is_set: impl Fn(u32, u32) -> bool) -> Vec<u32> {
     let height = size_px[1];
     let mut edges = Vec::new();
@@ -28,7 +30,7 @@ pub fn counts(size_px: [u32; 2], rect: Rect, is_set: impl Fn(u32, u32) -> bool) 
     starts.zip(ends).map(|(start, end)| end - start).collect()
 }
 
-/// Counts as COCO's text.
+/// Returns the counts in COCO's text encoding.
 pub fn text(counts: &[u32]) -> String {
     let mut text = String::new();
     for (k, &count) in counts.iter().enumerate() {
@@ -37,7 +39,7 @@ pub fn text(counts: &[u32]) -> String {
         loop {
             let low = (rest & 0x1f) as u8;
             rest >>= 5;
-            // Done when all that is left repeats the sign, which is the letter's fifth bit.
+            // Stop when the rest only repeats the sign, which is the highest bit of the digit.
             let done = rest == if low & 0x10 == 0 { 0 } else { -1 };
             text.push(char::from(48 + low + if done { 0 } else { 0x20 }));
             if done {
@@ -48,7 +50,7 @@ pub fn text(counts: &[u32]) -> String {
     text
 }
 
-/// The counts of a text, or `None` when it is none.
+/// Returns the counts of a text, or `None` if it is malformed.
 pub fn read(text: &str) -> Option<Vec<u32>> {
     let mut counts: Vec<u32> = Vec::new();
     let (mut value, mut shift) = (0i64, 0);

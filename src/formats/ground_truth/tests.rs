@@ -1,4 +1,4 @@
-//! The files of a ground truth against the labels that they were made of.
+//! Compares the files of a ground truth with the labels from which they were made.
 
 use serde_json::Value;
 

@@ -1,5 +1,5 @@
-//! tracks.csv: one row for each frame and individual (ALGORITHMS.md 8), in pixels of the film; cells
-//! are empty where there is nothing.
+//! tracks.csv: one row for each frame and individual, in pixels of the video (docs/reference/formats.md,
+//! "Ground truth"). Cells without a value are empty.
 
 use std::io::{self, Write};
 
@@ -13,7 +13,7 @@ pub const COLUMNS: &str = "frame,time_s,id,x_px,y_px,heading_rad,scale,depth_m,s
 rotation_rad,visible_x_px,visible_y_px,visible_w_px,visible_h_px,visible_area_px,amodal_x_px,amodal_y_px,\
 amodal_w_px,amodal_h_px,amodal_area_px,visibility\n";
 
-/// The rows of one frame.
+/// Writes the rows of one frame.
 pub fn write_frame(
     out: &mut impl Write,
     (flock, film): (&Flock, &FilmShape),

@@ -1,4 +1,4 @@
-//! The archives of a library's folder: mattes, or the sprites that were there before.
+//! Picture archives of a library folder: mattes, or the sprites of older libraries.
 
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
@@ -15,7 +15,7 @@ use crate::library::{Matte, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::Scratch;
 
-/// Writes a picture of every frame that has a sprite.
+/// Writes a picture for every frame that has a sprite.
 pub(super) fn write(
     dir: &Path,
     file: &'static str,
@@ -34,7 +34,7 @@ pub(super) fn write(
 pub(super) struct Archive<'a> {
     name: &'static str,
     file: File,
-    /// The centroid in each; `None` when they are sprites, and it lies at the middle.
+    /// Centroid in each matte; `None` for an archive of sprites, whose centroid is at the middle.
     pub(super) centers_px: Option<&'a [Option<[f64; 2]>]>,
 }
 
@@ -59,7 +59,7 @@ impl Archive<'_> {
         })
     }
 
-    /// Puts aside what the archive holds for every frame, none larger than `most_px`.
+    /// Stores the picture of every frame in `scratch`. Fails if one is larger than `most_px`.
     pub(super) fn mattes(
         &self,
         n_frames: usize,
@@ -105,7 +105,7 @@ impl Archive<'_> {
         })
     }
 
-    /// Reads a picture, no larger than `most_px`.
+    /// Reads a picture of at most `most_px`.
     fn picture(&self, entry: &Entry, most_px: [u32; 2]) -> Result<RgbaImage, Error> {
         let file = self.name;
         let mut bytes = vec![0; entry.n_bytes];

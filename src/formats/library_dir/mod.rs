@@ -1,12 +1,13 @@
-//! A library as a folder: library.json, poses.json, background.png, occluders.png where something is known to stand
-//! before the animal, and mattes.zip, whose entries
-//! 000000.png ... are the animal as filmed in straight-alpha RGBA, stored, so that any tool opens them. Where its
-//! centroid lies in each, library.json tells. A frame without the animal has no entry.
+//! A library as a folder: library.json, poses.json, background.png, mattes.zip, and occluders.png if there
+//! are known objects in front of the animal (docs/reference/formats.md, "library.json" and "mattes.zip").
 //!
-//! Sprites, all of one size with the centroid at the middle, are made of the mattes; an archive of them is for
-//! export. Libraries of before have such an archive in place of the mattes, and are still read.
+//! The entries 000000.png ... of mattes.zip show the animal as filmed in straight-alpha RGBA. They are
+//! uncompressed zip entries. library.json holds the centroid in each. A frame without the animal has no
+//! entry.
 //!
-//! The only module of ring 2 that touches the file system.
+//! Sprites are computed from the mattes; an archive of them is for export only. Older libraries have such an
+//! archive instead of the mattes and can still be read. This is the only module of ring 2 that accesses the
+//! file system.
 
 mod archive;
 
@@ -23,56 +24,56 @@ use crate::library::{Library, Shadow, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
-/// Why a folder is not a library.
+/// Reasons why a library folder cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file is missing or cannot be read or written.
     #[error("{file}: {cause}")]
     Io {
-        /// Which file of the folder.
+        /// Name of the file in the folder.
         file: &'static str,
-        /// What the system said.
+        /// The system's error.
         cause: io::Error,
     },
-    /// A JSON file does not hold what it should.
+    /// A JSON file has unexpected contents.
     #[error("{file}: {cause}")]
     Json {
-        /// Which file of the folder.
+        /// Name of the file in the folder.
         file: &'static str,
-        /// Where and why.
+        /// Position and reason.
         cause: serde_json::Error,
     },
-    /// A picture is not what it should be.
+    /// A picture has an unexpected format.
     #[error("{file}: {cause}")]
     Picture {
-        /// Which file of the folder.
+        /// Name of the file in the folder.
         file: &'static str,
-        /// What was found.
+        /// The reason.
         cause: picture::Error,
     },
     /// An archive of pictures is damaged.
     #[error("{file}: {cause}")]
     Zip {
-        /// Which file of the folder.
+        /// Name of the file in the folder.
         file: &'static str,
-        /// What was found.
+        /// The reason.
         cause: zip::result::ZipError,
     },
-    /// The mattes found no room beside the folder.
+    /// The scratch for the mattes is full.
     #[error(transparent)]
     Full(#[from] Full),
-    /// The files do not belong together.
+    /// The files contradict each other.
     #[error("the files do not belong together: {0}")]
     Mismatch(&'static str),
 }
 
-/// A library as it was read, with what made it.
+/// A stored library with its origin.
 pub struct StoredLibrary {
     /// The library.
     pub library: Library,
-    /// The parameters of its analysis.
+    /// Parameters of its analysis.
     pub params: Params,
-    /// The footage it came from.
+    /// The footage from which it was made.
     pub footage: FootageSummary,
 }
 
@@ -82,13 +83,13 @@ const BACKGROUND: &str = "background.png";
 const OCCLUDERS: &str = "occluders.png";
 const MATTES: &str = "mattes.zip";
 const SPRITES: &str = "sprites.zip";
-/// No picture of a library has a longer side.
+/// Maximum width and height of the pictures in a library, pixels. Free choice.
 const MOST_SIDE_PX: u32 = 16384;
-/// The files that a library is read from; there may be others beside them. Of the archives one is enough, and only
-/// some libraries have occluders.
+/// Files from which a library is read; the folder may hold others. One of the archives is sufficient, and
+/// only some libraries have occluders.
 pub const FILES: [&str; 6] = [LIBRARY, POSES, BACKGROUND, OCCLUDERS, MATTES, SPRITES];
 
-/// Writes a library into a folder, which is made if need be.
+/// Writes a library into a folder, which is created if needed.
 pub fn write(
     dir: &Path,
     library: &Library,
@@ -102,7 +103,7 @@ pub fn write(
     put(POSES, &poses_json::write(&library.poses, Some(params)))?;
     put(BACKGROUND, &picture::write_rgb(&library.background))?;
     write_mattes(dir, &library.sprites)?;
-    // What an earlier analysis left there is not of this library.
+    // Remove the sprites of an earlier analysis.
     fs::remove_file(dir.join(SPRITES)).ok();
     match &library.occluders {
         Some(image) => {
@@ -131,8 +132,7 @@ fn write_mattes(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
     })
 }
 
-/// Reads a library from a folder.
-/// The mattes are put aside in `scratch`.
+/// Reads a library from a folder and stores its mattes in `scratch`.
 pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Error> {
     let get =
         |file: &'static str| fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause });
@@ -184,7 +184,7 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
     })
 }
 
-/// What stands before the animal.
+/// Reads the objects in front of the animal.
 fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<RgbaImage, Error> {
     let file = OCCLUDERS;
     let bytes = fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause })?;
@@ -198,7 +198,7 @@ fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<RgbaImage, Error> {
     }
 }
 
-/// Whether what library.json says can be said of so many frames.
+/// Checks that library.json is valid for `n_frames` frames.
 fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
     let jumps = summary.playback.jumps.iter().flat_map(|j| [j.from, j.to]);
     let component = summary.playback.component.iter().copied();
@@ -319,7 +319,7 @@ mod tests {
             (back.params, back.footage),
             (Params::default(), footage.clone())
         );
-        // What was analyzed into the same folder before is not of a library that has nothing before the animal.
+        // Occluders of an earlier analysis are removed if the new library has none.
         let open = Library {
             occluders: None,
             ..library

@@ -1,19 +1,19 @@
-//! What runs from left to right in a picture: seconds of the footage, or frames, with round ticks.
+//! Horizontal axis of a chart: seconds of the footage or frames, with ticks at round numbers.
 
 use super::{LEFT, RIGHT, Sheet};
 use crate::library::Poses;
 
-/// A span from 0 to `end`, laid from `left` to `right`.
+/// A range from 0 to `end`, drawn from `left` to `right`.
 pub(super) struct Axis {
     pub(super) left: f64,
     pub(super) right: f64,
     pub(super) end: f64,
-    /// Said at the first tick.
+    /// Unit, shown at the first tick.
     unit: &'static str,
 }
 
 impl Axis {
-    /// The seconds of a footage, over the whole width.
+    /// Returns the time axis of a footage, over the whole width.
     pub(super) fn of_time(poses: &Poses) -> Axis {
         let end_s = poses.frames.last().map_or(1.0, |pose| pose.time_s);
         Axis {
@@ -24,7 +24,7 @@ impl Axis {
         }
     }
 
-    /// So many frames between two places.
+    /// Returns an axis of `n_frames` frames between two positions.
     pub(super) fn of_frames(n_frames: usize, [left, right]: [f64; 2]) -> Axis {
         Axis {
             left,
@@ -38,7 +38,7 @@ impl Axis {
         self.left + at / self.end * (self.right - self.left)
     }
 
-    /// Lines at round places through a plot from `top` to `bottom`, named under it.
+    /// Draws the tick lines through a plot from `top` to `bottom`, with labels below.
     pub(super) fn draw(&self, sheet: &mut Sheet, top: f64, bottom: f64) {
         self.draw_lines(sheet, top, bottom + 5.0);
         let step = self.step();
@@ -49,14 +49,14 @@ impl Axis {
                 0.0 => format!("{} 0", self.unit),
                 label => format!("{label}"),
             };
-            // The last one keeps inside the picture.
+            // The last label stays inside the picture.
             let half = 4.2 * label.chars().count() as f64;
             let x = self.x(at).min(super::WIDTH - half - 2.0);
             sheet.text("soft", "middle", [x, bottom + 20.0], &label);
         }
     }
 
-    /// The lines alone.
+    /// Draws only the tick lines.
     pub(super) fn draw_lines(&self, sheet: &mut Sheet, top: f64, bottom: f64) {
         for tick in 0..=self.n_steps() {
             let x = self.x(f64::from(tick) * self.step());
@@ -64,7 +64,7 @@ impl Axis {
         }
     }
 
-    /// About one tick to a hundred pixels.
+    /// Returns the tick interval, for about one tick per 100 pixels.
     fn step(&self) -> f64 {
         let n_ticks = ((self.right - self.left) / 96.0).round().max(2.0);
         let step = round_step(self.end / n_ticks);
@@ -79,7 +79,7 @@ impl Axis {
     }
 }
 
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+/// Returns the smallest of 1, 2 and 5 times a power of ten that is at least `least`.
 pub(super) fn round_step(least: f64) -> f64 {
     let power = libm::pow(10.0, libm::log10(least.max(1e-9)).floor());
     [1.0, 2.0, 5.0]

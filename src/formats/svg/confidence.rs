@@ -1,4 +1,4 @@
-//! confidence.svg: how far each frame's measurement is to be trusted, as strips over one time axis.
+//! confidence.svg: the confidence of each frame's measurement, as strips over a common time axis.
 
 use std::fmt::Write;
 
@@ -7,10 +7,10 @@ use super::{LEFT, RIGHT, Sheet, fill, rimmed, runs};
 use crate::library::{Pose, Poses};
 
 const TOP: f64 = 44.0;
-/// Height of a strip and the room below it.
+/// Height of a strip and the gap below it.
 const STRIP: [f64; 2] = [30.0, 10.0];
 
-/// How sure the measurement is, frame by frame, as an SVG picture 960 wide.
+/// Returns the confidence over time as an SVG picture, 960 wide.
 pub fn confidence(poses: &Poses) -> String {
     let axis = Axis::of_time(poses);
     let cut = poses.frames.iter().filter(|pose| pose.cut).count();
@@ -69,7 +69,7 @@ impl Rows<'_> {
         [from, to].map(|k| self.axis.x(k as f64 / self.poses.fps).min(RIGHT))
     }
 
-    /// Whether something holds.
+    /// Draws a strip with a bar for each run of frames in which `holds` is true.
     fn spans(&mut self, name: &str, role: &str, holds: impl Fn(&Pose) -> bool) {
         self.label(name);
         let frames = &self.poses.frames;
@@ -81,8 +81,8 @@ impl Rows<'_> {
         self.y += STRIP[0] + STRIP[1];
     }
 
-    /// A value between two bounds: the least of the frames that share a place, so that no short
-    /// doubt is averaged away.
+    /// Draws a value between two bounds. Frames that share a position show their minimum, so that short drops
+    /// stay visible.
     fn curve(&mut self, name: &str, [low, high]: [f64; 2], of: impl Fn(&Pose) -> Option<f64>) {
         self.label(name);
         let frames = &self.poses.frames;
@@ -105,7 +105,7 @@ impl Rows<'_> {
         self.y = bottom + STRIP[1];
     }
 
-    /// Where the tail beat was measured, with its rate.
+    /// Draws the spans of measured tail beats with their frequency.
     fn beats(&mut self) {
         let Some(beat) = &self.poses.tail_beat else {
             return;
@@ -167,7 +167,7 @@ mod tests {
             tail_beat: None,
         };
         let svg = confidence(&poses);
-        // The strip's bottom: two strips above it, and its own height.
+        // Bottom of the strip: two strips above it, plus its own height.
         assert!(svg.contains(&format!(" {:.1}L", TOP + 2.0 * 40.0 + 30.0)));
         assert!(svg.contains("found in 9000 of 9000"));
     }

@@ -1,20 +1,20 @@
-//! A heading as a curve. Where it passes from +180 to -180 degrees the line leaves at one edge and
-//! comes back at the other: a wrap is drawn as a wrap, not as a stroke through the whole circle.
+//! Curve of a heading over time. At the step from +180 to -180 degrees the line leaves at one edge and
+//! continues at the opposite one, instead of crossing the plot.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
 
-/// One place of a curve.
+/// One point of a curve.
 #[derive(Clone, Copy)]
 pub(super) struct Place {
     pub(super) x: f64,
-    /// In (-pi, pi]; `None` breaks the curve.
+    /// Heading in (-pi, pi]; `None` breaks the curve.
     pub(super) heading_rad: Option<f64>,
-    /// Whether the stroke that leads here is drawn.
+    /// Whether to draw the line to this point.
     pub(super) drawn: bool,
 }
 
-/// The curve as path data; `y` places a heading.
+/// Returns the curve as SVG path data; `y` converts a heading to a coordinate.
 pub(super) fn wrapped(places: impl Iterator<Item = Place>, y: impl Fn(f64) -> f64) -> String {
     let mut path = String::new();
     let mut last: Option<(f64, f64)> = None;

@@ -1,6 +1,6 @@
-//! headings.svg: the heading over time (O's figure 5), as degrees on the page; up is above.
+//! headings.svg: the heading over time in degrees (Okabe et al., figure 5). -90 degrees (up) is near the top.
 //!
-//! Below it how sure the head is; where nothing is known the plot is shaded.
+//! A strip below shows the confidence of the head. Frames without a heading are shaded.
 
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -13,12 +13,12 @@ use crate::library::{Pose, Poses};
 const HEIGHT: f64 = 340.0;
 const TOP: f64 = 40.0;
 const BOTTOM: f64 = 262.0;
-/// The strip of head confidence.
+/// Top and bottom of the strip of head confidence.
 const STRIP: [f64; 2] = [272.0, 298.0];
-/// A head that is less sure than this is drawn thinly.
+/// Confidence below which a heading is drawn with a thin line. Free choice.
 const SURE: f64 = 0.9;
 
-/// The heading over time as an SVG picture of 960 by 340.
+/// Returns the heading over time as an SVG picture of 960 by 340.
 pub fn headings(poses: &Poses) -> String {
     let n_known = poses
         .frames
@@ -60,7 +60,7 @@ pub fn headings(poses: &Poses) -> String {
     sheet.finish()
 }
 
-/// The directions by their names, and shade where nothing is known.
+/// Draws the grid with the names of directions, and shades frames without a heading.
 fn grid(sheet: &mut Sheet, poses: &Poses, axis: &Axis, y: impl Fn(f64) -> f64) {
     for [from, to] in runs(poses.frames.len(), |k| {
         poses.frames[k].heading_rad.is_none()
@@ -92,7 +92,7 @@ fn grid(sheet: &mut Sheet, poses: &Poses, axis: &Axis, y: impl Fn(f64) -> f64) {
     }
 }
 
-/// How sure the head is, 0.5 at the bottom to 1 at the top.
+/// Draws the confidence of the head, 0.5 at the bottom to 1 at the top.
 fn strip(sheet: &mut Sheet, poses: &Poses, axis: &Axis) {
     sheet.text("soft", "end", [LEFT - 8.0, STRIP[1] - 8.0], "head sure");
     sheet.rect(
@@ -116,12 +116,12 @@ fn strip(sheet: &mut Sheet, poses: &Poses, axis: &Axis) {
     ));
 }
 
-/// Every so many frames are drawn: a picture does not hold more.
+/// Returns the step between drawn frames, which limits the number of points.
 fn stride(poses: &Poses) -> usize {
     poses.frames.len().div_ceil(6000).max(1)
 }
 
-/// The line as path data, of the poses chosen and the one that leads to each.
+/// Returns the line as path data. It contains the chosen poses and the step to each.
 fn line(
     poses: &Poses,
     chosen: impl Fn(&Pose) -> bool,

@@ -1,8 +1,8 @@
-//! Pictures for people, as SVG written by hand: of a library headings.svg, trajectory.svg,
-//! confidence.svg and transitions.svg, of a flock plan.svg (DESIGN.md, REST API).
+//! Charts as SVG: headings.svg, trajectory.svg, confidence.svg and transitions.svg of a library, plan.svg of
+//! a flock.
 //!
-//! Each has a title and a description for those who do not see it, and colors for a light page in its
-//! attributes, over which a style sheet lays those for a dark one.
+//! Each chart has a title and a description for screen readers. Its attributes hold the colors for a light
+//! page, and its style sheet those for a dark one.
 
 mod axis;
 mod confidence;
@@ -22,7 +22,7 @@ pub use transitions::transitions;
 
 use crate::library::Library;
 
-/// Every picture of a library, by its file name.
+/// Returns all charts of a library with their file names.
 pub fn pictures(library: &Library) -> [(&'static str, String); 4] {
     let poses = &library.poses;
     [
@@ -33,9 +33,9 @@ pub fn pictures(library: &Library) -> [(&'static str, String); 4] {
     ]
 }
 
-/// Width of every picture.
+/// Width of every chart.
 const WIDTH: f64 = 960.0;
-/// The part of a picture in which time runs from left to right.
+/// Left and right end of the plot area.
 const LEFT: f64 = 78.0;
 const RIGHT: f64 = WIDTH - 16.0;
 
@@ -50,13 +50,13 @@ const COLORS: &[(&str, &str, &str)] = &[
     ("water", "#1c6b78", "#6cc3cf"),
 ];
 
-/// A picture on its way.
+/// A chart under construction.
 struct Sheet {
     svg: String,
 }
 
 impl Sheet {
-    /// An empty picture of `WIDTH` by `height`.
+    /// Returns an empty chart of `WIDTH` by `height`.
     fn new(height: f64, title: &str, description: &str) -> Sheet {
         let mut sheet = Sheet {
             svg: String::with_capacity(1 << 16),
@@ -103,7 +103,7 @@ impl Sheet {
         ));
     }
 
-    /// A line of path data; `more` is further attributes.
+    /// Draws a line of path data; `more` holds further attributes.
     fn stroke(&mut self, role: &str, path: &str, more: &str) {
         if !path.is_empty() {
             self.put(format_args!(
@@ -132,13 +132,13 @@ fn stroke(role: &str) -> String {
     format!("class=\"{role}-stroke\" stroke=\"{}\"", light(role))
 }
 
-/// Filled in one role's color, drawn round in another's.
+/// Returns the attributes for a fill in one role's color and an outline in another's.
 fn rimmed(inside: &str, rim: &str) -> String {
     let (fill, stroke) = (light(inside), light(rim));
     format!("class=\"{inside} {rim}-stroke\" fill=\"{fill}\" stroke=\"{stroke}\"")
 }
 
-/// Runs of frames for which something holds: the first frame and the one after the last.
+/// Returns the runs of frames for which `holds` is true: the first frame and the frame after the last.
 fn runs(n_frames: usize, holds: impl Fn(usize) -> bool) -> Vec<[usize; 2]> {
     let mut runs: Vec<[usize; 2]> = Vec::new();
     for k in (0..n_frames).filter(|&k| holds(k)) {

@@ -1,6 +1,5 @@
-//! plan.svg: for each individual the heading that its boid asked for against the one that is shown,
-//! over the frames of the flock, with its jumps (O's figure 8). Wraps are drawn as wraps; of many
-//! individuals the first are drawn, and the picture says so.
+//! plan.svg: the heading of each boid and the heading displayed, over the frames of the flock, with the jumps
+//! (Okabe et al., figure 8). In a large flock only the first individuals are drawn, as the chart notes.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
@@ -12,19 +11,19 @@ use crate::flock::placement::is_jump;
 use crate::flock::{Flock, Individual};
 use crate::geometry::wrap_rad;
 
-/// Individuals drawn at most.
+/// Maximum number of drawn individuals. Free choice.
 const MOST: usize = 20;
 const TOP: f64 = 92.0;
-/// Room for an individual's words over its plot, and the air under it.
+/// Height of the label above a plot and of the gap below it.
 const ROOM: [f64; 2] = [20.0, 14.0];
-/// Added to a heading: the circle is cut open where it points straight down, because most animals
-/// head left and right.
+/// Rotation of headings before drawing, radians. It places the wrap of the angle at straight down, because
+/// most animals head left or right.
 const UP: f64 = PI / 2.0;
 const BOID: &str = "stroke-width=\"4\" stroke-opacity=\"0.5\" stroke-linejoin=\"round\"";
 const SHOWN: &str = "stroke-width=\"1.3\" stroke-linejoin=\"round\"";
 const JUMP: &str = "stroke-width=\"1.4\"";
 
-/// The plan of a flock as an SVG picture 960 wide.
+/// Returns the plan of a flock as an SVG picture, 960 wide.
 pub fn plan(flock: &Flock) -> String {
     let drawn = &flock.individuals[..flock.individuals.len().min(MOST)];
     let n_columns = if drawn.len() > 3 { 2 } else { 1 };
@@ -85,7 +84,7 @@ fn key(sheet: &mut Sheet, y: f64) {
     }
 }
 
-/// Where one individual is drawn.
+/// The plot of one individual.
 struct Panel {
     axis: Axis,
     /// Top and bottom.
@@ -131,12 +130,12 @@ impl Panel {
         sheet.stroke("ink", &ticks, JUMP);
     }
 
-    /// Where an angle from straight up stands.
+    /// Returns the y coordinate of an angle relative to straight up.
     fn y(&self, from_up_rad: f64) -> f64 {
         self.span[0] + (from_up_rad + PI) / TAU * (self.span[1] - self.span[0])
     }
 
-    /// A picture does not hold more than about two frames a pixel.
+    /// Returns the curve of the headings, with at most about two frames per pixel.
     fn curve(&self, headings_rad: &[f64]) -> String {
         let stride = headings_rad.len().div_ceil(2000).max(1);
         let places = headings_rad.iter().enumerate().step_by(stride);
@@ -149,7 +148,7 @@ impl Panel {
     }
 }
 
-/// The frames that do not go on from the one before.
+/// Returns the frames that do not continue the previous one.
 fn jumps(individual: &Individual) -> Vec<usize> {
     let shown = |t: usize| (individual.source_frame[t], individual.mirrored[t]);
     let frames = 1..individual.source_frame.len();

@@ -1,11 +1,11 @@
-//! trajectory.svg: the animal's way across the picture, colored by time, with its start, its end and
-//! a scale; where it was not seen, a dashed line.
+//! trajectory.svg: the path of the animal in the picture, colored by time, with its start, its end and a
+//! scale. Frames without the animal are bridged by a dashed line.
 
 use super::axis::round_step;
 use super::{RIGHT, Sheet, WIDTH, fill, rimmed, runs};
 use crate::library::Poses;
 
-/// From first to last, readable on light and dark.
+/// Colors from the first to the last frame, readable on light and dark pages.
 const RAMP: [[f64; 3]; 5] = [
     [42.0, 128.0, 160.0],
     [70.0, 165.0, 120.0],
@@ -13,15 +13,15 @@ const RAMP: [[f64; 3]; 5] = [
     [222.0, 112.0, 48.0],
     [190.0, 50.0, 110.0],
 ];
-/// Strokes of one color each that the way is cut into.
+/// Number of colors of the path.
 const N_COLORS: usize = 96;
-/// Room above and below the picture.
+/// Margins above and below the picture.
 const MARGINS: [f64; 2] = [44.0, 56.0];
 const SIDE: f64 = 16.0;
-/// The tallest that the picture is drawn.
+/// Maximum height of the picture.
 const MOST_HEIGHT: f64 = 900.0;
 
-/// The way of the animal as an SVG picture 960 wide, in proportion to the footage.
+/// Returns the path of the animal as an SVG picture, 960 wide, in the proportions of the footage.
 pub fn trajectory(poses: &Poses) -> String {
     let [width_px, height_px] = poses.image_size_px.map(|side| f64::from(side.max(1)));
     let zoom = ((RIGHT - SIDE) / width_px).min(MOST_HEIGHT / height_px);
@@ -65,7 +65,7 @@ fn way(sheet: &mut Sheet, poses: &Poses, place: impl Fn([f64; 2]) -> [f64; 2]) {
         }
     }
     let per_color = n_frames.div_ceil(N_COLORS).max(1);
-    // More points than this to a color nobody can tell apart.
+    // More points per color would not be distinguishable.
     let stride = per_color.div_ceil(64);
     for [from, to] in &spans {
         let mut at = *from;
@@ -88,7 +88,7 @@ fn way(sheet: &mut Sheet, poses: &Poses, place: impl Fn([f64; 2]) -> [f64; 2]) {
     ends(sheet, &spans, point);
 }
 
-/// A ring where the way begins, a disc where it ends.
+/// Draws a ring at the start of the path and a disc at its end.
 fn ends(sheet: &mut Sheet, spans: &[[usize; 2]], point: impl Fn(usize) -> Option<[f64; 2]>) {
     let (Some(first), Some(last)) = (spans.first(), spans.last()) else {
         return;
@@ -119,7 +119,8 @@ fn ends(sheet: &mut Sheet, spans: &[[usize; 2]], point: impl Fn(usize) -> Option
     }
 }
 
-/// A bar about a fifth of the picture long: metres at the animal's median depth, else pixels.
+/// Draws a scale bar about an eighth of the picture wide: in metres at the animal's median depth, otherwise
+/// in pixels.
 fn scale_bar(sheet: &mut Sheet, poses: &Poses, [x, y]: [f64; 2], zoom: f64) {
     let mut depths_m: Vec<f64> = (poses.frames.iter())
         .filter_map(|pose| pose.position_m.map(|p| p[2]))
@@ -155,7 +156,7 @@ fn scale_bar(sheet: &mut Sheet, poses: &Poses, [x, y]: [f64; 2], zoom: f64) {
     sheet.text("soft", "start", [end + 10.0, y + 4.5], &label);
 }
 
-/// Which color is when.
+/// Draws the key of the time colors.
 fn time_key(sheet: &mut Sheet, poses: &Poses, [right, y]: [f64; 2]) {
     const KEY: f64 = 160.0;
     let end_s = poses.frames.last().map_or(0.0, |pose| pose.time_s);

@@ -1,6 +1,6 @@
-//! transitions.svg: what may follow what, as an arc diagram (O's figure 7.2). Every jump is an arc
-//! over the frames of the footage, above the axis where the mirror side stays and below where it
-//! changes; the cheaper, the stronger. On the axis the patches, the runs between jump ends.
+//! transitions.svg: the playback graph as an arc diagram (Okabe et al., figure 7.2). Each jump is an arc over
+//! the frames of the footage, above the axis if the mirror side stays and below if it changes. Cheaper jumps
+//! have stronger lines. The axis shows the patches, the runs between jump ends.
 
 use std::fmt::Write;
 
@@ -8,19 +8,20 @@ use super::axis::Axis;
 use super::{LEFT, RIGHT, Sheet, fill, stroke};
 use crate::library::{Jump, Library};
 
-/// The top of the highest arc.
+/// Top of the highest arc.
 const TOP: f64 = 64.0;
-/// How high an arc over the whole footage would be.
+/// Height of an arc over the whole footage.
 const HIGHEST: f64 = 250.0;
 /// Height of the axis with its patches.
 const BAND: f64 = 20.0;
-/// More arcs than these nobody can tell apart: the cheapest are drawn.
+/// Maximum number of drawn arcs, the cheapest; more would not be distinguishable. Free choice.
 const MOST_ARCS: usize = 4000;
 
-/// So many arcs are drawn with the pens below; of more each is thinner, of fewer stronger.
+/// Number of arcs for which the line widths below hold. Lines are thinner for more arcs and stronger for
+/// fewer.
 const USUAL_ARCS: f64 = 500.0;
 
-/// Costs up to this share of epsilon, and how they are drawn.
+/// Line style of jumps that cost at most `most` times epsilon.
 struct Class {
     most: f64,
     role: &'static str,
@@ -29,7 +30,7 @@ struct Class {
     name: &'static str,
 }
 
-/// From the costliest, which lie undermost.
+/// The costliest first, so that cheaper ones are drawn over them.
 const CLASSES: [Class; 4] = [
     Class {
         most: f64::INFINITY,
@@ -72,13 +73,13 @@ impl Class {
     }
 }
 
-/// The jumps of a library as an SVG picture 960 wide.
+/// Returns the jumps of a library as an SVG picture, 960 wide.
 pub fn transitions(library: &Library) -> String {
     let playback = &library.playback;
     let n_mirrored = playback.jumps.iter().filter(|jump| jump.mirrored).count();
     let axis = Axis::of_frames(library.poses.frames.len(), [LEFT, RIGHT]);
     let jumps = cheapest(&playback.jumps);
-    // Room for the highest arc either side, and for the words beside it.
+    // Space for the highest arc on either side, and for the label beside it.
     let highest = |mirrored: bool| {
         let of_side = jumps.iter().filter(|jump| jump.mirrored == mirrored);
         let rises = of_side.map(|jump| rise(jump, &axis) + 6.0);
@@ -117,7 +118,7 @@ fn summary(library: &Library, n_mirrored: usize, n_drawn: usize) -> String {
     )
 }
 
-/// At most `MOST_ARCS` of them, the costliest first, so that the cheapest are drawn over them.
+/// Returns the cheapest `MOST_ARCS` jumps, the costliest first, so that cheaper ones are drawn over them.
 fn cheapest(jumps: &[Jump]) -> Vec<Jump> {
     let mut jumps = jumps.to_vec();
     jumps.sort_by_key(|jump| (jump.cost, jump.from, jump.to, jump.mirrored));
@@ -126,12 +127,12 @@ fn cheapest(jumps: &[Jump]) -> Vec<Jump> {
     jumps
 }
 
-/// How high an arc is: short ones keep some height.
+/// Returns the height of an arc. The exponent below 1 keeps short arcs visible.
 fn rise(jump: &Jump, axis: &Axis) -> f64 {
     HIGHEST * libm::pow(f64::from(jump.from.abs_diff(jump.to)) / axis.end, 0.75)
 }
 
-/// Arcs of one class are one path: they do not darken each other.
+/// Draws the arcs. Arcs of one class form one path, so that they do not darken each other.
 fn arcs(sheet: &mut Sheet, library: &Library, jumps: &[Jump], axis: &Axis, band: [f64; 2]) {
     let mut paths: [String; CLASSES.len()] = Default::default();
     for jump in jumps {
@@ -154,7 +155,7 @@ fn arcs(sheet: &mut Sheet, library: &Library, jumps: &[Jump], axis: &Axis, band:
     }
 }
 
-/// Patches in two shades by turns; frames outside of them stay empty.
+/// Draws the patches in two alternating shades; other frames stay empty.
 fn patches(sheet: &mut Sheet, library: &Library, axis: &Axis, band: [f64; 2]) {
     sheet.rect("sunken", [LEFT, band[0], RIGHT - LEFT, BAND]);
     let mut shades = [String::new(), String::new()];
@@ -224,7 +225,7 @@ mod tests {
 
     #[test]
     fn plain_arcs_rise_and_mirrored_ones_hang() {
-        // Of 600 frames; epsilon is 1000.
+        // 600 frames, and an epsilon of 1000.
         let jumps = vec![jump(0, 300, 300, false), jump(599, 300, 900, true)];
         let svg = transitions(&library(jumps));
         let arc_of = |role: &str| {

@@ -1,6 +1,6 @@
-//! The filters between a decoder and us: fields, choice of frames, gray range, turn, square pixels, colors. The last
-//! ones fix size and format, so that a picture that changes its size in the middle cannot shift the bytes of the
-//! frames after it.
+//! The ffmpeg filters after a decoder: deinterlacing, frame selection, gray range, rotation, square pixels,
+//! colors. The last filters fix size and format, so that a picture size that changes within the film cannot
+//! shift the bytes of later frames.
 
 use super::wanted::Wanted;
 use crate::media::probe::Probe;
@@ -8,7 +8,7 @@ use crate::media::probe::header::{Turn, is_rgb};
 use crate::media::stretch::Stretch;
 use crate::raster::{Matrix, Range};
 
-/// The filters of a film, as ffmpeg takes them.
+/// Returns the filter chain of a film in ffmpeg's syntax.
 pub(super) fn filters(probe: &Probe, stretch: Option<&Stretch>, wanted: &Wanted) -> String {
     let matrix = match probe.color.matrix {
         Matrix::Bt601 => "bt601",
@@ -27,7 +27,7 @@ pub(super) fn filters(probe: &Probe, stretch: Option<&Stretch>, wanted: &Wanted)
     filters.extend(stretch.map(Stretch::filter));
     let turn = turn_filters(probe.turn);
     filters.extend(turn.iter().map(|&filter| filter.to_owned()));
-    // Bit-exact scaling: the same bytes from every processor.
+    // Bit-exact scaling gives the same bytes on every processor.
     let mut scale = format!(
         "scale={}:{}:flags=bicubic+accurate_rnd+bitexact",
         probe.width, probe.height

@@ -1,4 +1,4 @@
-//! Which range of gray a film uses, where it is gray of more than 8 bits.
+//! Measurement of the range of gray levels that a film uses, for gray of more than 8 bits.
 
 use super::wanted::Wanted;
 use super::{Film, MOST_SKIPPED};
@@ -9,10 +9,10 @@ use crate::media::stretch::{LEAST_FRAMES, Stretch};
 use crate::media::tools::Tool;
 
 impl Film {
-    /// Decodes frames spread over the film and returns the range of gray that they use.
+    /// Decodes frames spread over the film and returns the range of gray levels that they use.
     pub(super) fn measure_gray(&self) -> Result<Stretch, Error> {
         let (probe, n_pictures) = (&self.probe, self.probe.n_pictures);
-        // A child that shows nothing for long is taken for stalled.
+        // More frames for longer films, because a child that outputs nothing for long counts as stalled.
         let n_frames = LEAST_FRAMES.max(n_pictures / MOST_SKIPPED);
         let wanted = Wanted::Numbers(spread_idx(n_pictures, n_frames));
         let size = format!("scale={}:{}:flags=neighbor", probe.width, probe.height);

@@ -1,13 +1,12 @@
-//! Footage as frames: planar 4:2:0 over a pipe, each frame read once into the caller's memory
-//! (ECOSYSTEM.md 5, "Drive"; RELIABILITY.md, "Facts": decoded frames are counted, headers are only
-//! claims).
+//! Decoding of a film: planar YUV 4:2:0 frames over a pipe, each read directly into the caller's memory. The
+//! number of decoded frames counts, not the number in the header (docs/explanation/promises.md, "Bad input").
 //!
-//! ffmpeg turns nothing and drops nothing by itself: the turn, the square pixels and the
-//! deinterlacing are filters that we choose (`filters`).
+//! ffmpeg's own rotation and frame dropping are off. Rotation, square pixels and deinterlacing are explicit
+//! filters (`filters`).
 
-mod filters; // between the decoder and us
-mod gray; // the range of gray that is used
-mod wanted; // which frames a decoder is asked for
+mod filters; // ffmpeg filters after the decoder
+mod gray; // range of gray levels in use
+mod wanted; // frames that a decoder has to output
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -31,13 +30,14 @@ use crate::footage::{
 use crate::raster::Frame;
 use wanted::{MOST_UNTOLD, Wanted};
 
-/// Most frames that a child may decode without showing one.
+/// Largest number of frames that a child may decode without output. Free choice.
 const MOST_SKIPPED: usize = 300;
 
-/// In a part of so many frames there is one that others refer to: three in a row without are usual.
+/// Least number of frames in a part of the film, so that it contains a reference frame. Three frames in a row
+/// without one are common. Free choice.
 const LEAST_SKIPPED: usize = 8;
 
-/// A video file that is within its limits and can be read any number of times.
+/// A video file that is within the limits and can be read any number of times.
 #[derive(Clone, Debug)]
 pub(super) struct Film {
     path: PathBuf,
@@ -47,8 +47,9 @@ pub(super) struct Film {
 }
 
 impl Film {
-    /// Looks at the file: container, codec, size, rate, length. Reads it once, and decodes it only where its
-    /// packets do not tell its pictures. `path` is absolute, for the child works elsewhere.
+    /// Checks the file: container, codec, size, rate and length. Reads it once, and decodes it only if the
+    /// packets do not determine its pictures. `path` must be absolute, because the child has another working
+    /// directory.
     pub(super) fn open(path: PathBuf, limits: &Limits, hints: &Hints) -> Result<Film, Error> {
         let mut video = Film {
             probe: probe(&path, limits, hints)?,
@@ -64,22 +65,22 @@ impl Film {
         Ok(video)
     }
 
-    /// What is worth knowing of the file: assumptions, and faults that were mended.
+    /// Returns notes about the file: assumptions, and corrected faults.
     pub(super) fn notes(&self) -> &[Note] {
         &self.probe.notes
     }
 
-    /// Whether it has an alpha channel.
+    /// Returns whether the film has an alpha channel.
     pub(super) fn has_alpha(&self) -> bool {
         self.probe.has_alpha
     }
 
-    /// Returns its file.
+    /// Returns the file.
     pub(super) fn files(&self) -> &[PathBuf] {
         std::slice::from_ref(&self.path)
     }
 
-    /// The order to decode every frame, or some.
+    /// Returns the order to decode the wanted frames.
     fn order(&self, wanted: &Wanted) -> Order {
         let n_pictures = self.probe.n_pictures;
         let filters = filters::filters(&self.probe, self.stretch.as_ref(), wanted);
@@ -115,13 +116,13 @@ impl Film {
             .map(Into::into),
         );
         args.extend(["-vf", filters, "-f", "rawvideo"].map(Into::into));
-        // A frame is written at once, not copied into a buffer first.
+        // Write each frame at once, without a copy to a buffer.
         args.extend(["-avioflags", "direct", "pipe:1"].map(Into::into));
         args
     }
 
-    /// Decoding threads: one for each megapixel, for threads that share less than that cost more than
-    /// they bring.
+    /// Returns the number of decoding threads: one per megapixel and at most one per core. With less work per
+    /// thread the threads cost more than they gain.
     fn n_threads(&self) -> u32 {
         let pixels = u64::from(self.probe.width) * u64::from(self.probe.height);
         let useful = 1 + (pixels >> 20) as u32;
@@ -131,8 +132,8 @@ impl Film {
         }
     }
 
-    /// Calls `visit` with the wanted frames; returns how many there were. They are not compared with
-    /// what the header promised: who reads the whole footage finds out whether it is cut off.
+    /// Calls `visit` with the wanted frames and returns their number. The number is not compared with the
+    /// header's; that check belongs to reading the whole footage.
     fn show(&self, wanted: &Wanted, visit: &mut Visit<'_>) -> Result<usize, Error> {
         let mut stream = FilmStream::of(self, self.order(wanted))?;
         let mut frame = Frame::default();
@@ -147,7 +148,7 @@ impl Film {
                 return Ok(n_shown);
             }
         }
-        // Without a frame another way is tried, which then says why.
+        // With no frames the caller tries another way, which then reports the error.
         match wanted {
             Wanted::InTime { .. } => {}
             _ => stream.check_end()?,
@@ -175,12 +176,11 @@ impl FrameSource for Film {
         Ok(Box::new(FilmStream::of(self, self.order(&Wanted::All))?))
     }
 
-    /// The child hands over only the frames that are wanted. Of a long footage it decodes only those
-    /// that others refer to, and the first of them after the middle of each part stands for it: that
-    /// takes half the time or less.
+    /// The child outputs only the wanted frames. For a long footage it decodes only reference frames and uses
+    /// the first one after the middle of each part. This takes at most half the time.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         let n_pictures = self.probe.n_pictures;
-        // A child that shows nothing for long is taken for stalled.
+        // A child that outputs nothing for long counts as stalled.
         if n_pictures > MOST_SKIPPED * n {
             return spread_by_reading(self, n, visit);
         }
@@ -211,13 +211,13 @@ impl FrameSource for Film {
     }
 }
 
-/// One reading of a video.
+/// A reader of a video.
 struct FilmStream<'a> {
     video: &'a Film,
     child: Option<Child>,
     n_decoded: usize,
     n_given: usize,
-    /// The last decoded frame, kept only where frames may be shown twice.
+    /// The last decoded frame, kept only if frames may repeat.
     held: Frame,
 }
 
@@ -254,7 +254,7 @@ impl<'a> FilmStream<'a> {
         })
     }
 
-    /// Whether the child, which has closed its output, ended well.
+    /// Checks that the child, which has closed its output, exited successfully.
     fn check_end(&mut self) -> Result<(), Error> {
         match self.child.take() {
             Some(child) => child.finish()?.check().map(drop),
@@ -262,7 +262,7 @@ impl<'a> FilmStream<'a> {
         }
     }
 
-    /// Reads the bytes of one frame; returns how many came before the child closed its output.
+    /// Reads the bytes of one frame. Returns fewer bytes if the child closed its output.
     fn read(&mut self, frame: &mut Frame) -> Result<usize, Error> {
         let probe = &self.video.probe;
         (frame.width, frame.height, frame.color) = (probe.width, probe.height, probe.color);
@@ -275,7 +275,7 @@ impl<'a> FilmStream<'a> {
         }
     }
 
-    /// The next decoded frame; false after the last, once the child has ended well.
+    /// Decodes the next frame. Returns false after the last, once the child has exited successfully.
     fn decode(&mut self, frame: &mut Frame) -> Result<bool, Error> {
         if self.child.is_none() {
             return Ok(false);
@@ -286,7 +286,7 @@ impl<'a> FilmStream<'a> {
             return Ok(false);
         }
         self.n_decoded += 1;
-        // A packet holds a picture or two; what comes besides is no film any more.
+        // A packet holds one or two pictures. More pictures than that indicate a malicious file.
         let plenty = 2 * self.video.probe.n_pictures + MOST_UNTOLD;
         let limit = self.video.limits.max_frames.min(plenty);
         match self.n_decoded > limit {
@@ -295,7 +295,7 @@ impl<'a> FilmStream<'a> {
         }
     }
 
-    /// The next frame of the constant rate, which may be the last one again or some later one.
+    /// Returns the next frame at the constant rate. It may repeat the last frame or skip some.
     fn resample(
         &mut self,
         times_s: &[f64],
@@ -316,7 +316,7 @@ impl<'a> FilmStream<'a> {
         Ok(times_s.get(wanted).copied())
     }
 
-    /// The child has closed its output, `n_left` bytes after the last whole frame.
+    /// Handles the end of the output, `n_left` bytes after the last complete frame.
     fn end(&mut self, n_left: usize) -> Result<(), Error> {
         let Some(child) = self.child.take() else {
             return Ok(());
@@ -330,8 +330,8 @@ impl<'a> FilmStream<'a> {
         }
         let probe = &self.video.probe;
         let n_pictures = probe.n_pictures;
-        // A picture or two may be lost to an open start. More are missing without a complaint only where the
-        // codec may say "the same again" in its own way.
+        // A few pictures may be lost at an open GOP. More are missing without an error message only in codecs
+        // that can encode a repeated picture as nothing.
         let n_least = match end.complaint.is_empty() {
             true => n_pictures / 2,
             false => n_pictures - (n_pictures / 50).max(2).min(n_pictures),

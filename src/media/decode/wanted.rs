@@ -1,21 +1,21 @@
-//! Which frames of a film a decoder is asked for: all, or some spread through it (for `decode`). ffmpeg drops
-//! the others itself, and whoever hands over more than it was asked for is no decoder (RELIABILITY.md, R8).
+//! The frames that a decoder has to output: all, or a selection. ffmpeg drops the others itself. A child that
+//! outputs more than requested is stopped (docs/explanation/promises.md, "Poison jobs").
 
-/// Pictures that may come though no packet told of them.
+/// Number of pictures accepted beyond those that the packets announce. Free choice.
 pub(super) const MOST_UNTOLD: usize = 64;
 
-/// Which frames a child hands over.
+/// The frames that a child outputs.
 pub(super) enum Wanted {
-    /// Every one.
+    /// All frames.
     All,
-    /// Those of these numbers, counted as they are decoded.
+    /// The frames with these indices in decoding order.
     Numbers(Vec<usize>),
-    /// The first after the middle of each of so many parts a second.
+    /// The first frame after the middle of each part, with `parts_per_s` parts per second.
     InTime { parts_per_s: f64, n_parts: usize },
 }
 
 impl Wanted {
-    /// More frames than a child that does as it is told can hand over.
+    /// Returns the largest number of frames that a well-behaved child outputs.
     pub(super) fn most(&self) -> usize {
         match self {
             Wanted::All => usize::MAX,
@@ -32,7 +32,7 @@ impl Wanted {
                 Some(format!("select='{}'", each.join("+")))
             }
             Wanted::InTime { parts_per_s, .. } => {
-                // A little before the middle, for times are rounded.
+                // Slightly before the middle, because times are rounded.
                 let part = |time: &str| format!("floor(({time}-start_t)*{parts_per_s}-0.499)");
                 let (this, last) = (part("t"), part("prev_selected_t"));
                 Some(format!(

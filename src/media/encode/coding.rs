@@ -1,7 +1,6 @@
-//! The arguments of each kind of file that the encoder writes (ECOSYSTEM.md 5; ALGORITHMS.md 8): what
-//! it is fed, how that becomes the codec's own form, and the color tags that say how to read it.
-//!
-//! Threads are fixed numbers, because bytes may depend on them.
+//! ffmpeg's arguments for each output format (docs/explanation/algorithms.md, "Compositing"): pixel format of
+//! the input, codec settings, and color tags. Thread counts are fixed, because the output bytes may depend on
+//! them.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -9,39 +8,39 @@ use std::path::Path;
 use super::{Quality, VideoFormat};
 use crate::raster::{Matrix, Range};
 
-/// A kind of moving picture.
+/// An output format.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coding {
-    /// H.264 High in MP4, of planar frames: what browsers play.
+    /// H.264 High in MP4, from planar frames; plays in browsers.
     H264(Quality),
-    /// VP9 in WebM, of RGBA.
+    /// VP9 in WebM, from RGBA.
     Vp9 {
-        /// Keep the alpha, straight.
+        /// Whether to keep the alpha, straight.
         alpha: bool,
     },
-    /// ProRes 4444 in QuickTime, of RGBA: what editors take.
+    /// ProRes 4444 in QuickTime, from RGBA; for video editors.
     ProRes {
-        /// Keep the alpha, straight, 16 bits deep.
+        /// Whether to keep the alpha, straight, 16 bits.
         alpha: bool,
     },
-    /// An animated WebP of at most 480 columns and 15 frames a second, of RGBA.
+    /// Animated WebP, at most 480 pixels wide and 15 frames per second, from RGBA.
     Webp,
-    /// An animated GIF of at most 480 columns and 15 frames a second, of planar frames.
+    /// Animated GIF, at most 480 pixels wide and 15 frames per second, from planar frames.
     Gif,
 }
 
 impl Coding {
-    /// Whether frames are given as RGBA, not as planes.
+    /// Returns whether frames are RGBA, not planar.
     pub fn takes_rgba(self) -> bool {
         !matches!(self, Coding::H264(_) | Coding::Gif)
     }
 
-    /// Whether sides must be even.
+    /// Returns whether width and height must be even.
     pub(super) fn is_even(self) -> bool {
         matches!(self, Coding::H264(_))
     }
 
-    /// Everything that ffmpeg is told, the file last.
+    /// Returns all arguments of ffmpeg. The output file is last.
     pub(super) fn args(self, part: &Path, format: &VideoFormat) -> Vec<OsString> {
         let even = |side: u32| match self.is_even() {
             true => side.next_multiple_of(2),
@@ -57,7 +56,7 @@ impl Coding {
             self.output(format)
         );
         let mut args: Vec<OsString> = words.split_whitespace().map(Into::into).collect();
-        // The one word that may hold spaces.
+        // The only argument that may contain spaces.
         let mut file = OsString::from("file:");
         file.push(part);
         args.push(file);
@@ -77,7 +76,8 @@ impl Coding {
             Coding::H264(quality) => h264(format, quality),
             Coding::Vp9 { alpha } => {
                 let planes = if alpha { "yuva420p" } else { "yuv420p" };
-                // With alpha there may be no hidden reference frames: the two layers would part.
+                // With alpha, hidden reference frames are off, because they would make the two layers differ
+                // in time.
                 format!(
                     "-vf {} -c:v libvpx-vp9 -deadline realtime -cpu-used 5 -row-mt 1 -threads 4 \
                      -auto-alt-ref 0 -crf 26 -b:v 0 -f webm",
@@ -104,10 +104,10 @@ impl Coding {
     }
 }
 
-/// A preview's size and rate: never more than the film's own.
+/// Size and rate of a preview, never larger than those of the video.
 const SMALL: &str = "fps=fps='min(15,source_fps)',scale=w='min(480,iw)':h=-1:flags=area";
 
-/// From RGBA to planes of BT.709, tagged as such.
+/// Returns the filter from RGBA to BT.709 planes, with matching tags.
 fn from_rgba(planes: &str) -> String {
     format!(
         "scale=out_color_matrix=bt709:out_range=tv:flags=bicubic+accurate_rnd+full_chroma_int,\
@@ -126,10 +126,10 @@ fn h264(format: &VideoFormat, quality: Quality) -> String {
         Matrix::Bt709 => "bt709",
     };
     let Quality { crf, threads } = quality;
-    // Our RGB is sRGB, whatever the luma weights: its primaries are those of BT.709. The filter on
-    // the stream drops the message in which x264 writes its version and settings. Of motion it looks less closely than
-    // the preset does (`subme`, `me`): most of a film is its plate, and a quarter of the encoder's time buys 5 to 9 % of
-    // size there (docs/SPEED.md).
+    // The RGB values are sRGB whatever the luma weights, so the primaries are those of BT.709. The bitstream
+    // filter removes the message in which x264 writes its version and settings. `subme` and `me` are set
+    // below the preset, because most of a video is background. A better motion search saves 5 to 9 % of size
+    // there, for a quarter of the time (docs/measurements.md).
     format!(
         "-vf setparams=range={range}:colorspace={matrix}:color_primaries=bt709:color_trc=bt709 \
          -c:v libx264 -preset veryfast -profile:v high -crf {crf} -threads {threads} \
@@ -138,11 +138,11 @@ fn h264(format: &VideoFormat, quality: Quality) -> String {
     )
 }
 
-/// The fraction nearest to a frame rate, with numbers that ffmpeg takes (up to 1,001,000).
+/// Returns the fraction nearest to a frame rate whose terms ffmpeg accepts (up to 1,001,000).
 fn fraction(fps: f64) -> (u64, u64) {
     const MOST: f64 = 1_001_000.0;
     let (mut before, mut last, mut rest) = ((0.0, 1.0), (1.0, 0.0), fps);
-    // Continued fraction: each step is the best one with numbers of its size.
+    // Continued fraction: each step is the best approximation with terms of its size.
     loop {
         let whole = f64::floor(rest);
         let next = (whole * last.0 + before.0, whole * last.1 + before.1);

@@ -1,12 +1,14 @@
-//! Frames to a file: an MP4 that browsers play (H.264 High, 4:2:0, index in front), or one of the other
-//! kinds of `coding`, some with straight alpha (ECOSYSTEM.md 5).
+//! Encoding of frames: an MP4 for browsers (H.264 High, 4:2:0, index in front), or another format of
+//! `coding`, some with straight alpha.
 //!
-//! Equal frames give equal bytes whatever the machine: x264 gets a fixed number of threads (measured:
-//! 1, 2, 3 and 4 give four different films; 4 gives the same on one core, on two and without vector
-//! instructions), no processor-dependent choices, and writes no name of itself.
-//! The file appears under its own name only when it is whole.
+//! Equal frames give equal bytes on every machine. The output of x264 depends on its number of threads, so
+//! that number is fixed. Measured: 1, 2, 3 and 4 threads give four different files. With 4 threads the file
+//! is the same on one core, on two and without vector instructions. Choices that depend on the processor are
+//! off, and x264 writes no version.
+//!
+//! The file gets its final name only when it is complete.
 
-mod coding; // what the encoder is told for each kind of file
+mod coding; // arguments of ffmpeg for each output format
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -20,20 +22,20 @@ use super::tools::Tool;
 use crate::footage::FootageFormat;
 use crate::raster::{ColorSpec, Frame};
 
-/// What all frames of a video have in common.
+/// Properties common to all frames of a video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VideoFormat {
-    /// Columns, 1..=8192; an odd number gains one column, a copy of the last.
+    /// Width, pixels, 1..=8192. If it is odd, H.264 repeats the last column.
     pub width: u32,
-    /// Rows, 1..=8192; as the columns.
+    /// Height, pixels, 1..=8192. If it is odd, H.264 repeats the last row.
     pub height: u32,
-    /// Frames a second, > 0 and <= 1000.
+    /// Frame rate, frames per second, > 0 and <= 1000.
     pub fps: f64,
-    /// How the values of the frames are to be read; written into the file.
+    /// Color encoding of the frames; written to the file.
     pub color: ColorSpec,
 }
 
-/// The format in which a footage would be written again.
+/// Returns the format for encoding with the footage's properties.
 impl From<FootageFormat> for VideoFormat {
     fn from(footage: FootageFormat) -> VideoFormat {
         VideoFormat {
@@ -45,12 +47,12 @@ impl From<FootageFormat> for VideoFormat {
     }
 }
 
-/// How well to encode.
+/// Encoding quality.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quality {
-    /// x264's constant rate factor, 1 ..= 51; 18 looks like the original.
+    /// Constant rate factor of x264, 1..=51. At 18 the result looks like the original.
     pub crf: u8,
-    /// Encoding threads. The bytes depend on them, so this is no automatic number.
+    /// Number of encoding threads. It is fixed, because the bytes depend on it.
     pub threads: u32,
 }
 
@@ -63,11 +65,11 @@ impl Default for Quality {
     }
 }
 
-/// A video file being written. Dropped before [`VideoWriter::finish`], it leaves nothing behind.
+/// A video file being written. Dropping it before [`VideoWriter::finish`] deletes it.
 pub struct VideoWriter {
     format: VideoFormat,
     coding: Coding,
-    /// None once the encoder has failed: every later frame is refused.
+    /// `None` once the encoder has failed; all later frames are refused.
     child: Option<Child>,
     part: Part,
     path: PathBuf,
@@ -75,12 +77,12 @@ pub struct VideoWriter {
 }
 
 impl VideoWriter {
-    /// Starts an MP4 at `path`, with the default quality and limits.
+    /// Starts an MP4 at `path` with default quality and limits.
     pub fn create(path: &Path, format: &VideoFormat) -> Result<VideoWriter, Error> {
         VideoWriter::create_with(path, format, Quality::default(), &Limits::default())
     }
 
-    /// Starts a file of another kind, with the default limits.
+    /// Starts a file of another format with default limits.
     pub fn create_as(
         path: &Path,
         format: &VideoFormat,
@@ -89,7 +91,7 @@ impl VideoWriter {
         VideoWriter::start(path, format, coding, &Limits::default())
     }
 
-    /// As `create`; of the limits, those on time, memory and output bytes hold.
+    /// Starts an MP4 with given quality. Only the limits of time, memory and output size apply.
     pub fn create_with(
         path: &Path,
         format: &VideoFormat,
@@ -127,7 +129,7 @@ impl VideoWriter {
         })
     }
 
-    /// Adds a frame, of the video's size and colors.
+    /// Adds a frame with the size and colors of the video.
     pub fn write(&mut self, frame: &Frame) -> Result<(), Error> {
         let VideoFormat {
             width,
@@ -150,7 +152,7 @@ impl VideoWriter {
         written
     }
 
-    /// Adds a frame of straight-alpha RGBA, by rows, of the video's size.
+    /// Adds a frame of straight-alpha RGBA, row by row, with the size of the video.
     pub fn write_rgba(&mut self, rgba: &[u8]) -> Result<(), Error> {
         let n_bytes = self.format.width as usize * self.format.height as usize * 4;
         if rgba.len() != n_bytes || !self.coding.takes_rgba() {
@@ -170,7 +172,7 @@ impl VideoWriter {
         written
     }
 
-    /// Ends the video; only now does the file appear at its path.
+    /// Completes the video and moves the file to its path.
     pub fn finish(mut self) -> Result<(), Error> {
         let child = self
             .child
@@ -181,17 +183,17 @@ impl VideoWriter {
     }
 }
 
-/// The file under its working name; removed when dropped, unless it has been renamed.
+/// The file under its temporary name. Dropping it deletes the file, unless it was renamed.
 struct Part(PathBuf);
 
 impl Part {
-    /// Made here, empty, because the encoder may write this file and make no other.
+    /// Creates the file empty, because the encoder may write this file but not create one.
     fn beside(path: &Path) -> Result<Part, Error> {
         let mut name = OsString::from(".");
         name.push(path.file_name().unwrap_or_default());
         name.push(".part");
         let part = path.with_file_name(name);
-        // What another run has left, if anything, whatever it is.
+        // Remove the file of an earlier run, if any.
         std::fs::remove_file(&part).ok();
         std::fs::File::create_new(&part).map_err(Error::io("making the video"))?;
         Ok(Part(part))
@@ -205,8 +207,8 @@ impl Drop for Part {
     }
 }
 
-/// The planes with an even number of rows and columns, the last ones doubled where needed. The
-/// chroma planes of an odd size are rounded up already.
+/// Writes the planes with an even number of rows and columns, repeating the last ones if needed. Chroma
+/// planes are already rounded up.
 fn pad(frame: &Frame, padded: &mut Vec<u8>) {
     let (width, height) = (frame.width as usize, frame.height as usize);
     padded.clear();

@@ -1,11 +1,11 @@
-//! Pictures as footage: a folder of them, a zip of them, or the pages of one TIFF, as microscopes and lab cameras
-//! leave them. Libraries without unsafe code of C decode them in this process, under the same limits as films, each
-//! picture whenever it is asked for. Pictures have no rate: it comes from a hint, or is assumed.
+//! Still pictures as footage: a folder, a zip, or the pages of one TIFF, as microscopes and lab cameras write
+//! them. Libraries without unsafe C code decode each picture on request, under the same limits as films.
+//! Pictures have no frame rate: it comes from a hint or is assumed.
 
-mod order; // the order of numbered names
-mod picture; // bytes -> one picture
-mod source; // folder, zip or stack: which pictures there are
-mod stack; // the pages of a TIFF
+mod order; // order of numbered names
+mod picture; // decoding of one picture
+mod source; // pictures of a folder, zip or TIFF
+mod stack; // pages of a TIFF
 
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,7 @@ use crate::raster::{ColorSpec, Frame, Matrix, Range, RgbImage};
 use picture::Picture;
 use source::{Reader, Source};
 
-/// Full range: gray keeps its levels.
+/// Full range, so gray keeps its levels.
 const COLOR: ColorSpec = ColorSpec {
     matrix: Matrix::Bt601,
     range: Range::Full,
@@ -32,23 +32,23 @@ const COLOR: ColorSpec = ColorSpec {
 pub(super) struct Pictures {
     source: Source,
     limits: Limits,
-    /// Columns and rows as stored.
+    /// Stored width and height, pixels.
     stored: [u32; 2],
-    /// Columns and rows with square pixels.
+    /// Width and height in square pixels.
     shown: [u32; 2],
     fps: f64,
-    /// The range of gray that is used, where the first picture is gray of more than 8 bits.
+    /// Range of gray levels, if the first picture is gray of more than 8 bits.
     stretch: Option<Stretch>,
-    /// The first picture has an alpha channel.
+    /// Whether the first picture has an alpha channel.
     has_alpha: bool,
-    /// The alpha channel is shown, as gray.
+    /// Whether the alpha channel is returned, as gray.
     of_alpha: bool,
     notes: Vec<Note>,
 }
 
 impl Pictures {
-    /// Returns the pictures at `path`: those of a folder, a zip or a TIFF, or `None` for anything else. Decodes the
-    /// first one, and 16 of them where they are gray of 16 bits.
+    /// Opens the pictures at `path`: those of a folder, a zip or a TIFF; `None` for anything else. Decodes
+    /// the first one, and 16 if it is gray of 16 bits.
     pub(super) fn open(
         path: &Path,
         limits: &Limits,
@@ -90,12 +90,12 @@ impl Pictures {
         Ok(Some(pictures))
     }
 
-    /// Assumptions that were made.
+    /// Returns the assumptions made.
     pub(super) fn notes(&self) -> &[Note] {
         &self.notes
     }
 
-    /// Whether they have an alpha channel.
+    /// Returns whether the pictures have an alpha channel.
     pub(super) fn has_alpha(&self) -> bool {
         self.has_alpha
     }
@@ -105,7 +105,7 @@ impl Pictures {
         self.source.files()
     }
 
-    /// The range of gray that pictures spread over the footage use.
+    /// Returns the range of gray levels in pictures spread over the footage.
     fn measure_gray(&self) -> Result<Stretch, Error> {
         let mut reader = self.source.read(&self.limits, false)?;
         let mut counts = vec![0_u64; 1 << 16];
@@ -119,7 +119,7 @@ impl Pictures {
         Ok(Stretch::of(&counts))
     }
 
-    /// Decodes a picture into a frame. Fails where it has another size than the first.
+    /// Decodes a picture into a frame. Fails if its size differs from the first picture's.
     fn show(&self, reader: &mut Reader<'_>, idx: usize, frame: &mut Frame) -> Result<(), Error> {
         let (picture, _) = reader.picture(idx)?;
         if picture.size() != self.stored {
@@ -144,7 +144,7 @@ impl Pictures {
     }
 }
 
-/// The size with square pixels. The smaller count is stretched: no measured detail is lost.
+/// Returns the size in square pixels. The smaller dimension is stretched, so that no measured detail is lost.
 fn shown_size([width, height]: [u32; 2], hints: &Hints) -> [u32; 2] {
     match hints.pixel_aspect {
         Some(aspect) if aspect > 1.0 => [(f64::from(width) * aspect).round() as u32, height],
@@ -173,7 +173,7 @@ impl FrameSource for Pictures {
         }))
     }
 
-    /// Decodes the wanted pictures and no others.
+    /// Decodes only the wanted pictures.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         let mut reader = self.source.read(&self.limits, self.of_alpha)?;
         let mut frame = Frame::default();
@@ -187,7 +187,7 @@ impl FrameSource for Pictures {
     }
 }
 
-/// One reading of the pictures.
+/// A reader of the pictures.
 struct PictureStream<'a> {
     pictures: &'a Pictures,
     reader: Reader<'a>,

@@ -1,8 +1,8 @@
-//! The order of numbered names: `2.png` before `10.png`, as cameras count.
+//! Natural order of numbered file names: `2.png` before `10.png`.
 
 use std::cmp::Ordering;
 
-/// Compares two names, each run of digits by its value, and by its length where the values are equal.
+/// Compares two names. Runs of digits compare by value, and by length if the values are equal.
 ///
 /// Example: `a2`, `a02`, `a10`, `b1` are in this order.
 pub(super) fn by_number(a: &str, b: &str) -> Ordering {
@@ -22,7 +22,7 @@ pub(super) fn by_number(a: &str, b: &str) -> Ordering {
     }
 }
 
-/// Splits off a run of digits, or else one character.
+/// Splits off a run of digits, or otherwise one character.
 fn first_piece(text: &str) -> (&str, &str) {
     let n_digits = text.bytes().take_while(u8::is_ascii_digit).count();
     let n_bytes = match n_digits {

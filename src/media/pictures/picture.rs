@@ -1,4 +1,4 @@
-//! One picture of a footage: its bytes decoded, its pixels as red, green and blue.
+//! One still picture: decoding of its bytes and conversion to RGB.
 
 use std::io::Cursor;
 
@@ -14,7 +14,7 @@ use crate::media::stretch::Stretch;
 /// Gray of 16 bits.
 pub(super) type Gray16Image = image::ImageBuffer<image::Luma<u16>, Vec<u16>>;
 
-/// The alpha of a picture.
+/// Returns the alpha of a picture as gray.
 fn alpha_of(image: DynamicImage) -> GrayImage {
     let rgba = image.into_rgba8();
     GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| {
@@ -22,19 +22,22 @@ fn alpha_of(image: DynamicImage) -> GrayImage {
     })
 }
 
-/// A decoded picture, without its alpha.
+/// A decoded picture without alpha.
 pub(super) enum Picture {
     /// Gray of 8 bits.
     Gray(GrayImage),
-    /// Gray of more bits.
+    /// Gray of 16 bits.
     Gray16(Gray16Image),
     /// Colors of 8 bits.
     Rgb(RgbImage),
 }
 
 impl Picture {
-    /// Decodes a PNG, JPEG, BMP or the first page of a TIFF, or the alpha of one, opaque where it has none; and says
-    /// whether it has an alpha channel. That of a TIFF is passed over.
+    /// Decodes a PNG, JPEG, BMP or the first page of a TIFF. Returns the picture and whether it has an alpha
+    /// channel.
+    ///
+    /// With `of_alpha` the picture is the alpha instead, opaque if there is none. The alpha of a TIFF is
+    /// ignored.
     pub(super) fn decoded(
         bytes: &[u8],
         limits: &Limits,
@@ -66,7 +69,7 @@ impl Picture {
         }
     }
 
-    /// Columns and rows.
+    /// Returns width and height, pixels.
     pub(super) fn size(&self) -> [u32; 2] {
         let (width, height) = match self {
             Picture::Gray(image) => image.dimensions(),
@@ -76,7 +79,7 @@ impl Picture {
         [width, height]
     }
 
-    /// Returns rows of red, green, blue, scaled to `size`. Gray of 16 bits is stretched, or loses its lower 8 bits.
+    /// Returns RGB pixels, scaled to `size`. Gray of 16 bits is stretched, or reduced to its upper 8 bits.
     pub(super) fn into_rgb(self, stretch: Option<&Stretch>, size: [u32; 2]) -> Vec<u8> {
         let is_scaled = self.size() != size;
         let gray_of = |level: u16| match stretch {

@@ -1,5 +1,5 @@
-//! Where pictures lie: in a folder, in a zip, or as the pages of a TIFF; which of them there are, and in which order.
-//! A zip is never unpacked: each picture is read out of it, up to the size of the largest that is allowed.
+//! Storage of still pictures: a folder, a zip, or the pages of a TIFF, with their order. A zip is never
+//! unpacked to disk. Each picture is read from it directly, up to the size of the largest allowed picture.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -16,27 +16,27 @@ use crate::media::error::Error;
 use crate::media::image::largest_file;
 use crate::media::limits::Limits;
 
-/// Endings of names of pictures.
+/// File name extensions of pictures.
 const ENDINGS: [&str; 6] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp"];
 
-/// Bytes of a zip's directory for each picture of the limit: 46, its name, and its date in extra fields. The
-/// directory is kept in memory.
+/// Allowed size of a zip directory per picture of the limit, bytes: an entry of 46, its name, and its date in
+/// extra fields. The directory is kept in memory.
 const DIRECTORY_BYTES: u64 = 128;
 
-/// Pictures in their order.
+/// Pictures in order.
 #[derive(Clone, Debug)]
 pub(super) enum Source {
     /// Files of a folder.
     Folder(Vec<PathBuf>),
-    /// Entries of a zip, by their numbers in its directory.
+    /// Entries of a zip, by their index in its directory.
     Zip(PathBuf, Vec<usize>),
-    /// The pages of a TIFF, and how many.
+    /// A TIFF and its number of pages.
     Stack(PathBuf, usize),
 }
 
 impl Source {
-    /// Returns the pictures at `path`, `None` where it is neither a folder, nor a zip, nor a TIFF. Fails where there
-    /// is no picture, or more than the limit.
+    /// Returns the pictures at `path`; `None` if it is neither a folder nor a zip nor a TIFF. Fails if there
+    /// are no pictures, or more than the limit.
     pub(super) fn find(path: &Path, limits: &Limits) -> Result<Option<Source>, Error> {
         let failed = Error::io("opening the footage");
         let about = fs::metadata(path).map_err(&failed)?;
@@ -68,7 +68,7 @@ impl Source {
         }))
     }
 
-    /// How many pictures there are.
+    /// Returns the number of pictures.
     pub(super) fn n_pictures(&self) -> usize {
         match self {
             Source::Folder(files) => files.len(),
@@ -77,7 +77,7 @@ impl Source {
         }
     }
 
-    /// The files that hold the pictures.
+    /// Returns the files that hold the pictures.
     pub(super) fn files(&self) -> &[PathBuf] {
         match self {
             Source::Folder(files) => files,
@@ -110,7 +110,7 @@ impl Source {
     }
 }
 
-/// Reads pictures by their numbers.
+/// Reads pictures by index.
 pub(super) struct Reader<'a> {
     place: Place<'a>,
     limits: &'a Limits,
@@ -124,7 +124,8 @@ enum Place<'a> {
 }
 
 impl Reader<'_> {
-    /// Decodes a picture, counted from 0, and says whether it has an alpha channel. Fails with its number where it cannot be decoded.
+    /// Decodes a picture and returns whether it has an alpha channel. If it cannot be decoded, the error
+    /// names its number, counted from 1.
     pub(super) fn picture(&mut self, idx: usize) -> Result<(Picture, bool), Error> {
         let (limits, of_alpha) = (self.limits, self.of_alpha);
         let picture = match &mut self.place {
@@ -151,7 +152,7 @@ fn bytes_of(from: impl Read, limits: &Limits) -> Result<Vec<u8>, Error> {
     let read = from.take(largest_file(limits) + 1).read_to_end(&mut bytes);
     match read {
         Ok(_) => Ok(bytes),
-        // What a zip says of damaged data.
+        // Errors of the zip library for damaged data.
         Err(error)
             if matches!(
                 error.kind(),
@@ -166,7 +167,7 @@ fn bytes_of(from: impl Read, limits: &Limits) -> Result<Vec<u8>, Error> {
     }
 }
 
-/// The pictures of a folder by the order of their names; folders inside it are left out.
+/// Returns the pictures of a folder, ordered by name. Subfolders are skipped.
 fn files_of(folder: &Path, limits: &Limits) -> Result<Vec<PathBuf>, Error> {
     let failed = Error::io("reading the folder");
     let mut files = Vec::new();
@@ -180,7 +181,7 @@ fn files_of(folder: &Path, limits: &Limits) -> Result<Vec<PathBuf>, Error> {
     in_order(files, "the folder", limits)
 }
 
-/// The pictures of a zip by the order of their names, folders included.
+/// Returns the pictures of a zip, ordered by path.
 fn entries_of(file: BufReader<File>, limits: &Limits) -> Result<Vec<usize>, Error> {
     let n_most = limits.max_frames as u64 * DIRECTORY_BYTES;
     let bounded = Bounded {
@@ -214,7 +215,8 @@ fn in_order<T>(mut named: Vec<(String, T)>, place: &str, limits: &Limits) -> Res
     Ok(named.into_iter().map(|(_, picture)| picture).collect())
 }
 
-/// Whether a path names a picture. Hidden files are none, nor is what one system leaves beside each file.
+/// Returns whether a path has the name of a picture. Hidden files do not count, nor the `__MACOSX` entries
+/// that macOS adds for each file.
 fn is_picture(name: &str) -> bool {
     let is_hidden = |part: &str| part.starts_with('.') || part == "__MACOSX";
     let ending = name.rsplit_once('.').map(|(_, ending)| ending);
@@ -231,7 +233,7 @@ fn refused(error: ZipError) -> Error {
     }
 }
 
-/// A file of which only so many bytes are read, wherever they lie.
+/// A reader that allows a limited total number of bytes, at any offsets.
 struct Bounded<R> {
     inner: R,
     n_left: u64,

@@ -1,4 +1,4 @@
-//! The pages of a TIFF: gray or RGB of 8 or 16 bits, plain or packed without loss.
+//! Pages of a TIFF: gray or RGB of 8 or 16 bits, uncompressed or with lossless compression.
 
 use std::io::{Read, Seek};
 use std::time::Instant;
@@ -13,10 +13,10 @@ use crate::media::error::Error;
 use crate::media::limits::Limits;
 use crate::media::probe::check_size;
 
-/// Largest value of one tag, bytes: the places of as many strips as the highest picture has rows need half of it.
+/// Largest value of one tag, bytes. The strip offsets of the tallest allowed picture need half of it.
 const MAX_TAG_BYTES: usize = 1 << 17;
 
-/// Whether a file begins like a TIFF or a BigTIFF.
+/// Returns whether a file begins like a TIFF or a BigTIFF.
 pub(super) fn is_tiff(head: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]
         .iter()
@@ -34,7 +34,7 @@ pub(super) fn open<R: Read + Seek>(from: R, limits: &Limits) -> Result<Decoder<R
     Ok(decoder.with_limits(bounds))
 }
 
-/// Counts the pages, at most as many as the limit.
+/// Returns the number of pages. Fails beyond `limits.max_frames`, or if counting takes too long.
 pub(super) fn n_pages<R: Read + Seek>(
     pages: &mut Decoder<R>,
     limits: &Limits,
@@ -56,7 +56,7 @@ pub(super) fn n_pages<R: Read + Seek>(
     Ok(n_pages)
 }
 
-/// Decodes a page, counted from 0. Fails for samples of other kinds than gray or RGB of 8 or 16 bits.
+/// Decodes a page, counted from 0. Fails for samples other than gray or RGB of 8 or 16 bits.
 pub(super) fn page<R: Read + Seek>(
     pages: &mut Decoder<R>,
     idx: usize,

@@ -1,40 +1,41 @@
-//! The times of pictures as a recorder's clock gives them, mended where the clock is wrong. Recorders stall and
-//! write what they held back in a burst, clocks are set forward or back, several pictures get one time, or none.
-//! The pictures come in the order in which they are shown.
+//! Correction of picture timestamps from a recorder with a faulty clock. Recorders stall and then write a
+//! burst, clocks are set, several pictures share a time or have none. The input is in display order.
 //!
-//! Steps between half and one and a half of the usual step are regular. Each run of others is judged by where it
-//! ends. Where a clock that went on regularly would have brought it to the same time, its pictures are spaced
-//! evenly. Else a step back or far ahead becomes a usual step, and all later times are shifted with it. What is
-//! left are short gaps and dense stretches, and those are taken for true: pictures were lost, or the rate varies.
+//! Steps between 0.5 and 1.5 of the usual step are regular. A run of irregular steps is judged by its end. If
+//! a regular clock would reach the same time, the pictures of the run are spaced evenly. Otherwise each step
+//! back or far ahead becomes a usual step, and all later times shift with it. Remaining short gaps and dense
+//! stretches are kept: pictures were lost, or the rate varies.
 //!
-//! Example with a usual step of 0.1 s: 0, .1, .6, .61, .62, .63, .7, .8 becomes 0, .1, .22, .34, .46, .58, .7, .8.
+//! Example with a usual step of 0.1 s: 0, .1, .6, .61, .62, .63, .7, .8 becomes 0, .1, .22, .34, .46, .58,
+//! .7, .8.
 
-/// How far from the usual step a regular step may be, share of it. Rates that wander by less are a camera's own.
+/// Deviation of a regular step from the usual step, as a share of it. Cameras with a varying rate deviate
+/// less.
 const REGULAR: f64 = 0.5;
 
-/// How far off the end of a run may be, usual steps: more than a step, for the picture that a stall began with
-/// may be late itself.
+/// Tolerance for the end of a run, usual steps. More than one step, because the first picture of a stall may
+/// itself be late.
 const ON_TIME: f64 = 1.5;
 
-/// The longest gap taken for true, seconds, or [`LONGEST_GAP_STEPS`] where those are longer. Free choice between
-/// the tenths of a second that a busy recorder loses and the minutes of a pause.
+/// Longest gap that is kept, seconds, or [`LONGEST_GAP_STEPS`] if longer. Free choice between the tenths of a
+/// second that a busy recorder loses and the minutes of a pause.
 const LONGEST_GAP_S: f64 = 1.0;
 
-/// The longest gap taken for true in films of few pictures a second, usual steps.
+/// Longest gap that is kept at low frame rates, usual steps. Free choice.
 const LONGEST_GAP_STEPS: f64 = 8.0;
 
-/// Times that were mended.
+/// Corrected timestamps.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Mended {
-    /// One for each picture, seconds from the first, never decreasing.
+    /// Time of each picture, seconds from the first, never decreasing.
     pub(super) times_s: Vec<f64>,
-    /// Steps back or far ahead that were taken out: when, in mended time, and by how much, seconds.
+    /// Removed steps back or far ahead: corrected time of the step and its size, both in seconds.
     pub(super) leaps_s: Vec<[f64; 2]>,
 }
 
-/// Mends the times of pictures in the order in which they are shown; `None` marks a picture without a time.
+/// Corrects the times of pictures in display order; `None` marks a picture without a time.
 ///
-/// Returns `None` where no two pictures have different times.
+/// Returns `None` if no two pictures have different times.
 pub(super) fn mend(times_s: &[Option<f64>]) -> Option<Mended> {
     let told_s = filled(times_s)?;
     let step_s = usual_step(&told_s)?;
@@ -63,8 +64,8 @@ pub(super) fn mend(times_s: &[Option<f64>]) -> Option<Mended> {
     Some(Mended { times_s, leaps_s })
 }
 
-/// Spaces the times of a run that begins at `start_s` evenly where it ends on time; returns whether it does. The
-/// first time is left alone. Pictures that share the last time are counted on from the first of them.
+/// Spaces the times of a run evenly if it ends on time; returns whether it does. `start_s` is the original
+/// first time, which stays unchanged. Pictures that share the last time continue at the usual step.
 fn space_evenly(run: &mut [f64], start_s: f64, step_s: f64) -> bool {
     let end_s = run[run.len() - 1];
     let n_steps = 1 + run[1..].iter().position(|&time| time == end_s).unwrap_or(0);
@@ -80,7 +81,7 @@ fn space_evenly(run: &mut [f64], start_s: f64, step_s: f64) -> bool {
     true
 }
 
-/// Gives pictures without a time one between their neighbors', or on from the nearest.
+/// Interpolates missing times between neighbors, and extrapolates at the ends by the usual step.
 fn filled(times_s: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> = (times_s.iter().enumerate())
         .filter_map(|(k, time)| Some((k, (*time)?)))
@@ -116,7 +117,7 @@ fn filled(times_s: &[Option<f64>]) -> Option<Vec<f64>> {
     Some((0..times_s.len()).map(time_of).collect())
 }
 
-/// The median over the pictures of the step to the next time, shared by those that have the same time.
+/// Returns the median over the pictures of the step to the next time. Pictures with equal times share a step.
 fn usual_step(times_s: &[f64]) -> Option<f64> {
     let groups: Vec<&[f64]> = times_s.chunk_by(|a, b| a == b).collect();
     let steps = groups.windows(2).flat_map(|pair| {
@@ -168,7 +169,7 @@ mod tests {
         let mut times = grid(90, 30.0);
         times[40..60].fill(40.0 / 30.0);
         assert_even(&mended(&times).times_s, 30.0);
-        // Whole seconds, as some recorders stamp them.
+        // Some recorders store times in whole seconds.
         let seconds: Vec<f64> = times.iter().map(|time| time.floor()).collect();
         assert_even(&mended(&seconds).times_s, 30.0);
     }

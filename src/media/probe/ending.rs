@@ -1,7 +1,6 @@
-//! Whether a file ends where its own structure does (RELIABILITY.md: a file cut off inside is refused). The
-//! lengths that a header claims in seconds or frames say nothing of that: they may be those of the sound, or of
-//! a recorder that never came back to mend them. What counts is a box, chunk or page that goes on past the end
-//! of the file, and what it holds.
+//! Detection of files that are cut off (docs/explanation/promises.md, "Bad input"). The duration in the
+//! header does not show this: it may be that of the audio, or a recorder may not have updated it. Instead,
+//! the module looks for a box, chunk or page that extends beyond the end of the file, and at its contents.
 
 use std::fs::File;
 use std::io;
@@ -9,33 +8,33 @@ use std::os::unix::fs::FileExt;
 
 use crate::media::container::Container;
 
-/// How a file ends.
+/// The end of a file in relation to its structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Ending {
-    /// With its last structure, or the container has none that could be missing.
+    /// The file is complete, or its container has no structure that could be missing.
     Whole,
-    /// Inside what follows the pictures, such as an index.
+    /// The file ends after the pictures, for example inside an index.
     AfterPictures,
-    /// Inside samples that an index has told of: whoever reads them finds out whose are missing.
+    /// The file ends inside samples that an index lists. Reading the packets shows which are missing.
     InsideSamples,
-    /// Inside the part that holds pictures and sound together.
+    /// The file ends inside the data that holds pictures and audio.
     InsideData,
 }
 
-/// Most structures that are looked at; a file with more has pieces far smaller than any picture.
+/// Maximum number of structures examined. In a file with more, each is far smaller than any picture.
 const MAX_STEPS: usize = 2_000_000;
 
-/// Boxes besides `mdat` and `moof` that a film may end with (ISO/IEC 14496-12, table 1; QuickTime File Format).
+/// Boxes besides `mdat` and `moof` that may come last (ISO/IEC 14496-12, table 1; QuickTime File Format).
 const BOXES: [&[u8; 4]; 13] = [
     b"moov", b"free", b"skip", b"wide", b"udta", b"meta", b"uuid", b"mfra", b"sidx", b"styp",
     b"ftyp", b"pdin", b"emsg",
 ];
 
-/// The largest page of Ogg, bytes: a header of 27, 255 lengths, 255 pieces of 255.
+/// Largest Ogg page, bytes: a header of 27, 255 lengths, 255 segments of 255.
 const MAX_OGG_PAGE: u64 = 27 + 255 + 255 * 255;
 
 impl Ending {
-    /// Returns how `file` of `n_bytes` ends. Fails only when reading does.
+    /// Returns how `file` of `n_bytes` ends. Fails only if reading fails.
     pub(super) fn of(container: Container, file: &File, n_bytes: u64) -> io::Result<Ending> {
         let bytes = Bytes { file, n_bytes };
         match container {
@@ -45,7 +44,7 @@ impl Ending {
             Container::Asf => bytes.ending_of_asf(),
             Container::Flv => bytes.ending_of_flv(),
             Container::Ogg => bytes.ending_of_ogg(),
-            // Packets follow each other to the end, wherever that is.
+            // A sequence of packets without an overall structure.
             Container::MpegTs | Container::MpegPs | Container::H264 | Container::Hevc => {
                 Ok(Ending::Whole)
             }
@@ -53,14 +52,14 @@ impl Ending {
     }
 }
 
-/// A file read at given places.
+/// A file that is read at given offsets.
 struct Bytes<'a> {
     file: &'a File,
     n_bytes: u64,
 }
 
 impl Bytes<'_> {
-    /// Returns the `N` bytes at a place; `None` where the file ends before their end.
+    /// Returns the `N` bytes at an offset; `None` if the file ends before.
     fn at<const N: usize>(&self, place: u64) -> io::Result<Option<[u8; N]>> {
         let mut bytes = [0; N];
         match self.file.read_exact_at(&mut bytes, place) {
@@ -70,7 +69,7 @@ impl Bytes<'_> {
         }
     }
 
-    /// Boxes one after the other, each with its size (32 or 64 bits, big-endian) and name.
+    /// A sequence of boxes, each with its size (32 or 64 bits, big-endian) and name.
     fn ending_of_mov(&self) -> io::Result<Ending> {
         let mut place = 0_u64;
         for _ in 0..MAX_STEPS {
@@ -81,7 +80,7 @@ impl Bytes<'_> {
                 return Ok(Ending::AfterPictures);
             };
             let n_bytes = match u32::from_be_bytes([a, b, c, d]) {
-                0 => return Ok(Ending::Whole), // to the end of the file
+                0 => return Ok(Ending::Whole), // extends to the end of the file
                 1 => match self.at::<8>(place + 8)? {
                     Some(size) => u64::from_be_bytes(size),
                     None => return Ok(Ending::InsideData),
@@ -94,7 +93,7 @@ impl Bytes<'_> {
                     b"mdat" => Ending::InsideSamples,
                     b"moof" => Ending::InsideData,
                     name if BOXES.contains(&name) => Ending::AfterPictures,
-                    _ => Ending::Whole, // no box: something was appended
+                    _ => Ending::Whole, // not a box: appended data
                 });
             }
             place = end;
@@ -102,7 +101,7 @@ impl Bytes<'_> {
         Ok(Ending::Whole)
     }
 
-    /// The header, then a segment of known or unknown size whose children are clusters, indices and tags.
+    /// The header, then a segment of known or unknown size, which contains clusters, indices and tags.
     fn ending_of_matroska(&self) -> io::Result<Ending> {
         const SEGMENT: u64 = 0x1853_8067;
         const CLUSTER: u64 = 0x1f43_b675;
@@ -122,7 +121,7 @@ impl Bytes<'_> {
                     segment_end = Some(end);
                     place += head;
                 }
-                // A cluster without a size: its end is found by whoever reads its packets.
+                // The end of a cluster without a size is found by reading its packets.
                 (_, None) => return Ok(Ending::Whole),
                 (CLUSTER, Some(end)) if end > self.n_bytes => return Ok(Ending::InsideData),
                 (_, Some(end)) if end > self.n_bytes => return Ok(Ending::AfterPictures),
@@ -135,7 +134,7 @@ impl Bytes<'_> {
         })
     }
 
-    /// The id of an element, its size (`None` for an unknown one), and the length of both.
+    /// Returns the id of an element, its size (`None` if unknown), and the length of both.
     fn ebml_head(&self, place: u64) -> io::Result<Option<(u64, Option<u64>, u64)>> {
         let Some((id, n_id)) = self.ebml_number(place, false)? else {
             return Ok(None);
@@ -147,7 +146,8 @@ impl Bytes<'_> {
         Ok(Some((id, (!is_unknown).then_some(size), n_id + n_size)))
     }
 
-    /// A number whose leading zeros say its length, with or without the bit that ends them.
+    /// Returns a number of variable length and its length in bytes. The leading zeros give the length. The
+    /// marker bit after them is optionally removed.
     fn ebml_number(&self, place: u64, without_marker: bool) -> io::Result<Option<(u64, u64)>> {
         let Some([first]) = self.at::<1>(place)? else {
             return Ok(None);
@@ -167,7 +167,8 @@ impl Bytes<'_> {
         Ok(Some((number, n_bytes)))
     }
 
-    /// One `RIFF` or more, each with a list `movi` of pictures and sound. Sizes of 0 were never written.
+    /// One or more `RIFF` chunks, each with a list `movi` of pictures and audio. A size of 0 was never
+    /// written.
     fn ending_of_avi(&self) -> io::Result<Ending> {
         let mut place = 0;
         let mut riff_end = 0;
@@ -190,7 +191,7 @@ impl Bytes<'_> {
                 _ => {}
             }
             if place >= riff_end || end > self.n_bytes {
-                break; // what lies after the last RIFF, or is cut
+                break; // after the last RIFF, or cut off
             }
             place = end;
         }
@@ -200,7 +201,7 @@ impl Bytes<'_> {
         }
     }
 
-    /// Objects with an identifier of 16 bytes and a size of 8; the second or a later one holds all packets.
+    /// Objects with an identifier of 16 bytes and a size of 8. The second or a later one holds all packets.
     fn ending_of_asf(&self) -> io::Result<Ending> {
         const DATA: [u8; 16] = *b"\x36\x26\xb2\x75\x8e\x66\xcf\x11\xa6\xd9\x00\xaa\x00\x62\xce\x6c";
         let mut place = 0_u64;
@@ -216,7 +217,7 @@ impl Bytes<'_> {
             eight.copy_from_slice(size);
             let size = u64::from_le_bytes(eight);
             if size < 24 {
-                break; // never written, as in a broadcast
+                break; // size was never written, as in a broadcast
             }
             let end = place.saturating_add(size);
             if end > self.n_bytes {
@@ -230,8 +231,8 @@ impl Bytes<'_> {
         Ok(Ending::Whole)
     }
 
-    /// A header of 9 bytes, then tags of 11 bytes and their data, each with its size written again in front of
-    /// the next one. That of the last may be missing.
+    /// A header of 9 bytes, then tags: 11 bytes and their data. The size of each tag is repeated after it,
+    /// but may be missing after the last one.
     fn ending_of_flv(&self) -> io::Result<Ending> {
         let mut place = 9_u64;
         for _ in 0..MAX_STEPS {
@@ -242,7 +243,7 @@ impl Bytes<'_> {
                 return Ok(Ending::InsideData);
             };
             if ![8, 9, 18].contains(&(kind & 0x1f)) {
-                return Ok(Ending::Whole); // no tag: something was appended
+                return Ok(Ending::Whole); // not a tag: appended data
             }
             place += 15 + u64::from(u32::from_be_bytes([0, length[0], length[1], length[2]]));
             if place > self.n_bytes {
@@ -252,7 +253,7 @@ impl Bytes<'_> {
         Ok(Ending::Whole)
     }
 
-    /// Pages that tell their own length; the last that begins must end with the file.
+    /// Pages that contain their own length. The last page must end within the file.
     fn ending_of_ogg(&self) -> io::Result<Ending> {
         let from = self.n_bytes.saturating_sub(2 * MAX_OGG_PAGE);
         let mut tail = vec![0; (self.n_bytes - from) as usize];

@@ -1,4 +1,4 @@
-//! What a file's header says of its streams, by ffprobe: codec, size, turn, colors. Claims, to be held against the
+//! Stream headers, read by ffprobe: codec, size, rotation, colors. They are claims, checked against the
 //! limits before anything is decoded.
 
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::media::limits::Limits;
 use crate::media::tools::Tool;
 use crate::raster::{ColorSpec, Matrix, Range};
 
-/// Codecs that are accepted, by ffprobe's names.
+/// Accepted codecs, by ffprobe's names.
 const CODECS: [&str; 21] = [
     "h264",
     "hevc",
@@ -39,22 +39,22 @@ const CODECS: [&str; 21] = [
     "h263", // the codec of many .3gp files
 ];
 
-/// What ffprobe is asked for.
+/// The entries requested from ffprobe.
 const HEADER_ENTRIES: &str = "stream=index,codec_name,codec_type,codec_tag_string,\
     width,height,pix_fmt,sample_aspect_ratio,r_frame_rate,avg_frame_rate,time_base,color_range,color_space,\
     field_order:stream_disposition=attached_pic:stream_tags=enc_key_id,alpha_mode:stream_side_data=displaymatrix";
 
-/// Headers longer than this are not believed.
+/// Maximum length of ffprobe's header output, bytes. Free choice.
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
-/// How the stored picture is turned to be shown.
+/// Transformation of the stored picture for display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::media) struct Turn {
-    /// Rows and columns change places, first of all.
+    /// Whether rows and columns are exchanged, as the first step.
     pub(in crate::media) transpose: bool,
-    /// Then left and right.
+    /// Whether left and right are exchanged afterwards.
     pub(in crate::media) flip_x: bool,
-    /// And top and bottom.
+    /// Whether top and bottom are exchanged afterwards.
     pub(in crate::media) flip_y: bool,
 }
 
@@ -100,7 +100,7 @@ pub(super) fn read_header(
     }
 }
 
-/// The codec that ffprobe was not allowed to open, by its own words.
+/// Returns the codec that ffprobe was not allowed to open, from its error message.
 fn refused_codec(complaint: &str) -> Option<&str> {
     let line = complaint
         .lines()
@@ -108,7 +108,7 @@ fn refused_codec(complaint: &str) -> Option<&str> {
     Some(line.split_once("Codec (")?.1.split_once(')')?.0)
 }
 
-/// All video streams, at least one.
+/// Returns all video streams, at least one.
 pub(super) fn video_streams<'a>(
     header: &'a Value,
     limits: &Limits,
@@ -139,13 +139,13 @@ pub(super) fn check_codec(stream: &Value) -> Result<(), Error> {
     }
 }
 
-/// Size as shown, and the turn that leads there.
+/// Returns the displayed size and the transformation to it.
 pub(super) fn shown_size(stream: &Value, hints: &Hints) -> (u64, u64, Turn) {
     let side = |name: &str| number(&stream[name]).unwrap_or(0.0);
     let (mut width, mut height) = (side("width"), side("height"));
     let told = ratio(text(&stream["sample_aspect_ratio"]), ':');
     let aspect = hints.pixel_aspect.or(told).unwrap_or(1.0);
-    // The smaller count is stretched: no measured detail is lost.
+    // Stretch the smaller dimension, so that no measured detail is lost.
     match aspect {
         a if a > 1.0 => width = (width * a).round(),
         a if a > 0.0 => height = (height / a).round(),
@@ -158,7 +158,7 @@ pub(super) fn shown_size(stream: &Value, hints: &Hints) -> (u64, u64, Turn) {
     (width as u64, height as u64, turn)
 }
 
-/// The turn that a display matrix asks for, to the nearest quarter.
+/// Returns the rotation of a display matrix, rounded to a quarter turn.
 fn turn_of(stream: &Value) -> Turn {
     let matrices = stream["side_data_list"]
         .as_array()
@@ -181,7 +181,7 @@ fn turn_of(stream: &Value) -> Turn {
             flip_y: false,
         };
     };
-    // A stored point (x, y) is shown at (a x + c y, b x + d y).
+    // A stored point (x, y) is displayed at (a x + c y, b x + d y).
     let transpose = f64::abs(b) > f64::abs(a);
     Turn {
         transpose,
@@ -201,7 +201,7 @@ pub(super) fn index_of(stream: &Value) -> u64 {
 pub(super) fn color_of(stream: &Value) -> ColorSpec {
     let pix_fmt = text(&stream["pix_fmt"]);
     let matrix = match text(&stream["color_space"]) {
-        // Wider gamuts are converted to it by `decode`.
+        // `decode` converts the wider gamuts to BT.709.
         "bt709" | "bt2020nc" | "bt2020c" if !is_rgb(pix_fmt) => Matrix::Bt709,
         _ => Matrix::Bt601,
     };
@@ -212,14 +212,14 @@ pub(super) fn color_of(stream: &Value) -> ColorSpec {
     ColorSpec { matrix, range }
 }
 
-/// The bits of a gray pixel format, by ffmpeg's name, where they are more than 8.
+/// Returns the bits of a gray pixel format, by ffmpeg's name, if they are more than 8.
 pub(in crate::media) fn gray_bits(pix_fmt: &str) -> Option<u32> {
     let bits = pix_fmt.strip_prefix("gray")?;
     let bits = bits.strip_suffix("le").or(bits.strip_suffix("be"))?;
     bits.parse().ok().filter(|bits| (9..=16).contains(bits))
 }
 
-/// Whether a pixel format, by ffmpeg's name, holds red, green and blue.
+/// Returns whether a pixel format, by ffmpeg's name, holds red, green and blue.
 pub(in crate::media) fn is_rgb(pix_fmt: &str) -> bool {
     [
         "rgb", "bgr", "gbr", "argb", "abgr", "0rgb", "0bgr", "pal8", "x2rgb", "x2bgr", "mono",
@@ -228,8 +228,7 @@ pub(in crate::media) fn is_rgb(pix_fmt: &str) -> bool {
     .any(|start| pix_fmt.starts_with(start))
 }
 
-/// Whether a stream has an alpha channel: by its pixel format, or as WebM has it, in packets beside those of the
-/// picture.
+/// Returns whether a stream has an alpha channel: in its pixel format, or in separate packets as in WebM.
 pub(super) fn has_alpha(stream: &Value) -> bool {
     let of_format = [
         "yuva", "rgba", "bgra", "argb", "abgr", "gbrap", "ya8", "ya16",
@@ -240,7 +239,7 @@ pub(super) fn has_alpha(stream: &Value) -> bool {
         || number(&stream["tags"]["ALPHA_MODE"]) == Some(1.0)
 }
 
-/// The decoder that reads alpha that lies beside the picture's own packets; ffmpeg's own one passes it over.
+/// Returns the decoder that reads alpha from separate packets, which ffmpeg's native decoder ignores.
 pub(super) fn alpha_decoder(stream: &Value) -> Option<&'static str> {
     match text(&stream["codec_name"]) {
         "vp8" => Some("libvpx"),
@@ -253,12 +252,12 @@ pub(super) fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }
 
-/// A number, which ffprobe may have put in quotes.
+/// Returns a number, which ffprobe may have quoted.
 pub(super) fn number(value: &Value) -> Option<f64> {
     value.as_f64().or_else(|| value.as_str()?.parse().ok())
 }
 
-/// `30000/1001` or `4:3`; `None` for `0/0` and the like.
+/// Parses `30000/1001` or `4:3`; returns `None` for `0/0` and the like.
 pub(super) fn ratio(text: &str, sign: char) -> Option<f64> {
     let (over, under) = text.split_once(sign)?;
     let value = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;

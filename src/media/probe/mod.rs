@@ -1,11 +1,13 @@
-//! What a file holds, and whether it is within the limits (RELIABILITY.md, "Default limits" and
-//! "Reason codes"). Two runs of ffprobe: the headers, then the time of every packet of the video streams; a third
-//! that decodes, where packets do not tell the pictures. Numbers of the header are only claims.
+//! Probing of a file: its streams and pictures, checked against the limits (docs/explanation/promises.md,
+//! "Bad input").
+//!
+//! Two runs of ffprobe read the headers and the timestamps of all video packets. A third run decodes the
+//! film, if the packets do not determine its pictures. Numbers in the header are treated as claims.
 
-mod clock; // a recorder's times, mended
-mod ending; // whether a file ends where its structure does
-pub(in crate::media) mod header; // what a file's header says of its streams
-mod packets; // when each packet and picture is shown
+mod clock; // correction of a recorder's timestamps
+mod ending; // detection of files that are cut off
+pub(in crate::media) mod header; // stream headers
+mod packets; // timestamps of packets and pictures
 pub(in crate::media) mod timeline; // presentation times -> a constant rate
 
 use std::fs::File;
@@ -30,10 +32,11 @@ use header::{
 use packets::{AllPackets, Packets, Pictures};
 use timeline::{Claims, Timeline};
 
-/// A larger file may turn out to be none of ours: its packets are read only once its headers are good.
+/// Largest file, bytes, whose packets are read in parallel with its headers. A larger file may be invalid, so
+/// its headers are checked first. Free choice.
 const MOST_READ_EARLY: u64 = 64 << 20;
 
-/// Gray whose levels stay as they are.
+/// Gray of the full range, whose levels are kept.
 pub(in crate::media) const GRAY: ColorSpec = ColorSpec {
     matrix: Matrix::Bt601,
     range: Range::Full,
@@ -42,47 +45,48 @@ pub(in crate::media) const GRAY: ColorSpec = ColorSpec {
 /// A film that is within the limits.
 #[derive(Clone, Debug)]
 pub(in crate::media) struct Probe {
-    /// For `-f`.
+    /// Container, for `-f`.
     pub(in crate::media) container: Container,
-    /// For `-map`.
+    /// Index of the video stream, for `-map`.
     pub(in crate::media) stream_idx: u64,
-    /// Columns as shown, square pixels.
+    /// Width after rotation, in square pixels.
     pub(in crate::media) width: u32,
-    /// Rows as shown, square pixels.
+    /// Height after rotation, in square pixels.
     pub(in crate::media) height: u32,
-    /// How the stored picture is turned.
+    /// Rotation and mirroring of the stored picture.
     pub(in crate::media) turn: Turn,
     /// ffmpeg's name of the stored pixel format.
     pub(in crate::media) pix_fmt: String,
     /// ffmpeg's name of the stored luma weights.
     pub(in crate::media) color_space: String,
-    /// How the given frames are to be read.
+    /// Conversion of the frames to RGB.
     pub(in crate::media) color: ColorSpec,
-    /// The alpha channel is given, as gray of the full range; and the decoder that this needs, if it is not the usual one.
+    /// Whether the alpha channel is returned, as gray of the full range; and the decoder this needs, if not
+    /// the default.
     pub(in crate::media) of_alpha: bool,
     pub(in crate::media) decoder: Option<&'static str>,
-    /// There is an alpha channel.
+    /// Whether the film has an alpha channel.
     pub(in crate::media) has_alpha: bool,
-    /// Stored in two fields.
+    /// Whether the film is interlaced.
     pub(in crate::media) interlaced: bool,
-    /// Pictures that decoding gives, as far as can be told before.
+    /// Expected number of decoded pictures.
     pub(in crate::media) n_pictures: usize,
-    /// The file's own times lead to its pictures: none is missing, none was mended.
+    /// Whether the file's own timestamps determine its pictures, with none missing or corrected.
     pub(in crate::media) has_plain_times: bool,
-    /// Which frame is shown when.
+    /// Frames and times at a constant rate.
     pub(in crate::media) timeline: Timeline,
-    /// What is worth knowing of the file.
+    /// Notes about the file.
     pub(in crate::media) notes: Vec<Note>,
 }
 
-/// A file that was looked at from outside.
+/// Properties of a file that do not need ffprobe.
 struct Outside {
     container: Container,
     n_bytes: u64,
     ending: Ending,
 }
 
-/// Reads the headers and the packet times of a file.
+/// Reads the headers and packet timestamps of a file, and refuses a file that exceeds the limits.
 pub(in crate::media) fn probe(path: &Path, limits: &Limits, hints: &Hints) -> Result<Probe, Error> {
     let outside = look(path, limits)?;
     let Outside {
@@ -165,16 +169,16 @@ fn look(path: &Path, limits: &Limits) -> Result<Outside, Error> {
     })
 }
 
-/// The pictures of the film, before anything is made of their times.
+/// The pictures of a film with their times in the file.
 struct Found {
-    /// Their times as the file tells them, in the order in which they are shown.
+    /// Times in display order, as stored in the file; `None` for a picture without a time.
     times_s: Vec<Option<f64>>,
     has_plain_times: bool,
 }
 
 impl Found {
-    /// Finds the pictures by their packets where those tell them, else by decoding. Refuses a film that is cut
-    /// off or damaged, unless that is allowed.
+    /// Finds the pictures from their packets or, if the packets do not determine them, by decoding. Refuses a
+    /// film that is cut off or damaged, unless the limits allow it.
     fn of(
         path: &Path,
         outside: &Outside,
@@ -200,7 +204,8 @@ impl Found {
         };
         let is_cut = match outside.ending {
             Ending::InsideData => true,
-            // The index behind the pictures may be gone; a container without sizes ends where its reader says.
+            // Only the index after the pictures may be missing. A Matroska file without sizes ends where its
+            // reader says.
             Ending::AfterPictures if outside.container == Container::Matroska => false,
             _ => all.is_cut(packets.stream_idx),
         };
@@ -213,7 +218,7 @@ impl Found {
         }
     }
 
-    /// From the first picture to the last, seconds; 0 where that cannot be told.
+    /// Returns the time from the first to the last picture, seconds; 0 if unknown.
     fn span_s(&self) -> f64 {
         let times = self.times_s.iter().flatten();
         let (least, most) = times.fold((f64::MAX, f64::MIN), |(least, most), &time| {
@@ -243,7 +248,7 @@ impl Found {
     }
 }
 
-/// The times of the pictures that a stream decodes to, and whether some packets were too damaged for that.
+/// Returns the times of the decoded pictures, and whether too many packets were damaged.
 fn decoded(
     path: &Path,
     container: Container,
@@ -257,14 +262,14 @@ fn decoded(
     Ok((pictures.times_s, is_damaged))
 }
 
-/// Whether each packet that has a time rightly gives one picture, which then has that time.
+/// Returns whether each packet with a valid time decodes to exactly one picture with that time.
 fn has_a_picture_a_packet(outside: &Outside, stream: &Value) -> bool {
     let is_told = !outside.container.is_bare() && outside.container != Container::MpegPs;
     is_told && !is_interlaced(stream) && text(&stream["codec_name"]) != "vp8"
 }
 
-/// The stream with the most pictures, of equals that with the largest picture, of those the first: a thumbnail
-/// beside the film is a stream of one picture, marked as such or not.
+/// Returns the stream with the most pictures; of equals, the one with the largest picture, then the first. A
+/// thumbnail is a stream of one picture, whether marked as such or not.
 fn choose_stream<'a>(streams: &[&'a Value], packets: &AllPackets) -> Result<&'a Value, Error> {
     let side = |s: &Value, name: &str| number(&s[name]).unwrap_or(0.0) as u64;
     let rank = |s: &Value| {
@@ -279,7 +284,7 @@ fn choose_stream<'a>(streams: &[&'a Value], packets: &AllPackets) -> Result<&'a 
     (films.rev().max_by_key(|s| rank(s))).ok_or(Error::NoVideoStream)
 }
 
-/// Refuses a stream of a codec or a size that is not accepted; returns the size as shown and the turn to it.
+/// Refuses a stream whose codec or size is not accepted. Returns the displayed size and the rotation.
 fn check_stream(stream: &Value, limits: &Limits, hints: &Hints) -> Result<(u64, u64, Turn), Error> {
     check_codec(stream)?;
     let (width, height, turn) = shown_size(stream, hints);

@@ -1,6 +1,6 @@
-//! What is really in a file: the time of every packet of its video streams, and, where packets alone do not tell,
-//! the time of every picture that they decode to (RELIABILITY.md, "Facts": believe what is there, not what is
-//! claimed). Which of several streams is the film, how long it is, and at which rate, all follow from these.
+//! Timestamps of the video packets of a file and, if those do not suffice, of the decoded pictures. The
+//! choice of the stream, its length and its frame rate depend on them, not on the claims of the header
+//! (docs/explanation/promises.md, "Bad input").
 
 use std::path::Path;
 use std::time::Duration;
@@ -12,44 +12,45 @@ use crate::media::gate::{Child, Order};
 use crate::media::limits::Limits;
 use crate::media::tools::Tool;
 
-/// Disks read at least this fast, bytes a second; the packet times need the whole file.
+/// Minimum read speed of a disk, bytes per second. Reading packet times needs the whole file. Free choice.
 const SLOWEST_DISK: u64 = 50_000_000;
 
-/// What is said of one packet is shorter, side data and all.
+/// Maximum length of ffprobe's output for one packet with its side data, bytes. Free choice.
 const MAX_LINE_BYTES: usize = 64 << 10;
 
-/// What ffprobe says where the structure of a Matroska file breaks off.
+/// Messages of ffprobe for a Matroska file whose structure breaks off.
 const BROKEN: [&str; 2] = ["File ended prematurely", "EBML number"];
 
-/// Packets up to so many bytes may say "the same picture again", which some decoders answer with no picture.
+/// Packets of up to this size, bytes, may encode a repeated picture. Some decoders output no picture for
+/// them.
 const MAX_SILENT_BYTES: u64 = 16;
 
-/// No codec shows a picture so long after others that were stored behind it, seconds.
+/// Longest delay of a picture by reordering in any codec, seconds.
 const LONGEST_REORDER_S: f64 = 1.0;
 
-/// What the packets of one stream say.
+/// The packets of one stream.
 #[derive(Clone, Debug)]
 pub(super) struct Packets {
-    /// The stream's index in the file.
+    /// Index of the stream in the file.
     pub(super) stream_idx: u64,
-    /// Presentation times of the packets to be shown, in the order of the file.
+    /// Presentation times of the displayed packets, in file order.
     times_s: Vec<Option<f64>>,
-    /// The packets alone do not tell which pictures are shown when.
+    /// Whether the packets alone do not determine the pictures.
     is_unclear: bool,
-    /// Some packet is encrypted.
+    /// Whether a packet is encrypted.
     pub(super) encrypted: bool,
 }
 
-/// What the packets of all video streams say.
+/// The packets of all video streams.
 #[derive(Debug)]
 pub(super) struct AllPackets {
     streams: Vec<Packets>,
-    /// What the tool complained of.
+    /// The end of ffprobe's stderr.
     complaint: String,
 }
 
 impl AllPackets {
-    /// Reads the packets of all video streams, of each at most as many as the limit.
+    /// Reads the packets of all video streams. Fails if a stream has more than `limits.max_frames`.
     pub(super) fn read(
         container: Container,
         path: &Path,
@@ -68,20 +69,20 @@ impl AllPackets {
         Ok(AllPackets { streams, complaint })
     }
 
-    /// The packets of a stream; none where it has none.
+    /// Returns the packets of a stream; an empty list if it has none.
     pub(super) fn of(&self, stream_idx: u64) -> Packets {
         let packets = self.streams.iter().find(|p| p.stream_idx == stream_idx);
         packets.cloned().unwrap_or(Packets::none(stream_idx))
     }
 
-    /// How many packets of a stream are to be shown.
+    /// Returns the number of displayed packets of a stream.
     pub(super) fn n_shown(&self, stream_idx: u64) -> usize {
         let packets = self.streams.iter().find(|p| p.stream_idx == stream_idx);
         packets.map_or(0, Packets::n_shown)
     }
 
-    /// Whether samples of a stream lie beyond the end of the file, the file ends inside a block, or its blocks are
-    /// damaged.
+    /// Returns whether samples of a stream lie beyond the end of the file, the file ends inside a block, or
+    /// its blocks are damaged.
     pub(super) fn is_cut(&self, stream_idx: u64) -> bool {
         let of_stream = format!("stream {stream_idx}, offset ");
         let lines = self.complaint.lines();
@@ -92,7 +93,8 @@ impl AllPackets {
     }
 }
 
-/// One line about a packet: stream, time, size, flags, side data. Side data may go on for further lines.
+/// Parses one line about a packet: stream, time, size, flags, side data. Side data may continue on further
+/// lines.
 fn add(streams: &mut Vec<Packets>, line: &str, limits: &Limits) -> Result<(), Error> {
     let mut cells = line.split(',');
     let numbers = (cells.next().map(str::parse), cells.next(), cells.next());
@@ -131,13 +133,13 @@ impl Packets {
         }
     }
 
-    /// Packets to be shown.
+    /// Returns the number of displayed packets.
     pub(super) fn n_shown(&self) -> usize {
         self.times_s.len()
     }
 
-    /// The times in the order in which pictures are shown; `None` where only the pictures themselves tell them:
-    /// some packet has no time, may hold no picture, or lies further back than any codec reorders.
+    /// Returns the times in display order. Returns `None` if the packets do not determine them. In that case
+    /// a packet has no time, may hold no picture, or is further out of order than any codec allows.
     pub(super) fn shown_s(&self) -> Option<Vec<f64>> {
         let mut shown_s: Vec<f64> = self.times_s.iter().copied().collect::<Option<_>>()?;
         let mut latest_s = f64::MIN;
@@ -153,17 +155,17 @@ impl Packets {
     }
 }
 
-/// The pictures that a stream decodes to.
+/// The pictures to which a stream decodes.
 #[derive(Debug)]
 pub(super) struct Pictures {
-    /// Their times in the order in which they are shown; `None` for one without a time.
+    /// Times in display order; `None` for a picture without a time.
     pub(super) times_s: Vec<Option<f64>>,
-    /// What the decoder complained of.
+    /// The end of the decoder's stderr.
     pub(super) complaint: String,
 }
 
 impl Pictures {
-    /// Decodes a stream of `n_packets` and reads the times of its pictures, at most as many as the limit.
+    /// Decodes a stream of `n_packets` and reads the times of its pictures. Fails beyond `limits.max_frames`.
     pub(super) fn read(
         container: Container,
         path: &Path,
@@ -192,7 +194,7 @@ impl Pictures {
     }
 }
 
-/// Runs a tool and hands on each line that it says; returns what it complained of.
+/// Runs a tool and passes each line of its output to `take`. Returns its stderr.
 fn read_lines(
     order: Order,
     mut take: impl FnMut(&str) -> Result<(), Error>,
@@ -209,7 +211,7 @@ fn read_lines(
     Ok(child.finish()?.check()?.complaint)
 }
 
-/// The next piece of the output; `line` is what came of a line that has not ended.
+/// Splits a piece of output into lines. `line` holds the start of an unfinished line.
 fn split_lines(
     piece: &[u8],
     line: &mut Vec<u8>,

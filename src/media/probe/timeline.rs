@@ -1,18 +1,18 @@
-//! From the presentation times of a film to frames at a constant rate (ECOSYSTEM.md 5, "Drive").
+//! Conversion of a film's presentation times to a constant frame rate.
 //!
-//! Telephones film at rates that wander; the algorithms want one rate. A film whose times lie on a
-//! regular grid, up to the rounding of its clock, is left as it is. Any other is given at its
-//! nominal rate, each frame being the one nearest in time, with its own true time.
+//! Phones film at varying rates, but the algorithms need one rate. A film whose times lie on a regular grid,
+//! up to the rounding of its clock, stays unchanged. Any other film is resampled at its nominal rate. Each
+//! frame is then the one nearest in time and keeps its own true time.
 
 use super::clock;
 use crate::media::error::Error;
 use crate::media::limits::Limits;
 use crate::media::note::Note;
 
-/// The rate of a film that tells none: that of most cameras.
+/// Frame rate of a film without any timing, frames per second: that of most cameras.
 const ASSUMED_FPS: f64 = 30.0;
 
-/// Rates that cameras are sold with; a wandering film was meant to have one of them.
+/// Nominal frame rates of cameras, frames per second. A film with a varying rate probably has one of them.
 const COMMON_FPS: [f64; 11] = [
     24000.0 / 1001.0,
     24.0,
@@ -27,48 +27,48 @@ const COMMON_FPS: [f64; 11] = [
     240.0,
 ];
 
-/// How far from its nominal rate a wandering film may be: half a percent.
+/// Tolerance between the measured and a nominal rate: 0.5 %. Free choice.
 const NEAR: f64 = 0.005;
 
-/// How many frames at the end may be late without making the rate a variable one.
+/// Number of last frames that may be late in a film of constant rate.
 const RAGGED: usize = 3;
 
-/// Which decoded frame is shown when.
+/// Assignment of decoded frames to times.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::media) enum Timeline {
     /// Every decoded frame once, at this rate.
     Constant {
-        /// Frames a second.
+        /// Frames per second.
         fps: f64,
-        /// True times, seconds from the first, of the last few frames where those are late: a film
-        /// cut without re-encoding lacks some of the frames before its last.
+        /// True times, seconds from the first, of the last few frames, if those are late. A film cut without
+        /// re-encoding lacks some of the frames before its last.
         ragged_s: Vec<f64>,
     },
-    /// Frames skipped and repeated so that the rate becomes constant.
+    /// Frames skipped and repeated to make the rate constant.
     Variable {
-        /// Frames a second, after resampling.
+        /// Frames per second, after resampling.
         fps: f64,
         /// True time of each decoded frame, seconds from the first.
         times_s: Vec<f64>,
-        /// For each given frame, the decoded frame it shows; never decreasing.
+        /// For each output frame, the index of the decoded frame it shows; never decreasing.
         sources: Vec<u32>,
     },
 }
 
-/// What is claimed of a film's rate.
+/// Claims about a film's frame rate.
 #[derive(Clone, Debug)]
 pub(in crate::media) struct Claims {
-    /// Frames a second by the header, the likeliest first.
+    /// Frame rates from the header, frames per second, most likely first.
     pub(in crate::media) fps: Vec<f64>,
-    /// A tick of its clock, seconds.
+    /// Resolution of the file's timestamps, seconds.
     pub(in crate::media) tick_s: f64,
-    /// Frames a second as a person wants them, whatever the file says.
+    /// Frame rate given by the user, which overrides the file.
     pub(in crate::media) wanted_fps: Option<f64>,
 }
 
 impl Timeline {
-    /// The timeline of pictures whose times in the file are `times_s`, in the order in which they are shown,
-    /// within the limits.
+    /// Returns the timeline of pictures with the given times in the file, in display order. Fails if it
+    /// exceeds the limits.
     pub(in crate::media) fn found(
         times_s: &[Option<f64>],
         claims: &Claims,
@@ -126,11 +126,11 @@ impl Timeline {
         Timeline::Constant { fps, ragged_s }
     }
 
-    /// The timeline of frames shown at `times_s` (ascending), given the rates that the header
-    /// claims and the length of a tick of its clock.
+    /// Returns the timeline of frames shown at `times_s` (ascending), given the claimed rates and the clock
+    /// resolution.
     ///
-    /// `None` when there are fewer than two times or all are equal. Times that lie far apart, or a rate that
-    /// is far too high, are refused before a frame of it is counted out: a few bytes can claim billions.
+    /// Returns `None` if there are fewer than two times or all are equal. Excessive time spans and rates are
+    /// refused before the frames are enumerated, because a few bytes can claim billions of frames.
     fn of(
         times_s: &[f64],
         claimed_fps: &[f64],
@@ -173,7 +173,7 @@ impl Timeline {
         }))
     }
 
-    /// Frames a second, as given.
+    /// Returns the frame rate of the output, frames per second.
     pub(in crate::media) fn fps(&self) -> f64 {
         match self {
             Timeline::Constant { fps, .. } | Timeline::Variable { fps, .. } => *fps,
@@ -181,20 +181,20 @@ impl Timeline {
     }
 }
 
-/// Whether frame k is shown at k / fps, up to the rounding of two clock readings.
+/// Returns whether frame k is shown at k / fps, within the rounding of two timestamps.
 fn is_regular(times_s: &[f64], fps: f64, tick_s: f64) -> bool {
     if !(fps > 0.0 && fps.is_finite()) {
         return false;
     }
-    // Times arrive with six decimals. A coarse clock must not hide a missing frame.
+    // Times have six decimals. The limit of 0.25 / fps keeps a coarse clock from hiding a missing frame.
     let tolerance_s = (tick_s * 1.01 + 2e-6).min(0.25 / fps);
     let regular =
         |(k, time): (usize, &f64)| (time - times_s[0] - k as f64 / fps).abs() <= tolerance_s;
     times_s.iter().enumerate().all(regular)
 }
 
-/// The rate that the film was meant to have: the mean of its ordinary steps, drawn to a claimed or
-/// common rate nearby.
+/// Returns the nominal rate of a film: the mean rate of its ordinary steps, or a claimed or common rate near
+/// it.
 fn nominal_fps(times_s: &[f64], claimed_fps: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s
         .windows(2)
@@ -218,7 +218,7 @@ fn nominal_fps(times_s: &[f64], claimed_fps: &[f64]) -> Option<f64> {
     )
 }
 
-/// Whether so many seconds at this rate are within the limits.
+/// Checks that a duration at this rate is within the limits.
 fn check_extent(span_s: f64, fps: f64, limits: &Limits) -> Result<(), Error> {
     if fps > limits.max_fps {
         return Err(Error::TooFast { fps });
@@ -237,7 +237,7 @@ fn check_extent(span_s: f64, fps: f64, limits: &Limits) -> Result<(), Error> {
     }
 }
 
-/// For each instant k / fps the index of the nearest time, the earlier one at a tie.
+/// Returns, for each instant k / fps, the index of the nearest time; the earlier one at a tie.
 fn nearest(times_s: &[f64], fps: f64) -> Vec<u32> {
     let last_s = times_s[times_s.len() - 1];
     let n_frames = (last_s * fps + 0.5) as usize + 1;

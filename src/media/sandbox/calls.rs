@@ -1,9 +1,10 @@
-//! Seccomp (RELIABILITY.md, "The gate"): the filter that refuses the system calls that no film needs (`refused`).
-//! The program is written out here instructions by instruction, because it is short and must be read.
+//! Seccomp filter that refuses system calls no film needs (`refused`; docs/explanation/promises.md,
+//! "Sandbox"). The BPF program is written out here instruction by instruction, because it is short and must
+//! be reviewable.
 //!
-//! A refused call fails with EPERM; it does not kill. Libraries are curious, and live with a refusal: a
-//! kill would turn the curiosity of the next version of some library into films that fail. What the call
-//! would have done is not done either way. Only a program that speaks another machine's language is killed.
+//! A refused call fails with EPERM and does not kill the process. Libraries probe for features and handle a
+//! refusal; a kill could make films fail after a library update. The call has no effect either way. Only a
+//! program for another processor architecture is killed.
 
 #![expect(
     unsafe_code,
@@ -16,11 +17,11 @@ use libc::{c_long, sock_filter};
 
 use super::refused::REFUSED;
 
-/// Stands in the filter where the child's own number goes, which is known after the fork alone.
+/// Placeholder in the filter for the child's process id, which is known only after the fork.
 const OWN: u32 = u32::MAX;
 
-/// Calls with larger numbers are newer than the list: they are answered as by a kernel that has not
-/// learned them yet, which every library knows how to meet. On x86 that holds the 32-bit numbers too.
+/// Highest known system call number. Calls with higher numbers fail with ENOSYS, as on an older kernel, which
+/// libraries handle. On x86-64 this range includes the 32-bit (x32) numbers.
 const NEWEST: u32 = libc::SYS_mseal as u32;
 
 #[cfg(target_arch = "x86_64")]
@@ -30,8 +31,8 @@ const ARCH: Option<u32> = Some(0xc000_00b7);
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
 const ARCH: Option<u32> = None;
 
-// Where a call's number, its language and the low and high halves of its arguments lie (both machines
-// above are little-endian).
+// Offsets of a call's number, architecture and the low and high halves of its arguments. Both architectures
+// above are little-endian.
 const NUMBER: u32 = 0;
 const LANGUAGE: u32 = 4;
 const fn low(argument: u32) -> u32 {
@@ -41,14 +42,14 @@ const fn high(argument: u32) -> u32 {
     low(argument) + 4
 }
 
-/// Why this machine has no such filters; `None` where it has.
+/// Returns why this machine does not support the filter; `None` if it does.
 pub(super) fn lack() -> Option<String> {
     if ARCH.is_none() {
         return Some("the list of system calls is not written for this processor".to_owned());
     }
     const ASK_ACTION: libc::c_ulong = 2;
     let action = libc::SECCOMP_RET_ERRNO;
-    // SAFETY: the kernel reads one number of ours, which lives until the call returns.
+    // SAFETY: the kernel reads one number, which lives until the call returns.
     let asked = unsafe { libc::syscall(libc::SYS_seccomp, ASK_ACTION, 0, &raw const action) };
     match asked {
         0 => None,
@@ -59,34 +60,34 @@ pub(super) fn lack() -> Option<String> {
     }
 }
 
-/// The filter, as the kernel runs it for every call of the child.
+/// Returns the filter, which the kernel runs for every system call of the child.
 pub(super) fn program() -> Vec<sock_filter> {
     let mut program = Program(Vec::new());
     program.load(LANGUAGE);
     program.when_not(ARCH.unwrap_or_default(), libc::SECCOMP_RET_KILL_PROCESS);
     program.load(NUMBER);
     program.when_above(NEWEST, refusal(libc::ENOSYS));
-    // Its flags lie in memory, which no filter can see; libraries go back to `clone`.
+    // The flags of clone3 are in memory, which a filter cannot read. Libraries fall back to `clone`.
     program.when(libc::SYS_clone3, refusal(libc::ENOSYS));
     for call in REFUSED.iter().flat_map(|(_, calls)| *calls) {
         program.when(*call, refusal(libc::EPERM));
     }
-    // Threads are made by `clone` too.
+    // Threads are also created by `clone`.
     program.when_then(libc::SYS_clone, |then| {
         then.load(low(0));
         then.unless_bit(libc::CLONE_THREAD as u32, refusal(libc::EPERM));
     });
-    // A signal to itself is how a program aborts.
+    // A program aborts by sending itself a signal.
     program.when_then(libc::SYS_tgkill, |then| {
         then.load(low(0));
         then.when_not(OWN, refusal(libc::EPERM));
     });
-    // The leash cannot be slipped.
+    // The parent death signal must stay set.
     program.when_then(libc::SYS_prctl, |then| {
         then.load(low(0));
         then.when(libc::PR_SET_PDEATHSIG.into(), refusal(libc::EPERM));
     });
-    // Limits may be read, not set.
+    // Limits may be read but not set.
     program.when_then(libc::SYS_prlimit64, |then| {
         for half in [low(2), high(2)] {
             then.load(half);
@@ -101,7 +102,7 @@ fn refusal(errno: i32) -> u32 {
     libc::SECCOMP_RET_ERRNO | errno as u32
 }
 
-/// Writes the number of the process that asks into its filter. Async-signal-safe.
+/// Writes the id of the calling process into its filter. Async-signal-safe.
 fn own(program: &mut [sock_filter]) {
     // SAFETY: the call has no arguments and cannot fail.
     let process = unsafe { libc::getpid() };
@@ -110,14 +111,14 @@ fn own(program: &mut [sock_filter]) {
     }
 }
 
-/// Enters the filter, for good, in the child that it is for. Async-signal-safe.
+/// Enters the filter in the child. This cannot be undone. Async-signal-safe.
 pub(super) fn enter(program: &mut [sock_filter]) -> io::Result<()> {
     own(program);
     let filter = libc::sock_fprog {
         len: program.len() as u16,
         filter: program.as_ptr().cast_mut(),
     };
-    // SAFETY: the kernel reads the program, which outlives the call, and does not write it.
+    // SAFETY: the kernel reads the program, which outlives the call, and does not write to it.
     let entered = unsafe {
         libc::syscall(
             libc::SYS_seccomp,
@@ -132,7 +133,7 @@ pub(super) fn enter(program: &mut [sock_filter]) -> io::Result<()> {
     }
 }
 
-/// A filter in the making. Every answer stands right behind its question, so that jumps are short.
+/// A filter under construction. Each result follows its test directly, so that jumps are short.
 struct Program(Vec<sock_filter>);
 
 impl Program {
@@ -177,7 +178,7 @@ impl Program {
         self.end(answer);
     }
 
-    /// Looks closer at one call; what the look does not refuse is allowed.
+    /// Adds tests for one call. If none of them refuses it, the call is allowed.
     fn when_then(&mut self, call: c_long, look: impl FnOnce(&mut Program)) {
         let mut then = Program(Vec::new());
         look(&mut then);

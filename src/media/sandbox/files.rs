@@ -1,9 +1,8 @@
-//! Landlock (RELIABILITY.md, "The gate"): a child reads its one input and what its program is made
-//! of, writes its one output, runs nothing but its program, opens no TCP connection and signals nobody
-//! outside. Each kernel gives as much of this as it has.
+//! Landlock rules (docs/explanation/promises.md, "Sandbox"). A child may read its input and its libraries,
+//! write its output and run its own program. It may not open TCP connections or signal outside processes.
+//! Each kernel enforces as much of this as it supports.
 //!
-//! The output is a file that is there already, not a folder: the child can neither make nor remove
-//! a file anywhere.
+//! The output is an existing file, not a folder, so the child cannot create or delete files.
 
 #![expect(
     unsafe_code,
@@ -21,16 +20,16 @@ use landlock::{
 
 use super::{Cage, Layer};
 
-/// What a program is made of: where it and its libraries lie.
+/// Files that a program needs to run: the program, its loader and its libraries.
 #[derive(Clone, Debug, Default)]
 pub(in crate::media) struct Reach {
-    /// Files that may be run: the program and its loader.
+    /// Files that may be executed: the program and its loader.
     pub(in crate::media) runs: Vec<PathBuf>,
-    /// Folders whose files may be read: those of its libraries.
+    /// Folders of its libraries, which may be read.
     pub(in crate::media) reads: Vec<PathBuf>,
 }
 
-/// What libraries look at when they are loaded, besides themselves; none of it is anybody's secret.
+/// Files that libraries read when they are loaded. None of them is secret.
 const USUAL: [&str; 9] = [
     "/etc/ld.so.cache",
     "/etc/ld.so.preload",
@@ -43,10 +42,10 @@ const USUAL: [&str; 9] = [
     "/sys/devices/system/node",
 ];
 
-/// The newest version of the rules that this code was written for.
+/// The newest Landlock ABI that this code was written for.
 const NEWEST: ABI = ABI::V6;
 
-/// The rules of a child, ready to be entered; `None` where no layer wants them.
+/// Returns the rules of a child, ready to be entered; `None` if no layer needs them.
 pub(super) fn ruleset(cage: &Cage, reach: &Reach) -> io::Result<Option<OwnedFd>> {
     let mut rules = Ruleset::default();
     let mut is_empty = true;
@@ -86,7 +85,7 @@ fn allow(mut rules: RulesetCreated, cage: &Cage, reach: &Reach) -> io::Result<Ru
         rules = add(rules, must(output)?, write)?;
     }
     let usual = USUAL.iter().map(Path::new);
-    // What is not there cannot be missed.
+    // Paths that do not exist are skipped.
     for path in reach.reads.iter().map(PathBuf::as_path).chain(usual) {
         if let Ok(found) = PathFd::new(path) {
             rules = add(rules, found, read | AccessFs::ReadDir)?;
@@ -105,9 +104,9 @@ fn add(
         .map_err(io::Error::other)
 }
 
-/// Enters the rules, for good. Async-signal-safe.
+/// Enters the rules. This cannot be undone. Async-signal-safe.
 pub(super) fn enter(ruleset: &OwnedFd) -> io::Result<()> {
-    // SAFETY: the call takes a descriptor that is open, and reads no memory of ours.
+    // SAFETY: the call takes an open descriptor and reads no memory of this process.
     let entered =
         unsafe { libc::syscall(libc::SYS_landlock_restrict_self, ruleset.as_raw_fd(), 0) };
     match entered {

@@ -1,6 +1,5 @@
-//! The layers of the sandbox by name, and which of them this machine's kernel has (RELIABILITY.md,
-//! "The gate": what the kernel lacks is said). Whether the installed tools can work inside them as
-//! well is found out by `tools`.
+//! The layers of the sandbox, and which of them the kernel of this machine supports
+//! (docs/explanation/promises.md, "Sandbox"). `tools` finds out whether the installed tools run inside them.
 
 #![expect(
     unsafe_code,
@@ -9,27 +8,27 @@
 
 use super::calls;
 
-/// One wall around a media child.
+/// One protection around a media child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
-    /// It dies with the process that started it, and with the thread's group.
+    /// The child is killed when the thread that started it ends, and so when flockreel dies.
     Leash,
-    /// Root's powers are dropped, and none can be had again.
+    /// The capabilities of root are dropped.
     Privileges,
-    /// Bounds on address space, processor time, file size, open files, core dumps.
+    /// Limits of address space, processor time, file size, open files and core dumps.
     Limits,
-    /// Landlock: it reads its input and its libraries, writes its output, runs nothing else.
+    /// Landlock: reads only its input and its libraries, writes only its output, runs no other program.
     Files,
-    /// Landlock: no TCP connection in or out.
+    /// Landlock: no TCP connections in or out.
     Network,
-    /// Landlock: no signal and no abstract socket to anybody outside.
+    /// Landlock: no signals and no abstract sockets to processes outside.
     Signals,
-    /// Seccomp: no sockets, no processes, no other process's memory, no mounts, and so on.
+    /// Seccomp: no sockets, processes, access to the memory of other processes, mounts and so on.
     Calls,
 }
 
 impl Layer {
-    /// Every layer, in the order in which a child enters them.
+    /// All layers, in the order in which a child enters them.
     pub const ALL: [Layer; 7] = [
         Layer::Leash,
         Layer::Privileges,
@@ -40,7 +39,7 @@ impl Layer {
         Layer::Calls,
     ];
 
-    /// Its stable name.
+    /// Returns the stable name.
     pub fn name(self) -> &'static str {
         match self {
             Layer::Leash => "leash",
@@ -53,7 +52,7 @@ impl Layer {
         }
     }
 
-    /// What a film could do where it is missing, in plain words.
+    /// Returns what a malicious film could do without the layer.
     pub fn meaning(self) -> &'static str {
         match self {
             Layer::Leash => "a decoder could go on after flockreel has died",
@@ -74,41 +73,41 @@ impl Layer {
 pub struct Layers(u8);
 
 impl Layers {
-    /// Every layer.
+    /// All layers.
     pub const ALL: Layers = Layers((1 << Layer::ALL.len()) - 1);
-    /// No layer at all.
+    /// No layers.
     pub const NONE: Layers = Layers(0);
-    /// What every Linux has had for long: `--sandbox off` leaves these.
+    /// Layers that every common Linux supports. `--sandbox off` uses only these.
     pub const OLD: Layers = Layers::NONE
         .with(Layer::Leash)
         .with(Layer::Privileges)
         .with(Layer::Limits);
 
-    /// The same and `layer`.
+    /// Returns the set with `layer` added.
     #[must_use]
     pub const fn with(self, layer: Layer) -> Layers {
         Layers(self.0 | 1 << layer as u8)
     }
 
-    /// The same without `layer`.
+    /// Returns the set without `layer`.
     #[must_use]
     pub const fn without(self, layer: Layer) -> Layers {
         Layers(self.0 & !(1 << layer as u8))
     }
 
-    /// Those in both.
+    /// Returns the layers in both sets.
     #[must_use]
     pub const fn and(self, other: Layers) -> Layers {
         Layers(self.0 & other.0)
     }
 
-    /// Whether `layer` is among them.
+    /// Returns whether the set contains `layer`.
     pub const fn has(self, layer: Layer) -> bool {
         self.0 & 1 << layer as u8 != 0
     }
 }
 
-/// Why the kernel cannot give a layer; `None` where it can.
+/// Returns why the kernel does not support a layer; `None` if it does.
 pub(in crate::media) fn lack_of(layer: Layer) -> Option<String> {
     let landlock = |since: i64, linux: &str| match landlock_abi() {
         Ok(abi) if abi >= since => None,
@@ -126,11 +125,11 @@ pub(in crate::media) fn lack_of(layer: Layer) -> Option<String> {
     }
 }
 
-/// The version of Landlock's interface that the kernel speaks.
+/// Returns the Landlock ABI version of the kernel.
 pub(in crate::media) fn landlock_abi() -> std::io::Result<i64> {
     const ASK_VERSION: libc::c_ulong = 1;
     let nothing = std::ptr::null::<u8>();
-    // SAFETY: with this flag the kernel reads no memory of ours and makes nothing.
+    // SAFETY: with this flag the kernel reads no memory of this process and creates nothing.
     let abi = unsafe {
         libc::syscall(
             libc::SYS_landlock_create_ruleset,

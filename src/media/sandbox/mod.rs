@@ -1,17 +1,17 @@
-//! What a media child may do (RELIABILITY.md, "The gate", "Before exec"): layers that do not rely on
-//! each other, so that what slips through one is held by the next. Everything that allocates is
-//! prepared before the fork; after it there are plain system calls alone.
+//! Sandbox of a media child process (docs/explanation/promises.md, "Sandbox"). The layers are independent, so
+//! what one layer misses another catches. Everything that allocates is prepared before the fork; after it the
+//! child makes only plain system calls.
 //!
-//! RLIMIT_NPROC is left out on purpose: it counts every thread of the *user*, so that it fails innocent
-//! films on a busy machine, and it does not hold for root at all. `calls` refuses new processes instead,
-//! however many there are, and threads are bounded by the address space that their stacks need.
+//! RLIMIT_NPROC is deliberately omitted. It counts all threads of the user, so valid films would fail on a
+//! busy machine, and it does not apply to root. `calls` refuses new processes instead. The address space
+//! limit bounds the number of threads, because each needs a stack.
 
 #![expect(unsafe_code, reason = "code between fork and exec needs `pre_exec`")]
 
-mod calls; // seccomp: the filter
+mod calls; // seccomp filter
 mod files; // Landlock: files, network, signals
-mod layer; // the layers by name, and which of them this machine has
-mod refused; // which system calls the filter refuses, and why
+mod layer; // names of the layers, and support by this machine
+mod refused; // refused system calls, with reasons
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -26,30 +26,30 @@ pub(super) use files::Reach;
 pub use layer::{Layer, Layers};
 pub(super) use layer::{lack_of, landlock_abi};
 
-/// The walls around one child.
+/// Sandbox settings of one child.
 #[derive(Clone, Debug)]
 pub(super) struct Cage {
-    /// Which layers stand.
+    /// Layers to apply.
     pub(super) layers: Layers,
-    /// Address space, bytes.
+    /// Limit of the address space, bytes.
     pub(super) memory_bytes: u64,
-    /// Processor time of all threads together, seconds.
+    /// Limit of the processor time of all threads, seconds.
     pub(super) cpu_s: u64,
-    /// Largest file it may write, bytes; 0 = it may write to pipes only.
+    /// Limit of the size of a written file, bytes; 0 allows output to pipes only.
     pub(super) file_bytes: u64,
-    /// The one file that it may read, besides its own libraries.
+    /// The only file that it may read, besides its libraries.
     pub(super) input: Option<PathBuf>,
-    /// The one file that it may write; it must be there already.
+    /// The only file that it may write. The file must exist.
     pub(super) output: Option<PathBuf>,
 }
 
-/// Files a child may hold open: the libraries are mapped, not held.
+/// Limit of open file descriptors. Libraries are mapped and do not count.
 const OPEN_FILES: u64 = 64;
 
-/// Puts the cage around the child that `command` will start, a program of this reach.
+/// Applies the sandbox to the child that `command` will start. `reach` describes its program.
 ///
-/// The parent's death is noticed through the *thread* that starts the child, so that thread must
-/// live as long as the process (see `gate`). Fails when a file that the child is to use is not there.
+/// The kernel kills the child when the *thread* that started it ends, so that thread must live as long as the
+/// process (see `gate`). Fails if a file that the child needs does not exist.
 pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::Result<()> {
     let ruleset = files::ruleset(cage, reach)?;
     let mut refusals = match cage.layers.has(Layer::Calls) {
@@ -64,10 +64,10 @@ pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::
             rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
         }
         if rustix::process::getppid() != Some(parent) {
-            // The parent died before the line above took hold.
+            // The parent died before the death signal was set.
             return Err(rustix::io::Errno::SRCH.into());
         }
-        // The kernel wants it of whoever enters the layers below.
+        // The kernel requires this of every process that enters the layers below.
         rustix::thread::set_no_new_privs(true)?;
         if layers.has(Layer::Privileges) {
             drop_privileges()?;
@@ -79,8 +79,8 @@ pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::
         }
         enter_rules(ruleset.as_ref(), &mut refusals)
     };
-    // SAFETY: between fork and exec only async-signal-safe work is allowed. `enter` makes plain
-    // system calls on values that were made before: it neither allocates, nor locks, nor panics.
+    // SAFETY: between fork and exec only async-signal-safe work is allowed. `enter` makes plain system calls
+    // on prepared values: it does not allocate, lock or panic.
     unsafe {
         command.pre_exec(enter);
     }
@@ -97,8 +97,8 @@ fn limits_of(cage: &Cage) -> [(Resource, u64); 5] {
     ]
 }
 
-/// Gives up what root may do, but for reaching the files of others: a service of root's may be asked
-/// for a person's file, and `files` draws the border there. Of an ordinary user there is nothing to drop.
+/// Drops all capabilities of root, except access to other users' files. A service run by root may have to
+/// read such a file, and `files` limits which. An ordinary user has no capabilities to drop.
 fn drop_privileges() -> rustix::io::Result<()> {
     let held = rustix::thread::capabilities(None)?;
     let kept = held.permitted & (CapabilitySet::DAC_OVERRIDE | CapabilitySet::DAC_READ_SEARCH);
@@ -110,7 +110,7 @@ fn drop_privileges() -> rustix::io::Result<()> {
     rustix::thread::set_capabilities(None, sets)
 }
 
-/// Lowers a limit, never raising one that the system or an administrator has set.
+/// Lowers a limit. Never raises a limit set by the system or an administrator.
 fn lower(resource: Resource, limit: u64) -> rustix::io::Result<()> {
     let held = rustix::process::getrlimit(resource).maximum;
     let limit = Some(held.map_or(limit, |held| held.min(limit)));
@@ -123,7 +123,7 @@ fn lower(resource: Resource, limit: u64) -> rustix::io::Result<()> {
     )
 }
 
-/// The last two layers, in this order: the second refuses what it takes to enter the first.
+/// Enters the last two layers. The order matters: the second refuses the calls needed to enter the first.
 fn enter_rules(ruleset: Option<&OwnedFd>, refusals: &mut [libc::sock_filter]) -> io::Result<()> {
     if let Some(ruleset) = ruleset {
         files::enter(ruleset)?;

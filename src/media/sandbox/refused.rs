@@ -1,12 +1,12 @@
-//! The system calls that no film needs, with the reason for each (RELIABILITY.md, "The gate"). Those that depend
-//! on what they are asked for stand in the filter itself (`calls`).
+//! System calls that no film needs, with the reason for each (docs/explanation/promises.md, "Sandbox"). Calls
+//! that depend on their arguments are tested in the filter itself (`calls`).
 
 use libc::c_long;
 
-/// The same number on every machine; the C library's crate does not name it on all.
+/// Number of fchmodat2 on all architectures. The `libc` crate does not define it for all of them.
 const SYS_FCHMODAT2: c_long = 452;
 
-/// Calls that are refused, with the reason.
+/// Refused system calls, grouped by reason.
 pub(super) const REFUSED: &[(&str, &[c_long])] = &[
     (
         "a film is a file: it needs no network",

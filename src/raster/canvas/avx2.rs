@@ -1,5 +1,5 @@
-//! Rows of a canvas with AVX2: the same integers as the plain code beside it, sixteen at a time
-//! (ALGORITHMS.md 8).
+//! Rows of a canvas with AVX2, sixteen values at a time. Results equal those of the scalar code in this
+//! folder.
 
 #![expect(unsafe_code, reason = "vector loads and stores go through pointers")]
 
@@ -8,7 +8,7 @@ use std::arch::x86_64::*;
 use crate::raster::color::FromQuads;
 use crate::raster::resample::{ONE, Quad};
 
-/// Premultiplied pixels under others.
+/// Draws premultiplied pixels under the pixels of a row.
 #[target_feature(enable = "avx2")]
 pub(super) fn under_row(row: &mut [Quad], sprite: &[Quad]) {
     let (row_fours, row_rest) = row.as_chunks_mut::<4>();
@@ -19,15 +19,15 @@ pub(super) fn under_row(row: &mut [Quad], sprite: &[Quad]) {
     let n_rest = row_rest.len().min(sprite_rest.len());
     let rest = first_of_four(n_rest);
     let [above, below] = [&*row_rest, sprite_rest].map(|pixels| {
-        // SAFETY: `pixels` holds the `n_rest` pixels that are read, of 8 bytes each.
+        // SAFETY: `pixels` holds the `n_rest` pixels read, 8 bytes each.
         unsafe { _mm256_maskload_epi64(pixels.as_ptr().cast(), rest) }
     });
     let drawn = four_over(above, below);
-    // SAFETY: `row_rest` holds the `n_rest` pixels that are written, of 8 bytes each.
+    // SAFETY: `row_rest` holds the `n_rest` pixels written, 8 bytes each.
     unsafe { _mm256_maskstore_epi64(row_rest.as_mut_ptr().cast(), rest, drawn) };
 }
 
-/// Has pixels fetched that are about to be drawn under: they are far from the row before.
+/// Prefetches pixels that will be drawn under; they are far from the previous row in memory.
 #[inline]
 #[target_feature(enable = "avx2")]
 pub(super) fn prefetch(row: &[Quad]) {
@@ -37,7 +37,7 @@ pub(super) fn prefetch(row: &[Quad]) {
     }
 }
 
-/// A mask of the first `n` pixels of four.
+/// Returns a mask of the first `n` of four pixels.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn first_of_four(n: usize) -> __m256i {
@@ -48,12 +48,12 @@ fn first_of_four(n: usize) -> __m256i {
 fn four_over(above: __m256i, below: __m256i) -> __m256i {
     let alpha = _mm256_shufflehi_epi16::<0xff>(_mm256_shufflelo_epi16::<0xff>(above));
     let left = _mm256_sub_epi16(_mm256_set1_epi16(ONE), alpha);
-    // Doubled with saturation: 32767 of 32768 leaves every value as it is.
+    // Saturated doubling: a weight of 32767/32768 leaves every value unchanged.
     let through = _mm256_adds_epi16(left, left);
     _mm256_add_epi16(above, _mm256_mulhrs_epi16(below, through))
 }
 
-/// Luma of the first pixels of a row, eight at a time; returns of how many.
+/// Converts the first pixels of a row to luma, eight at a time. Returns the number of converted pixels.
 #[target_feature(enable = "avx2")]
 pub(super) fn luma_row(from: &FromQuads, row: &[Quad], luma: &mut [u8]) -> usize {
     let weights = weights_of(from.y);
@@ -68,7 +68,7 @@ pub(super) fn luma_row(from: &FromQuads, row: &[Quad], luma: &mut [u8]) -> usize
     luma.len().min(eights.len() * 8) / 8 * 8
 }
 
-/// Chroma of the first blocks of two rows, four at a time; returns of how many.
+/// Converts the first blocks of two rows to chroma, four at a time. Returns the number of converted blocks.
 #[target_feature(enable = "avx2")]
 pub(super) fn chroma_row(from: &FromQuads, rows: [&[Quad]; 2], planes: [&mut [u8]; 2]) -> usize {
     let (u_weights, v_weights) = (weights_of(from.u), weights_of(from.v));
@@ -89,7 +89,7 @@ pub(super) fn chroma_row(from: &FromQuads, rows: [&[Quad]; 2], planes: [&mut [u8
     above.len().min(below.len()) * 4
 }
 
-/// Each of eight pixels times the weights of its channels, added up, in the order of the pixels.
+/// Returns the weighted channel sum of each of eight pixels, in order.
 #[target_feature(enable = "avx2")]
 fn eight_dots(pixels: &[Quad; 8], weights: __m256i) -> __m256i {
     let (halves, _) = pixels.as_chunks::<4>();
@@ -98,14 +98,14 @@ fn eight_dots(pixels: &[Quad; 8], weights: __m256i) -> __m256i {
     _mm256_permute4x64_epi64::<0b11_01_10_00>(mixed)
 }
 
-/// Three weights and none for alpha, four times. They fit 16 bits: a span of 255 in 128ths is less.
+/// Repeats three weights, and 0 for alpha, four times. The weights fit 16 bits: they are below 255 * 128.
 #[target_feature(enable = "avx2")]
 fn weights_of(weights: [i32; 3]) -> __m256i {
     let [r, g, b] = weights.map(|weight| i64::from(weight as i16 as u16));
     _mm256_set1_epi64x(r | g << 16 | b << 32)
 }
 
-/// Eight values as bytes, clamped.
+/// Returns eight values as bytes, clamped.
 #[target_feature(enable = "avx2")]
 fn bytes_of(values: __m256i) -> [u8; 8] {
     let words = _mm256_packs_epi32(values, values);
@@ -119,12 +119,12 @@ fn bytes_of(values: __m256i) -> [u8; 8] {
 
 #[target_feature(enable = "avx2")]
 fn store(pixels: &mut [Quad; 4], values: __m256i) {
-    // SAFETY: `pixels` is 32 bytes that are ours to write.
+    // SAFETY: `pixels` is 32 writable bytes.
     unsafe { _mm256_storeu_si256(pixels.as_mut_ptr().cast(), values) };
 }
 
 #[target_feature(enable = "avx2")]
 fn load(pixels: &[Quad; 4]) -> __m256i {
-    // SAFETY: `pixels` is 32 bytes that can be read.
+    // SAFETY: `pixels` is 32 readable bytes.
     unsafe { _mm256_loadu_si256(pixels.as_ptr().cast()) }
 }

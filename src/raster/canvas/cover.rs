@@ -1,33 +1,36 @@
-//! What of a canvas has been drawn on, by tiles, so that each is developed and wiped once however many
-//! sprites lie over each other there; and which of its pixels let nothing through, as bits, a bit for
-//! eight of them, so that what is hidden is passed over 512 pixels at a time, and is not drawn around in
-//! runs too short to be worth it (ALGORITHMS.md 8, dirty rectangles).
+//! Records, for a canvas, which tiles were drawn on and which pixels are opaque
+//! (docs/explanation/algorithms.md, "Compositing").
+//!
+//! Tiles are the dirty rectangles: each is converted and cleared once per frame, however many sprites overlap
+//! there. Opacity is one bit for 8 pixels, so hidden parts are skipped 512 pixels at a time and short gaps
+//! are ignored.
 
 use std::ops::Range;
 
 use crate::geometry::Rect;
 use crate::raster::resample::{ONE, Quad};
 
-/// Columns and rows of a tile: even, so that no block of chroma is parted.
+/// Width and height of a tile, pixels. Even, so that no chroma block is divided between tiles.
 const TILE: usize = 16;
-/// From this alpha on a pixel counts as letting nothing through: less than half a level of 8 bits. Of fins and soft
-/// edges, one before another, only ever more little is left.
+/// Least alpha of an opaque pixel. What shows through is then less than half an 8-bit level. Overlapping fins
+/// and soft edges reach it; what lies behind them is skipped.
 const OPAQUE: i16 = ONE - ONE / 512;
-/// Columns of a block.
+/// Number of columns of a block.
 const BLOCK: usize = 8;
 
-/// What has been drawn on a canvas.
+/// The drawn tiles and opaque blocks of a canvas.
 #[derive(Clone, Debug)]
 pub struct Cover {
     size: [u32; 2],
-    /// By rows of tiles: whether anything has been drawn there.
+    /// For each tile, row by row: whether anything was drawn there.
     touched: Vec<bool>,
-    /// By rows of pixels, each beginning a word: the blocks whose pixels all have alpha 1.
+    /// For each row of pixels: one bit per block, set if all its pixels are opaque. Each row starts a new
+    /// word.
     opaque: Vec<u64>,
 }
 
 impl Cover {
-    /// Nothing yet, on a canvas of `size` pixels.
+    /// Returns the record of an empty canvas of `size` pixels.
     pub fn none(size: [u32; 2]) -> Cover {
         let [width, height] = size.map(|side| side as usize);
         Cover {
@@ -37,12 +40,12 @@ impl Cover {
         }
     }
 
-    /// Counts everything as drawn on.
+    /// Marks every tile as drawn on.
     pub fn touch_all(&mut self) {
         self.touched.fill(true);
     }
 
-    /// Adds columns of row `y`, which is `drawn` as they left it.
+    /// Records that columns of row `y` were drawn on. `drawn` is the whole row afterwards.
     #[inline(always)]
     pub(super) fn add_run(&mut self, y: u32, columns: Range<u32>, drawn: &[Quad]) {
         let [y, x, to] = [y, columns.start, columns.end].map(|at| at as usize);
@@ -61,8 +64,8 @@ impl Cover {
         }
     }
 
-    /// The first columns of `within`, in row `y`, that may let something through; empty when there are
-    /// none. What is left out lets nothing through.
+    /// Returns the first columns of `within`, in row `y`, that may not be opaque; empty if there are none.
+    /// The columns skipped are opaque.
     #[inline]
     pub fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
         let n_words = words_of(self.size[0] as usize);
@@ -73,7 +76,7 @@ impl Cover {
         columns(start)..columns(find(start..last, |word| row[word]))
     }
 
-    /// Boxes that hold all that has been drawn on, none over another; then nothing has been.
+    /// Yields disjoint boxes that contain everything drawn, and resets the record.
     pub fn take(&mut self) -> impl Iterator<Item = Rect> {
         self.opaque.fill(0);
         let [width, height] = self.size;
@@ -94,20 +97,20 @@ impl Cover {
     }
 }
 
-/// Whether all pixels let nothing through.
+/// Returns whether all pixels are opaque.
 #[inline(always)]
 fn are_opaque(pixels: &[Quad]) -> bool {
-    // All four channels, as vectors take them: no color is more than its alpha.
+    // Takes the minimum of all four channels, which vectorizes; colors never exceed alpha.
     let least = |a: Quad, b: &Quad| std::array::from_fn(|k| a[k].min(b[k]));
     pixels.iter().fold([ONE; 4], least)[3] >= OPAQUE
 }
 
-/// Words for the blocks of a row.
+/// Returns the number of words for the blocks of a row.
 fn words_of(width: usize) -> usize {
     width.div_ceil(BLOCK * 64)
 }
 
-/// The first place of a range whose bit is set in the words told; its end when there is none.
+/// Returns the first index of a range whose bit is set in `words`; the end of the range if there is none.
 fn find(within: Range<u32>, words: impl Fn(usize) -> u64) -> u32 {
     let mut at = within.start;
     while at < within.end {
@@ -138,7 +141,7 @@ mod tests {
         let mut layer = Resampled {
             rect: rect(10, 15, 8, 3),
             pixels: vec![[1; 4]; 24],
-            // To the edge of a tile, nothing, and beyond it.
+            // Up to the edge of a tile, and across one.
             runs: vec![[15, 10, 16], [17, 15, 18]],
         };
         canvas.under(&layer, &mut cover, Level::Scalar);
@@ -197,7 +200,7 @@ mod tests {
             for pixel in [[0, 0, 0, alpha], [color, color, color, ONE]] {
                 canvas.under(&row(pixel), &mut cover, Level::Scalar);
             }
-            // Black behind all.
+            // Black behind everything.
             canvas.under_box(
                 &Canvas::of_rgb(&RgbImage::new(8, 1)),
                 rect(0, 0, 8, 1),

@@ -1,10 +1,10 @@
-//! What sprites are drawn on: premultiplied pixels in 16384ths, opaque or not, and the way from there to
-//! planes and to straight alpha (ALGORITHMS.md 8).
+//! The picture on which sprites are composited: premultiplied pixels, 16384 for alpha 1, opaque or not. It
+//! converts to encoder planes and to straight alpha (docs/explanation/algorithms.md, "Compositing").
 
 #[cfg(target_arch = "x86_64")]
-mod avx2; // rows, sixteen values at a time
-mod cover; // where anything has been drawn, and where nothing more shows
-mod planes; // to an encoder's planes
+mod avx2; // AVX2 kernels
+mod cover; // dirty tiles and opaque pixels
+mod planes; // conversion to encoder planes
 
 pub use cover::Cover;
 
@@ -18,16 +18,16 @@ use crate::geometry::Rect;
 /// A picture of premultiplied pixels.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Canvas {
-    /// Columns.
+    /// Number of columns.
     pub width: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// By rows.
+    /// Pixels, row by row.
     pub pixels: Vec<Quad>,
 }
 
 impl Canvas {
-    /// A wholly transparent canvas.
+    /// Returns a fully transparent canvas.
     pub fn new(width: u32, height: u32) -> Canvas {
         Canvas {
             width,
@@ -36,7 +36,7 @@ impl Canvas {
         }
     }
 
-    /// An opaque picture.
+    /// Converts an RGB image to an opaque canvas.
     pub fn of_rgb(image: &RgbImage) -> Canvas {
         let pixels = image.pixels.chunks_exact(3);
         Canvas {
@@ -46,7 +46,7 @@ impl Canvas {
         }
     }
 
-    /// Makes a box what a whole canvas of the box's size is.
+    /// Copies a canvas of the box's size into the box.
     pub fn put(&mut self, from: &Canvas, rect: Rect) {
         let from_rows = from.pixels.chunks_exact(from.width.max(1) as usize);
         for (row, from) in self.rows(rect).zip(from_rows) {
@@ -54,14 +54,15 @@ impl Canvas {
         }
     }
 
-    /// Makes a box wholly transparent.
+    /// Makes a box fully transparent.
     pub fn clear_box(&mut self, rect: Rect) {
         for row in self.rows(rect) {
             self.pixels[row].fill([0; 4]);
         }
     }
 
-    /// Draws a layer under what is there, where that lets anything through: nearer ones come first.
+    /// Draws a layer under the existing pixels, where they are not opaque. Layers are therefore drawn front
+    /// to back.
     pub fn under(&mut self, layer: &Resampled, cover: &mut Cover, cpu: Level) {
         let mut below = Below::of(self, cover, cpu);
         for ([x, y], pixels) in layer.shown() {
@@ -75,7 +76,8 @@ impl Canvas {
         }
     }
 
-    /// The same with a placed sprite that nothing else is done to.
+    /// Draws a placed sprite under the existing pixels, without an intermediate layer. Returns its bounding
+    /// box.
     pub fn draw_under(
         &mut self,
         sprite: &Premultiplied,
@@ -88,14 +90,14 @@ impl Canvas {
         draw_on(&mut below, size, sprite, place, cpu)
     }
 
-    /// Draws a box of another canvas of the same size under what is there.
+    /// Draws a box of another canvas of the same size under the existing pixels.
     pub fn under_box(&mut self, below: &Canvas, rect: Rect, cpu: Level) {
         for row in self.rows(rect) {
             put_under(&mut self.pixels[row.clone()], &below.pixels[row], cpu);
         }
     }
 
-    /// Draws a box of another canvas of the same size over what is there.
+    /// Draws a box of another canvas of the same size over the existing pixels.
     pub fn over_box(&mut self, above: &Canvas, rect: Rect) {
         for row in self.rows(rect) {
             let here = self.pixels[row.clone()].iter_mut();
@@ -107,8 +109,8 @@ impl Canvas {
         }
     }
 
-    /// The box as straight-alpha RGBA, into a picture of the canvas's size; a pixel without alpha keeps
-    /// the color that the picture has there.
+    /// Writes the box as straight-alpha RGBA into a picture of the canvas's size. A pixel with alpha 0 keeps
+    /// the color that it has in the picture.
     pub fn straight_into(&self, rect: Rect, rgba: &mut [u8]) {
         for row in self.rows(rect) {
             let out = &mut rgba[row.start * 4..row.end * 4];
@@ -127,7 +129,7 @@ impl Canvas {
         &mut self.pixels[y as usize * width..][..width]
     }
 
-    /// Where the rows of a box lie among the pixels.
+    /// Returns the index range of each row of a box among the pixels.
     fn rows(&self, rect: Rect) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let width = self.width as usize;
         (rect.y..rect.bottom()).map(move |y| {
@@ -137,11 +139,11 @@ impl Canvas {
     }
 }
 
-/// What is below all that has been drawn on a canvas.
+/// Surface that draws below everything already on a canvas.
 struct Below<'a> {
     canvas: &'a mut Canvas,
     cover: &'a mut Cover,
-    /// Memory for a run.
+    /// Buffer for a run of pixels.
     row: Vec<Quad>,
     cpu: Level,
 }
@@ -156,7 +158,7 @@ impl<'a> Below<'a> {
         }
     }
 
-    /// Puts pixels into columns of row `y`.
+    /// Draws pixels under the columns of row `y` and updates the cover.
     #[inline(always)]
     fn put(&mut self, y: u32, columns: Range<u32>, pixels: &[Quad]) {
         let drawn = self.canvas.row_mut(y);
@@ -187,13 +189,13 @@ impl Surface for Below<'_> {
     }
 }
 
-/// A color of alpha 1.
+/// Converts an opaque color.
 pub fn opaque(rgb: [u8; 3]) -> Quad {
     let [r, g, b] = rgb.map(|value| FULL[usize::from(value)]);
     [r, g, b, ONE]
 }
 
-/// Every 8-bit value in 16384ths.
+/// The 8-bit values scaled to 0..=16384.
 static FULL: [i16; 256] = {
     let mut full = [0; 256];
     let mut value = 0;
@@ -204,7 +206,7 @@ static FULL: [i16; 256] = {
     full
 };
 
-/// A pixel as 8-bit straight alpha; without alpha it has no color.
+/// Converts a pixel to 8-bit straight alpha. A pixel with alpha 0 becomes all zero.
 pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
     if a <= 0 {
         return [0; 4];
@@ -215,7 +217,7 @@ pub fn straight([r, g, b, a]: Quad) -> [u8; 4] {
     [color(r), color(g), color(b), alpha]
 }
 
-/// Has pixels fetched that are needed soon.
+/// Prefetches pixels that are needed soon.
 #[inline(always)]
 #[cfg_attr(
     not(target_arch = "x86_64"),
@@ -226,7 +228,7 @@ fn prefetch(row: &[Quad], cpu: Level) {
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "a kernel for AVX2")]
-            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
             unsafe {
                 avx2::prefetch(row);
             }
@@ -240,7 +242,7 @@ fn put_under(row: &mut [Quad], below: &[Quad], cpu: Level) {
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "a kernel for AVX2")]
-            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
             unsafe {
                 avx2::under_row(row, below);
             }
@@ -249,7 +251,7 @@ fn put_under(row: &mut [Quad], below: &[Quad], cpu: Level) {
     }
 }
 
-/// The definition of what vector instructions do.
+/// Defines the result of the vector kernels.
 fn under_row(row: &mut [Quad], below: &[Quad]) {
     for (above, below) in row.iter_mut().zip(below) {
         *above = one_over(*above, *below);
@@ -257,7 +259,7 @@ fn under_row(row: &mut [Quad], below: &[Quad]) {
 }
 
 fn one_over(above: Quad, below: Quad) -> Quad {
-    // 16384 doubled is one more than fits; 32767 of 32768 leaves every value as it is.
+    // The doubled value 32768 does not fit; 32767/32768 leaves every value unchanged.
     let through = (2 * (i32::from(ONE) - i32::from(above[3]))).min(32767) as i16;
     std::array::from_fn(|channel| above[channel] + scaled(below[channel], through))
 }
@@ -335,7 +337,7 @@ mod tests {
         }
     }
 
-    /// A canvas of any colors and alphas, and a layer over part of it.
+    /// Returns a canvas of random colors and alphas, and a layer over part of it.
     fn anything(seed: u32, width: u32, height: u32) -> Canvas {
         let mut state = seed;
         let mut next = || {

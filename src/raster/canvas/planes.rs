@@ -1,5 +1,5 @@
-//! From a canvas to the planes that an encoder takes: luma of every pixel, chroma of blocks of two by two
-//! (ALGORITHMS.md 8).
+//! Conversion of a canvas to the planes of an encoder: luma of every pixel, chroma of 2 x 2 blocks
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use super::Canvas;
 use crate::cpu::Level;
@@ -9,10 +9,10 @@ use crate::raster::color::FromQuads;
 use crate::raster::resample::Quad;
 
 impl Frame {
-    /// Writes the box of an opaque canvas of the frame's own size into the planes: luma of the box, chroma
-    /// of every 2 x 2 block that the box touches.
+    /// Writes a box of an opaque canvas into the planes: the pixels and chroma of every 2 x 2 block that the
+    /// box touches.
     ///
-    /// Panics when the canvas has another size than the frame.
+    /// Panics if the sizes of canvas and frame differ.
     pub fn draw_canvas(&mut self, canvas: &Canvas, rect: Rect, cpu: Level) {
         assert_eq!(
             (canvas.width, canvas.height),
@@ -30,7 +30,7 @@ impl Frame {
         let (x0, x1) = (rect.x as usize / 2, (rect.right() as usize).div_ceil(2));
         let (left, right) = (2 * x0, (2 * x1).min(width));
         for by in rect.y as usize / 2..(rect.bottom() as usize).div_ceil(2) {
-            // At an odd bottom edge the last row stands in for the missing one.
+            // At an odd bottom edge the last row is used twice.
             let lines = [2 * by, (2 * by + 1).min(height - 1)];
             let rows = lines.map(|y| &canvas.pixels[y * width + left..y * width + right]);
             for (row, y) in rows.iter().zip(lines) {
@@ -53,7 +53,7 @@ fn luma_row(from: &FromQuads, row: &[Quad], luma: &mut [u8], cpu: Level) {
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "a kernel for AVX2")]
-            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
             unsafe {
                 super::avx2::luma_row(from, row, luma)
             }
@@ -70,7 +70,7 @@ fn chroma_row(from: &FromQuads, rows: [&[Quad]; 2], [us, vs]: [&mut [u8]; 2], cp
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "a kernel for AVX2")]
-            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
             unsafe {
                 super::avx2::chroma_row(from, rows, [us, vs])
             }
@@ -79,7 +79,7 @@ fn chroma_row(from: &FromQuads, rows: [&[Quad]; 2], [us, vs]: [&mut [u8]; 2], cp
     };
     let last = rows[0].len() - 1;
     for (k, (u, v)) in us.iter_mut().zip(vs).enumerate().skip(n_done) {
-        // At an odd right edge the last pixel stands in for the missing one.
+        // At an odd right edge the last pixel is used twice.
         let columns = [2 * k, (2 * k + 1).min(last)];
         let block = columns.map(|x| rows.map(|row| row[x]));
         let sum =

@@ -1,5 +1,5 @@
-//! Interpolation with AVX2: the four taps of a row at a time, the same integers as the plain code of
-//! `catmull_rom` (ALGORITHMS.md 8).
+//! Interpolation with AVX2: four taps of a row at a time. Results equal those of the scalar code in
+//! `catmull_rom`.
 
 #![expect(unsafe_code, reason = "vector loads and stores go through pointers")]
 
@@ -10,7 +10,7 @@ use super::map::Map;
 use super::{ONE, Premultiplied, Quad, Surface, draw_rows_with};
 use crate::geometry::Rect;
 
-/// All rows of a sprite.
+/// Draws all rows of a sprite.
 #[target_feature(enable = "avx2")]
 pub(super) fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map)) {
     let interpolate = |sprite: &_, row: &mut _, start, step| interpolate(sprite, row, start, step);
@@ -18,7 +18,7 @@ pub(super) fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premulti
     draw_rows_with(surface, rect, from, (interpolate, prefetch));
 }
 
-/// Has the last row of taps fetched of places that are interpolated soon.
+/// Prefetches the last row of taps of positions that are interpolated soon.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn prefetch(sprite: &Premultiplied, start: [i32; 2], step: [i32; 2], n: usize) {
@@ -27,18 +27,18 @@ fn prefetch(sprite: &Premultiplied, start: [i32; 2], step: [i32; 2], n: usize) {
     let [mut u, mut v] = start;
     for _ in 0..n.div_ceil(LINE) {
         let at = ((v >> 16) as isize + 2) * stride + (u >> 16) as isize;
-        // What lies beyond the sprite is fetched in vain.
+        // Addresses outside the sprite are harmless in a prefetch.
         _mm_prefetch::<_MM_HINT_T0>(pixels.wrapping_offset(at).cast());
         u = u.wrapping_add(LINE as i32 * step[0]);
         v = v.wrapping_add(LINE as i32 * step[1]);
     }
 }
 
-/// A run of pixels. Not inlined: the loop needs all registers.
+/// Interpolates a run of pixels. Not inlined, because the loop needs all registers.
 #[inline(never)]
 #[target_feature(enable = "avx2")]
 fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
-    // The first of a place's taps lies a pixel to the left and above.
+    // The first tap of a position is one pixel to the left and above.
     let first = start.map(|at| at + HALF_PLACE - (1 << 16));
     let n_steps = row.len() as i64 - 1;
     let last = [0, 1].map(|k| i64::from(first[k]) + i64::from(step[k]) * n_steps);
@@ -53,7 +53,7 @@ fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: 
     let (fours, rest) = row.as_chunks_mut::<4>();
     for four in fours {
         let places = Places::of(u, v, stride);
-        // SAFETY: all four lie between the first place and the last, whose taps the sprite holds.
+        // SAFETY: all four positions lie between the first and the last, whose taps the sprite holds.
         let taps = unsafe {
             let tap = |k| places.weighted(k, pixels, stride);
             [tap(0), tap(1), tap(2), tap(3)]
@@ -68,7 +68,7 @@ fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: 
     let places = Places::of(u, v, stride);
     let mut taps = [_mm256_setzero_si256(); 4];
     for (k, taps) in taps[..rest.len()].iter_mut().enumerate() {
-        // SAFETY: as above; those beyond the last are not touched.
+        // SAFETY: as above; positions after the last are not read.
         *taps = unsafe { places.weighted(k, pixels, stride) };
     }
     let mut four = [[0; 4]; 4];
@@ -77,7 +77,7 @@ fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: 
 }
 
 impl Premultiplied {
-    /// Whether all sixteen taps of a place, given by its first one, are there.
+    /// Returns whether the sprite holds all 16 taps of a position, given by its first tap.
     fn holds_taps(&self, [u, v]: [i64; 2]) -> bool {
         let (stride, n_rows) = (self.stride(), self.spans.len());
         let is_held = |first: i64, n: usize| first >= 0 && (first >> 16) + 4 <= n as i64;
@@ -85,11 +85,11 @@ impl Premultiplied {
     }
 }
 
-/// Four places in a sprite, each given by the first of its taps.
+/// Four positions in a sprite, each given by its first tap.
 struct Places {
-    /// Where that lies among the pixels.
+    /// Index of the first tap among the pixels.
     first: [i32; 4],
-    /// The place between two pixels is the lowest byte.
+    /// Index of the interpolation position, in the lowest byte.
     across: [i32; 4],
     down: [i32; 4],
 }
@@ -102,7 +102,7 @@ impl Places {
         let above = _mm_mullo_epi32(y, _mm_set1_epi32(stride as i32));
         let numbers = |values: __m128i| {
             let mut numbers = [0; 4];
-            // SAFETY: `numbers` is 16 bytes that are ours to write.
+            // SAFETY: `numbers` is an owned buffer of 16 bytes.
             unsafe { _mm_storeu_si128(numbers.as_mut_ptr().cast(), values) };
             numbers
         };
@@ -113,18 +113,19 @@ impl Places {
         }
     }
 
-    /// Four taps of a place, of each the column weighted and summed, and its weight across.
+    /// Returns the 16 taps of position `k`, summed along columns and multiplied by the weights along the row.
     ///
     /// # Safety
-    /// `pixels`, in rows of `stride`, must hold the taps of place `k`.
+    ///
+    /// `pixels`, in rows of `stride`, must hold the taps of position `k`.
     #[inline]
     #[target_feature(enable = "avx2")]
     unsafe fn weighted(&self, k: usize, pixels: *const Quad, stride: usize) -> __m256i {
         let down = &TWICE[usize::from(self.down[k] as u8)];
-        // SAFETY: the caller made sure that the first of the taps is there.
+        // SAFETY: the caller guarantees the first tap.
         let first = unsafe { pixels.add(self.first[k] as usize) };
         let tap = |row: usize| {
-            // SAFETY: and that four rows are, of four pixels or 32 bytes each.
+            // SAFETY: the caller guarantees four rows of four pixels, 32 bytes each.
             let taps = unsafe { _mm256_loadu_si256(first.add(row * stride).cast()) };
             _mm256_mulhrs_epi16(taps, _mm256_set1_epi32(down[row]))
         };
@@ -133,17 +134,17 @@ impl Places {
             _mm256_add_epi16(tap(2), tap(3)),
         );
         let across = WIDE[usize::from(self.across[k] as u8)].as_ptr();
-        // SAFETY: sixteen weights are 32 bytes that can be read.
+        // SAFETY: sixteen weights are 32 readable bytes.
         let across = unsafe { _mm256_loadu_si256(across.cast()) };
         _mm256_mulhrs_epi16(column, across)
     }
 }
 
-/// The sums of four pixels' taps, none more than opaque and no color without its alpha.
+/// Sums the taps of four pixels along the row, and limits alpha to 1 and each color to alpha.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn summed([a, b, c, d]: [__m256i; 4]) -> __m256i {
-    // The first two taps of each pixel in the lower half, the last two in the upper.
+    // Sums of the first two taps of each pixel in the lower half, of the last two in the upper half.
     let ab = _mm256_add_epi16(_mm256_unpacklo_epi64(a, b), _mm256_unpackhi_epi64(a, b));
     let cd = _mm256_add_epi16(_mm256_unpacklo_epi64(c, d), _mm256_unpackhi_epi64(c, d));
     let sum = _mm256_add_epi16(
@@ -158,6 +159,6 @@ fn summed([a, b, c, d]: [__m256i; 4]) -> __m256i {
 #[inline]
 #[target_feature(enable = "avx2")]
 fn store(pixels: &mut [Quad; 4], values: __m256i) {
-    // SAFETY: `pixels` is 32 bytes that are ours to write.
+    // SAFETY: `pixels` is 32 writable bytes.
     unsafe { _mm256_storeu_si256(pixels.as_mut_ptr().cast(), values) };
 }

@@ -1,26 +1,27 @@
-//! Catmull and Rom's interpolation of one row of output: sixteen taps of four values each, weighted in
-//! 32768ths at 256 places between two pixels (ALGORITHMS.md 8). The plain code here says what the kernel
-//! for AVX2 computes.
+//! Catmull-Rom interpolation of a row of pixels (docs/explanation/algorithms.md, "Compositing"). Each output
+//! pixel is a weighted sum of 4 x 4 taps. Positions are rounded to 1/256 of a pixel and weights to 1/32768.
+//! The scalar code here defines the result of the AVX2 kernel.
 
 use super::{ONE, Premultiplied, Quad};
 
-/// Places told apart between two pixels.
+/// Number of interpolation positions between two pixels.
 pub(super) const PLACES: usize = 256;
-/// Half a place, in 65536ths: added, so that places are rounded to the nearest.
+/// Half an interpolation position, in 1/65536 of a pixel. Added before truncation, so that positions round to
+/// the nearest.
 pub(super) const HALF_PLACE: i32 = (1 << 16) / (2 * PLACES as i32);
 
-/// The four taps' weights at each place; they add up to 32767.
+/// The weights of the four taps at each position; their sum is 32767.
 pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
-/// The same, each weight once for every value of a pixel.
+/// The same weights, each repeated for the four values of a pixel.
 pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
-/// The same, each weight twice in its 32 bits: those a register is filled with at once.
+/// The same weights, each stored twice in 32 bits, ready for a broadcast to a vector register.
 #[cfg(target_arch = "x86_64")]
 pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
 
 impl Premultiplied {
-    /// Interpolates a row of pixels: the first at `start`, each further by `step`, in 65536ths of the
-    /// padded pixels. All must lie within reach of the sprite's bounds. The definition of what vector
-    /// instructions do.
+    /// Interpolates a row of pixels, the first at `start`, the next ones at intervals of `step`, in 1/65536
+    /// of a pixel of the padded sprite. All positions must lie within `REACH` of the sprite. Defines the
+    /// result of the vector kernels.
     pub(super) fn interpolate(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
         let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
         let stride = self.stride();
@@ -39,7 +40,7 @@ impl Premultiplied {
     }
 }
 
-/// Down the columns first, then along the row.
+/// Sums the taps along columns first, then along the row.
 #[inline(always)]
 fn blend(rows: [&[i16]; 4], across: &[i16; 16], down: &[i16; 4]) -> Quad {
     let mut column = [0i16; 16];
@@ -58,13 +59,13 @@ fn blend(rows: [&[i16]; 4], across: &[i16; 16], down: &[i16; 4]) -> Quad {
         sum[k] = (weighted[k].wrapping_add(weighted[4 + k]))
             .wrapping_add(weighted[8 + k].wrapping_add(weighted[12 + k]));
     }
-    // The curve may overshoot: no more than opaque, no color without its alpha.
+    // The kernel may overshoot: limit alpha to 1 and each color to alpha.
     let alpha = sum[3].clamp(0, ONE);
     let color = |k: usize| sum[k].clamp(0, alpha);
     [color(0), color(1), color(2), alpha]
 }
 
-/// A value times a weight in 32768ths, rounded.
+/// Returns a value times a weight in 1/32768, rounded.
 #[inline(always)]
 pub(in crate::raster) fn scaled(value: i16, weight: i16) -> i16 {
     ((((i32::from(value) * i32::from(weight)) >> 14) + 1) >> 1) as i16
@@ -80,9 +81,9 @@ const fn all_weights() -> [[i16; 4]; PLACES] {
     all
 }
 
-/// At `f` 256ths of the way from the second tap to the third.
+/// Returns the weights at `f`/256 of the distance from the second tap to the third.
 const fn weights(f: i64) -> [i16; 4] {
-    // In 2^25ths: the cubic's halves stay whole.
+    // In units of 2^-25, in which the coefficients of the cubic are whole numbers.
     let (f1, f2, f3) = (f << 16, (f * f) << 8, f * f * f);
     let exact = [
         -f1 + 2 * f2 - f3,
@@ -98,7 +99,7 @@ const fn weights(f: i64) -> [i16; 4] {
         sum += rounded[tap] as i32;
         tap += 1;
     }
-    // What rounding left over goes to the greatest weight.
+    // The largest weight absorbs the rounding error.
     let greatest = if f < 128 { 1 } else { 2 };
     rounded[greatest] += (32767 - sum) as i16;
     rounded
@@ -143,7 +144,7 @@ mod tests {
     #[test]
     fn weights_are_those_of_the_textbook_and_add_up() {
         assert_eq!(WEIGHTS[0], [0, 32767, 0, 0]);
-        // At the middle: -1, 9, 9, -1 sixteenths.
+        // Half way: -1, 9, 9, -1 sixteenths.
         let sixteenths = WEIGHTS[128].map(|w| (f64::from(w) / 2048.0).round());
         assert_eq!(sixteenths, [-1.0, 9.0, 9.0, -1.0]);
         for (place, weights) in WEIGHTS.iter().enumerate() {

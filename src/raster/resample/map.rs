@@ -1,23 +1,25 @@
-//! From the picture to a sprite: mirror, rotation, scale and place as one affine map (ALGORITHMS.md 8).
+//! Affine map from the picture to a sprite: mirroring, rotation, scale and position
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use super::Placement;
 use super::premultiplied::{PAD, Premultiplied, REACH};
 use crate::geometry::Rect;
 
-/// Picture coordinates to coordinates of the sprite's padded pixels, the first at (0, 0).
+/// Maps picture coordinates to coordinates in the padded sprite, whose first pixel is (0, 0).
 pub(super) struct Map {
     origin: [f64; 2],
     pub(super) per_column: [f64; 2],
     per_row: [f64; 2],
-    /// Columns to a pixel of the sprite; infinite where a row goes along.
+    /// Picture columns per sprite pixel along each axis; infinite if a picture row is constant along the
+    /// axis.
     columns: [f64; 2],
     place: Placement,
 }
 
-/// The steps that a row of the picture makes through a sprite, in 65536ths of its pixels.
+/// The step through the sprite for one picture column, in 1/65536 of a sprite pixel.
 pub(super) struct Way {
     pub(super) step: [i32; 2],
-    /// Steps to go one 65536th, in 2^32ths, rounded down.
+    /// Steps per 1/65536 of a pixel, as a fraction of 2^32, rounded down.
     per_unit: [u64; 2],
 }
 
@@ -29,7 +31,7 @@ impl Way {
         }
     }
 
-    /// The same the other way round.
+    /// Returns the same path in the opposite direction.
     pub(super) fn back(&self) -> Way {
         Way {
             step: self.step.map(|step| -step),
@@ -37,13 +39,13 @@ impl Way {
         }
     }
 
-    /// Where `n` steps from a place lead to.
+    /// Returns the position after `n` steps.
     #[inline(always)]
     pub(super) fn along(&self, from: [i32; 2], n: i32) -> [i32; 2] {
         std::array::from_fn(|k| from[k] + self.step[k] * n)
     }
 
-    /// Steps after which a distance may be exceeded, and before which it is not; at least one.
+    /// Returns a number of steps, at least 1. Fewer steps stay within `distance` along the axis.
     #[inline(always)]
     pub(super) fn n_beyond(&self, distance: u32, axis: usize) -> usize {
         ((u64::from(distance) * self.per_unit[axis]) >> 32) as usize + 1
@@ -52,7 +54,7 @@ impl Way {
 
 impl Map {
     pub(super) fn new(sprite: &Premultiplied, place: &Placement) -> Map {
-        // One pixel of the level is so many of the sprite.
+        // Size of a pixel of this mipmap level in sprite pixels.
         let unit = f64::from(1u32 << sprite.level);
         let (cos, sin) = (
             libm::cos(place.rotation_rad) / (place.scale * unit),
@@ -62,7 +64,7 @@ impl Map {
         let (per_column, per_row) = ([flip * cos, -sin], [flip * sin, cos]);
         let [x, y] = place.center_px;
         let origin = std::array::from_fn(|k| {
-            // Pixel k of a level has its center at k + 0.5 of its own pixels.
+            // The center of pixel k of a level is at k + 0.5 level pixels.
             let middle = sprite.middle_px[k] / unit - 0.5;
             middle + PAD as f64 - per_column[k] * x - per_row[k] * y
         });
@@ -75,22 +77,22 @@ impl Map {
         }
     }
 
-    /// The way of a row through the sprite.
+    /// Returns the step of a picture row through the sprite.
     pub(super) fn way(&self) -> Way {
         Way::of(self.per_column.map(fixed))
     }
 
-    /// The way through the sprite from a point of the picture to one so many rows below it, in 65536ths.
+    /// Returns the displacement in the sprite for `n` picture rows, in 1/65536 of a sprite pixel.
     pub(super) fn rows_on(&self, n: f64) -> [i32; 2] {
         self.per_row.map(|step| fixed(n * step))
     }
 
-    /// The place in the sprite of a point of the picture.
+    /// Returns the position in the sprite of a picture point.
     pub(super) fn source(&self, x: f64, y: f64) -> [f64; 2] {
         std::array::from_fn(|k| self.origin[k] + self.per_column[k] * x + self.per_row[k] * y)
     }
 
-    /// The box of the picture that the sprite may touch.
+    /// Returns the box of the picture that the sprite may touch.
     pub(super) fn covered(&self, sprite: &Premultiplied, [w, h]: [u32; 2]) -> Rect {
         let unit = f64::from(1u32 << sprite.level);
         if sprite.is_empty() {
@@ -114,7 +116,7 @@ impl Map {
         Rect::clipped(left, top, right, bottom, w, h)
     }
 
-    /// A point given from the sprite's middle, in the picture.
+    /// Returns the picture position of a point given relative to the sprite's middle.
     fn forward(&self, u: f64, v: f64) -> [f64; 2] {
         let place = &self.place;
         let u = if place.mirrored { -u } else { u };
@@ -128,7 +130,8 @@ impl Map {
         ]
     }
 
-    /// The columns `from..to` of a row of `n`, which begins at `start`, whose source shows anything.
+    /// Returns the columns `from..to`, of a picture row of `n` columns, that map into the sprite. `start` is
+    /// the position of the first column in the sprite.
     pub(super) fn columns_within(
         &self,
         sprite: &Premultiplied,
@@ -158,7 +161,7 @@ impl Map {
     }
 }
 
-/// A coordinate in 65536ths.
+/// Converts a coordinate to 1/65536 of a pixel.
 pub(super) fn fixed(coordinate: f64) -> i32 {
     (coordinate * 65536.0).round() as i32
 }

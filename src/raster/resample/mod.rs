@@ -1,15 +1,17 @@
-//! Sprites turned, mirrored, scaled and placed between pixels: Catmull-Rom interpolation of
-//! premultiplied values, of a level of halved pictures where a sprite shrinks below 0.6 (ALGORITHMS.md
-//! 8). Where a sprite lies on whole pixels at its own size, its pixels come out as they are.
+//! Sprites drawn with rotation, mirroring, scale and sub-pixel position (docs/explanation/algorithms.md,
+//! "Compositing").
 //!
-//! Everything is done in integers, 16384 for alpha 1 and for a full color: the same on every machine,
-//! and sixteen values at a time where it has AVX2.
+//! Pixels are interpolated (Catmull-Rom) in premultiplied alpha. Below scale 0.6 the source is a mipmap level
+//! of the sprite. At whole pixels, scale 1 and rotation 0 the result is an exact copy.
+//!
+//! All arithmetic is in integers, with 16384 for alpha 1 and for a full color, so results are identical on
+//! every machine. With AVX2 sixteen values are computed at a time.
 
 #[cfg(target_arch = "x86_64")]
-mod avx2; // the same with vector instructions
-mod catmull_rom; // the interpolation of one row
-mod map; // from picture to sprite
-mod premultiplied; // a sprite as it is interpolated
+mod avx2; // AVX2 kernel
+mod catmull_rom; // interpolation of a row of pixels
+mod map; // affine map from picture to sprite
+mod premultiplied; // sprite prepared for interpolation
 
 use std::ops::Range;
 
@@ -21,53 +23,53 @@ use super::canvas::Cover;
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
-/// So many rows of the picture before it is needed a sprite's row is fetched: sprites are shown once in a while and lie
-/// far off in memory.
+/// Number of rows by which the prefetch of sprite pixels is ahead of drawing. Sprites are used rarely, so
+/// they are usually not in the cache. Free choice.
 const ROWS_AHEAD: u32 = 8;
 
-/// Alpha 1, or a full color of alpha 1.
+/// The value of alpha 1 and of a full color at alpha 1.
 pub const ONE: i16 = 1 << 14;
 
-/// One pixel: each color times its alpha, and alpha, all 0..=[`ONE`].
+/// One pixel: three premultiplied colors and alpha, each 0..=[`ONE`].
 pub type Quad = [i16; 4];
 
-/// Where a sprite goes.
+/// Position and transformation of a sprite in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Where the middle of the sprite comes to lie.
+    /// Position of the sprite's middle in the picture, pixels.
     pub center_px: [f64; 2],
-    /// Rotation about it, clockwise as seen, after mirroring.
+    /// Rotation about the middle, radians, clockwise in the picture, applied after mirroring.
     pub rotation_rad: f64,
-    /// Size of the result relative to the sprite, > 0.
+    /// Size of the drawn sprite relative to the sprite, > 0.
     pub scale: f64,
-    /// Left and right exchanged.
+    /// Whether left and right are exchanged.
     pub mirrored: bool,
 }
 
-/// What a sprite is drawn into.
+/// The picture into which a sprite is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Room<'a> {
-    /// Width and height of the picture.
+    /// Width and height of the picture, pixels.
     pub size: [u32; 2],
-    /// What is nearer, in a picture of that size: what lets nothing through there hides the sprite.
+    /// Coverage by nearer objects, in a picture of that size. Opaque parts hide the sprite and are skipped.
     pub nearer: Option<&'a Cover>,
 }
 
-/// A placed sprite: premultiplied pixels of a box of the picture.
+/// A drawn sprite: premultiplied pixels of a box of the picture.
 #[derive(Clone, Debug, Default)]
 pub struct Resampled {
-    /// The box.
+    /// The box in the picture.
     pub rect: Rect,
-    /// Its pixels by rows, and perhaps more behind them.
+    /// Pixels of the box, row by row. The vector may be longer than the box.
     pub pixels: Vec<Quad>,
-    /// Where it may show, from top to bottom: a row of the picture and its columns, from and to. Pixels
-    /// elsewhere mean nothing.
+    /// Runs that may be visible, from top to bottom: row, first column, end column, in picture coordinates.
+    /// Pixels outside the runs are unspecified.
     pub runs: Vec<[u32; 3]>,
 }
 
 impl Resampled {
-    /// Draws a placed sprite, clipped to its room, reusing memory. The sprite must have been made for the
-    /// placement's scale.
+    /// Draws a placed sprite, clipped to the room, into this layer, whose memory is reused. The sprite must
+    /// have been prepared for the placement's scale.
     pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, room: Room, cpu: Level) {
         let map = Map::new(sprite, place);
         let rect = map.covered(sprite, room.size);
@@ -84,7 +86,7 @@ impl Resampled {
         );
     }
 
-    /// Nothing yet, in a box, whose pixels mean nothing.
+    /// Starts an empty layer with the given box. The pixels are unspecified.
     pub fn begin(&mut self, rect: Rect) {
         self.rect = rect;
         self.runs.clear();
@@ -94,14 +96,14 @@ impl Resampled {
         }
     }
 
-    /// Lets all of the box show.
+    /// Marks the whole box as visible.
     pub fn show_whole(&mut self) {
         let Rect { x, y, w, h } = self.rect;
         self.runs.clear();
         self.runs.extend((y..y + h).map(|y| [y, x, x + w]));
     }
 
-    /// Where it may show: the first place of each run in the picture, and its pixels.
+    /// Yields, for each run, its first pixel (column, row) in the picture and its pixels.
     pub fn shown(&self) -> impl Iterator<Item = ([u32; 2], &[Quad])> {
         self.runs.iter().map(|&[y, from, to]| {
             let first = ((y - self.rect.y) * self.rect.w + from - self.rect.x) as usize;
@@ -109,7 +111,7 @@ impl Resampled {
         })
     }
 
-    /// The alpha of the whole box, by rows, in 16384ths.
+    /// Returns the alpha of the whole box, row by row, 0..=16384.
     pub fn alpha(&self) -> Vec<u16> {
         let mut alpha = vec![0; self.rect.area() as usize];
         for ([x, y], row) in self.shown() {
@@ -122,16 +124,16 @@ impl Resampled {
     }
 }
 
-/// What the rows of a placed sprite are drawn on.
+/// The target on which rows of a placed sprite are drawn.
 pub(super) trait Surface {
-    /// The first columns of `within`, in row `y`, where anything may show; empty when there are none.
+    /// Returns the first columns of `within`, in row `y`, that are not hidden; empty if there are none.
     fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32>;
 
-    /// Takes what `draw` makes of a run of columns of row `y`.
+    /// Stores the pixels that `draw` writes for a run of columns of row `y`.
     fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad]));
 }
 
-/// A layer that is begun.
+/// A layer that has been started with `begin`.
 struct Layer<'a> {
     layer: &'a mut Resampled,
     nearer: Option<&'a Cover>,
@@ -155,8 +157,8 @@ impl Surface for Layer<'_> {
     }
 }
 
-/// Draws a placed sprite straight on a surface of `size` pixels; returns the box that it lies in. The sprite must
-/// have been made for the placement's scale.
+/// Draws a placed sprite on a surface of `size` pixels and returns its bounding box. The sprite must have
+/// been prepared for the placement's scale.
 pub(super) fn draw_on(
     surface: &mut impl Surface,
     size: [u32; 2],
@@ -175,7 +177,7 @@ fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "a kernel for AVX2")]
-            // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+            // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
             unsafe {
                 avx2::draw_rows(surface, rect, from);
             }
@@ -189,7 +191,7 @@ fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map
     }
 }
 
-/// Draws with a kernel, for whose instructions this is compiled too.
+/// Draws with the given kernel functions. Inlined, so that it is compiled for the kernel's instruction set.
 #[inline(always)]
 fn draw_rows_with(
     surface: &mut impl Surface,

@@ -1,5 +1,6 @@
-//! A sprite as interpolation takes it: premultiplied, in a transparent border so that no edge is a
-//! special case, halved as often as its scale asks (ALGORITHMS.md 8).
+//! A sprite prepared for interpolation (docs/explanation/algorithms.md, "Compositing"). Its pixels are
+//! premultiplied and surrounded by a transparent border, so that edges need no special case. For small scales
+//! it is halved.
 
 use std::ops::Range;
 
@@ -8,35 +9,35 @@ use super::map::Way;
 use super::{ONE, Quad};
 use crate::geometry::Rect;
 
-/// Transparent pixels around a sprite.
+/// Width of the transparent border, pixels.
 pub(super) const PAD: usize = 4;
-/// From so many pixels beyond a sprite's own nothing shows: there only negative weights meet, and where they meet in both
-/// directions interpolation would leave a ghost, a sixty-fourth of a pixel at most.
+/// Distance beyond the sprite, pixels, from which nothing is drawn. Only negative weights of the kernel reach
+/// that far. In two dimensions their product would leave a ghost of at most 1/64 of a pixel.
 pub(super) const REACH: usize = 1;
-/// Below this scale a sprite is halved first.
+/// Scale below which a sprite is halved. Free choice.
 const LEAST_SCALE: f64 = 0.6;
-/// A sprite is a dot by then.
+/// Maximum number of halvings. The sprite is then a dot.
 const MOST_HALVED: u32 = 8;
 
-/// A sprite, premultiplied.
+/// A premultiplied sprite.
 #[derive(Clone, Debug, Default)]
 pub struct Premultiplied {
-    /// Its middle, which a placement places, from its upper left corner; pixels before halving.
+    /// The sprite's reference point for placement, from its upper left corner, in pixels before halving.
     pub(super) middle_px: [f64; 2],
-    /// How often it has been halved.
+    /// Number of halvings.
     pub(super) level: u32,
-    /// Columns and rows of the level.
+    /// Width and height of the halved sprite, pixels.
     pub(super) size: [usize; 2],
-    /// These and a border of `PAD`, by rows.
+    /// Pixels with a border of `PAD` on each side, row by row.
     pub(super) pixels: Vec<Quad>,
-    /// Per row: the columns, in 65536ths, between which a place lies beside a pixel that shows; from above to when
-    /// none does.
+    /// For each row, the open interval of positions, in 1/65536 of a pixel, that are next to a pixel with
+    /// alpha. If there is none, the start exceeds the end.
     pub(super) spans: Vec<[i32; 2]>,
 }
 
 impl Premultiplied {
-    /// Takes a straight-alpha RGBA sprite of `size` pixels, for being drawn at `scale` about `middle_px`, which is told
-    /// from its upper left corner and may lie between pixels.
+    /// Prepares a straight-alpha RGBA sprite of `size` pixels for drawing at `scale`. `middle_px` is the
+    /// point to be placed, from the upper left corner; it may lie between pixels.
     pub fn of(rgba: &[u8], size: [u32; 2], middle_px: [f64; 2], scale: f64) -> Premultiplied {
         let mut sprite = Premultiplied {
             middle_px,
@@ -51,7 +52,7 @@ impl Premultiplied {
         sprite
     }
 
-    /// How often a sprite that is drawn at `scale` is halved.
+    /// Returns the number of halvings for drawing at `scale`.
     pub fn level_for(scale: f64) -> u32 {
         let mut level = 0;
         while level < MOST_HALVED && scale * f64::from(1u32 << level) < LEAST_SCALE {
@@ -60,8 +61,8 @@ impl Premultiplied {
         level
     }
 
-    /// Which of `n` places on a way that begins at `start` lie between the first and the last that find
-    /// anything; empty where none does.
+    /// Returns the range of steps between the first and the last position next to a pixel with alpha, out of
+    /// `n` steps from `start`. The range is empty if there is no such position.
     #[inline(always)]
     pub(super) fn seen(&self, start: [i32; 2], way: &Way, n: usize) -> Range<usize> {
         let first = self.n_blank(start, way, n);
@@ -70,8 +71,8 @@ impl Premultiplied {
         first..n - n_after
     }
 
-    /// How many of `n` places find nothing before one does. Goes from row to row of the sprite, in each to
-    /// where its span begins.
+    /// Returns the number of steps, at most `n`, before a position next to a pixel with alpha. The search
+    /// skips from one sprite row to the next, and in each row to the start of its span.
     #[inline(always)]
     fn n_blank(&self, start: [i32; 2], way: &Way, n: usize) -> usize {
         let mut at = 0;
@@ -91,7 +92,7 @@ impl Premultiplied {
                 (if way.step[0] > 0 { from - u } else { u - to }) as u32,
             ];
             let n_in_row = way.n_beyond(row_left, 1);
-            // Behind the span there is nothing more in this row.
+            // Past the span, the rest of this row is empty.
             at += match before_span as i32 >= 0 {
                 true => n_in_row.min(way.n_beyond(before_span, 0)),
                 false => n_in_row,
@@ -100,12 +101,12 @@ impl Premultiplied {
         at.min(n)
     }
 
-    /// Memory that it takes.
+    /// Returns the memory used, bytes.
     pub fn n_bytes(&self) -> usize {
         size_of_val(&*self.pixels) + size_of_val(&*self.spans)
     }
 
-    /// Whether it has no pixels.
+    /// Returns whether the sprite has no pixels.
     pub(super) fn is_empty(&self) -> bool {
         self.size.contains(&0)
     }
@@ -122,7 +123,7 @@ impl Premultiplied {
         }
     }
 
-    /// Columns of `pixels`.
+    /// Returns the number of columns of `pixels`, border included.
     pub(super) fn stride(&self) -> usize {
         self.size[0] + 2 * PAD
     }
@@ -133,7 +134,7 @@ impl Premultiplied {
         self.pixels.resize(self.stride() * n_rows, [0; 4]);
     }
 
-    /// The next level: means of two by two pixels.
+    /// Halves the sprite: each pixel becomes the mean of 2 x 2 pixels.
     fn halve(&mut self) {
         let finer = std::mem::take(&mut self.pixels);
         let stride_before = self.stride();
@@ -144,7 +145,7 @@ impl Premultiplied {
         let [width, height] = self.size;
         for y in 0..height {
             for x in 0..width {
-                // The border takes in what an odd edge lacks.
+                // At an odd edge the missing pixels come from the border.
                 let at = (2 * y + PAD) * stride_before + 2 * x + PAD;
                 let block = [at, at + 1, at + stride_before, at + stride_before + 1];
                 let mut sum = [2i32; 4];
@@ -171,7 +172,7 @@ impl Premultiplied {
                 continue;
             };
             let (first, last) = ((first - REACH) as i32, (last + REACH) as i32);
-            // Places of the row before it and of its own lie beside it.
+            // Positions are rounded down to a row, so this row's pixels also reach into the row before it.
             for span in &mut self.spans[y - 1..=y] {
                 *span = [span[0].min(first << 16), span[1].max(last << 16)];
             }
@@ -179,9 +180,9 @@ impl Premultiplied {
     }
 }
 
-/// A straight-alpha pixel of 8 bits a channel.
+/// Converts a straight-alpha RGBA pixel.
 fn premultiplied(pixel: &[u8]) -> Quad {
-    // Most pixels are opaque or clear.
+    // Most pixels are opaque or transparent.
     match pixel[3] {
         0 => return [0; 4],
         255 => return crate::raster::canvas::opaque([pixel[0], pixel[1], pixel[2]]),
@@ -198,7 +199,8 @@ fn premultiplied(pixel: &[u8]) -> Quad {
     ]
 }
 
-/// Where a straight-alpha RGBA sprite of `width` columns has any alpha; empty when it has none.
+/// Returns the bounding box of the pixels with alpha in a straight-alpha RGBA sprite of `width` columns;
+/// empty if there are none.
 pub fn bounds_of(rgba: &[u8], width: u32) -> Rect {
     let mut bounds = [usize::MAX, usize::MAX, 0, 0];
     for (y, row) in rgba.chunks_exact(width.max(1) as usize * 4).enumerate() {

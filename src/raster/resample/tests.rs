@@ -1,4 +1,4 @@
-//! What a placed sprite looks like: exact where it can be, smooth where it cannot.
+//! Tests of placed sprites: exact copies where possible, smooth interpolation elsewhere.
 
 use super::*;
 use crate::raster::Canvas;
@@ -18,7 +18,7 @@ fn place(center_px: [f64; 2]) -> Placement {
     }
 }
 
-/// The part of a sprite of `size` pixels that shows anything, placed by the middle of the whole.
+/// Prepares the visible part of a sprite of `size` pixels; the middle of the whole sprite is placed.
 fn cut(rgba: &[u8], [width, height]: [u32; 2], scale: f64) -> Premultiplied {
     let bounds = bounds_of(rgba, width);
     let rows = (bounds.y..bounds.bottom()).flat_map(|y| {
@@ -89,7 +89,7 @@ fn a_quarter_turn_clockwise_leads_right_to_down() {
     assert_eq!(pixel(&resampled, 19, 18), [200, 100, 50, 255]);
 }
 
-/// A white square of 6 in a picture of 12.
+/// Returns a white square of 6 x 6 pixels in a picture of 12 x 12.
 fn square() -> Vec<u8> {
     let mut rgba = vec![0; 12 * 12 * 4];
     for k in 0..12 * 12 {
@@ -137,7 +137,7 @@ fn no_edge_is_darker_than_its_sprite_at_any_scale() {
         };
         for pixel in drawn(&square(), (12, 12), &turned).pixels {
             let [r, g, b, a] = crate::raster::canvas::straight(pixel);
-            // A fringe would be a pixel with alpha and less than the white of the square.
+            // A fringe is a pixel with alpha whose color is darker than the white square.
             assert!(
                 a < 3 || [r, g, b].iter().all(|&c| c >= 252),
                 "{scale}: {pixel:?}"
@@ -181,7 +181,7 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
     };
     let mut canvas = Canvas::new(40, 30);
     for (k, pixel) in canvas.pixels.iter_mut().enumerate() {
-        // Whole blocks are hidden, and in the others a pixel here and there.
+        // Every second block is hidden; in the others only single pixels are.
         let hides = k / 8 % 2 == 1 || k % 3 == 2;
         pixel[3] = if hides { ONE } else { ONE - ONE / 256 };
     }
@@ -233,7 +233,7 @@ fn every_instruction_set_gives_the_same_pixels() {
 
 #[test]
 fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
-    // A bow: its rows begin and end elsewhere, and some are empty.
+    // A bow shape: rows differ in start and end, and some are empty.
     let mut rgba = vec![0; 40 * 30 * 4];
     for k in 0..40 * 30 {
         let (x, y) = (k % 40, k / 40);
@@ -269,7 +269,7 @@ fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
 
 #[test]
 fn what_lies_beside_a_pixel_that_shows_is_drawn() {
-    // An eighth of all pixels, so that many lie alone.
+    // An eighth of all pixels, many of them isolated.
     let mut rgba = checkered(14, 9);
     for (k, pixel) in rgba.chunks_exact_mut(4).enumerate() {
         pixel[3] = if k * 5 % 8 == 0 { 255 } else { 0 };
@@ -297,7 +297,7 @@ fn what_lies_beside_a_pixel_that_shows_is_drawn() {
             if is_beside {
                 sprite.interpolate(&mut whole, place.map(fixed), [0, 0]);
             }
-            // Places are 256 to a pixel.
+            // Positions are rounded to 1/256 of a pixel.
             assert!(
                 alpha.abs_diff(whole[0][3] as u16) < 200,
                 "{k} {x} {y}: {alpha}"

@@ -1,5 +1,5 @@
-//! The sphere of directions cut into cells, what the body looks like from each, and what one frame
-//! costs each (ALGORITHMS.md 4).
+//! The cells of the direction sphere, the appearance of the body from each, and the cost of each in one frame
+//! (docs/explanation/algorithms.md, "Direction in space").
 
 use std::f64::consts::{PI, TAU};
 
@@ -10,28 +10,29 @@ use super::super::shape::Shape;
 pub(super) const N_YAW: usize = 36;
 pub(super) const N_PITCH: usize = 13;
 pub(super) const N_CELL: usize = N_YAW * N_PITCH;
-/// From one yaw, and one pitch, to the next.
+/// Distance between neighboring cells in yaw and in pitch, radians.
 pub(super) const YAW_STEP_RAD: f64 = TAU / N_YAW as f64;
 pub(super) const PITCH_STEP_RAD: f64 = 2.0 * STEEPEST_RAD / (N_PITCH - 1) as f64;
-/// The steepest pitch.
+/// Largest pitch of a cell, radians. Free choice.
 const STEEPEST_RAD: f64 = PI / 3.0;
-/// Noise of the motion in the picture and in depth, lengths a second.
+/// Standard deviations of the velocity in x, y and depth, body lengths per second. Free choice.
 const MOTION_BL: [f64; 3] = [0.25, 0.25, 0.6];
-/// Usual pitch, radians.
+/// Standard deviation of the pitch, radians. Free choice.
 const PITCH: f64 = 0.4;
-/// Squared deviations beyond nine count linearly.
+/// Residuals grow linearly beyond this many standard deviations. Free choice.
 const ROBUST: f64 = 3.0;
 
-/// The cells of the sphere, and what the body looks like from each.
+/// The cells, with the expected measurements for each.
 pub(super) struct Cells {
     pub(super) axes: Vec<Axes>,
     pitch: [f64; N_PITCH],
-    /// Projected moments, square metres.
+    /// Projected moments xx, xy, yy, square metres.
     moments: Vec<[f64; 3]>,
-    /// Inverse of their covariance: xx, xy, xz, yy, yz, zz; and half the logarithm of its determinant.
+    /// Inverse covariance of the measured moments, as xx, xy, xz, yy, yz, zz. x, y and z are the three
+    /// moments. `half_log_det` is half the logarithm of the determinant of the covariance.
     inverse: Vec<[f64; 6]>,
     half_log_det: Vec<f64>,
-    /// The upright extent by pitch, metres.
+    /// Vertical extent by pitch, metres.
     upright_m: [f64; N_PITCH],
 }
 
@@ -67,14 +68,15 @@ impl Cells {
         cells
     }
 
-    /// What the motion, metres a second about the line of sight, costs each cell.
+    /// Returns the cost of a velocity for each cell. The velocity is in metres per second, relative to the
+    /// line of sight.
     pub(super) fn motion_costs(&self, velocity: [f64; 3], length_m: f64) -> Vec<f64> {
         let noise = MOTION_BL.map(|bl| bl * length_m);
         let moved: [f64; 3] = std::array::from_fn(|c| velocity[c] / noise[c]);
         let one = |(k, axes): (usize, &Axes)| {
             let along: [f64; 3] = std::array::from_fn(|c| axes.forward[c] / noise[c]);
             let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-            // The speed that explains most of it; animals do not swim backward.
+            // The speed that explains most of the velocity. Animals do not swim backward.
             let speed = (dot(&along, &moved) / dot(&along, &along)).max(0.0);
             let rest: [f64; 3] = std::array::from_fn(|c| moved[c] - speed * along[c]);
             let pitch = self.pitch[k % N_PITCH] / PITCH;
@@ -83,7 +85,7 @@ impl Cells {
         self.axes.iter().enumerate().map(one).collect()
     }
 
-    /// What the silhouette's moments cost each cell, its scale being that of the upright extent.
+    /// Adds the cost of the silhouette's moments to each cell. The vertical extent gives the scale.
     pub(super) fn add_moment_costs(&self, outline: &Outline, costs: &mut [f64]) {
         let scale = self.upright_m.map(|m| (m / outline.upright_px).powi(2));
         for (k, cost) in costs.iter_mut().enumerate() {
@@ -99,7 +101,7 @@ impl Cells {
         }
     }
 
-    /// The mean direction of the posterior within 50 degrees of a cell.
+    /// Returns the mean direction of the posterior within 50 degrees of a cell, a unit vector.
     pub(super) fn mean_near(&self, posterior: &[f64], cell: usize) -> [f64; 3] {
         const COS_50: f64 = 0.642_787_609_686_539_4;
         let center = self.axes[cell].forward;
@@ -121,13 +123,15 @@ impl Cells {
     }
 }
 
-/// The inverse covariance of measured moments about those of a cell, and half the logarithm of its
-/// determinant: noise of each, of the common scale, and whatever the sway.
+/// Returns the inverse covariance of the measured moments of a cell, and half the logarithm of its
+/// determinant.
+///
+/// The covariance adds the noise of each moment, the noise of the common scale, and the sway.
 fn precision(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], f64) {
     let mean = (m[0] * m[2]).max(0.0).sqrt();
     let noise = [0.08 * m[0] + 0.04 * mean, 0.08 * mean, 0.08 * m[2]]
         .map(|n| n * shape.moment_noise.max(1.0));
-    // The scale is that of the upright extent; moments go with its square.
+    // The vertical extent gives the scale. Moments grow with its square.
     let scale = (2.0 * shape.upright_noise).powi(2);
     let entry = |i: usize, j: usize| {
         let own = if i == j { noise[i] * noise[i] } else { 0.0 };

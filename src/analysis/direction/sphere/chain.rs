@@ -1,23 +1,28 @@
-//! The chain of directions over time: the likeliest course (Viterbi) and the posterior of every cell
-//! (forward-backward), from the costs of every cell in every frame.
+//! Hidden Markov model over the cells of the direction sphere: the most probable course (Viterbi) and the
+//! posterior of every cell (forward-backward).
+//!
+//! Its input is the cost of every cell in every frame, a negative log likelihood. Turns cost in proportion to
+//! their angle.
 
 use rayon::prelude::*;
 
 use super::cells::{N_CELL, N_PITCH, N_YAW, PITCH_STEP_RAD, YAW_STEP_RAD};
 
-/// Cells that the yaw, and the pitch, may go in one frame.
+/// Largest change from one frame to the next, in cells of yaw and of pitch. Free choice.
 const YAW_REACH: usize = 4;
 const PITCH_REACH: usize = 2;
-/// Cost of turning, per radian: of the whole way, whatever the frame rate.
+/// Cost per radian of turning. The total depends on the angle only, not on the frame rate. Free choice.
 const TURN_COST: f64 = 5.8;
 
-/// Frames whose costs are held at a time: memory for a whole long footage is kept for the way back
-/// through it alone, two bytes a cell.
+/// Number of frames whose costs are in memory at a time. The costs are computed a second time for the
+/// backward pass. Only two bytes per cell are kept for every frame.
 const BLOCK: usize = 512;
 
-/// Decodes a course of `n` >= 1 frames from what every cell costs in each (`cost`, frame after frame of a
-/// range): `on_frame` is told of every frame, from the last to the first, its cell of the
-/// likeliest course and the posterior of all cells.
+/// Decodes a course of `n` frames, at least 1.
+///
+/// `cost(k)` returns the cost of every cell in frame k. `on_frame` is called for every frame, from the last
+/// to the first. Its arguments are the frame, its cell on the most probable course, and the posterior of all
+/// cells.
 pub(super) fn decode(
     n: usize,
     cost: impl Fn(usize) -> Vec<f64> + Sync,
@@ -29,7 +34,7 @@ pub(super) fn decode(
     };
     let n_blocks = n.div_ceil(BLOCK);
     let mut likeliest = Likeliest::default();
-    // What is carried into each block from before it.
+    // The forward probabilities on entry to each block.
     let mut carried = vec![vec![1.0; N_CELL]];
     for block_idx in 0..n_blocks {
         let costs = costs_of(block_idx);
@@ -56,16 +61,16 @@ pub(super) fn decode(
     }
 }
 
-/// The likeliest course (Viterbi).
+/// The most probable course (Viterbi).
 #[derive(Default)]
 struct Likeliest {
-    /// The least cost of being in each cell now; empty before the first frame.
+    /// The lowest cost of a path to each cell in the current frame; empty before the first frame.
     best: Vec<f64>,
     came_from: Vec<Vec<u16>>,
 }
 
 impl Likeliest {
-    /// Takes the costs of the next frames.
+    /// Extends the paths by the costs of the next frames.
     fn go_on(&mut self, costs: &[Vec<f64>]) {
         for cost in costs {
             if self.best.is_empty() {
@@ -79,7 +84,7 @@ impl Likeliest {
         }
     }
 
-    /// The cell of every frame.
+    /// Returns the cell of every frame.
     fn path(self) -> Vec<usize> {
         let best = &self.best;
         let mut cell = (0..N_CELL).fold(0, |a, b| if best[b] < best[a] { b } else { a });
@@ -92,7 +97,8 @@ impl Likeliest {
     }
 }
 
-/// The least cost of reaching each cell, and from which one: pitch after yaw.
+/// Returns the lowest cost of reaching each cell from its neighbors, yaw first, then pitch. `from` receives
+/// the predecessors.
 fn reach(best: &[f64], from: &mut [u16]) -> Vec<f64> {
     let came: Vec<u16> = from.to_vec();
     let mut turned = best.to_vec();
@@ -135,7 +141,7 @@ fn likelihoods(costs: &[Vec<f64>]) -> Vec<Vec<f64>> {
     costs.par_iter().map(of_frame).collect()
 }
 
-/// The probability of every cell in the frames of a block, given them and those before.
+/// Returns the forward probabilities of every cell in the frames of a block.
 fn ahead(carried: &[f64], likely: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut ahead: Vec<Vec<f64>> = Vec::with_capacity(likely.len());
     for likely in likely {
@@ -147,7 +153,7 @@ fn ahead(carried: &[f64], likely: &[Vec<f64>]) -> Vec<Vec<f64>> {
     ahead
 }
 
-/// Probability carried to the neighbors of every cell.
+/// Returns the probabilities after one transition to neighboring cells, not normalised.
 fn spread(mass: &[f64]) -> Vec<f64> {
     let weight = |step: f64, k: usize| libm::exp(-TURN_COST * step * k as f64);
     let yaw: [f64; YAW_REACH + 1] = std::array::from_fn(|k| weight(YAW_STEP_RAD, k));

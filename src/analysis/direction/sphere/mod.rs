@@ -1,12 +1,13 @@
-//! A histogram filter on the sphere of directions: which way the animal points in every frame, decided
-//! over the whole footage.
+//! A histogram filter on the sphere of directions: decides the animal's direction in every frame over the
+//! whole footage.
 //!
-//! The sphere is cut into cells of yaw and pitch about the line of sight. A cell is likely in a frame when
-//! the body's projected moments are those seen there, whatever the sway, and when the animal moves that way;
-//! neighbors in time must be neighbors on the sphere. The likeliest course (Viterbi) picks one of the
-//! mirrored ways; the posterior about it (forward-backward) gives its mean and its certainty. This replaces
-//! the two separate decisions of ALGORITHMS.md 4 (head or tail, toward or away) where a camera is calibrated:
-//! one course must satisfy both at once.
+//! The sphere is divided into cells of yaw and pitch relative to the line of sight. A cell is probable in a
+//! frame if the projected body has the measured moments, for any sway, and the animal moves that way.
+//! Successive frames must lie in neighboring cells. The most probable course (Viterbi) selects one of the
+//! mirrored alternatives. The posterior around it (forward-backward) gives its mean and its confidence.
+//!
+//! One course decides head or tail and toward or away together. It replaces the two separate decisions of
+//! docs/explanation/algorithms.md, "Pose".
 
 mod cells;
 mod chain;
@@ -17,18 +18,19 @@ use super::{States, Views};
 use crate::geometry::wrap_rad;
 use cells::Cells;
 
-/// What a frame says counts this much at 30 frames a second: neighbors say nearly the same.
+/// Weight of one frame's cost at 30 frames per second. Below 1, because successive frames are not
+/// independent.
 const EVIDENCE: f64 = 0.35;
-/// A cell less likely than this tells nothing of how sure the course is.
+/// Cells below this probability do not count toward the confidence. Free choice.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Cost of pointing away from where the head is known to be.
+/// Cost of a direction away from a head given by the user. High enough to exclude it.
 const PINNED: f64 = 1e4;
 
 /// The decoded course.
 pub(super) struct Course {
-    /// Mean direction of the posterior near the likeliest course, in the camera frame.
+    /// Mean direction of the posterior near the most probable course, unit vectors in the camera frame.
     forward: Vec<[f64; 3]>,
-    /// The cells of each frame that are not all but impossible, with their probabilities.
+    /// Cells of each frame with a probability above `NEGLIGIBLE`, with that probability.
     posterior: Vec<Vec<(u16, f32)>>,
     cells: Cells,
     z_apparent_m: Vec<f64>,
@@ -82,7 +84,7 @@ pub(super) fn decode(views: &Views, shape: &Shape) -> Course {
 }
 
 impl Course {
-    /// Where the best estimate starts.
+    /// Returns the initial states of the energy minimisation: one body length per second and no sway.
     pub(super) fn states(&self, views: &Views, shape: &Shape) -> States {
         let mut last_yaw = 0.0;
         (0..views.frames.len())
@@ -102,8 +104,8 @@ impl Course {
             .collect()
     }
 
-    /// How sure the filter is of the head's side in the picture, and of the sign of depth, of a
-    /// direction in a frame: 0.5..=1.
+    /// Returns the probability of the head's side in the image and of the sign of depth, both 0.5..=1, for a
+    /// direction in one frame.
     pub(super) fn confidence(&self, idx: usize, forward: [f64; 3]) -> [f64; 2] {
         let along = about_sight(self.slopes[idx], forward);
         let (mut head, mut depth, mut all) = (0.0, 0.0, 0.0);
@@ -121,17 +123,17 @@ impl Course {
     }
 }
 
-/// A vector of the camera frame about the line of sight to a place of the picture.
+/// Rotates a vector from the camera frame to the line of sight with slope (tx, ty), to first order.
 fn about_sight([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
     normalized_like([x, y, z], [x - tx * z, y - ty * z, z + tx * x + ty * y])
 }
 
-/// Back again.
+/// Rotates a vector from the line of sight to the camera frame; approximate inverse of [`about_sight`].
 fn camera_frame([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
     normalized_like([x, y, z], [x + tx * z, y + ty * z, z - tx * x - ty * y])
 }
 
-/// `b` with the length of `a`.
+/// Returns `b` scaled to the length of `a`.
 fn normalized_like(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     let norm = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     let scale = if norm(b) > 0.0 {
@@ -142,7 +144,8 @@ fn normalized_like(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     b.map(|c| c * scale)
 }
 
-/// The depth that the upright extent shows, over half a second, metres.
+/// Returns the apparent depth from the vertical extent, metres, averaged over 0.5 s. Frames without a
+/// silhouette are interpolated.
 fn rough_depth_m(views: &Views, shape: &Shape) -> Vec<f64> {
     let seen: Vec<(usize, f64)> = views
         .frames
@@ -163,7 +166,7 @@ fn rough_depth_m(views: &Views, shape: &Shape) -> Vec<f64> {
     running_mean(&depth, views, 0.5)
 }
 
-/// Metres a second in the camera frame.
+/// Returns the smoothed velocity in the camera frame, metres per second.
 fn velocity_m_s(views: &Views, z_apparent_m: &[f64]) -> Vec<[f64; 3]> {
     let n = views.frames.len();
     let part = |c: usize, over_s: f64| {
@@ -183,7 +186,7 @@ fn velocity_m_s(views: &Views, z_apparent_m: &[f64]) -> Vec<[f64; 3]> {
     (0..n).map(|k| [x[k], y[k], z[k]]).collect()
 }
 
-/// The mean over a window of `over_s` seconds around each value; shorter at the ends.
+/// Returns the mean over a window of `over_s` seconds around each value; the window is shorter at the ends.
 fn running_mean(values: &[f64], views: &Views, over_s: f64) -> Vec<f64> {
     let half = (over_s / views.dt / 2.0).round() as usize;
     (0..values.len())

@@ -1,9 +1,9 @@
-//! AVX2: 32 bytes to an instruction (`vpsadbw`), a register tile of 6 x 2 sprites, so that eight loads
-//! feed twelve sums, over blocks of 1 KB that stay in the nearest cache.
+//! AVX2 kernel: 32 bytes per instruction (`vpsadbw`) and a register tile of 6 x 2 sprites, so that eight
+//! loads feed twelve sums. The blocks of 1 KB stay in the L1 cache.
 //!
-//! Twelve sums, two columns, a row and a difference are the sixteen registers that there are: with eight sums
-//! the loads, not the sums, keep the processor busy. A block's partial sums stay below 2^32 (32 steps of at
-//! most 4 * 2040), so two of them share a 64-bit lane while they are added up.
+//! Twelve sums, two columns, one row and one difference fill the sixteen registers. With eight sums, the
+//! loads would limit the speed. The partial sums of a block stay below 2^32 (32 steps of at most 4 * 2040).
+//! Two of them therefore share a 64-bit lane in the final addition.
 #![expect(unsafe_code, reason = "vector loads and the call into code for AVX2")]
 
 use std::arch::x86_64::*;
@@ -12,15 +12,16 @@ use std::ops::Range;
 use super::{LANES, SadTile, Tile};
 use crate::analysis::distance::group::{BLOCK, Block};
 
-/// Rows against two columns: their sums, two columns, a row and a difference fill the registers.
+/// Largest number of rows against two columns. Their sums, two columns, one row and one difference fill the
+/// registers.
 const MOST_ROWS: usize = 6;
-/// Loads of 32 bytes in a block.
+/// Number of 32-byte loads per block.
 const STEPS: usize = BLOCK / 32;
 
-/// As `scalar::sad_tile`. Panics where AVX2 is missing.
+/// Works like `scalar::sad_tile`. Panics without AVX2.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
     assert!(is_x86_feature_detected!("avx2"), "this machine has no AVX2");
-    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+    // SAFETY: the assertion above ensures AVX2, the only requirement of the callee.
     unsafe { sad_tile_avx2(tile, sums) }
 }
 
@@ -30,7 +31,7 @@ fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
     let strips = strips(&tile);
     for block in 0..tile.rows.n_blocks() {
         for strip in &strips {
-            // Groups are padded to 48 sprites, so two columns never leave them.
+            // Groups are padded to 48 sprites, so both columns exist.
             let columns = strip.column..strip.column + 2;
             if !tile.meet(block, [&strip.rows, &columns]) {
                 continue;
@@ -47,13 +48,14 @@ fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
     }
 }
 
-/// Some rows in succession, at most [`MOST_ROWS`], against two columns.
+/// Successive rows, at most [`MOST_ROWS`], against two columns.
 struct Strip {
     rows: Range<usize>,
     column: usize,
 }
 
-/// All rows of which two columns ask anything, in pieces about as long as each other: rows by rows, then columns.
+/// Returns the needed rows of every two columns, in strips of similar length, sorted by rows, then by
+/// columns.
 fn strips(tile: &Tile<'_>) -> Vec<Strip> {
     let mut strips = Vec::new();
     for column in (0..tile.columns.n_sprites).step_by(2) {
@@ -88,7 +90,7 @@ fn put_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: 
     }
 }
 
-/// The sums of some blocks, at most six, against two.
+/// Returns the sums of up to six blocks against two.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn sad_rows<const R: usize>(a: [&Block; R], b: [&Block; 2]) -> [[u32; 2]; R] {
@@ -115,16 +117,16 @@ fn sad_rows<const R: usize>(a: [&Block; R], b: [&Block; 2]) -> [[u32; 2]; R] {
     each
 }
 
-/// Calls for one of the 32 cache lines of the two blocks after this one: the next two columns', mostly.
+/// Prefetches one of the 32 cache lines after this block: usually those of the next two columns.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn fetch_next(block: &Block, step: usize) {
     let line = block.0.as_ptr().wrapping_add(BLOCK + step * 64);
-    // Nothing is read, wherever the line may be.
+    // A prefetch reads nothing, so any address is allowed.
     _mm_prefetch::<_MM_HINT_T0>(line.cast());
 }
 
-/// The totals of four vectors of four 64-bit sums, each below 2^32.
+/// Returns the totals of four vectors of four 64-bit sums, each below 2^32.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn totals([a, b, c, d]: [__m256i; 4]) -> [u32; 4] {
@@ -136,25 +138,25 @@ fn totals([a, b, c, d]: [__m256i; 4]) -> [u32; 4] {
         _mm256_extracti128_si256::<1>(abcd),
     );
     let mut totals = [0; 4];
-    // SAFETY: `totals` is 16 bytes long and the store needs no alignment.
+    // SAFETY: `totals` is 16 bytes long, and the store needs no alignment.
     unsafe { _mm_storeu_si128(totals.as_mut_ptr().cast(), abcd) };
     totals
 }
 
-/// 32 bytes of a block.
+/// Loads 32 bytes of a block.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn load(block: &Block, step: usize) -> __m256i {
     debug_assert!(step < STEPS, "a block has 32 steps");
-    // SAFETY: callers count `step` below STEPS, so the 32 bytes lie inside the block, which stands
-    // on a boundary of 64.
+    // SAFETY: callers keep `step` below STEPS, so the 32 bytes are inside the block, which is aligned to 64
+    // bytes.
     unsafe { _mm256_load_si256(block.0.as_ptr().cast::<__m256i>().add(step)) }
 }
 
-/// As `scalar::least_differences`. Panics where AVX2 is missing.
+/// Works like `scalar::least_differences`. Panics without AVX2.
 pub(super) fn least_differences(row: &[u16], others: &[u16], sums: &mut [u32]) {
     assert!(is_x86_feature_detected!("avx2"), "this machine has no AVX2");
-    // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+    // SAFETY: the assertion above ensures AVX2, the only requirement of the callee.
     unsafe { least_differences_avx2(row.as_chunks().0, others, sums) }
 }
 
@@ -163,24 +165,24 @@ fn least_differences_avx2(row: &[[u16; LANES]], others: &[u16], sums: &mut [u32]
     let ones = _mm256_set1_epi16(1);
     let others = others.as_chunks().0.chunks_exact(row.len().max(1));
     for (sum, other) in sums.iter_mut().zip(others) {
-        // Eight lanes, each of fewer than 2^15 differences below 2^16.
+        // Eight lanes. Each sums fewer than 2^15 differences below 2^16.
         let mut lanes = _mm256_setzero_si256();
         for (a, b) in row.iter().zip(other) {
             let difference = _mm256_abs_epi16(_mm256_sub_epi16(values(a), values(b)));
             lanes = _mm256_add_epi32(lanes, _mm256_madd_epi16(difference, ones));
         }
         let mut each = [0u32; 8];
-        // SAFETY: `each` is 32 bytes long and the store needs no alignment.
+        // SAFETY: `each` is 32 bytes long, and the store needs no alignment.
         unsafe { _mm256_storeu_si256(each.as_mut_ptr().cast(), lanes) };
         let total: u64 = each.iter().map(|&lane| u64::from(lane)).sum();
         *sum = u32::try_from(total).unwrap_or(u32::MAX);
     }
 }
 
-/// Sixteen values.
+/// Loads sixteen values.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn values(values: &[u16; LANES]) -> __m256i {
-    // SAFETY: 32 bytes are there, and the load needs no alignment.
+    // SAFETY: the array has 32 bytes, and the load needs no alignment.
     unsafe { _mm256_loadu_si256(values.as_ptr().cast()) }
 }

@@ -1,6 +1,7 @@
-//! AVX-512 BW: 64 bytes to an instruction, a register tile of 4 x 4 sprites out of the 32
-//! registers, where most pairs of a tile are asked for: of few, `avx2` leaves out more. The 16 steps of a block
-//! keep every 64-bit lane below 2^15, a total below 2^18.
+//! AVX-512 BW kernel: 64 bytes per instruction and a register tile of 4 x 4 sprites in 32 registers.
+//!
+//! It is used where most pairs of a tile are needed. For few pairs, `avx2` skips more. The 16 steps of a
+//! block keep every 64-bit lane below 2^15 and a total below 2^18.
 #![expect(
     unsafe_code,
     reason = "vector loads and the call into code for AVX-512"
@@ -11,23 +12,23 @@ use std::arch::x86_64::*;
 use super::{SadTile, Tile};
 use crate::analysis::distance::group::{BLOCK, Block};
 
-/// Loads of 64 bytes in a block.
+/// Number of 64-byte loads per block.
 const STEPS: usize = BLOCK / 64;
 
-/// As `scalar::sad_tile`. Panics where AVX-512 BW is missing.
+/// Works like `scalar::sad_tile`. Panics without AVX-512 BW.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
     assert!(
         is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw"),
         "this machine has no AVX-512 BW"
     );
-    // SAFETY: the line above made sure of what the callee asks for.
+    // SAFETY: the assertion above ensures what the callee requires.
     unsafe { sad_tile_avx512(tile, sums) }
 }
 
 #[target_feature(enable = "avx512f,avx512bw")]
 fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
     *sums = tile.apart();
-    // Groups are padded to 48 sprites, so blocks of 4 and 4 never leave them.
+    // Groups are padded to 48 sprites, so all four rows and columns exist.
     let corners = tile.corners::<4, 4>();
     for block in 0..tile.rows.n_blocks() {
         for &[row, column] in &corners {
@@ -46,7 +47,7 @@ fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
     }
 }
 
-/// The sums of four blocks against four: `[row][column]`.
+/// Returns the sums of four blocks against four: `[row][column]`.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 fn sad_4x4(a: [&Block; 4], b: [&Block; 4]) -> [[u64; 4]; 4] {
@@ -80,12 +81,12 @@ fn sad_4x4(a: [&Block; 4], b: [&Block; 4]) -> [[u64; 4]; 4] {
     totals
 }
 
-/// 64 bytes of a block.
+/// Loads 64 bytes of a block.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 fn load(block: &Block, step: usize) -> __m512i {
     debug_assert!(step < STEPS, "a block has 16 steps");
-    // SAFETY: callers count `step` below STEPS, so the 64 bytes lie inside the block, which stands
-    // on a boundary of 64.
+    // SAFETY: callers keep `step` below STEPS, so the 64 bytes are inside the block, which is aligned to 64
+    // bytes.
     unsafe { _mm512_load_si512(block.0.as_ptr().cast::<__m512i>().add(step)) }
 }

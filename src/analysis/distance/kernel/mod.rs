@@ -1,5 +1,6 @@
-//! Sums of absolute differences of 48 x 48 sprites at a time, by the vector instructions asked for
-//! (ALGORITHMS.md 5, distance engine). `scalar` is the definition; the others are only fast.
+//! Sums of absolute differences for 48 x 48 pairs of sprites, with the given instruction level
+//! (docs/explanation/algorithms.md, "Distances"). `scalar` is the definition. The other kernels are faster
+//! and give the same results.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -17,20 +18,21 @@ use crate::cpu::Level;
 /// d of each row sprite (first index) and each column sprite.
 pub(super) type SadTile = [[u64; GROUP]; GROUP];
 
-/// Which pairs are compared.
+/// Two groups of sprites and the pairs to compare.
 #[derive(Clone, Copy)]
 pub(super) struct Tile<'a> {
     pub(super) rows: Group<'a>,
     pub(super) columns: Group<'a>,
-    /// The columns asked for in each row, as bits.
+    /// The needed columns of each row, as bits.
     pub(super) wanted: &'a Wanted,
 }
 
-/// Values at a time of [`least_differences`].
+/// Number of values that [`least_differences`] processes at a time.
 pub(super) const LANES: usize = 16;
 
-/// The sums of absolute differences of a row of values, each below 2^15, and each of many rows. All are
-/// of the same length, a multiple of [`LANES`]; what exceeds 32 bits is cut off there.
+/// Writes the sums of absolute differences between one row of values and each of many rows.
+///
+/// Values are below 2^15. All rows have the same length, a multiple of [`LANES`]. Sums saturate at 32 bits.
 pub(super) fn least_differences(cpu: Level, row: &[u16], others: &[u16], sums: &mut [u32]) {
     match cpu {
         #[cfg(target_arch = "x86_64")]
@@ -39,16 +41,16 @@ pub(super) fn least_differences(cpu: Level, row: &[u16], others: &[u16], sums: &
     }
 }
 
-/// Which columns of a tile are asked for in each of its rows: bit k is column k.
+/// The needed columns in each row of a tile: bit k is column k.
 pub(super) type Wanted = [u64; GROUP];
 
-/// Every pair of two groups of so many sprites.
+/// Returns all pairs of two groups.
 pub(super) fn all(rows: Group<'_>, columns: Group<'_>) -> Wanted {
     let bits = (1 << columns.n_sprites) - 1;
     std::array::from_fn(|row| if row < rows.n_sprites { bits } else { 0 })
 }
 
-/// The pairs with column >= row of one group with itself: a tile on the matrix's diagonal.
+/// Returns the pairs with column >= row of a group with itself, for a tile on the diagonal.
 pub(super) fn upper(rows: Group<'_>, columns: Group<'_>) -> Wanted {
     let mut wanted = all(rows, columns);
     (0..)
@@ -58,7 +60,7 @@ pub(super) fn upper(rows: Group<'_>, columns: Group<'_>) -> Wanted {
 }
 
 impl Tile<'_> {
-    /// The corners of the blocks of `R` rows and `C` columns in which anything is asked for.
+    /// Returns the corners of the subtiles of `R` rows and `C` columns that contain a needed pair.
     fn corners<const R: usize, const C: usize>(&self) -> Vec<[usize; 2]> {
         let rows = (0..self.rows.n_sprites).step_by(R);
         rows.flat_map(|row| {
@@ -71,20 +73,21 @@ impl Tile<'_> {
         .collect()
     }
 
-    /// Whether most pairs are asked for.
+    /// Returns whether most pairs are needed.
     #[cfg(target_arch = "x86_64")]
     fn is_dense(&self) -> bool {
         let n_wanted: u32 = self.wanted.iter().map(|bits| bits.count_ones()).sum();
         2 * n_wanted as usize > self.rows.n_sprites * self.columns.n_sprites
     }
 
-    /// d of all pairs as if no two sprites had anything in the same block: |a - 0| is a, whose sum is known.
+    /// Returns d of all pairs as if no two sprites had content in the same block. d is then the sum of both
+    /// totals.
     fn apart(&self) -> SadTile {
         let (rows, columns) = (self.rows.totals(), self.columns.totals());
         rows.map(|row| columns.map(|column| row + column))
     }
 
-    /// Whether some of these rows and some of these columns have anything in a block.
+    /// Returns whether a block has content in some of the given rows and in some of the given columns.
     #[inline]
     fn meet(&self, block: usize, [rows, columns]: [&Range<usize>; 2]) -> bool {
         let filled = |group: Group<'_>, sprites: &Range<usize>| {
@@ -93,7 +96,7 @@ impl Tile<'_> {
         filled(self.rows, rows) && filled(self.columns, columns)
     }
 
-    /// Puts right what was summed as if apart: in a block a row and a column differ by `d`.
+    /// Replaces the contribution of one block to a pair, computed by `apart`, by its actual difference `d`.
     #[inline]
     fn put(&self, block: usize, [row, column]: [usize; 2], d: u64, sums: &mut SadTile) {
         let apart = self.rows.sum(block, row) + self.columns.sum(block, column);
@@ -101,9 +104,9 @@ impl Tile<'_> {
     }
 }
 
-/// The distances of a tile. Entries that were not asked for may hold anything.
+/// Returns the distances of a tile. Entries that are not needed are unspecified.
 ///
-/// `cpu` must be a level that this machine has; a level of another machine falls back to scalar.
+/// `cpu` must be a level of this machine. A level of another architecture falls back to scalar.
 pub(super) fn sad_tile(cpu: Level, tile: Tile<'_>) -> Box<SadTile> {
     let mut sums = Box::new([[0; GROUP]; GROUP]);
     match cpu {

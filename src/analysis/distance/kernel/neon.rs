@@ -1,6 +1,7 @@
-//! NEON: 16 bytes to an instruction, a register tile of 2 x 4 sprites. Absolute differences are
-//! added pairwise into 16-bit lanes: over a block of 1 KB a lane takes 64 steps of at most
-//! 2 * 255, below 2^15, and is widened at the block's end.
+//! NEON kernel: 16 bytes per instruction and a register tile of 2 x 4 sprites.
+//!
+//! Absolute differences are added pairwise into 16-bit lanes. In a block of 1 KB, a lane takes 64 steps of at
+//! most 2 * 255, which stays below 2^15. Lanes are widened at the end of each block.
 #![expect(unsafe_code, reason = "vector loads and the call into code for NEON")]
 
 use std::arch::aarch64::*;
@@ -8,19 +9,19 @@ use std::arch::aarch64::*;
 use super::{SadTile, Tile};
 use crate::analysis::distance::group::{BLOCK, Block};
 
-/// Loads of 16 bytes in a block.
+/// Number of 16-byte loads per block.
 const STEPS: usize = BLOCK / 16;
 
-/// As `scalar::sad_tile`.
+/// Works like `scalar::sad_tile`.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
-    // SAFETY: NEON, all that the callee asks for, is part of every AArch64 that this is built for.
+    // SAFETY: NEON, the only requirement of the callee, is part of every AArch64 target of this project.
     unsafe { sad_tile_neon(tile, sums) }
 }
 
 #[target_feature(enable = "neon")]
 fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
     *sums = tile.apart();
-    // Groups are padded to 48 sprites, so blocks of 2 and 4 never leave them.
+    // Groups are padded to 48 sprites, so both rows and all four columns exist.
     let corners = tile.corners::<2, 4>();
     for block in 0..tile.rows.n_blocks() {
         for &[row, column] in &corners {
@@ -39,7 +40,7 @@ fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
     }
 }
 
-/// The sums of two blocks against four: `[row][column]`.
+/// Returns the sums of two blocks against four: `[row][column]`.
 #[inline]
 #[target_feature(enable = "neon")]
 fn sad_2x4(a: [&Block; 2], b: [&Block; 4]) -> [[u32; 4]; 2] {
@@ -68,11 +69,11 @@ fn sad_2x4(a: [&Block; 2], b: [&Block; 4]) -> [[u32; 4]; 2] {
     totals
 }
 
-/// 16 bytes of a block.
+/// Loads 16 bytes of a block.
 #[inline]
 #[target_feature(enable = "neon")]
 fn load(block: &Block, step: usize) -> uint8x16_t {
     debug_assert!(step < STEPS, "a block has 64 steps");
-    // SAFETY: callers count `step` below STEPS, so the 16 bytes lie inside the block.
+    // SAFETY: callers keep `step` below STEPS, so the 16 bytes are inside the block.
     unsafe { vld1q_u8(block.0.as_ptr().add(16 * step)) }
 }

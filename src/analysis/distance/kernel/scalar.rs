@@ -1,9 +1,9 @@
-//! The sum of absolute differences in plain Rust: the definition that every other kernel equals.
+//! The sum of absolute differences in plain Rust: the definition that every other kernel must equal.
 
 use super::{SadTile, Tile};
 use crate::analysis::distance::group::Block;
 
-/// Adds d of every pair of the tile.
+/// Adds d of every needed pair to `sums`.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
     let corners = tile.corners::<1, 1>();
     for block in 0..tile.rows.n_blocks() {
@@ -17,14 +17,14 @@ pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile
     }
 }
 
-/// The sum over a block of |a - b|, by sixteen: so the compiler finds the instruction for it.
+/// Returns the sum of |a - b| over a block. Chunks of sixteen let the compiler vectorise it.
 pub(in crate::analysis::distance) fn sad_block(a: &Block, b: &Block) -> u64 {
     let sixteens = a.0.as_chunks::<16>().0.iter().zip(b.0.as_chunks::<16>().0);
     let sums = sixteens.map(|(a, b)| (0..16).map(|k| u32::from(a[k].abs_diff(b[k]))).sum::<u32>());
     u64::from(sums.sum::<u32>())
 }
 
-/// The sums of |a - b| over a row of values and each of many.
+/// Writes the sums of |a - b| between one row of values and each of many rows.
 pub(in crate::analysis::distance) fn least_differences(
     row: &[u16],
     others: &[u16],

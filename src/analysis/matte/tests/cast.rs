@@ -1,15 +1,15 @@
-//! Mirror images of the animal in things darker than its ground.
+//! Tests of mattes with mirror images of the animal in things darker than its ground.
 
 use super::*;
 
 const WALL: u8 = 50;
 
-/// Paper before a dark wall.
+/// Paper in front of a dark wall.
 fn wall(x: u32, _: u32) -> u8 {
     if x < 70 { PAPER } else { WALL }
 }
 
-/// A dark body, its shadow on the paper, and in the wall its image, at one place as dark as itself.
+/// A dark body, its shadow on the paper, and its image in the wall, in one place as dark as the body.
 fn with_image(x: u32, y: u32) -> u8 {
     let is_cast = (BODY.right()..100).contains(&x) && (28..38).contains(&y);
     let is_clear = (80..92).contains(&x) && (30..36).contains(&y);
@@ -28,12 +28,12 @@ fn an_image_in_a_dark_wall_stays_behind_and_so_does_the_shadow_before_it() {
     }
 }
 
-/// Black, a little less so on the left.
+/// Nearly black, slightly lighter on the left.
 fn nearly_black(x: u32, _: u32) -> u8 {
     if x < 62 { 4 } else { 1 }
 }
 
-/// A light animal there, in two parts, of which one is dimmer.
+/// A light animal on it, in two parts, one of them dimmer.
 fn in_the_dark(x: u32, y: u32) -> u8 {
     let is_leg = (64..76).contains(&x) && (30..34).contains(&y);
     match (away([x, y], BODY), is_leg) {
@@ -43,12 +43,12 @@ fn in_the_dark(x: u32, y: u32) -> u8 {
     }
 }
 
-/// Paper, a dark stripe, and paper.
+/// Paper with a dark stripe.
 fn striped(x: u32, _: u32) -> u8 {
     if (64..84).contains(&x) { WALL } else { PAPER }
 }
 
-/// A body, and its tail, of which a part before the stripe is hidden.
+/// A body with a tail, a part of which is hidden in front of the stripe.
 fn with_a_hidden_part(x: u32, y: u32) -> u8 {
     let is_tail = ((60..64).contains(&x) || (68..84).contains(&x)) && (30..33).contains(&y);
     match away([x, y], BODY) == 0 || is_tail {
@@ -67,7 +67,7 @@ fn a_limb_apart_from_the_body_is_no_image() {
     }
 }
 
-/// The same body, half over the wall.
+/// The same body, half of it in front of the wall.
 fn across_the_wall(x: u32, y: u32) -> u8 {
     match away([x.saturating_sub(25), y], BODY) {
         0 => FUR,
@@ -84,7 +84,7 @@ fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
     }
 }
 
-/// The same, and its image farther on in the wall, as dark as itself.
+/// The same scene, and an image farther along the wall, as dark as the body.
 fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
     let is_image = (92..102).contains(&x) && (29..36).contains(&y);
     if is_image { FUR } else { across_the_wall(x, y) }
@@ -99,7 +99,9 @@ fn what_is_as_dark_as_the_animal_and_too_large_for_a_limb_is_an_image() {
     }
 }
 
-/// The body that ends at the wall, and in the wall its small image, in its midst as dark as itself, that fades over ten pixels.
+/// A body that ends at the wall, and a small image in the wall.
+///
+/// The image is as dark as the body in its middle and fades over ten pixels.
 fn with_a_small_image(x: u32, y: u32) -> u8 {
     let midst = Rect {
         x: 75,
@@ -124,7 +126,7 @@ fn an_image_that_fades_is_no_limb_however_dark_its_midst() {
     }
 }
 
-/// A body that casts a shadow, and an image in the wall that is larger than itself.
+/// A body with a shadow, and an image in the wall that is larger than the body.
 fn with_a_large_image(x: u32, y: u32) -> u8 {
     let is_cast = (BODY.right()..68).contains(&x) && (28..38).contains(&y);
     let is_image = x >= 72 && (18..48).contains(&y);

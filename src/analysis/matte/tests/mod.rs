@@ -1,4 +1,4 @@
-//! What a matte is where the animal casts a shadow, and where the floor shows between its parts.
+//! Tests of mattes with cast shadows, and with floor visible between parts of the animal.
 
 mod cast;
 
@@ -11,7 +11,7 @@ const SIZE: [u32; 2] = [120, 90];
 const PAPER: u8 = 170;
 const FUR: u8 = 30;
 
-/// The matte of what is drawn on paper, for an animal 60 pixels long, with the place of each pixel in the frame.
+/// A matte of an animal 60 pixels long, and the shade of each pixel of its frame.
 struct Drawn {
     matte: Matte,
     shade: fn(u32, u32) -> u8,
@@ -49,7 +49,7 @@ fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
 }
 
 impl Drawn {
-    /// Color and alpha at a place of the frame.
+    /// Returns the color and alpha at a place of the frame.
     fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
         let rect = self.matte.rect;
         if !(rect.x..rect.right()).contains(&x) || !(rect.y..rect.bottom()).contains(&y) {
@@ -59,7 +59,7 @@ impl Drawn {
         [0, 1, 2, 3].map(|c| self.matte.image.pixels[k + c])
     }
 
-    /// What shows where the matte lies over something of that shade.
+    /// Returns the shade of the matte over a background of shade `back`.
     fn over(&self, back: u8, [x, y]: [u32; 2]) -> f64 {
         let [shade, .., alpha] = self.pixel(x, y).map(f64::from);
         f64::from(back) + (shade - f64::from(back)) * alpha / 255.0
@@ -76,14 +76,14 @@ impl Drawn {
     }
 }
 
-/// How many steps a pixel lies outside a box.
+/// Returns the number of steps from a pixel outside a box to the box; 0 inside.
 fn away([x, y]: [u32; 2], body: Rect) -> u32 {
     let beyond =
         |at: u32, first: u32, n: u32| first.saturating_sub(at) + (at + 1).saturating_sub(first + n);
     beyond(x, body.x, body.w).max(beyond(y, body.y, body.h))
 }
 
-/// A dark body, and around it a shadow that fades over ten pixels.
+/// A dark body; `with_shadow` draws a fading shadow around it.
 const BODY: Rect = Rect {
     x: 30,
     y: 25,
@@ -111,7 +111,7 @@ fn a_shadow_is_no_part_of_the_matte() {
     }
 }
 
-/// A body with a spot as light as the paper; beside it two thin things that meet at both ends.
+/// A body with a spot of the paper's shade, and two thin parts that meet at both ends.
 fn with_gaps(x: u32, y: u32) -> u8 {
     let body = Rect {
         x: 20,
@@ -155,7 +155,7 @@ fn a_light_spot_on_the_body_covers_and_the_floor_between_two_thin_parts_does_not
     }
 }
 
-/// What the edge of the next body is before looks like that body.
+/// At the right edge of the body the background (101) has nearly the shade of the body (100).
 fn light_stripe(x: u32, _: u32) -> u8 {
     if x < 58 { 50 } else { 101 }
 }
@@ -181,7 +181,7 @@ fn lit_from_the_right(x: u32, _: u32) -> u8 {
     if x < 65 { 150 } else { 240 }
 }
 
-/// A dark body on the left, its paler tail on the right, and two shadows that two lamps make of the tail.
+/// A dark body on the left, its paler tail on the right, and two shadows of the tail from two lamps.
 fn with_two_shadows(x: u32, y: u32) -> u8 {
     let floor = lit_from_the_right(x, y);
     let is_along = (60..105).contains(&x);
@@ -209,7 +209,7 @@ fn striped_floor(x: u32, _: u32) -> u8 {
     if (62..66).contains(&x) { 116 } else { PAPER }
 }
 
-/// Before it, in its own shadow, a body with a pale ear.
+/// A body with a pale ear on the striped floor, in its own shadow.
 fn with_a_pale_ear(x: u32, y: u32) -> u8 {
     let is_ear = (BODY.right() - 6..BODY.right() + 1).contains(&x) && (28..38).contains(&y);
     let is_cast = (BODY.right()..70).contains(&x) && (26..40).contains(&y);
@@ -234,7 +234,7 @@ fn black(_: u32, _: u32) -> u8 {
     0
 }
 
-/// A light animal with a thin loop, in which it is hardly brighter than black.
+/// A light animal with a thin loop; inside the loop the ground is hardly brighter than black.
 fn with_a_loop(x: u32, y: u32) -> u8 {
     const LOOP: Rect = Rect {
         x: 66,
@@ -263,7 +263,7 @@ fn gray(_: u32, _: u32) -> u8 {
     100
 }
 
-/// A light body with a tail that fills half of the pixels of a row, and a quarter of those beside it.
+/// A light body with a tail that fills half of each pixel of one row and a quarter in the next row.
 fn with_a_thin_tail(x: u32, y: u32) -> u8 {
     let along = (60..90).contains(&x);
     match (away([x, y], BODY), along, y) {

@@ -1,9 +1,10 @@
-//! Plain advice to whoever films: what a library lacks, each with a stable code (ALGORITHMS.md 5,
-//! pruning: what the component covers). Pure: of a library and the parameters that made it, so that it is
-//! never stored as a fact of its own and an older library gets today's advice.
+//! Derives advice for the person who films: what a library lacks, each with a stable code.
 //!
-//! A flock can only do what playback shows. From the side that is where the animal heads; from above, where
-//! a sprite is turned to any heading, it is which way the animal turns. Mirrored playback makes left of right.
+//! Advice depends only on the library and its parameters. It is computed on request and not stored, so older
+//! libraries also get the current advice.
+//!
+//! A flock can only do what playback shows. In side view, the headings of the animal matter. In top view,
+//! sprites are rotated to any heading, so the turns matter. Mirrored playback turns left into right.
 
 use crate::analysis::Params;
 use crate::geometry::wrap_rad;
@@ -11,83 +12,84 @@ use crate::library::{Library, Mover, Poses, View};
 
 mod sentence;
 
-/// Less than this of one motion is hardly any.
+/// Playback with less than this of one motion gives advice, seconds. Free choice.
 const LEAST_MOTION_S: f64 = 0.5;
-/// Up and down begin so far off the horizontal, in bins of 10 degrees.
+/// Number of 10-degree bins from the horizontal to the start of "up" and "down". Free choice.
 const LEVEL_BINS: usize = 3;
-/// Turning more slowly than the playback's gate can tell is going straight; a turn is so fast that it
-/// is no jitter of the heading.
+/// Up to this turning rate the animal moves straight, radians per second. Equal to the gate of
+/// transitions in top view.
 const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// Above this turning rate the animal turns, radians per second. High enough to exclude heading noise.
 const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
-/// A guess of the view that is less probable than this is worth a word.
+/// A guessed view below this probability gives advice. Free choice.
 const SURE: f64 = 0.9;
-/// Of more frames it is said that their transitions can be found approximately.
+/// Above this number of frames the advice recommends the approximate search. Free choice.
 const MANY_FRAMES: usize = 50_000;
-/// Slower than this is rest, lengths a second; measured over so long either way.
+/// Speed below which the animal rests, body lengths per second. Free choice.
 const REST_BL_PER_S: f64 = 0.1;
+/// Half the time span over which speed and turning rate are measured, seconds. Free choice.
 const REACH_S: f64 = 0.1;
 
-/// One thing that a library lacks, the gravest first in the enum's order.
+/// One deficiency of a library. The variants are in order of severity, the most severe first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Advice {
-    /// The animal covers too few pixels: there are no sprites.
+    /// The animal covers too few pixels, so there are no sprites.
     AnimalTooSmall,
-    /// Several animals move and the largest was followed.
+    /// Several animals move. The largest was followed.
     SeveralAnimals,
-    /// So many things moved besides the animal; this one for the longest.
+    /// Number of other moving objects, and the one that moves longest.
     OtherMovers(usize, Mover),
-    /// So many frames show another scene; the first of them is at this time, seconds.
+    /// Number of frames that show another scene, and the time of the first, seconds.
     ForeignFrames(usize, f64),
-    /// The view was guessed, and is right with this probability, below .9.
+    /// The guessed view and its probability, below 0.9.
     ViewUnsure(View, f64),
-    /// The animal was found in this share of the frames, below 0.8.
+    /// Share of the frames in which the animal was found, below 0.8.
     SeldomFound(f64),
-    /// The animal touches the border in this share of the frames in which it was found, above 0.2.
+    /// Share of the frames with the animal in which it touches the border, above 0.2.
     OftenAtBorder(f64),
-    /// Playback always ends: no flock can be made.
+    /// Playback always ends, so no flock can be made.
     NoTransitions,
-    /// Playback without an end holds this share of the frames and lasts so many seconds: below a half
-    /// or below 4 s.
+    /// Share of the frames and duration (seconds) of endless playback: below 0.5 or below 4 s.
     LittlePlayback(f64, f64),
-    /// Playback can leave its course after so many frames only, below 20.
+    /// Number of frames from which playback can jump, below 20.
     FewJumps(usize),
-    /// Epsilon had to be this multiple of the natural step, more than was asked for.
+    /// Multiple of the natural step that epsilon needed, above the requested `kappa`.
     LooseJumps(f64),
-    /// The animal moves in this share of what can be played, below a quarter.
+    /// Share of playable frames in which the animal moves, below 0.25.
     MostlyRests(f64),
-    /// Transitions were looked for approximately, and this share of the like moments was found.
+    /// Share of the similar moments that the approximate search found, 0..=1.
     SomeMissed(f64),
-    /// So many frames, above 50 000, were all compared: `approximate` is faster.
+    /// Number of frames that were all compared with each other, above 50,000. `approximate` is faster.
     ManyFrames(usize),
-    /// Of a motion there are so many seconds in what can be played, below 0.5, and so many in the footage.
+    /// A motion, its duration in playback (below 0.5 s), and its duration in the footage, seconds.
     Lacks(Motion, f64, f64),
 }
 
-/// What a flock wants to be able to show.
+/// A motion that a flock should be able to show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// From the side: within 30 degrees of the picture's right.
+    /// Side view: within 30 degrees of the right of the image.
     Right,
-    /// From the side: within 30 degrees of the picture's left.
+    /// Side view: within 30 degrees of the left of the image.
     Left,
-    /// From the side, mirrors counted: right or left.
+    /// Side view with mirrored playback: right or left.
     Level,
-    /// From the side: more than 30 degrees above the horizontal.
+    /// Side view: more than 30 degrees above the horizontal.
     Up,
-    /// From the side: more than 30 degrees below the horizontal.
+    /// Side view: more than 30 degrees below the horizontal.
     Down,
-    /// From above: by more than 45 degrees a second.
+    /// Top view: turns left by more than 45 degrees per second.
     TurningLeft,
-    /// From above: by more than 45 degrees a second.
+    /// Top view: turns right by more than 45 degrees per second.
     TurningRight,
-    /// From above, mirrors counted: either way.
+    /// Top view with mirrored playback: turns left or right.
     Turning,
-    /// From above: moving and turning by less than 20 degrees a second.
+    /// Top view: moves, and turns by at most 20 degrees per second.
     Straight,
 }
 
 impl Advice {
-    /// The stable name: what a program may test for.
+    /// Returns the stable code, for use by programs.
     pub fn code(&self) -> &'static str {
         match self {
             Advice::AnimalTooSmall => "animal_too_small",
@@ -109,7 +111,7 @@ impl Advice {
     }
 }
 
-/// What a library lacks, the gravest first; nothing of a good one.
+/// Returns the advice for a library, the most severe first; empty for a good library.
 pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     let stats = &library.stats;
     let poses = &library.poses;
@@ -132,7 +134,7 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     }
     of_search(library, params, &mut all);
     match library.playback.jumps.is_empty() {
-        // Without sprites nothing is compared: the animal's size is the reason.
+        // Without sprites nothing is compared. The size of the animal is then the reason.
         true if stats.animal_too_small => {}
         true => all.push(Advice::NoTransitions),
         false => of_playback(library, params, &mut all),
@@ -140,7 +142,7 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     all
 }
 
-/// What else the film shows, and how it was taken.
+/// Adds advice about other moving objects, other scenes and the view.
 fn of_scene(library: &Library, all: &mut Vec<Advice>) {
     let (stats, poses) = (&library.stats, &library.poses);
     let longest = poses
@@ -161,7 +163,7 @@ fn of_scene(library: &Library, all: &mut Vec<Advice>) {
     }
 }
 
-/// How the search for transitions went, and how else it could.
+/// Adds advice about the search for transitions.
 fn of_search(library: &Library, params: &Params, all: &mut Vec<Advice>) {
     let n_frames = library.stats.n_frames;
     match library.stats.recall {
@@ -217,7 +219,7 @@ fn lacks(of: &[(Motion, usize, usize)], fps: f64) -> Vec<Advice> {
         .collect()
 }
 
-/// From the side: the headings of the component (its histogram), and of the whole footage.
+/// Returns advice for side view. It compares the headings in the component with those in the footage.
 fn of_headings(library: &Library, mirror: bool) -> Vec<Advice> {
     let all: Vec<u32> = (0..library.poses.frames.len() as u32).collect();
     let filmed = by_direction(&super::histogram(&library.poses, &all));
@@ -234,7 +236,8 @@ fn of_headings(library: &Library, mirror: bool) -> Vec<Advice> {
     lacks(&[sides, upright.to_vec()].concat(), library.poses.fps)
 }
 
-/// Frames that head right, down, left and up, of a histogram from -180 degrees.
+/// Returns the number of frames that head right, down, left and up, from a histogram that starts at -180
+/// degrees.
 fn by_direction(histogram: &[u32]) -> [usize; 4] {
     let half = histogram.len() / 2;
     let mut n_frames = [0; 4];
@@ -250,7 +253,7 @@ fn by_direction(histogram: &[u32]) -> [usize; 4] {
     n_frames
 }
 
-/// From above: which way the animal turns while it moves.
+/// Returns advice for top view, from the turns of the animal while it moves.
 fn of_turns(library: &Library, motion: &[FrameMotion], mirror: bool) -> Vec<Advice> {
     let count = |holds: &dyn Fn(&FrameMotion) -> bool| {
         let component = library.playback.component.iter();
@@ -259,7 +262,7 @@ fn of_turns(library: &Library, motion: &[FrameMotion], mirror: bool) -> Vec<Advi
             motion.iter().filter(|&frame| holds(frame)).count(),
         )
     };
-    // y runs down: a rising heading turns to the animal's right.
+    // The y axis points down, so an increasing heading turns to the animal's right.
     let right = count(&|frame| frame.turn_rad_per_s > TURNING_RAD_PER_S);
     let left = count(&|frame| frame.turn_rad_per_s < -TURNING_RAD_PER_S);
     let straight = count(&|frame| frame.moves && frame.turn_rad_per_s.abs() <= STRAIGHT_RAD_PER_S);
@@ -280,7 +283,8 @@ struct FrameMotion {
     turn_rad_per_s: f64,
 }
 
-/// Over a tenth of a second either way; rest where the animal was not found at either end.
+/// Returns the motion in each frame over 0.1 s on each side. Without a detection at both ends the animal
+/// rests.
 fn motion(library: &Library) -> Vec<FrameMotion> {
     let poses = &library.poses;
     let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);

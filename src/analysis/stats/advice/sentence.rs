@@ -1,4 +1,4 @@
-//! The sentences of advice: what each one says, with its figures.
+//! Writes the sentences of the advice, with their numbers.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use crate::geometry::Rect;
 use crate::library::{Mover, MoverKind, View};
 
 impl Advice {
-    /// What is to be said of what else the film shows and of how it was taken.
+    /// Writes the sentences about other moving objects, other scenes and the view.
     fn write_scene(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Advice::OtherMovers(n, mover) => write_movers(f, *n, mover),
@@ -33,7 +33,7 @@ impl Advice {
 }
 
 impl Motion {
-    /// The advice's code, and the words.
+    /// Returns the code of the advice and the words for the motion.
     pub(super) fn names(self) -> (&'static str, &'static str) {
         match self {
             Motion::Right => ("lacks_right", "heading right"),
@@ -138,7 +138,7 @@ fn percent(share: &f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-/// What moved besides the animal, where and when.
+/// Writes what else moved, with time and box.
 fn write_movers(f: &mut fmt::Formatter<'_>, n: usize, mover: &Mover) -> fmt::Result {
     let what = match mover.kind {
         MoverKind::Animal => "something that looks like the animal",

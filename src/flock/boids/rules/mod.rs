@@ -1,8 +1,8 @@
-//! What a boid asks of itself: separation, alignment, cohesion, walls, circling and wander, granted
-//! in order of priority (Reynolds 1987; O 4; ALGORITHMS.md 7).
+//! Steering rules: separation, alignment, cohesion, walls, circling and wander, granted in order of priority.
+//! Sources: Reynolds 1987; Okabe et al., section 4; docs/explanation/algorithms.md, "Boids".
 //!
-//! Requests are measured against the acceleration that the animal usually makes, so that one set of weights
-//! serves a slow animal and a fast one, and their sum is cut to the greatest it was seen to make.
+//! Requests are scaled by the usual acceleration of the animal, so that the same weights suit slow and fast
+//! animals. Their sum is limited to the greatest acceleration of the animal.
 
 mod seen;
 mod zones;
@@ -16,61 +16,64 @@ use super::tank::Tank;
 use super::vector::{add_scaled, cross, dot, minus, norm, plus, scaled, unit};
 use crate::flock::params::{Params, Separation, Zones};
 
-/// A wall is steered from when the path over this time meets it, and that of a slow animal over the time in which it
-/// cruises so far: who notices a wall only when it is there turns alone, and the others push on.
+/// Time ahead within which a path that meets a wall is steered away from it, seconds
+/// (docs/explanation/algorithms.md, "Boids").
 const WALL_HORIZON_S: f64 = 1.0;
+/// Least distance ahead within which a boid at cruising speed notices a wall, body lengths. A slow boid that
+/// notices a wall late turns by itself, while the others push on. Free choice.
 const WALL_HORIZON_BL: f64 = 0.7;
 
-/// The share of a wall's braking that becomes a turn alone.
+/// Share of a wall's braking that is removed when a turn replaces it. Free choice.
 const BRAKED: f64 = 0.7;
-/// So strong a wish is granted as far as the turn rate allows.
+/// Weight of the zonal course, so large that only the turn rate limits the turn. Free choice.
 const WITHOUT_DELAY: f64 = 20.0;
-/// Whoever circles does so at this share of the way from the middle to the walls.
+/// Radius of circling, as a share of the way from the middle to the walls. Free choice.
 const RING: f64 = 0.65;
-/// By how much of the cruising speed whoever circles goes ahead of a crowd behind it.
+/// Additional speed while circling of a boid with all neighbors behind it, in cruising speeds. Free choice.
 const SPREADING: f64 = 0.5;
-/// Time constant of coming back to a slope that the animal has.
+/// Time constant of the return to the wanted slope, seconds. Free choice.
 const LEVEL_S: f64 = 0.25;
-/// Weight of swimming across the picture rather than into it.
+/// Weight of swimming across the line of sight rather than along it. Free choice.
 const BROADSIDE: f64 = 1.5;
 
-/// A moment of some boids.
+/// State of some boids at one moment.
 pub struct Moment<'a, L: Lanes> {
-    /// Where each is.
+    /// Positions, body lengths.
     pub position: [L; 3],
-    /// Its velocity, body lengths a second.
+    /// Velocities, body lengths per second.
     pub velocity: [L; 3],
-    /// Nearest first; all that its rules may need.
+    /// Neighbors, nearest first: all that the rules may need.
     pub neighbors: &'a [Neighbor<L>],
-    /// The wandering turn rate in the plane of swimming, and how many standard deviations the wished slope is off
-    /// the usual one.
+    /// Wandering turn rate in the plane of swimming, radians per second, and wanted slope in standard
+    /// deviations from the usual one.
     pub wander: [L; 2],
-    /// Who leads: alignment and cohesion are off.
+    /// Boids that lead. Their alignment and cohesion are off.
     pub leads: L::Mask,
-    /// What its course is wrong by, with zones.
+    /// Random error of the course in the zonal model.
     pub noise: [L; 3],
 }
 
-/// Everything that steering depends on besides the moment.
+/// Inputs of steering that all boids share.
 pub struct Steering<'a> {
     /// Weights and radii.
     pub params: &'a Params,
-    /// The animal's limits.
+    /// Limits measured on the animal.
     pub calibration: &'a Calibration,
-    /// Where the walls are.
+    /// Tank with the walls.
     pub tank: &'a Tank,
-    /// What else there is.
+    /// Goals, obstacles and predator.
     pub habitat: &'a Habitat<'a>,
-    /// Seconds of the film.
+    /// Time of the video, seconds.
     pub time_s: f64,
-    /// The predator.
+    /// State of the predator, if there is one.
     pub hunter: Option<&'a Hunter>,
-    /// cos of half the field of view.
+    /// Cosine of half the field of view.
     pub cos_half_view: f64,
 }
 
 impl Steering<'_> {
-    /// The acceleration granted, at most the calibration's, BL/s^2.
+    /// Returns the granted acceleration, at most the greatest of the calibration, body lengths per second
+    /// squared.
     #[inline(always)]
     pub fn acceleration<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
         let most = self.calibration.acceleration_bl_per_s2();
@@ -114,14 +117,17 @@ impl Steering<'_> {
         )
     }
 
-    /// How far ahead walls count, seconds.
+    /// Returns the time ahead within which walls count, seconds.
     fn wall_horizon_s(&self) -> f64 {
         WALL_HORIZON_S.max(WALL_HORIZON_BL / self.calibration.cruise_bl_per_s)
     }
 
-    /// A push as a turn: who is only slowed down by a wall dawdles before it. What of the push would brake leads to
-    /// the side instead that the rest of it points to, or, head-on, to the one where the neighbors turn, as far as
-    /// it aligns, and where the tank's middle lies, or its circle leads.
+    /// Replaces most of the braking part of a push by a turn. A boid that only slows down would linger in
+    /// front of a wall.
+    ///
+    /// Three terms choose the side: the lateral part of the push, the turns of the neighbors (0 without
+    /// alignment), and the way to the middle of the tank. A circling boid uses its circle instead of the
+    /// middle.
     #[inline(always)]
     fn aside<L: Lanes>(&self, push: [L; 3], moment: &Moment<L>) -> [L; 3] {
         let ahead = unit(moment.velocity);
@@ -135,7 +141,7 @@ impl Steering<'_> {
         for neighbor in moment.neighbors {
             turned = turned + dot(unit(neighbor.velocity), side);
         }
-        // Who does not align does not follow others either.
+        // Boids that do not align do not follow others either.
         let follow = L::splat(self.params.rules.alignment.min(1.0)) / at_least_one(moment.count());
         let home = match self.params.rules.circling > 0.0 {
             true => self.circling(moment),
@@ -147,7 +153,8 @@ impl Steering<'_> {
         select3::<L>(is_braked, turned, push)
     }
 
-    /// Reynolds 1987: what is urgent, and alignment, circling, broadside and cohesion in this order.
+    /// Returns the wishes by the rules of Reynolds 1987: first separation, then alignment, circling,
+    /// broadside and cohesion in order of priority.
     #[inline(always)]
     fn with_rules<L: Lanes>(&self, moment: &Moment<L>) -> ([L; 3], [[L; 3]; 4]) {
         let rules = &self.params.rules;
@@ -168,7 +175,7 @@ impl Steering<'_> {
         (scaled(L::splat(rules.separation), apart), wishes)
     }
 
-    /// Couzin et al. 2002: as fast as may be onto the course of the zones.
+    /// Returns the wish by the zonal model of Couzin et al. 2002: the fastest turn onto its course.
     #[inline(always)]
     fn with_zones<L: Lanes>(&self, zones: &Zones, moment: &Moment<L>) -> [L; 3] {
         let (velocity, cos) = (moment.velocity, self.cos_half_view);
@@ -179,7 +186,7 @@ impl Steering<'_> {
         scaled(L::splat(WITHOUT_DELAY / cruise), gap)
     }
 
-    /// mean v_j - v_i, in cruising speeds.
+    /// Returns mean v_j - v_i, in cruising speeds.
     #[inline(always)]
     fn alignment<L: Lanes>(&self, seen: &Seen<L>, moment: &Moment<L>) -> [L; 3] {
         let one = L::splat(1.0);
@@ -188,7 +195,8 @@ impl Steering<'_> {
         select3::<L>(seen.n_along.at_least(one), wished, [L::splat(0.0); 3])
     }
 
-    /// O 4, rule A: slower when ahead of the neighbors, faster when behind, and their direction.
+    /// Returns the wish by rule A of Okabe et al., section 4: slower when ahead of the neighbors, faster when
+    /// behind, and in their direction.
     #[inline(always)]
     fn rule_a_of_the_papers<L: Lanes>(
         &self,
@@ -207,8 +215,8 @@ impl Steering<'_> {
         select3::<L>(half.less(n), wished, [L::splat(0.0); 3])
     }
 
-    /// Toward swimming round the middle of the tank, on a ring that its narrower side holds, in
-    /// the plane of swimming.
+    /// Returns the wish to circle around the middle of the tank, in the plane of swimming, on a ring that
+    /// fits its narrower side.
     #[inline(always)]
     fn circling<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
         if self.params.rules.circling == 0.0 {
@@ -223,7 +231,7 @@ impl Steering<'_> {
         let off = L::splat(RING) - norm(from_middle) / L::splat(room.max(1e-6));
         let inward = scaled(L::splat(2.0) * off.clamp(-one, one), outward);
         let course = unit(plus(inward, cross(up, outward)));
-        // Faster than those behind, slower than those ahead: the ring is to be as full all the way round.
+        // Boids ahead of their neighbors swim faster, those behind slower, so that the ring fills evenly.
         let mut lead = L::splat(0.0);
         for neighbor in moment.neighbors {
             lead = lead - dot(course, unit(neighbor.offset));
@@ -235,9 +243,11 @@ impl Steering<'_> {
         scaled(L::splat(1.0 / cruise), gap)
     }
 
-    /// In side view: out of the line of sight, to the side where the neighbors go, or, where nobody aligns, where fewer
-    /// go; the more so, the nearer to end-on. Footage shows an animal best broadside, and a flock that lingers in depth
-    /// would be seen end-on half the time.
+    /// Returns the wish to leave the line of sight, in side view. Footage shows an animal best broadside. A
+    /// flock that lingers in depth would be seen end-on half of the time.
+    ///
+    /// The boid's own direction and those of its neighbors choose the side. Boids that do not align avoid the
+    /// side of their neighbors. The wish grows with the share of the velocity along the line of sight.
     #[inline(always)]
     fn broadside<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
         let (nothing, one) = (L::splat(0.0), L::splat(1.0));
@@ -247,7 +257,7 @@ impl Steering<'_> {
         let [x, _, z] = self.habitat.lens.sight(moment.position);
         let sight = unit([x, nothing, z]);
         let across = [sight[2], nothing, -sight[0]];
-        // Courses count, not speeds: slow ones would never find a side to turn to.
+        // Directions count, not speeds: slow boids would otherwise not settle on a side.
         let ahead = unit(moment.velocity);
         let (mut sum, mut n) = (nothing, nothing);
         for neighbor in moment.neighbors {
@@ -259,7 +269,7 @@ impl Steering<'_> {
         let follow = L::splat(follow) / at_least_one(n);
         let side = (dot(ahead, across) + follow * sum).clamp(-one, one);
         let cruise = L::splat(self.calibration.cruise_bl_per_s);
-        // Not onto a wall: its push leads back.
+        // A wall on this side pushes toward the other side.
         let aside = scaled(cruise.copysign(side), across);
         let push = self
             .tank
@@ -270,9 +280,9 @@ impl Steering<'_> {
         add_scaled(scaled(side * into.abs(), across), -into, sight)
     }
 
-    /// The wandering turn, as the acceleration that makes it, and the way back to the slopes that the animal has:
-    /// left to the rules alone, boids swim as steeply as they may, and who is both steep and seen nearly end-on
-    /// heads in the picture where the animal never did.
+    /// Returns the acceleration of the wandering turn and of the return to the slopes of the animal. Without
+    /// this return, boids swim as steeply as they may. A steep boid seen nearly end-on then has a heading in
+    /// the image that the animal never had.
     #[inline(always)]
     fn wander<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
         let up = splat3(self.tank.up());
@@ -287,7 +297,7 @@ impl Steering<'_> {
         add_scaled(turn, gap / L::splat(LEVEL_S), up)
     }
 
-    /// Back to cruising speed; leaders are faster.
+    /// Returns the acceleration back to cruising speed. Leaders cruise at 1.4 times that speed.
     #[inline(always)]
     fn cruise<L: Lanes>(&self, moment: &Moment<L>) -> [L; 3] {
         let speed = norm(moment.velocity);
@@ -299,7 +309,7 @@ impl Steering<'_> {
 }
 
 impl<L: Lanes> Moment<'_, L> {
-    /// How many neighbors each has.
+    /// Returns the number of neighbors of each boid.
     #[inline(always)]
     fn count(&self) -> L {
         let mut count = L::splat(0.0);
@@ -310,7 +320,8 @@ impl<L: Lanes> Moment<'_, L> {
     }
 }
 
-/// Requests in order, until the sum of their sizes reaches `most`; the last one is cut.
+/// Returns the sum of the requests in order, until the sum of their sizes reaches `most`. The last one is
+/// cut.
 #[inline(always)]
 fn granted<L: Lanes>(requests: &[[L; 3]], most: f64) -> [L; 3] {
     let mut left = L::splat(most);

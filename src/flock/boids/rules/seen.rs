@@ -1,25 +1,26 @@
-//! What boids see of their neighbors, summed up for the rules (Reynolds 1987; ALGORITHMS.md 7).
+//! Sums over the visible neighbors of boids, from which the rules are computed (Reynolds 1987;
+//! docs/explanation/algorithms.md, "Boids").
 
 use crate::flock::boids::lanes::Lanes;
 use crate::flock::boids::nearest::Neighbor;
 use crate::flock::boids::params::Rules;
 use crate::flock::boids::vector::{add_scaled, dot, scaled};
 
-/// What boids see of their neighbors.
+/// Sums over the visible neighbors of boids.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen<L> {
-    /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over those nearer than r_s.
+    /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over neighbors within r_s.
     pub(super) apart: [L; 3],
-    /// sum v_j over those nearer than r_a, and how many they are.
+    /// sum v_j over neighbors within r_a, and their number.
     pub(super) along: [L; 3],
     pub(super) n_along: L,
-    /// sum p_j - p_i over those nearer than r_c, and how many they are.
+    /// sum p_j - p_i over neighbors within r_c, and their number.
     toward: [L; 3],
     n_toward: L,
 }
 
 impl<L: Lanes> Seen<L> {
-    /// Of neighbors, nearest first, of who looks `ahead`, unit vectors.
+    /// Returns the sums for boids that swim along the unit vectors `ahead`.
     #[inline(always)]
     pub(super) fn of(
         neighbors: &[Neighbor<L>],
@@ -39,7 +40,7 @@ impl<L: Lanes> Seen<L> {
             n_toward: nothing,
         };
         for neighbor in neighbors {
-            // Nothing is added instead of nothing being done: who is seen is not to be guessed.
+            // Invisible neighbors add 0. A branch on visibility would often be mispredicted.
             let square_bl2 = neighbor.square_bl2;
             let is_seen = is_seen(neighbor, ahead, cos_half_view);
             let along = L::one_where(L::and(is_seen, square_bl2.less(along_bl2)));
@@ -62,7 +63,7 @@ impl<L: Lanes> Seen<L> {
         seen
     }
 
-    /// Adds (p_i - p_j)/|.| (1 - |.|/r), in the plane of the picture, over those nearer than r there, seen or not.
+    /// Adds (p_i - p_j)/|.| (1 - |.|/r) in the image plane, over neighbors within r there, visible or not.
     #[inline(always)]
     fn part_in_picture(&mut self, neighbors: &[Neighbor<L>], radius_bl: f64) {
         let nothing = L::splat(0.0);
@@ -76,7 +77,7 @@ impl<L: Lanes> Seen<L> {
         }
     }
 
-    /// mean p_j - p_i over those nearer than r_c, in r_c.
+    /// Returns mean p_j - p_i over neighbors within r_c, in units of r_c.
     #[inline(always)]
     pub(super) fn cohesion(&self, rules: &Rules) -> [L; 3] {
         let n = at_least_one(self.n_toward) * L::splat(rules.cohesion_bl);
@@ -84,13 +85,13 @@ impl<L: Lanes> Seen<L> {
     }
 }
 
-/// What to divide by where there may be nobody.
+/// Returns the count, or 1 instead of 0, as a divisor.
 #[inline(always)]
 pub(super) fn at_least_one<L: Lanes>(count: L) -> L {
     count.max(L::splat(1.0))
 }
 
-/// Whether it is there and seen by who looks `ahead`.
+/// Returns whether a neighbor exists and is in the field of view of a boid that swims along `ahead`.
 #[inline(always)]
 pub(super) fn is_seen<L: Lanes>(
     neighbor: &Neighbor<L>,

@@ -1,14 +1,16 @@
-//! The course of a boid with three zones around it (Couzin et al. 2002, eqs 1 to 3): away from the too near, or
-//! with those in the zone of orientation and toward those in the zone of attraction, half and half.
+//! Course of a boid in the zonal model (Couzin et al. 2002, equations 1 to 3). A boid heads away from
+//! neighbors in the zone of repulsion. Otherwise it takes the heading of neighbors in the zone of orientation
+//! and heads toward neighbors in the zone of attraction, in equal parts.
 
 use crate::flock::boids::lanes::{Lanes, select3};
 use crate::flock::boids::nearest::Neighbor;
 use crate::flock::boids::params::Zones;
 use crate::flock::boids::vector::{add_scaled, dot, norm, plus, unit};
 
-/// The direction wished for, a unit vector; straight on when nobody is in any zone, or all cancel out.
+/// Returns the wanted direction, a unit vector. It is straight ahead if no neighbor is in a zone or all terms
+/// cancel.
 ///
-/// `cos_half_view`: who is behind is seen in the zone of repulsion alone.
+/// Neighbors outside the field of view, which `cos_half_view` gives, count only in the zone of repulsion.
 #[inline(always)]
 pub(super) fn course<L: Lanes>(
     zones: &Zones,

@@ -1,22 +1,25 @@
-//! How far the floor goes on that the animal was seen on, seen from above: what looks like it in the background.
+//! Extent of the floor in top view: the part of the background that looks like the floor on which the animal
+//! was seen.
 
 use super::site::Line;
 use crate::order::percentile;
 use crate::raster::RgbImage;
 
-/// Along the longer side of the background so many places are looked at, at least.
+/// Least number of samples along the longer side of the background. Free choice.
 const N_PLACES: u32 = 320;
-/// A strip with more of other things than this ends the floor: a rim is thin.
+/// Largest share of samples in a strip that may not look like the floor. It is small because a rim is thin.
+/// Free choice.
 const MOST_OTHER: f64 = 0.05;
-/// What is darker or lighter than nearly all of the floor so far, by this share of its light or so many levels of 255,
-/// is another thing: a rim, a wall, what lies outside. Uneven light changes by less from one strip to the next.
+/// Least difference from nearly all of the floor found so far that is no longer floor. It is a share of the
+/// brightness of the floor, or a number of levels of 255 if that is more. Uneven light changes by less from
+/// one strip to the next. Free choices.
 const OTHER_SHARE: f64 = 0.1;
 const OTHER_LEVELS: f64 = 5.0;
 
-/// What of the background may be floor.
+/// Samples of the background.
 pub(super) struct Floor {
     places: Vec<Place>,
-    /// Its size, and how far apart places are, pixels.
+    /// Size of the background, and distance between samples, pixels.
     size_px: [f64; 2],
     spacing_px: f64,
 }
@@ -44,8 +47,8 @@ impl Floor {
         }
     }
 
-    /// Moves each line out by about so many pixels within which, and within all the other lines, the floor goes on
-    /// that lies within all of them; not out of the picture. False when none may move.
+    /// Moves each line outward by `by_px` where the floor continues in the strip that this adds, but not
+    /// beyond the image. Returns whether any line moved.
     pub(super) fn widen(&self, lines: &mut [Line], by_px: f64) -> bool {
         let Some(usual) = self.usual(lines) else {
             return false;
@@ -79,7 +82,8 @@ impl Floor {
         moved
     }
 
-    /// The range of levels that floor may have, by what lies within the lines or beside them; `None` when nothing does.
+    /// Returns the range of levels of the floor by channel, from the samples within the lines or next to
+    /// them. Returns `None` if there are none.
     fn usual(&self, lines: &[Line]) -> Option<[[f64; 2]; 3]> {
         let is_within = |place: &&Place| {
             (lines.iter()).all(|&(u, px)| along(u, place.at_px) <= px + self.spacing_px)
@@ -97,7 +101,7 @@ impl Floor {
         Some([range(0)?, range(1)?, range(2)?])
     }
 
-    /// How far the picture reaches in a direction.
+    /// Returns how far the image reaches in a direction, pixels.
     fn extent_px(&self, outward: [f64; 2]) -> f64 {
         let reach = |axis: usize| (outward[axis] * self.size_px[axis]).max(0.0);
         reach(0) + reach(1)
@@ -112,7 +116,7 @@ fn along(outward: [f64; 2], [x, y]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Where the lines end that begin as a square around the middle.
+    /// Returns the offsets of four lines that start as a square around the middle.
     fn ends([width, height]: [u32; 2], pixel: fn(u32, u32) -> [u8; 3], step_px: f64) -> Vec<f64> {
         let pixels = (0..width * height).flat_map(|k| pixel(k % width, k / width));
         let floor = Floor::of(&RgbImage {

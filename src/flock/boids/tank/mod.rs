@@ -1,5 +1,6 @@
-//! Where the flock may go: half-spaces, seen in the picture as lines, and in side view a depth
-//! (ALGORITHMS.md 7). All in body lengths. Inside the tank always.
+//! Tank: the convex region in which a flock swims, an intersection of half-spaces
+//! (docs/explanation/algorithms.md, "Boids"). Its side walls are lines in the image. In side view it has a
+//! depth too. All lengths are in body lengths.
 
 mod floor;
 mod site;
@@ -8,47 +9,47 @@ use super::OVERLAP_BL;
 use super::lanes::{Lanes, splat3};
 use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
-/// The side of the square that a boid needs to keep the usual distances.
+/// Side of the square that a boid needs to keep the usual distances, body lengths. Free choice.
 const ROOM_BL: f64 = 1.2;
-/// The side of the square that an animal seen from above needs so that it seldom lies on another. A free choice;
-/// docs/FLOCKS.md has the overlap of flocks of that size.
+/// Side of the square that an animal in top view needs to overlap others only seldom, body lengths. Free
+/// choice. docs/measurements.md lists the overlap of flocks of that size.
 const ROAM_BL: f64 = 1.6;
-/// The share of an even distance that boids can keep while they swim: told to keep more, a crowd is pushed about. In
-/// depth they get past each other more easily than in a plane.
+/// Share of the distance in an even arrangement that boids can keep while they swim. At a larger share a
+/// dense flock is pushed about. In depth boids get past each other more easily than in a plane. Free choices.
 const KEPT: f64 = 0.45;
 const KEPT_IN_DEPTH: f64 = 0.62;
-/// Points a side by which the tank's section is measured.
+/// Samples per side by which the section of the tank is measured. Free choice.
 const N_SAMPLES: usize = 48;
 
 /// A convex tank.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tank {
     walls: Vec<Wall>,
-    /// The box around it: least and greatest corner.
+    /// Least and greatest corner of the bounding box.
     pub corners: [Vec3; 2],
-    /// A place well inside.
+    /// Center of the section at half the depth.
     pub middle: Vec3,
-    /// How far it reaches from there, about: half its width, height and depth.
+    /// Approximate half width, half height and half depth.
     pub reach_bl: Vec3,
     section_bl2: f64,
 }
 
-/// Inside is where `outward . p <= offset`.
+/// A half-space. A position p is inside if `outward . p <= offset_bl`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wall {
     /// Unit vector out of the tank.
     pub outward: Vec3,
-    /// Distance from the origin along it.
+    /// Distance of the wall from the origin along `outward`, body lengths.
     pub offset_bl: f64,
 }
 
 impl Tank {
-    /// A box; flat when it has no depth.
+    /// Returns a box. It is flat if it has no depth.
     pub fn new(least: Vec3, greatest: Vec3) -> Tank {
         Tank::within([least, greatest], Vec::new())
     }
 
-    /// A box, cut by further walls; there must be something left.
+    /// Returns a box that is cut by further walls. The result must not be empty.
     fn within(corners: [Vec3; 2], mut walls: Vec<Wall>) -> Tank {
         for (axis, (least, greatest)) in corners[0].into_iter().zip(corners[1]).enumerate() {
             for (sign, offset_bl) in [(1.0, greatest), (-1.0, -least)] {
@@ -68,7 +69,7 @@ impl Tank {
         tank
     }
 
-    /// The middle of the places inside at half its depth, how far they reach, and their area.
+    /// Measures the section at half the depth: its center, extent and area.
     fn measure(&mut self) {
         let [least, greatest] = self.corners;
         let depth = 0.5 * (least[2] + greatest[2]);
@@ -91,7 +92,7 @@ impl Tank {
             true => scaled(1.0 / n, sum),
             false => [at(0, N_SAMPLES / 2), at(1, N_SAMPLES / 2), depth],
         };
-        // The half of a span is the root of three times its variance.
+        // Half the span of a uniform distribution is the root of three times its variance.
         let half = |axis: usize| {
             let variance = squares[axis] / f64::max(n, 1.0) - self.middle[axis] * self.middle[axis];
             (3.0 * variance.max(0.0)).sqrt()
@@ -99,12 +100,13 @@ impl Tank {
         self.reach_bl = [half(0), half(1), 0.5 * (greatest[2] - least[2])];
     }
 
-    /// Whether it has no depth: everything happens in the picture's plane.
+    /// Returns whether the tank has no depth, so that boids move in the image plane.
     pub fn is_flat(&self) -> bool {
         self.corners[1][2] <= self.corners[0][2]
     }
 
-    /// The axis about which boids turn: out of the picture when flat, the vertical otherwise.
+    /// Returns the axis about which boids turn: the normal of the image plane in a flat tank, else the
+    /// vertical.
     pub fn up(&self) -> Vec3 {
         match self.is_flat() {
             true => [0.0, 0.0, 1.0],
@@ -112,14 +114,15 @@ impl Tank {
         }
     }
 
-    /// The share of the usual distances at which `n` boids fit in: 1 with room for all, less where each has less than
-    /// a square of `ROOM_BL` in the picture, or in a deep tank, where they swim one behind another, less than a cube.
+    /// Returns the factor on all radii with which `n` boids fit into the tank, 0.05..=1. It is 1 if each boid
+    /// has a square of side `ROOM_BL`. In a tank so deep that boids swim one behind another, each needs a
+    /// cube.
     pub fn closeness(&self, n: usize) -> f64 {
         (self.apart_bl(n) / ROOM_BL).clamp(0.05, 1.0)
     }
 
-    /// How near `n` boids may come to each other, body lengths: half a length where they can keep that and still get
-    /// about, and else the usual share of it.
+    /// Returns the least distance between `n` boids, body lengths: `OVERLAP_BL` if boids can keep it while
+    /// they swim, else `OVERLAP_BL` times `closeness`.
     pub fn overlap_bl(&self, n: usize) -> f64 {
         let kept = match self.is_deep_for(n) {
             true => KEPT_IN_DEPTH,
@@ -131,7 +134,7 @@ impl Tank {
         }
     }
 
-    /// How far apart `n` boids are that share the tank evenly.
+    /// Returns the distance between `n` boids that share the tank evenly.
     fn apart_bl(&self, n: usize) -> f64 {
         let (beside_bl, depth_bl) = (self.beside_bl(n), 2.0 * self.reach_bl[2]);
         match self.is_deep_for(n) {
@@ -140,23 +143,23 @@ impl Tank {
         }
     }
 
-    /// Whether `n` boids would swim one behind another, not only side by side.
+    /// Returns whether `n` boids would swim one behind another, not only side by side.
     fn is_deep_for(&self, n: usize) -> bool {
         2.0 * self.reach_bl[2] > self.beside_bl(n)
     }
 
-    /// Whether `n` boids could keep the usual distances side by side.
+    /// Returns whether `n` boids can keep the usual distances side by side.
     pub fn has_room_beside(&self, n: usize) -> bool {
         self.beside_bl(n) >= ROOM_BL
     }
 
-    /// How far apart `n` boids are side by side.
+    /// Returns the distance between `n` boids that share the tank evenly side by side.
     fn beside_bl(&self, n: usize) -> f64 {
         (self.section_bl2 / n as f64).sqrt()
     }
 
-    /// How many have room. In side view, how many fit in as near as boids may come to each other, side by side and one behind
-    /// another. From above, how many can move without lying on each other.
+    /// Returns the number of animals that the tank has room for. In side view, neighbors are `OVERLAP_BL`
+    /// apart, side by side and one behind another. In top view, each animal has a square of side `ROAM_BL`.
     pub fn room_for(&self) -> u32 {
         let n = match self.is_flat() {
             true => self.section_bl2 / (ROAM_BL * ROAM_BL),
@@ -168,7 +171,8 @@ impl Tank {
         n.max(1.0) as u32
     }
 
-    /// Inward pushes for whoever would pass a wall within `horizon_s`, growing to 1 at the wall.
+    /// Returns inward pushes for boids that would pass a wall within `horizon_s`. A push grows to 1 at the
+    /// wall.
     #[inline(always)]
     pub fn push<L: Lanes>(&self, position: [L; 3], velocity: [L; 3], horizon_s: f64) -> [L; 3] {
         let nothing = L::splat(0.0);
@@ -184,7 +188,7 @@ impl Tank {
         push
     }
 
-    /// Whether any of them is beyond a wall.
+    /// Returns whether any of the positions is beyond a wall.
     #[inline(always)]
     pub fn is_left_by_any<L: Lanes>(&self, position: [L; 3]) -> bool {
         (self.walls.iter()).any(|wall| {
@@ -193,11 +197,11 @@ impl Tank {
         })
     }
 
-    /// Puts a position inside and reflects the part of the velocity that leads out: who only lost it
-    /// would be caught in corners, never getting round. True when a wall was met.
+    /// Moves a position into the tank and reflects the part of the velocity that leads out. If that part were
+    /// only removed, boids would be caught in corners. Returns whether the position was beyond a wall.
     pub fn keep_inside(&self, position: &mut Vec3, velocity: &mut Vec3) -> bool {
         let mut met = false;
-        // A few rounds settle most corners; one that meets no wall leaves all as it is.
+        // A few rounds settle most corners. A round without a wall ends the loop.
         for _ in 0..3 {
             let mut meets = false;
             for wall in &self.walls {
@@ -220,7 +224,7 @@ impl Tank {
         met
     }
 
-    /// As far on the way from a place inside to another as the tank goes: it is convex.
+    /// Returns `to`, or the point at which the line from `from`, a position inside, to `to` leaves the tank.
     pub fn on_the_way(&self, from: Vec3, to: Vec3) -> Vec3 {
         let way = minus(to, from);
         let share = self.walls.iter().fold(1.0f64, |share, wall| {
@@ -238,18 +242,18 @@ impl Tank {
         }
     }
 
-    /// Whether a position lies inside, to rounding.
+    /// Returns whether a position is inside, within rounding.
     pub fn holds(&self, position: Vec3) -> bool {
         let beyond = |wall: &Wall| dot(wall.outward, position) - wall.offset_bl;
         self.walls.iter().all(|wall| beyond(wall) < 1e-9)
     }
 
-    /// Where it ends.
+    /// Returns all walls.
     pub fn walls(&self) -> &[Wall] {
         &self.walls
     }
 
-    /// The walls that steer: a flat tank has no front and back.
+    /// Returns the walls that boids steer away from: in a flat tank, all but the front and the back.
     fn upright_walls(&self) -> impl Iterator<Item = &Wall> {
         let flat = self.is_flat();
         self.walls

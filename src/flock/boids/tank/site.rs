@@ -1,4 +1,5 @@
-//! The tank of a library: where the animal was seen, and where it is wholly in the picture (ALGORITHMS.md 7).
+//! Tank of a library: the area in which the animal was seen, as far as it is wholly in the image
+//! (docs/explanation/algorithms.md, "Boids").
 
 use super::floor::Floor;
 use super::{Tank, Wall};
@@ -9,23 +10,23 @@ use crate::flock::params::{Params, TankExtent};
 use crate::library::{Library, Pose, View};
 use crate::order::{median, percentile};
 
-/// Directions in which the seen area is bounded.
+/// Number of directions in which the seen area is bounded. Free choice.
 const N_SIDES: usize = 16;
-/// A flock without room gets it farther out: from above where the floor goes on, from the side until the tank is this
-/// share of the picture.
+/// Share of the image up to which the tank of a large flock grows in side view. In top view it grows as far
+/// as the floor. Free choice.
 const MOST_OF_TANK: f64 = 0.7;
-/// By so much at a time.
+/// Distance by which the tank grows at a time, body lengths. Free choice.
 const FARTHER_BL: f64 = 0.25;
-/// Between a body and a wall.
+/// Distance between a body and a wall, body lengths. Free choice.
 const CLEARANCE_BL: f64 = 0.05;
-/// How deep a tank is whose depth is not asked for: as deep as the animal was seen to be, within these.
+/// Least and greatest depth of a tank without a requested depth, body lengths. Free choice.
 const DEPTHS_BL: [f64; 2] = [1.0, 6.0];
-/// Share of the frames, and of the bodies, that what was seen leaves out at either end.
+/// Share of frames, and of bodies, that the seen region leaves out at either end. Free choice.
 const OUTLIERS: f64 = 0.01;
 
 impl Tank {
-    /// The tank of a library: where the animal was seen, as deep as it was seen to be. Where a flock has no room
-    /// there, it reaches farther, but not beyond where the animal is wholly in the picture.
+    /// Returns the tank of a library: the area and the range of depths in which the animal was seen. If the
+    /// flock lacks room, the area grows, but only as far as the animal is wholly in the image.
     pub fn of(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> Tank {
         let [w, h] = library.poses.image_size_px.map(f64::from);
         let site = Site {
@@ -56,7 +57,7 @@ impl Tank {
     }
 }
 
-/// Moves all lines out by so many pixels; not, and false, when there is at least `most_px2` within them.
+/// Moves all lines outward by `by_px`. Does nothing and returns false if they enclose at least `most_px2`.
 fn widen(lines: &mut [Line], by_px: f64, most_px2: f64) -> bool {
     if area(lines) >= most_px2 {
         return false;
@@ -65,10 +66,10 @@ fn widen(lines: &mut [Line], by_px: f64, most_px2: f64) -> bool {
     true
 }
 
-/// A unit vector in the picture and how far it may be gone along it from the picture's corner, pixels.
+/// Unit vector in the image, and the greatest offset along it from the corner of the image, pixels.
 pub(super) type Line = ([f64; 2], f64);
 
-/// What tanks of one library have in common.
+/// Inputs that all tanks of one library share.
 struct Site<'a> {
     lens: &'a Lens,
     body: Body,
@@ -77,7 +78,7 @@ struct Site<'a> {
 }
 
 impl Site<'_> {
-    /// The tank in which bodies stay within the picture and these lines.
+    /// Returns the tank in which bodies stay within the image and within these lines.
     fn tank(&self, lines: &[Line]) -> Tank {
         let [w, h] = self.size_px;
         let picture = [
@@ -102,8 +103,8 @@ impl Site<'_> {
         Tank::within(corners, walls)
     }
 
-    /// A body's margin within lines, each of which has its opposite half the way round; never more than
-    /// a third of the way between them.
+    /// Returns the walls for lines, moved inward by the margin of a body, but by at most a third of the
+    /// distance between opposite lines. Opposite lines are half the list apart.
     fn walls(&self, lines: &[Line]) -> impl Iterator<Item = Wall> {
         let px_per_bl = self.lens.px_per_bl(self.depths_bl[0]);
         (0..lines.len()).map(move |k| {
@@ -116,7 +117,7 @@ impl Site<'_> {
     }
 }
 
-/// How far a body reaches from its centroid.
+/// Extent of a body around its centroid.
 struct Body {
     view: View,
     half_height_bl: f64,
@@ -136,7 +137,8 @@ impl Body {
         }
     }
 
-    /// What it needs between its centroid and a wall: in top view it may point to any, in side view it is level.
+    /// Returns the distance that a centroid keeps from a wall, body lengths. In top view a body may point at
+    /// the wall. In side view it is level.
     fn margin_bl(&self, outward: [f64; 2]) -> f64 {
         let reach = match self.view {
             View::Top => 0.5,
@@ -146,7 +148,7 @@ impl Body {
     }
 }
 
-/// The nearest and the farthest place, from the camera; nowhere when the lens is flat.
+/// Returns the least and the greatest depth, body lengths from the camera; 0 for a flat lens.
 fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> [f64; 2] {
     if lens.is_flat() {
         return [0.0; 2];
@@ -162,13 +164,13 @@ fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Param
     let depth = params
         .depth_bl
         .unwrap_or((far - near).clamp(DEPTHS_BL[0], DEPTHS_BL[1]));
-    // Never so near that a body fills the picture.
+    // The front is never so near that a body has more than 1.5 times its usual size.
     let least = lens.depth_at_bl(1.5 * lens.length_px);
     let nearest = (0.5 * (near + far - depth)).max(least);
     [nearest, nearest + depth]
 }
 
-/// The outer polygon of the bodies seen; empty when there are none.
+/// Returns the outer polygon of the bodies seen; empty if there are none.
 fn seen_lines(library: &Library) -> Vec<Line> {
     (0..N_SIDES)
         .filter_map(|k| {
@@ -187,7 +189,7 @@ fn seen_lines(library: &Library) -> Vec<Line> {
         .collect()
 }
 
-/// How far a body reaches in a direction: an ellipse of its length and height.
+/// Returns how far a body reaches in a direction, pixels. The body is an ellipse of its length and height.
 fn reach_px(pose: &Pose, outward: [f64; 2]) -> Option<f64> {
     let [x, y] = pose.centroid_px?;
     let axis = pose.heading_rad?;
@@ -197,7 +199,7 @@ fn reach_px(pose: &Pose, outward: [f64; 2]) -> Option<f64> {
     Some(outward[0] * x + outward[1] * y + along.hypot(across))
 }
 
-/// The area within lines of rising angle, by their corners.
+/// Returns the area within lines of ascending angle, square pixels.
 fn area(lines: &[Line]) -> f64 {
     let corner = |k: usize| {
         let (a, b) = (&lines[k], &lines[(k + 1) % lines.len()]);
