@@ -319,9 +319,8 @@ impl Stage<'_> {
         let reach = (AROUND_S * self.library.poses.fps).round() as usize;
         let frame = frame as usize;
         let around = frame.saturating_sub(reach)..(frame + reach + 1).min(self.motion.len());
-        let n = around.len() as f64;
         let speeds = self.motion[around].iter().map(|moved| moved.speed_bl_per_s);
-        speeds.sum::<f64>() / n
+        speeds.clone().sum::<f64>() / speeds.len() as f64
     }
 
     /// Returns `place`, or the point at which the line from the boid to it leaves the tank.

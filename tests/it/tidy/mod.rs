@@ -2,6 +2,8 @@
 //! grow, which words have another word here, what the page may hold. Where a rule fails, its message
 //! names the file and the rule; the rule itself is argued in CONTRIBUTING.md and ARCHITECTURE.md.
 
+mod citations;
+mod cycles;
 mod guards;
 mod imports;
 mod reading;
