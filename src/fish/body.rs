@@ -1,21 +1,26 @@
-//! Trunk and eyes of the virtual fish: elliptical cross-sections along the spine, with the profile
-//! of a common goldfish: a blunt nose, the deepest place behind the head, a slender tail root.
+//! Trunk and eyes of the virtual fish: elliptical cross-sections along the spine.
+//!
+//! The profile is that of a common goldfish: a blunt nose, the greatest depth behind the head, and a
+//! slender tail root.
 
 use std::f64::consts::{PI, TAU};
 
 use super::mesh::{Layer, Sketch, SketchPoint};
 use super::paint::Coat;
 
-/// Where the trunk ends and the tail fin begins, from the nose (0) to the tail tip (1).
+/// Position along the body where the trunk ends and the tail fin begins: 0 = nose, 1 = tip of the tail.
+/// Free choice.
 pub(super) const TRUNK_END_S: f64 = 0.76;
-/// Half of the greatest depth of the trunk, lengths.
+/// Half of the greatest depth of the trunk, in body lengths. Free choice.
 const HALF_DEPTH_BL: f64 = 0.152;
 
+/// Number of cross-sections along the trunk. Free choice.
 const RINGS: usize = 88;
+/// Number of points around a cross-section; the last repeats the first. Free choice.
 const SPOKES: usize = 41;
 
-/// Knots of the profile over u = s / TRUNK_END_S: (u, above the spine, below it, half width), in
-/// half depths.
+/// Knots of the profile: (u, extent above the spine, extent below the spine, half width), with u = s /
+/// TRUNK_END_S and extents as multiples of HALF_DEPTH_BL. Free choice.
 const PROFILE: [[f64; 4]; 12] = [
     [0.00, 0.00, 0.00, 0.00],
     [0.012, 0.15, 0.17, 0.15],
@@ -31,7 +36,8 @@ const PROFILE: [[f64; 4]; 12] = [
     [1.00, 0.37, 0.34, 0.00],
 ];
 
-/// How far the trunk reaches above the spine, below it and to each side at `s`, lengths.
+/// Returns the extent of the trunk above the spine, below the spine and to each side at `s`, in body
+/// lengths.
 pub(super) fn profile_bl(s: f64) -> [f64; 3] {
     let u = (s / TRUNK_END_S).clamp(0.0, 1.0);
     let k = PROFILE
@@ -40,18 +46,19 @@ pub(super) fn profile_bl(s: f64) -> [f64; 3] {
     std::array::from_fn(|column| HALF_DEPTH_BL * hermite(k - 1, column + 1, u))
 }
 
-/// Where the middle of the trunk lies at `s`, lengths below the spine: the nose points a little down.
+/// Returns how far the middle of the trunk lies below the spine at `s`, in body lengths. The nose points
+/// slightly down.
 fn sag_bl(s: f64) -> f64 {
     let ahead = (0.2 - s).max(0.0);
     0.55 * ahead * ahead
 }
 
-/// Adds the trunk.
+/// Adds the trunk to the mesh.
 pub(super) fn add_trunk(sketch: &mut Sketch, coat: &Coat) {
     sketch.add_grid(Layer::Body, RINGS, SPOKES, |i, j| {
         let s = TRUNK_END_S * ring_u(i);
         let angle = TAU * j as f64 / (SPOKES - 1) as f64;
-        // The seam closes exactly: its last point is its first.
+        // The last point equals the first, so the seam closes exactly.
         let (sin, cos) = match j {
             j if j == SPOKES - 1 => (0.0, 1.0),
             _ => (libm::sin(angle), libm::cos(angle)),
@@ -68,7 +75,7 @@ pub(super) fn add_trunk(sketch: &mut Sketch, coat: &Coat) {
     });
 }
 
-/// Adds an eye on either side.
+/// Adds an eye on each side to the mesh.
 pub(super) fn add_eyes(sketch: &mut Sketch, coat: &Coat) {
     const AT: [f64; 2] = [0.098, -0.016];
     const RADIUS: f64 = 0.0235;
@@ -98,13 +105,14 @@ pub(super) fn add_eyes(sketch: &mut Sketch, coat: &Coat) {
     }
 }
 
-/// Rings lie closer together toward the nose.
+/// Returns the position of ring `i` along the trunk, 0..=1. Rings are denser toward the nose.
 fn ring_u(i: usize) -> f64 {
     let t = i as f64 / (RINGS - 1) as f64;
     t * (0.35 + 0.65 * t)
 }
 
-/// Monotone cubic between knots k and k + 1 of one column (Fritsch & Butland 1984): no dents.
+/// Returns the monotone cubic interpolation of one column of the profile between knots k and k + 1 (Fritsch
+/// & Butland 1984). Monotone interpolation makes no dents.
 fn hermite(k: usize, column: usize, u: f64) -> f64 {
     let knot = |i: usize| (PROFILE[i][0], PROFILE[i][column]);
     let secant = |i: usize| (knot(i + 1).1 - knot(i).1) / (knot(i + 1).0 - knot(i).0);

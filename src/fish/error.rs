@@ -1,23 +1,23 @@
-//! Why there is no virtual fish.
+//! Errors of the virtual fish: the reasons why no fish can be made.
 
 use crate::code::Code;
 
-/// The reasons, one variant each.
+/// Reason why no virtual fish can be made.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// A parameter is out of its range.
     #[error("{0}")]
     InvalidParams(String),
-    /// The animal was found in no frame, so that nothing can drive the fish.
+    /// The animal was found in no frame, so no motion is known.
     #[error("the animal was found in none of the {n_frames} frames")]
     NothingMoves {
-        /// Frames of the footage.
+        /// Number of frames in the footage.
         n_frames: usize,
     },
 }
 
 impl Error {
-    /// The stable code.
+    /// Returns the stable error code.
     pub fn code(&self) -> Code {
         match self {
             Error::InvalidParams(_) => Code::InvalidParams,

@@ -1,11 +1,11 @@
-//! The film of a virtual fish: each posture drawn over a background, in the encoder's own format.
+//! The film of a virtual fish: each posture drawn over a background, in the encoder's pixel format.
 
 use super::motion::Motion;
 use super::render::{Drawing, Renderer};
 use crate::geometry::Rect;
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
-/// A motion with all that is needed to draw any of its frames.
+/// Motion, renderer and background of the film of a virtual fish.
 pub struct Film {
     motion: Motion,
     renderer: Renderer,
@@ -14,7 +14,8 @@ pub struct Film {
 }
 
 impl Film {
-    /// The film of a motion before a background of the motion's image size. Panics on another size.
+    /// Returns the film of a motion over a background. Panics if the background does not have the motion's
+    /// image size.
     pub fn new(motion: Motion, background: RgbImage) -> Film {
         let [width, height] = motion.image_size_px;
         assert_eq!(
@@ -32,29 +33,29 @@ impl Film {
         }
     }
 
-    /// What is filmed.
+    /// Returns the motion of the fish.
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// What draws the fish.
+    /// Returns the renderer of the fish.
     pub fn renderer(&self) -> &Renderer {
         &self.renderer
     }
 
-    /// The scene without the fish.
+    /// Returns the background without the fish.
     pub fn background(&self) -> &RgbImage {
         &self.background
     }
 
-    /// The fish alone in a frame. Panics beyond the last frame.
+    /// Returns the fish of one frame, without the background. Panics beyond the last frame.
     pub fn draw(&self, frame_idx: usize) -> Drawing {
         let posture = &self.motion.frames[frame_idx];
         self.renderer
             .draw(&self.motion.camera, self.motion.image_size_px, posture)
     }
 
-    /// The whole frame, reusing `frame`'s memory. Panics beyond the last frame.
+    /// Draws one whole frame into `frame`, reusing its memory. Panics beyond the last frame.
     pub fn render(&self, frame_idx: usize, frame: &mut Frame) {
         frame.clone_from(&self.plate);
         let drawing = self.draw(frame_idx);
@@ -64,7 +65,7 @@ impl Film {
     }
 }
 
-/// Water without anything in it: lighter above, for a fish without a library's background.
+/// Returns a picture of empty water, lighter at the top.
 pub fn plain_water(width: u32, height: u32) -> RgbImage {
     let (top, bottom) = ([128.0, 182.0, 190.0], [38.0, 84.0, 100.0]);
     let mut image = RgbImage::new(width, height);

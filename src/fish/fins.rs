@@ -1,11 +1,12 @@
-//! Fins of the virtual fish: sheets of rays from a base on the trunk to an edge. Tail forked, one
-//! dorsal and one anal fin, pairs of pelvic and pectoral fins.
+//! Fins of the virtual fish: surfaces with rays, from a base on the trunk to a free edge.
+//!
+//! The fish has a forked tail fin, one dorsal and one anal fin, and pairs of pelvic and pectoral fins.
 
 use super::body::{TRUNK_END_S, profile_bl};
 use super::mesh::{Layer, Sketch, SketchPoint};
 use super::paint::Coat;
 
-/// Adds every fin.
+/// Adds all fins to the mesh.
 pub(super) fn add_fins(sketch: &mut Sketch, coat: &Coat) {
     add_fin(
         sketch,
@@ -48,13 +49,16 @@ pub(super) fn add_fins(sketch: &mut Sketch, coat: &Coat) {
     }
 }
 
+/// Resolution and texture of a fin: grid points across the rays, grid points from base to edge, number of
+/// rays.
 struct FinShape {
     across: usize,
     out: usize,
     rays: f64,
 }
 
-/// `point(v, w)`: v in 0..=1 from the first ray to the last, w in 0..=1 from base to edge.
+/// Adds one fin. `point(v, w)` is its surface: v in 0..=1 from the first ray to the last, w in 0..=1 from
+/// base to edge.
 fn add_fin(
     sketch: &mut Sketch,
     coat: &Coat,
@@ -63,7 +67,7 @@ fn add_fin(
 ) {
     sketch.add_grid(Layer::Fins, shape.across, shape.out, |i, j| {
         let v = i as f64 / (shape.across - 1) as f64;
-        // Rows lie closer toward the edge, where the fin turns translucent.
+        // Rows are denser toward the edge, where the opacity changes.
         let t = j as f64 / (shape.out - 1) as f64;
         let w = t * (1.35 - 0.35 * t);
         SketchPoint {
@@ -76,7 +80,8 @@ fn add_fin(
     });
 }
 
-/// Two rounded lobes with a notch between; v from the upper lobe to the lower.
+/// Returns a point of the tail fin: two rounded lobes with a notch between them. v runs from the upper lobe
+/// to the lower.
 fn tail(v: f64, w: f64) -> [f64; 3] {
     let side = 2.0 * v - 1.0;
     let a = side.abs();
@@ -85,10 +90,10 @@ fn tail(v: f64, w: f64) -> [f64; 3] {
         TRUNK_END_S - 0.022,
         side * if side < 0.0 { above } else { below } * 0.92,
     ];
-    // The edge runs from the notch out to the lobe, rounds its tip and comes a little forward again.
+    // The edge runs from the notch back to the tip of the lobe, and forward a little beyond the tip.
     let reach = 0.880 + 0.120 * smooth(a / 0.86) - 0.035 * smooth((a - 0.86) / 0.14);
     let spread = 0.192 * libm::pow(a, 0.80) * side.signum();
-    // Rays leave the base along the body and fan out.
+    // Rays start along the body and fan out.
     let fan = w * (0.85 + 0.15 * w);
     [
         base[0] + (reach - base[0]) * w,
@@ -97,7 +102,7 @@ fn tail(v: f64, w: f64) -> [f64; 3] {
     ]
 }
 
-/// Tall in front, falling off behind, swept back.
+/// Returns a point of the dorsal fin: tall in front, lower behind, swept back.
 fn dorsal(v: f64, w: f64) -> [f64; 3] {
     let s = 0.275 + 0.32 * v;
     let height = 0.128 * smooth(v / 0.16 + 0.22) * (1.0 - 0.52 * v);
@@ -109,7 +114,7 @@ fn dorsal(v: f64, w: f64) -> [f64; 3] {
     ]
 }
 
-/// Short, under the tail root.
+/// Returns a point of the anal fin: short, below the tail root.
 fn anal(v: f64, w: f64) -> [f64; 3] {
     let s = 0.575 + 0.075 * v;
     let height = 0.082 * smooth(v / 0.3 + 0.35) * (1.0 - 0.5 * v);
@@ -117,7 +122,7 @@ fn anal(v: f64, w: f64) -> [f64; 3] {
     [s + w * (0.065 + 0.02 * v), 0.9 * below + height * w, 0.0]
 }
 
-/// The left one of the pair under the belly.
+/// Returns a point of the left pelvic fin, below the belly.
 fn pelvic(v: f64, w: f64) -> [f64; 3] {
     let s = 0.365 + 0.035 * v;
     let [_, below, side] = profile_bl(s);
@@ -129,13 +134,13 @@ fn pelvic(v: f64, w: f64) -> [f64; 3] {
     ]
 }
 
-/// The left one of the pair behind the gills.
+/// Returns a point of the left pectoral fin, behind the gills.
 fn pectoral(v: f64, w: f64) -> [f64; 3] {
     let s = 0.215 + 0.008 * v;
     let [_, below, side] = profile_bl(s);
     let start = (0.42 + 0.28 * v) * below;
     let share = start / below;
-    // Rays of the middle are the longest.
+    // Rays near v = 0.35 are the longest.
     let reach = 1.0 - 0.35 * (2.0 * v - 0.7) * (2.0 * v - 0.7);
     [
         s + 0.098 * w * reach,
@@ -148,6 +153,7 @@ fn mirrored([s, down, left]: [f64; 3], sign: f64) -> [f64; 3] {
     [s, down, sign * left]
 }
 
+/// Smoothstep: 0 for x <= 0, 1 for x >= 1, smooth between.
 fn smooth(x: f64) -> f64 {
     let t = x.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)

@@ -1,26 +1,30 @@
-//! How the virtual fish is lit: one key light from above and in front, soft light from everywhere,
-//! more from above; a wet glint; scales and fin rays as a fine pattern. Encoded sRGB throughout, as
-//! the pictures that it is laid over.
+//! Lighting of the virtual fish: one key light from above and in front, and ambient light that is stronger
+//! from above. Wet skin has a highlight. Scales and fin rays make a fine pattern.
+//!
+//! All colors are encoded sRGB, like the pictures over which the fish is drawn.
 
-/// What a sample of the surface looks like before it is lit.
+/// Properties of one surface sample before lighting.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surface {
-    /// Camera frame; any length.
+    /// Normal in the camera frame, of any length.
     pub(super) normal: [f32; 3],
     /// Straight-alpha RGBA, 0..=1.
     pub(super) color: [f32; 4],
+    /// Shininess, 0..=1.
     pub(super) shine: f32,
+    /// Texture coordinates (see `Vertex`).
     pub(super) grain: [f32; 2],
+    /// Strength of the texture: > 0 scales, < 0 fin rays, 0 none.
     pub(super) grain_depth: f32,
 }
 
-/// Toward the key light, camera frame: above, a little left, in front. Unit length.
+/// Unit vector toward the key light in the camera frame: above, slightly left, in front. Free choice.
 const KEY: [f32; 3] = [-0.34, -0.80, -0.495];
-/// Halfway between the key light and the camera. Unit length.
+/// Unit vector halfway between the key light and the camera. Derived from `KEY`.
 const HALF: [f32; 3] = [-0.197, -0.463, -0.864];
 
 impl Surface {
-    /// The surface between three corners.
+    /// Returns the surface inside a triangle, interpolated from its corners.
     pub(super) fn between(corners: [&Surface; 3], weights: [f32; 3]) -> Surface {
         let mix = |of: fn(&Surface) -> f32| -> f32 {
             weights[0] * of(corners[0]) + weights[1] * of(corners[1]) + weights[2] * of(corners[2])
@@ -44,11 +48,11 @@ impl Surface {
     }
 }
 
-/// The color of a sample, 0..=1 a channel.
+/// Returns the color of a sample after lighting, 0..=1 per channel.
 pub(super) fn shade(surface: &Surface) -> [f32; 3] {
     let mut n = surface.normal;
     let length = dot(n, n).sqrt().max(1e-12);
-    // A fin is seen from both sides: its normal is turned toward the camera.
+    // A fin is visible from both sides, so its normal is turned toward the camera.
     let turn = if n[2] > 0.0 && surface.grain_depth < 0.0 {
         -1.0
     } else {
@@ -64,7 +68,7 @@ pub(super) fn shade(surface: &Surface) -> [f32; 3] {
     };
     let grain = 1.0 + grain(surface);
     let glint = surface.shine * (0.50 * power32(dot(n, HALF)) + 0.10 * power4(dot(n, HALF)));
-    // Toward its outline the wet skin mirrors the water around it.
+    // Near the outline, wet skin reflects the water around it.
     let facing = (-n[2]).clamp(0.0, 1.0);
     let rim = surface.shine * 0.22 * power4(1.0 - facing);
     let water = [0.55, 0.78, 0.84];
@@ -74,7 +78,8 @@ pub(super) fn shade(surface: &Surface) -> [f32; 3] {
     })
 }
 
-/// Scales: each a little brighter in its middle, rows offset by half. Fin rays: darker lines.
+/// Returns the relative brightness of the pattern. A scale is brighter in its middle, and every second row
+/// is offset by half a scale. Fin rays are darker lines.
 fn grain(surface: &Surface) -> f32 {
     let [u, v] = surface.grain;
     if surface.grain_depth > 0.0 {

@@ -1,8 +1,9 @@
-//! The surface of the virtual fish: our own geometry, skinned to the spine of 8 joints
-//! (ALGORITHMS.md 4). Opaque body and eyes, translucent fins, a color at every vertex.
+//! Mesh of the virtual fish: our own geometry, skinned to the spine of 8 joints. It has an opaque body,
+//! opaque eyes, translucent fins, and a color at every vertex
+//! (docs/explanation/algorithms.md, "Virtual fish").
 //!
-//! It is built in lengths, then scaled: x by the length, y and z such that the silhouette, fins
-//! included, is as tall as asked for. Metres, in the frame of `spine`.
+//! The mesh is built in body lengths and then scaled: x by the length, y and z so that the silhouette, fins
+//! included, has the requested height. The result is in metres, in the frame of `spine`.
 
 use super::body;
 use super::fins;
@@ -11,42 +12,43 @@ use super::params::Palette;
 use super::spine::{ORIGIN_S, SPINE_DOWN_BL, joints_at};
 use crate::library::Animal;
 
-/// One point of the surface.
+/// Vertex of the mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
-    /// Where it is when the body is straight, metres.
+    /// Position when the body is straight, in metres.
     pub position_m: [f64; 3],
-    /// Unit normal; fins have one as well and are seen from both sides.
+    /// Unit normal. Fins have one normal too, although they are visible from both sides.
     pub normal: [f64; 3],
     /// Straight-alpha RGBA in encoded sRGB, 0..=1.
     pub color: [f32; 4],
-    /// The two joints that move it.
+    /// The two joints that move the vertex.
     pub joints: [u8; 2],
-    /// Share of the second joint, 0..=1.
+    /// Weight of the second joint, 0..=1.
     pub share: f32,
-    /// How shiny it is, 0..=1.
+    /// Shininess, 0..=1.
     pub shine: f32,
-    /// Texture coordinates: scales on the body, in rows and columns of scales; rays on a fin.
+    /// Texture coordinates. On the body: row and column of scales. On a fin: ray, and position from base to
+    /// edge.
     pub grain: [f32; 2],
-    /// Depth of the texture: above 0 scales, below 0 fin rays, 0 plain.
+    /// Strength of the texture: > 0 scales, < 0 fin rays, 0 none.
     pub grain_depth: f32,
 }
 
 /// Vertices and triangles of a fish.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    /// The points.
+    /// Vertices.
     pub vertices: Vec<Vertex>,
-    /// Triangles of body and eyes, counter-clockwise seen from outside.
+    /// Triangles of body and eyes, counter-clockwise as seen from outside.
     pub body: Vec<[u32; 3]>,
-    /// Triangles of the fins, to be drawn after the body from far to near.
+    /// Triangles of the fins. The renderer draws them after the body, from far to near.
     pub fins: Vec<[u32; 3]>,
-    /// The size it was made for.
+    /// Size of the fish.
     pub size: Animal,
 }
 
 impl Mesh {
-    /// A fish of the given size and colors.
+    /// Returns a goldfish mesh of the given size and colors.
     pub fn goldfish(size: Animal, palette: Palette) -> Mesh {
         let coat = Coat::of(palette);
         let mut sketch = Sketch::default();
@@ -56,13 +58,14 @@ impl Mesh {
         sketch.finish(size)
     }
 
-    /// Lowest and highest of the opaque silhouette along one axis of the straight fish, metres.
+    /// Returns the lowest and the highest coordinate of the opaque silhouette along one axis of the
+    /// straight fish, in metres.
     pub fn extent_m(&self, axis: usize) -> [f64; 2] {
         extent(&self.vertices, axis)
     }
 }
 
-/// A mesh under construction: x is s (from the nose), y down, z left, all in lengths.
+/// Mesh under construction, in body lengths: x is s (from the nose), y down, z left.
 #[derive(Default)]
 pub(super) struct Sketch {
     points: Vec<SketchPoint>,
@@ -70,10 +73,10 @@ pub(super) struct Sketch {
     fins: Vec<[u32; 3]>,
 }
 
-/// One point of a sketch.
+/// Point of a sketch.
 #[derive(Clone, Copy)]
 pub(super) struct SketchPoint {
-    /// (s, down, left), lengths.
+    /// (s, down, left), in body lengths.
     pub(super) at: [f64; 3],
     pub(super) color: [f32; 4],
     pub(super) shine: f32,
@@ -81,7 +84,7 @@ pub(super) struct SketchPoint {
     pub(super) grain_depth: f32,
 }
 
-/// Which list of triangles a grid belongs to.
+/// List of triangles to which a grid belongs.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Layer {
     Body,
@@ -89,7 +92,7 @@ pub(super) enum Layer {
 }
 
 impl Sketch {
-    /// Adds a grid of `n` by `m` points given row by row; `point(i, j)` makes each.
+    /// Adds a grid of `n` by `m` points, row by row. `point(i, j)` returns each point.
     pub(super) fn add_grid(
         &mut self,
         layer: Layer,
@@ -159,7 +162,7 @@ fn vertex(point: &SketchPoint, length_m: f64) -> Vertex {
     }
 }
 
-/// Extent of what is more opaque than not.
+/// Returns the extent of the vertices whose alpha is at least one half.
 fn extent(vertices: &[Vertex], axis: usize) -> [f64; 2] {
     vertices
         .iter()
@@ -169,7 +172,7 @@ fn extent(vertices: &[Vertex], axis: usize) -> [f64; 2] {
         })
 }
 
-/// Rings that end in a point make triangles without area: they are left out.
+/// Removes triangles without area, which occur where a ring shrinks to a point.
 fn drop_slivers(triangles: Vec<[u32; 3]>, vertices: &[Vertex]) -> Vec<[u32; 3]> {
     let length = |v: [f64; 3]| dot(v, v).sqrt();
     triangles
@@ -178,8 +181,8 @@ fn drop_slivers(triangles: Vec<[u32; 3]>, vertices: &[Vertex]) -> Vec<[u32; 3]> 
         .collect()
 }
 
-/// Area-weighted means over the triangles at each place: points that coincide (the seam of a ring,
-/// the tip of the nose) share one normal.
+/// Sets each normal to the area-weighted mean over the triangles at its position. Vertices at the same
+/// position, such as the seam of a ring or the tip of the nose, share one normal.
 fn set_normals(vertices: &mut [Vertex], layers: &[&[[u32; 3]]]) {
     for triangles in layers {
         let mut sums = vec![[0.0; 3]; vertices.len()];

@@ -1,5 +1,8 @@
-//! Poses to virtual fish: a goldfish of our own geometry, moved as the measured animal moved, and
-//! the film of it whose truth is known (ALGORITHMS.md 4, virtual fish; N 7).
+//! The virtual fish: a goldfish mesh of our own geometry that moves as the measured animal moved.
+//!
+//! `drive` turns poses into motion, and `render` draws the motion. `sample` makes the sample film, in which
+//! every pose is known exactly (Nakajima et al., section 7;
+//! docs/explanation/algorithms.md, "Virtual fish").
 
 pub mod drive;
 pub mod error;

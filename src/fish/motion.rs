@@ -1,5 +1,5 @@
-//! The motion of a virtual fish: where it is, how it lies and how it bends, frame by frame. What the
-//! renderer draws and what a GLB file holds.
+//! Motion of a virtual fish: position, rotation and bend in every frame. The renderer draws it, and a GLB
+//! file stores it.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -8,38 +8,39 @@ use super::spine::N_JOINTS;
 use crate::geometry::Camera;
 use crate::library::Animal;
 
-/// A virtual fish over time.
+/// Motion of a virtual fish over time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     /// Frames a second, > 0.
     pub fps: f64,
-    /// Width and height of the footage, pixels.
+    /// Width and height of the footage, in pixels.
     pub image_size_px: [u32; 2],
-    /// The camera that films it: the footage's, or an assumed one.
+    /// Camera that films the fish: that of the footage, or an assumed one.
     pub camera: Camera,
-    /// The size of the fish.
+    /// Size of the fish.
     pub size: Animal,
-    /// Its coat.
+    /// Colors of the fish.
     pub palette: Palette,
-    /// One entry a frame, in order.
+    /// Posture in each frame, in order.
     pub frames: Vec<Posture>,
 }
 
-/// The fish in one frame.
+/// Posture of the fish in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
-    /// Where the middle of its silhouette is, camera frame, metres.
+    /// Position of the middle of the silhouette, in the camera frame, in metres.
     pub position_m: DVec3,
-    /// From the fish's own frame (x forward, y down, z left) to the camera frame, unit length.
+    /// Rotation from the fish's own frame (x forward, y down, z left) to the camera frame, a unit
+    /// quaternion.
     pub rotation: DQuat,
-    /// How each joint of the spine is turned, radians (see `spine`).
+    /// Angle of each joint of the spine, in radians (see `spine`).
     pub joint_angles_rad: [f64; N_JOINTS],
-    /// False where nothing is known of the animal.
+    /// Whether the fish is drawn; false where the pose of the animal is unknown.
     pub visible: bool,
 }
 
 impl Posture {
-    /// A straight fish at a place.
+    /// Returns a straight, visible fish at a position.
     pub fn at(position_m: DVec3, rotation: DQuat) -> Posture {
         Posture {
             position_m,
@@ -49,14 +50,15 @@ impl Posture {
         }
     }
 
-    /// The direction in which it points, camera frame, unit length.
+    /// Returns the direction of the fish in the camera frame, a unit vector.
     pub fn forward(&self) -> DVec3 {
         self.rotation * DVec3::X
     }
 }
 
-/// The upright rotation of a fish pointing along yaw and pitch (DESIGN.md), leaning by `roll_rad`
-/// about its own axis: positive brings the back over to its right.
+/// Returns the rotation of a fish that points along yaw and pitch (docs/reference/formats.md,
+/// "Conventions") and is rolled by `roll_rad` about its own axis. A positive roll moves the back to the
+/// fish's right.
 pub fn rotation_of(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> DQuat {
     let (sy, cy) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
     let (sp, cp) = (libm::sin(pitch_rad), libm::cos(pitch_rad));
@@ -67,9 +69,9 @@ pub fn rotation_of(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> DQuat {
     upright * DQuat::from_xyzw(libm::sin(half), 0.0, 0.0, libm::cos(half))
 }
 
-/// The lean of a fish that turns at `turn_rad_per_s` (positive: to its left) while swimming at
-/// `speed_m_per_s`: into the turn as a banked flier would, a few times more as fish do, at most
-/// `limit_rad`.
+/// Returns the roll angle, in radians, of a fish that turns at `turn_rad_per_s` (positive = to its left)
+/// and swims at `speed_m_per_s`. The fish rolls into the turn like a banking aircraft, six times as far,
+/// and at most by `limit_rad`.
 pub fn bank_rad(turn_rad_per_s: f64, speed_m_per_s: f64, limit_rad: f64) -> f64 {
     const GRAVITY_M_PER_S2: f64 = 9.81;
     const EXAGGERATION: f64 = 6.0;
@@ -77,8 +79,8 @@ pub fn bank_rad(turn_rad_per_s: f64, speed_m_per_s: f64, limit_rad: f64) -> f64 
     -lean.clamp(-limit_rad, limit_rad)
 }
 
-/// The quaternion on the same side as `previous`: both signs mean the same rotation, but only one
-/// can be reached by going straight.
+/// Returns `rotation` with the sign that is nearer to `previous`. Both signs are the same rotation, but
+/// only the nearer one interpolates the short way.
 pub fn same_side(previous: DQuat, rotation: DQuat) -> DQuat {
     if previous.dot(rotation) < 0.0 {
         -rotation
@@ -87,7 +89,7 @@ pub fn same_side(previous: DQuat, rotation: DQuat) -> DQuat {
     }
 }
 
-/// The rotation `share` of the way from `a` to `b`, at constant rate, the short way round.
+/// Returns the rotation at `share` of the short way from `a` to `b`, at a constant angular rate.
 pub fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
     let b = same_side(a, b);
     let angle = libm::acos(a.dot(b).clamp(-1.0, 1.0));

@@ -1,9 +1,10 @@
-//! Colors of the virtual fish: countershaded, darker above and paler below, as a fish in the open
-//! is. Encoded sRGB, 0..=1.
+//! Colors of the virtual fish, in encoded sRGB, 0..=1.
+//!
+//! The fish is countershaded like fish of open water: darker above and paler below.
 
 use super::params::Palette;
 
-/// The colors of one fish.
+/// Colors of one fish.
 pub(super) struct Coat {
     back: Rgb,
     flank: Rgb,
@@ -16,7 +17,7 @@ pub(super) struct Coat {
 type Rgb = [f32; 3];
 
 impl Coat {
-    /// The coat of a palette.
+    /// Returns the colors of a palette.
     pub(super) fn of(palette: Palette) -> Coat {
         match palette {
             Palette::Goldfish => Coat {
@@ -46,12 +47,13 @@ impl Coat {
         }
     }
 
-    /// The skin at `s` (from the nose) and `up` (1 on the back, -1 on the belly).
+    /// Returns the RGBA color of the skin at `s` (0 = nose, 1 = tip of the tail) and `up` (1 = back, -1 =
+    /// belly).
     pub(super) fn skin(&self, s: f64, up: f64) -> [f32; 4] {
         let up = up as f32;
         let above = mix(self.flank, self.back, smoothstep(0.15, 0.95, up));
         let mut color = mix(self.belly, above, smoothstep(-0.95, -0.15, up));
-        // Cheeks are smooth and a little paler; the edge of the gill cover is a dark crescent.
+        // Cheeks are smooth and slightly paler. The edge of the gill cover is a dark crescent.
         let s = s as f32;
         let cheek = 1.0 - smoothstep(0.14, 0.19, s);
         color = mix(
@@ -69,8 +71,8 @@ impl Coat {
         [color[0], color[1], color[2], 1.0]
     }
 
-    /// A fin at `out` (0 where it joins the body, 1 at its edge). More opaque than not even at its
-    /// edge, so that the silhouette ends where the mesh does.
+    /// Returns the RGBA color of a fin at `out` (0 = base, 1 = edge). Alpha stays above one half even at
+    /// the edge, so that the silhouette ends where the mesh ends.
     pub(super) fn fin(&self, out: f64) -> [f32; 4] {
         let out = out as f32;
         let color = mix(self.fin_base, self.fin_edge, smoothstep(0.1, 1.0, out));
@@ -78,7 +80,8 @@ impl Coat {
         [color[0], color[1], color[2], alpha]
     }
 
-    /// The eye at `out` (1 at the middle of the pupil, 0 at its rim), turned up by `up`.
+    /// Returns the RGBA color of the eye at `out` (1 = middle of the pupil, 0 = rim). `up` in -1..=1
+    /// brightens the upper part of the iris.
     pub(super) fn eye(&self, out: f64, up: f64) -> [f32; 4] {
         let out = out as f32;
         let iris = self.iris.map(|c| c * (1.0 + 0.15 * up as f32));
@@ -92,13 +95,13 @@ impl Coat {
     }
 }
 
-/// 0 below `from`, 1 above `to`, smooth between.
+/// Returns 0 below `from`, 1 above `to`, and a smooth curve between.
 fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
     let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// 1 at 0, falling smoothly to 0 at -1 and 1.
+/// Returns 1 at 0, falling smoothly to 0 at -1 and 1.
 fn bump(x: f32) -> f32 {
     let t = (1.0 - x * x).max(0.0);
     t * t

@@ -1,40 +1,44 @@
-//! What a person may set about the virtual fish. Every default is the value of ALGORITHMS.md 4.
+//! Parameters of the virtual fish: colors, size, and motion
+//! (docs/explanation/algorithms.md, "Virtual fish").
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use crate::library::Animal;
 
-/// Parameters of the virtual fish; all have defaults.
+/// Parameters of the virtual fish. Every field has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = FishParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Its colors.
+    /// Colors of the fish.
     pub palette: Palette,
-    /// From the nose to the tip of the tail, metres, > 0; null = the measured animal's, or 0.10.
+    /// Length from the nose to the tip of the tail, in metres, > 0. null = the length of the measured
+    /// animal, or 0.10 if it is unknown.
     pub length_m: Option<f64>,
-    /// Height of the whole silhouette, fins included, metres, > 0; null = the measured animal's, or
-    /// in proportion to the length.
+    /// Height of the whole silhouette, fins included, in metres, > 0. null = the height of the measured
+    /// animal, or 0.47 times the length if it is unknown.
     pub height_m: Option<f64>,
-    /// Bend the body; off is N's rigid fish.
+    /// Whether the body bends. false = the rigid fish of Nakajima et al.
     pub swim: bool,
-    /// Largest lean into a turn, radians, 0..=0.8.
+    /// Maximum roll angle in a turn, in radians, 0..=0.8. 0 = the fish stays upright.
     pub bank_rad: f64,
-    /// Standard deviation of the smoothing over time, seconds, 0..=1; 0 = none.
+    /// Standard deviation of the Gaussian that smooths the motion over time, in seconds, 0..=1. 0 = no
+    /// smoothing.
     pub smooth_s: f64,
-    /// Longest gap in the measurement that is bridged, seconds, 0..=5; longer ones hide the fish.
+    /// Longest gap in the measurement that is filled by interpolation, in seconds, 0..=5. The fish is
+    /// invisible during longer gaps.
     pub bridge_s: f64,
 }
 
-/// The colors of the virtual fish.
+/// Color scheme of the virtual fish.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Palette {
-    /// The common goldfish: orange, darker above, pale gold below.
+    /// Common goldfish: orange, darker above, pale gold below.
     #[default]
     Goldfish,
-    /// A silvery fish with a slate back.
+    /// Silver with a slate back.
     Silver,
     /// Nearly black above, bronze below.
     Bronze,
@@ -55,7 +59,7 @@ impl Default for Params {
 }
 
 impl Params {
-    /// What N says: the body does not bend, its up axis stays upright, values as they were measured.
+    /// Returns the parameters of Nakajima et al.: a rigid, upright body and unsmoothed values.
     pub fn papers() -> Params {
         Params {
             swim: false,
@@ -65,7 +69,8 @@ impl Params {
         }
     }
 
-    /// The size of the fish: as set, else as measured, else a goldfish 0.10 m long.
+    /// Returns the size of the fish. Each dimension is the one set here, else the measured one, else the
+    /// default.
     pub fn size(&self, measured: Option<Animal>) -> Animal {
         let length_m = self
             .length_m
@@ -78,7 +83,7 @@ impl Params {
         }
     }
 
-    /// Checks every range; the sentence says which parameter is out of which range.
+    /// Checks the range of every field. The error names the field and its range.
     pub fn check(&self) -> Result<(), String> {
         for (name, value) in [("length_m", self.length_m), ("height_m", self.height_m)] {
             if value.is_some_and(|v| !(v.is_finite() && v > 0.0)) {
@@ -98,9 +103,10 @@ impl Params {
     }
 }
 
-/// Length of the fish when nothing is known, metres.
+/// Length of the fish if none is set or measured, in metres. Free choice.
 const DEFAULT_LENGTH_M: f64 = 0.10;
-/// Height of the silhouette in lengths when nothing is known: a common goldfish with raised fins.
+/// Height of the silhouette if none is set or measured, in body lengths. A common goldfish with raised fins
+/// has about this height.
 const DEFAULT_HEIGHT_BL: f64 = 0.47;
 
 #[cfg(test)]

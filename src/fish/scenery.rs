@@ -1,15 +1,16 @@
-//! The tank in which the sample fish is filmed: water with shafts of light, a gravel floor, stones
-//! and plants. Painted from seeded random numbers, the same on every machine.
+//! Background of the sample film: a tank with shafts of light, a gravel floor, stones and plants.
+//!
+//! The scene is painted with seeded random numbers and is the same on every machine.
 
 use crate::random;
 use crate::raster::RgbImage;
 
-/// Where the floor meets the back wall, of the height.
+/// Height at which the floor meets the back wall, as a share of the image height from the top. Free choice.
 const HORIZON: f64 = 0.765;
-/// The water, above and below, 0..=255.
+/// Color of the water at the top and at the bottom, 0..=255. Free choice.
 const WATER: [[f64; 3]; 2] = [[126.0, 184.0, 188.0], [34.0, 84.0, 98.0]];
 
-/// The scene without the fish.
+/// Returns the scene without the fish.
 pub(super) fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
     let mut scene = Painting::of_water(width, height, seed);
     scene.plants(&PlantBed {
@@ -60,7 +61,7 @@ struct Painting {
     pixels: Vec<[f64; 3]>,
 }
 
-/// A row of plants; lengths in shares of the width or, along the vertical, of the height.
+/// Row of plants. Horizontal lengths are shares of the image width, vertical lengths of the image height.
 struct PlantBed {
     key: u64,
     n: u64,
@@ -71,7 +72,7 @@ struct PlantBed {
     haze: f64,
 }
 
-/// An ellipse lit from the upper left.
+/// Ellipse lit from the upper left, in pixels.
 struct Pebble {
     at: [f64; 2],
     radii: [f64; 2],
@@ -95,12 +96,12 @@ impl Painting {
         }
     }
 
-    /// Random number `k` of a plant or stone, in [0, 1).
+    /// Returns random number `k` of a plant or stone, in [0, 1).
     fn unit(&self, key: u64, item: u64, k: u64) -> f64 {
         random::unit(self.seed, &[0x73_6365_6e65, key, item, k])
     }
 
-    /// Leaves like ribbons, each swaying its own way and narrowing to its tip.
+    /// Draws a row of plants. Their leaves are ribbons that sway individually and narrow toward the tip.
     fn plants(&mut self, bed: &PlantBed) {
         for plant in 0..bed.n {
             let at = |k: u64| self.unit(bed.key, plant, k);
@@ -141,7 +142,7 @@ impl Painting {
                 (blade.root[1] - blade.tall * t) * h,
             ];
             let radius = blade.wide * w * (1.0 - 0.85 * t * t) * (0.5 + 0.5 * (6.0 * t).min(1.0));
-            // The foot lies in shadow, the tip in the light; the left edge catches more of it.
+            // The foot is dark and the tip bright. The left edge is brighter than the rest.
             let glow = 0.62 + 0.55 * t;
             let far = water([at[0] / w, at[1] / h], self.seed);
             let tint = |gain: f64| -> [f64; 3] {
@@ -152,7 +153,7 @@ impl Painting {
         }
     }
 
-    /// The floor: sand with pebbles, small and dim at the back, larger and brighter in front.
+    /// Draws the floor: sand with pebbles, small and dim at the back, larger and brighter in front.
     fn gravel(&mut self) {
         let (w, h) = (self.width as f64, self.height as f64);
         for y in (HORIZON * h) as usize..self.height {
@@ -188,7 +189,7 @@ impl Painting {
         }
     }
 
-    /// Three stones at the back.
+    /// Draws three stones at the back.
     fn rocks(&mut self) {
         let (w, h) = (self.width as f64, self.height as f64);
         for (x, y, rx, ry, gray) in [
@@ -205,7 +206,8 @@ impl Painting {
         }
     }
 
-    /// A stone shaded as a rounded body, with a grain; `haze` mixes in the water before it.
+    /// Draws a stone, shaded as a rounded body with a grain. `haze` is the share of water color mixed in,
+    /// 0..=1.
     fn pebble(&mut self, stone: &Pebble, haze: f64) {
         let ([cx, cy], [rx, ry]) = (stone.at, stone.radii);
         let (w, h) = (self.width as f64, self.height as f64);
@@ -233,7 +235,8 @@ impl Painting {
         });
     }
 
-    /// Blends what `paint` gives (coverage and color) at every pixel middle within the reach.
+    /// Blends the coverage and color that `paint` returns for every pixel center within `reach` of
+    /// `center`.
     fn each_near(
         &mut self,
         center: [f64; 2],
@@ -263,7 +266,7 @@ impl Painting {
     }
 }
 
-/// One leaf: shares of the width across, of the height along.
+/// One leaf. Horizontal lengths are shares of the image width, vertical lengths of the image height.
 struct Blade {
     root: [f64; 2],
     tall: f64,
@@ -272,8 +275,8 @@ struct Blade {
     wide: f64,
 }
 
-/// The water at a place, 0..=1 across and down: lighter above and in the middle, with slanting
-/// shafts of light that fade on their way down.
+/// Returns the color of the water at a position, 0..=1 across and down. The water is lighter at the top and
+/// in the middle, with slanting shafts of light that fade downward.
 fn water([x, y]: [f64; 2], seed: u64) -> [f64; 3] {
     let down = y.clamp(0.0, 1.0);
     let ramp = 1.0 - (1.0 - down) * (1.0 - down);

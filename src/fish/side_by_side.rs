@@ -1,14 +1,15 @@
-//! The animal and its virtual twin next to each other: the real frame, put together again from
-//! matte and background, on the left; the same moment of the virtual fish on the right (N, figures
-//! 2 and 3).
+//! The real animal and the virtual fish side by side (Nakajima et al., figures 2 and 3).
+//!
+//! The left half is the real frame, composed of matte and background. The right half is the virtual fish in
+//! the same frame.
 
 use super::film::Film;
 use crate::geometry::Rect;
 use crate::library::Library;
 use crate::raster::{Frame, RgbImage};
 
-/// Draws frame `frame_idx` of both into one frame twice as wide. Panics beyond the last frame of
-/// either, and when the two differ in size.
+/// Draws frame `frame_idx` of both into one frame of twice the width. Panics beyond the last frame of
+/// either, and if their sizes differ.
 pub fn render(library: &Library, film: &Film, frame_idx: usize, frame: &mut Frame) {
     let real = real_frame(library, frame_idx);
     let mut twin = film.background().clone();
@@ -35,7 +36,8 @@ pub fn render(library: &Library, film: &Film, frame_idx: usize, frame: &mut Fram
     frame.draw_rgb(&both, Rect::of_size(width, height));
 }
 
-/// The background with the animal of one frame laid back where it was.
+/// Returns the background with the animal's matte of one frame at its place. If the animal was not found,
+/// the background is returned.
 fn real_frame(library: &Library, frame_idx: usize) -> RgbImage {
     let mut image = library.background.clone();
     let sprites = &library.sprites;

@@ -1,9 +1,11 @@
-//! The spine of 8 joints, and how it bends: by the measured midline or by the swimming wave
-//! A(s) sin(2 pi (f t - s / 0.95)), A(s) = a0 + a2 s^2 (ALGORITHMS.md 4, virtual fish).
+//! Spine of the virtual fish: 8 joints, bent by the measured midline or by a swimming wave.
 //!
-//! The fish's own frame: x forward, y down (toward the belly), z to its left; origin at the middle
-//! of its silhouette. `s` runs from the nose (0) to the tip of the tail (1). A joint angle turns what
-//! lies behind the joint about the y axis; positive swings the tail to the fish's left.
+//! The wave is A(s) sin(2 pi (f t - s / 0.95)) with A(s) = a0 + a2 s^2
+//! (docs/explanation/algorithms.md, "Virtual fish").
+//!
+//! The fish's own frame: x forward, y down (toward the belly), z to its left; the origin is the middle of
+//! the silhouette. `s` runs from the nose (0) to the tip of the tail (1). A joint angle rotates the part
+//! behind the joint about the y axis. A positive angle moves the tail to the fish's left.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,40 +13,44 @@ use glam::{DQuat, DVec3};
 
 use crate::geometry::wrap_rad;
 
-/// Joints of the spine.
+/// Number of joints of the spine.
 pub const N_JOINTS: usize = 8;
 
-/// Where the joints lie, from nose (0) to tail tip (1). The first carries the head, which is stiff.
+/// Positions of the joints along the body, from the nose (0) to the tip of the tail (1). The first joint
+/// carries the head, which is stiff. Free choice.
 pub const JOINT_S: [f64; N_JOINTS] = [0.27, 0.36, 0.45, 0.54, 0.63, 0.72, 0.81, 0.90];
 
-/// Where the origin of the fish's own frame lies: the middle of the silhouette.
+/// Position along the body of the origin of the fish's own frame: the middle of the silhouette.
 pub const ORIGIN_S: f64 = 0.466;
 
-/// How far the spine lies below the middle of the silhouette, lengths: the dorsal fin is the tallest.
+/// Distance of the spine below the middle of the silhouette, in body lengths. The dorsal fin, the tallest
+/// fin, moves the middle up.
 pub const SPINE_DOWN_BL: f64 = 0.017;
 
-/// Wavelength of the swimming wave, lengths.
+/// Wavelength of the swimming wave, in body lengths. Free choice.
 const WAVELENGTH_BL: f64 = 0.95;
-/// Amplitude of the wave at the nose, lengths.
+/// Amplitude a0 of the wave at the nose, in body lengths. Free choice.
 const A0_BL: f64 = 0.012;
-/// Growth of the amplitude with s squared, lengths: the tail tip swings by a0 + a2.
+/// Growth a2 of the amplitude with s squared, in body lengths. The amplitude of the tail tip is a0 + a2.
+/// Free choice.
 const A2_BL: f64 = 0.085;
-/// Sideways bend of the tail tip in a turn, lengths per radian a second.
+/// Sideways bend in a turn, in body lengths per radian a second: the factor of (s - 0.2) squared. Free
+/// choice.
 const TURN_BEND_BL: f64 = 0.055;
 
-/// How the fish swims at one moment.
+/// Phase and strength of swimming at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swimming {
-    /// f t: where in the tail beat, turns.
+    /// Phase f t of the tail beat, in beats.
     pub phase_turns: f64,
-    /// Share of the full amplitude, 0..=1.5: small when gliding.
+    /// Share of the full amplitude, 0..=1.5; small while the fish glides.
     pub effort: f64,
-    /// Rate of turn to the left, radians a second.
+    /// Turn rate to the left, in radians a second.
     pub turn_rad_per_s: f64,
 }
 
 impl Swimming {
-    /// Sideways offset of the spine at `s`, lengths, positive to the fish's left.
+    /// Returns the sideways displacement of the spine at `s`, in body lengths, positive to the fish's left.
     pub fn lateral_bl(&self, s: f64) -> f64 {
         let amplitude = self.effort * (A0_BL + A2_BL * s * s);
         let wave = amplitude * libm::sin(TAU * (self.phase_turns - s / WAVELENGTH_BL));
@@ -52,7 +58,7 @@ impl Swimming {
         wave + TURN_BEND_BL * self.turn_rad_per_s.clamp(-3.0, 3.0) * behind * behind
     }
 
-    /// The joint angles that lay the spine on this curve, radians.
+    /// Returns the joint angles that bend the spine along this curve, in radians.
     pub fn joint_angles_rad(&self) -> [f64; N_JOINTS] {
         let slope = |from: f64, to: f64| {
             libm::atan2(self.lateral_bl(to) - self.lateral_bl(from), to - from)
@@ -66,18 +72,21 @@ impl Swimming {
     }
 }
 
-/// Tail beats a second at a speed in lengths a second, after Bainbridge (1958): v = (3 f - 4) / 4.
+/// Returns the frequency of the tail beat at a speed in body lengths a second, at most 12 Hz. Bainbridge
+/// (1958): v = (3 f - 4) / 4.
 pub fn tail_beat_hz(speed_bl_per_s: f64) -> f64 {
     (4.0 / 3.0 * (1.0 + speed_bl_per_s.max(0.0))).min(12.0)
 }
 
-/// How far the tail swings at a speed in lengths a second: a glide keeps half of the amplitude.
+/// Returns the share of the full amplitude at a speed in body lengths a second: 0.5 at rest, 1.1 from 1.5
+/// body lengths a second on.
 pub fn effort_at(speed_bl_per_s: f64) -> f64 {
     0.5 + 0.6 * (speed_bl_per_s / 1.5).clamp(0.0, 1.0)
 }
 
-/// The joint angles of a midline seen from above, head first, for a fish heading `heading_rad`
-/// (image axes). `None` when the midline has fewer than two points or no length.
+/// Returns the joint angles, in radians, of a midline in top view. The midline begins at the head;
+/// `heading_rad` is the heading of the fish in image axes. `None` if the midline has fewer than two points
+/// or no length.
 pub fn joint_angles_of_midline_rad(
     midline_px: &[[f64; 2]],
     heading_rad: f64,
@@ -102,7 +111,8 @@ pub fn joint_angles_of_midline_rad(
     Some(differences(tangents).map(wrap_rad))
 }
 
-/// Where each joint is and how it is turned in the fish's own frame, for a fish of `length_m`.
+/// Returns the position (in metres) and the rotation of each joint in the fish's own frame, for a fish of
+/// `length_m`.
 pub fn joint_frames(length_m: f64, angles_rad: &[f64; N_JOINTS]) -> [(DVec3, DQuat); N_JOINTS] {
     let mut pivot = joint_at_rest_m(length_m, 0);
     let mut turned_rad = 0.0;
@@ -115,18 +125,18 @@ pub fn joint_frames(length_m: f64, angles_rad: &[f64; N_JOINTS]) -> [(DVec3, DQu
     })
 }
 
-/// Where joint `j` lies in the fish's own frame when the body is straight, metres.
+/// Returns the position of joint `j` in the fish's own frame when the body is straight, in metres.
 pub fn joint_at_rest_m(length_m: f64, j: usize) -> DVec3 {
     DVec3::new((ORIGIN_S - JOINT_S[j]) * length_m, 0.0, 0.0)
 }
 
-/// The rotation about the y axis by `angle_rad`.
+/// Returns the rotation about the y axis by `angle_rad`.
 pub fn about_y(angle_rad: f64) -> DQuat {
     let half = 0.5 * angle_rad;
     DQuat::from_xyzw(0.0, libm::sin(half), 0.0, libm::cos(half))
 }
 
-/// The two joints that move a point at `s`, and the share of the second, 0..=1.
+/// Returns the two joints that move a point at `s`, and the weight of the second, 0..=1.
 pub fn joints_at(s: f64) -> (usize, usize, f64) {
     let middle = |j: usize| 0.5 * (JOINT_S[j] + segment_end(j));
     let next = (0..N_JOINTS).find(|&j| s < middle(j)).unwrap_or(N_JOINTS);
@@ -231,7 +241,8 @@ mod tests {
             .collect();
         let angles = joint_angles_of_midline_rad(&straight, heading).expect("it has a length");
         assert!(angles.iter().all(|a| a.abs() < 1e-9), "{angles:?}");
-        // A quarter circle, heading along +x at the head, the tail curving up the picture: to the left.
+        // A quarter circle. The head points along +x. The tail curves up in the picture, to the fish's
+        // left.
         let arc: Vec<[f64; 2]> = (0..=40)
             .map(|k| f64::from(k) / 40.0 * PI / 2.0)
             .map(|t| [-100.0 * t.sin(), -100.0 * (1.0 - t.cos())])

@@ -1,5 +1,7 @@
-//! A wandering swimmer in a tank: how the sample fish moves. Ornstein-Uhlenbeck turn rate and speed,
-//! now and then a dart aside, and a turn away from every wall that comes near. Seeded.
+//! Random swimmer in a tank: the motion of the sample fish.
+//!
+//! Turn rate and speed are Ornstein-Uhlenbeck processes. Now and then the fish turns aside abruptly, and it
+//! turns away from walls ahead. All random numbers depend on the seed.
 
 use std::f64::consts::PI;
 
@@ -9,35 +11,36 @@ use super::spine::tail_beat_hz;
 use crate::geometry::wrap_rad;
 use crate::random;
 
-/// Width, height and depth of the tank, metres.
+/// Width, height and depth of the tank, in metres. Free choice.
 pub const TANK_M: [f64; 3] = [0.60, 0.36, 0.30];
-/// Distance from the camera to the tank's front pane, metres.
+/// Distance from the camera to the tank's front pane, in metres. Free choice.
 pub const PANE_Z_M: f64 = 0.70;
 
-/// How far ahead it looks for a wall, metres.
+/// Distance ahead at which the fish reacts to a wall, in metres. Free choice.
 const LOOK_AHEAD_M: f64 = 0.11;
-/// How near its middle may come to a wall: ahead and behind it is half a fish.
+/// Least distance of the middle of the fish from a wall along x, y and z, in metres. Half of the fish lies
+/// ahead of its middle and half behind.
 const CLEARANCE_M: [f64; 3] = [0.055, 0.045, 0.055];
 
-/// The swimmer at one moment.
+/// State of the swimmer in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
-    /// Camera frame, metres.
+    /// Position in the camera frame, in metres.
     pub position_m: DVec3,
-    /// atan2(dz, dx) of the direction, in (-pi, pi].
+    /// Yaw: atan2(dz, dx) of the direction, in (-pi, pi].
     pub yaw_rad: f64,
-    /// asin(dy) of the direction: positive = nose down.
+    /// Pitch: asin(dy) of the direction; positive = nose down.
     pub pitch_rad: f64,
-    /// Metres a second.
+    /// Speed, in metres a second.
     pub speed_m_per_s: f64,
-    /// Turn rate, radians a second, positive to the left of the fish.
+    /// Turn rate, in radians a second; positive = to the left of the fish.
     pub turn_rad_per_s: f64,
-    /// Tail beats since the start.
+    /// Number of tail beats since the start.
     pub phase_turns: f64,
 }
 
 impl Stroke {
-    /// Unit vector along which it swims.
+    /// Returns the direction of the swimmer, a unit vector.
     pub fn forward(&self) -> DVec3 {
         let (cos_pitch, sin_pitch) = (libm::cos(self.pitch_rad), libm::sin(self.pitch_rad));
         DVec3::new(
@@ -48,7 +51,7 @@ impl Stroke {
     }
 }
 
-/// `n_frames` moments at `fps` of a swimmer `length_m` long.
+/// Returns `n_frames` states of a swimmer of `length_m`, at `fps` frames a second.
 pub fn wander(seed: u64, n_frames: usize, fps: f64, length_m: f64) -> Vec<Stroke> {
     let dt_s = 1.0 / fps;
     let mut now = Stroke {
@@ -69,11 +72,11 @@ pub fn wander(seed: u64, n_frames: usize, fps: f64, length_m: f64) -> Vec<Stroke
         .collect()
 }
 
-/// What it would do in open water.
+/// Changes turn rate, speed and pitch at random, as in open water.
 fn wish(now: &mut Stroke, seed: u64, step: u64, dt_s: f64) {
     let noise = |channel: u64| random::normal(seed, &[step, channel]);
     let chance = |channel: u64| random::unit(seed, &[step, channel]);
-    // White noise of the same strength per second at any frame rate.
+    // The strength of the noise per second does not depend on the frame rate.
     let kick = (dt_s / 30.0).sqrt();
     now.turn_rad_per_s += -2.2 * now.turn_rad_per_s * dt_s + 6.5 * noise(1) * kick;
     if chance(2) < 0.35 * dt_s {
@@ -85,7 +88,8 @@ fn wish(now: &mut Stroke, seed: u64, step: u64, dt_s: f64) {
     now.pitch_rad += -0.8 * now.pitch_rad * dt_s + 1.9 * noise(6) * kick;
 }
 
-/// Turns from what lies ahead, sharper and slower the nearer it is.
+/// Turns the fish away from a wall ahead. The nearer the wall, the sharper the turn and the slower the
+/// fish.
 fn avoid_walls(now: &mut Stroke, dt_s: f64) {
     let ahead = now.position_m + LOOK_AHEAD_M * now.forward();
     let into = inward(ahead);
@@ -93,7 +97,7 @@ fn avoid_walls(now: &mut Stroke, dt_s: f64) {
     if depth_m > 0.0 {
         let mut gap = wrap_rad(libm::atan2(into.z, into.x) - now.yaw_rad);
         if gap.abs() > 2.0 {
-            // Head-on either side will do: it keeps to the one it has begun with.
+            // Head-on, both sides are equally good. The fish keeps its present direction of turning.
             gap = gap.abs().copysign(now.turn_rad_per_s);
         }
         let urgency = (0.3 + depth_m / 0.04).min(1.6);
@@ -108,7 +112,7 @@ fn avoid_walls(now: &mut Stroke, dt_s: f64) {
     now.pitch_rad = now.pitch_rad.clamp(-0.5, 0.5);
 }
 
-/// How far the point would have to move to be clear of every wall, metres.
+/// Returns the displacement that moves a point clear of every wall, in metres.
 fn inward(point: DVec3) -> DVec3 {
     let [lo, hi] = clear_water();
     point.clamp(lo, hi) - point

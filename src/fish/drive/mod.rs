@@ -1,10 +1,11 @@
-//! Poses to motion: the virtual fish placed and turned as the animal was measured, bent by its
-//! midline or by a swimming wave of the measured speed (N 7; ALGORITHMS.md 4, virtual fish).
+//! From poses to motion: position and rotation of the virtual fish are those of the measured animal. Its
+//! body bends along the measured midline, or in a swimming wave that fits the measured speed (Nakajima et
+//! al., section 7; docs/explanation/algorithms.md, "Virtual fish").
 //!
-//! With a calibrated camera the fish moves in space. Without one nothing is known of its depth: it
-//! swims at a constant distance from an assumed camera, as long in the picture as the animal, and
-//! turns about by way of the camera when the heading changes sides. Short gaps are bridged, longer
-//! ones hide it.
+//! With a calibrated camera the fish moves in space. Without one its depth is unknown. The fish then keeps
+//! a constant distance from an assumed camera, at which it is as long in the picture as the animal. When
+//! its heading changes sides, it turns by way of the camera. Short gaps are filled by interpolation. In
+//! longer gaps the fish is invisible.
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
@@ -15,7 +16,7 @@ use super::spine::{N_JOINTS, Swimming, effort_at, joint_angles_of_midline_rad, t
 use crate::geometry::Camera;
 use crate::library::{Animal, Pose, Poses, View};
 
-/// The motion of the virtual fish. Fails on parameters out of range, and when the animal was found
+/// Returns the motion of the virtual fish. Fails if a parameter is out of range, or if the animal was found
 /// in no frame.
 pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
     params.check().map_err(Error::InvalidParams)?;
@@ -33,15 +34,15 @@ pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
     })
 }
 
-/// What holds for all frames.
+/// Values that are the same for all frames.
 struct Stage {
     fps: f64,
     view: View,
     camera: Camera,
     size: Animal,
-    /// Apparent depth at which a fish is put whose depth was not measured.
+    /// Apparent depth of the fish where no depth was measured, in metres.
     z_apparent_m: f64,
-    /// Length of the animal seen broadside, pixels.
+    /// Length of the animal seen broadside, in pixels.
     length_px: f64,
 }
 
@@ -56,7 +57,7 @@ impl Stage {
             });
         }
         let [width, height] = poses.image_size_px.map(f64::from);
-        // The 90th percentile: a fish is seen shorter than it is, rarely longer.
+        // The 90th percentile: foreshortening makes many measured lengths too short, and few are too long.
         let rank = lengths_px.len() * 9 / 10;
         let length_px = lengths_px.get(rank).copied().unwrap_or(0.15 * width);
         let size = params.size(poses.animal);
@@ -77,10 +78,10 @@ impl Stage {
     }
 }
 
-/// How far away an assumed camera stands, body lengths.
+/// Distance of the assumed camera, in body lengths. Free choice.
 const ASSUMED_DISTANCE_BL: f64 = 10.0;
 
-/// Where and how the fish is in one frame, before it swims.
+/// Position, rotation and measured bend of the fish in one frame, before swimming is added.
 #[derive(Clone, Copy, Debug)]
 struct Placement {
     position_m: DVec3,
@@ -117,8 +118,8 @@ fn position_of(pose: &Pose, stage: &Stage) -> Option<DVec3> {
     Some(DVec3::from(point))
 }
 
-/// Headings as vectors in the image, shorter where the fish is seen foreshortened, smoothed: when
-/// the fish turns about they pass through zero instead of jumping.
+/// Returns the headings as vectors in the image, smoothed over time. A vector is shorter where the fish is
+/// foreshortened. When the fish turns around, the vectors pass through zero without a jump.
 fn headings_in_image(frames: &[Pose], stage: &Stage, params: &Params) -> Vec<Option<DVec2>> {
     let vectors: Vec<Option<DVec2>> = frames
         .iter()
@@ -136,8 +137,8 @@ fn headings_in_image(frames: &[Pose], stage: &Stage, params: &Params) -> Vec<Opt
         .collect()
 }
 
-/// Smoothing of headings that are known in the image alone, seconds: a fish turns about in three
-/// times as long.
+/// Least smoothing of headings that are known only in the image: standard deviation in seconds. A fish
+/// takes about three times as long to turn around.
 const LEAST_TURN_S: f64 = 0.08;
 
 fn weighted_mean(values: &[Option<DVec2>], middle: usize, sigma_frames: f64) -> DVec2 {
@@ -151,7 +152,8 @@ fn weighted_mean(values: &[Option<DVec2>], middle: usize, sigma_frames: f64) -> 
     sum / total
 }
 
-/// The direction in space of a heading vector of length 0..=1: what is missing points to the camera.
+/// Returns the direction in space of a heading vector of length 0..=1. The missing length points toward the
+/// camera.
 fn toward_camera(heading: DVec2) -> DVec3 {
     let depth = (1.0 - heading.length_squared()).max(0.0).sqrt();
     DVec3::new(heading.x, heading.y, -depth)
@@ -162,7 +164,8 @@ fn upright_along(forward: DVec3) -> DQuat {
     rotation_of(libm::atan2(forward.z, forward.x), pitch, 0.0)
 }
 
-/// Heading in the image plane, back to the camera.
+/// Returns the rotation of a fish in top view: the heading lies in the image plane, the back faces the
+/// camera.
 fn seen_from_above(heading_rad: f64) -> DQuat {
     let forward = DVec3::new(libm::cos(heading_rad), libm::sin(heading_rad), 0.0);
     DQuat::from_mat3(&DMat3::from_cols(
@@ -172,7 +175,7 @@ fn seen_from_above(heading_rad: f64) -> DQuat {
     ))
 }
 
-/// Fills gaps of at most `longest` frames between two known ones.
+/// Fills gaps of at most `longest` frames between two known frames by interpolation.
 fn bridge(measured: &[Option<Placement>], longest: usize) -> Vec<Option<Placement>> {
     let mut bridged = measured.to_vec();
     let known: Vec<usize> = (0..measured.len())
@@ -203,7 +206,8 @@ fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
     }
 }
 
-/// Gaussian means over time, within each unbroken run.
+/// Returns Gaussian means of positions and rotations over time, within each run without gaps. Joint angles
+/// stay unchanged.
 fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<Placement>> {
     let around = |k: usize| {
         let middle = placements[k]?;
@@ -230,7 +234,7 @@ fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<P
     (0..placements.len()).map(around).collect()
 }
 
-/// Indices within three standard deviations of `middle`, with their weights.
+/// Returns the indices within three standard deviations of `middle`, with their Gaussian weights.
 fn window(n: usize, middle: usize, sigma_frames: f64) -> impl Iterator<Item = (usize, f64)> {
     let reach = (3.0 * sigma_frames).floor() as usize;
     (middle.saturating_sub(reach)..(middle + reach + 1).min(n)).map(move |k| {
@@ -239,7 +243,8 @@ fn window(n: usize, middle: usize, sigma_frames: f64) -> impl Iterator<Item = (u
     })
 }
 
-/// Bends and banks the fish as fast as it moves and turns; where it is unknown, hides it.
+/// Returns the posture of each frame: the body bends along the midline, else in the swimming wave, and
+/// rolls into turns. The fish is invisible where its placement is unknown.
 fn swim(
     placements: &[Option<Placement>],
     poses: &Poses,
@@ -261,9 +266,9 @@ fn swim(
         };
         let moving = Moving::around(placements, k, stage.fps);
         let new_speed = moving.speed_m_per_s.max(0.0) / stage.size.length_m;
-        // The tail answers within a fifth of a second; measured speeds are noisier than that.
+        // A low-pass of 0.2 s: measured speeds are noisier than the motion of the tail.
         speed_bl_per_s += (new_speed - speed_bl_per_s) * (5.0 / stage.fps).min(1.0);
-        // Where no beat was measured, the one that goes with the speed.
+        // Where no tail beat was measured, its frequency follows from the speed.
         let beat_hz = poses
             .tail_beat_hz(k)
             .unwrap_or(tail_beat_hz(speed_bl_per_s));
@@ -292,16 +297,16 @@ fn swim(
     frames
 }
 
-/// How the fish moves about one frame.
+/// Speed and turn rate of the fish in one frame.
 struct Moving {
-    /// Along its own direction, metres a second.
+    /// Speed along its own direction, in metres a second.
     speed_m_per_s: f64,
-    /// To its left, radians a second.
+    /// Turn rate to its left, in radians a second.
     turn_rad_per_s: f64,
 }
 
 impl Moving {
-    /// From the neighbors that are known; at rest where there are none.
+    /// Returns the motion between the known neighboring frames; zero if there are none.
     fn around(placements: &[Option<Placement>], k: usize, fps: f64) -> Moving {
         let known = |k: usize| placements.get(k).copied().flatten();
         let (before, after) = (

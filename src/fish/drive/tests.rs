@@ -1,5 +1,5 @@
-//! What driving promises: the fish is where the animal was, points where it pointed, and hides
-//! where nothing is known.
+//! Tests of `drive`: the fish has the position and direction of the animal, and is invisible where nothing
+//! is known.
 
 use std::f64::consts::PI;
 
@@ -18,7 +18,8 @@ fn truth(n_frames: usize) -> (SampleFilm, Poses) {
     (film, poses)
 }
 
-/// A fish that crosses the image to the right, turns about and comes back; no camera.
+/// Returns the poses of a fish that crosses the image to the right, turns around and comes back. There is
+/// no camera.
 fn uncalibrated(view: View) -> Poses {
     let frames = (0..120).map(|k| {
         let t = f64::from(k);

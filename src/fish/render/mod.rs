@@ -1,6 +1,8 @@
-//! Draws one posture of the virtual fish: skins the mesh, projects it by the camera, shades every
-//! sample by its own normal, and averages 3 x 3 samples a pixel for soft edges (ALGORITHMS.md 4,
-//! virtual fish). Body first with a depth buffer, then the translucent fins from far to near.
+//! Renderer of the virtual fish, for one posture at a time.
+//!
+//! It skins the mesh, projects it with the camera, shades every sample by its own normal, and averages 3 x
+//! 3 samples per pixel for soft edges. The body is drawn first, with a depth buffer. The translucent fins
+//! follow, from far to near (docs/explanation/algorithms.md, "Virtual fish").
 
 use glam::DVec3;
 
@@ -13,39 +15,39 @@ use crate::geometry::{Camera, Rect};
 use crate::library::Animal;
 use crate::raster::{RgbImage, RgbaImage};
 
-/// Samples along each side of a pixel.
+/// Number of samples along each side of a pixel. Free choice.
 const SAMPLES: usize = 3;
-/// Nothing nearer to the camera than this is drawn, metres.
+/// Least distance from the camera, in metres. A fish with a nearer vertex is not drawn. Free choice.
 const NEAREST_M: f64 = 0.02;
 
-/// A fish ready to be drawn.
+/// Renderer of one fish.
 pub struct Renderer {
     mesh: Mesh,
 }
 
-/// A drawn fish: only the box that it covers.
+/// Drawn fish: the pixels of its bounding box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
-    /// Where the box lies in the image; empty when the fish is out of sight.
+    /// Bounding box in the image; empty if the fish is out of sight.
     pub rect: Rect,
-    /// Premultiplied RGBA of the box, 0..=1, row by row.
+    /// Premultiplied RGBA of the box, 0..=1, by rows.
     pub pixels: Vec<[f32; 4]>,
 }
 
 impl Renderer {
-    /// A renderer of fish of one size and coat.
+    /// Returns a renderer for fish of one size and palette.
     pub fn new(size: Animal, palette: Palette) -> Renderer {
         Renderer {
             mesh: Mesh::goldfish(size, palette),
         }
     }
 
-    /// The mesh that is drawn.
+    /// Returns the mesh of the fish.
     pub fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// Draws one posture as the camera sees it; invisible ones give an empty box.
+    /// Draws one posture as the camera sees it. An invisible posture gives an empty box.
     pub fn draw(&self, camera: &Camera, image_size_px: [u32; 2], posture: &Posture) -> Drawing {
         let points = match posture.visible {
             true => self.project(camera, posture),
@@ -64,7 +66,8 @@ impl Renderer {
         samples.average()
     }
 
-    /// Every vertex where the posture puts it: in the image, in sample units, and in space.
+    /// Returns every vertex, moved by the posture: image position in samples, depth, and surface in the
+    /// camera frame.
     fn project(&self, camera: &Camera, posture: &Posture) -> Vec<Point> {
         let length_m = self.mesh.size.length_m;
         let joints = joint_frames(length_m, &posture.joint_angles_rad);
@@ -101,12 +104,12 @@ impl Renderer {
 }
 
 impl Drawing {
-    /// Opacity of pixel (x, y) of the box, 0..=1. Panics outside the box.
+    /// Returns the alpha of pixel (x, y) of the box, 0..=1. Panics outside the box.
     pub fn alpha(&self, x: u32, y: u32) -> f32 {
         self.pixels[(y * self.rect.w + x) as usize][3]
     }
 
-    /// Lays the fish over an image of the size that it was drawn for. Panics on a smaller one.
+    /// Draws the fish over an image of the size for which it was drawn. Panics if the image is smaller.
     pub fn over(&self, image: &mut RgbImage) {
         for y in 0..self.rect.h {
             for x in 0..self.rect.w {
@@ -122,7 +125,7 @@ impl Drawing {
         }
     }
 
-    /// The box as a straight-alpha image.
+    /// Returns the box as a straight-alpha image.
     pub fn to_rgba(&self) -> RgbaImage {
         let straight = |&[r, g, b, a]: &[f32; 4]| {
             let scale = if a > 0.0 { 255.0 / a } else { 0.0 };
@@ -141,7 +144,7 @@ impl Drawing {
     }
 }
 
-/// One vertex in the image.
+/// Vertex projected into the image.
 struct Point {
     x: f32,
     y: f32,
@@ -149,7 +152,7 @@ struct Point {
     surface: Surface,
 }
 
-/// The box around the points, clipped to the image; empty when some are behind the camera.
+/// Returns the box around the points, clipped to the image. Empty if a point is not beyond `NEAREST_M`.
 fn bounds(points: &[Point], [width, height]: [u32; 2]) -> Rect {
     let mut lo = [f32::MAX; 2];
     let mut hi = [f32::MIN; 2];
@@ -174,7 +177,7 @@ fn bounds(points: &[Point], [width, height]: [u32; 2]) -> Rect {
     )
 }
 
-/// Triangles by falling depth, ties in their own order.
+/// Returns the triangles from far to near. Ties keep their order.
 fn far_to_near(triangles: &[[u32; 3]], points: &[Point]) -> Vec<[u32; 3]> {
     let depth = |t: &[u32; 3]| t.iter().map(|&v| points[v as usize].z).sum::<f32>();
     let mut sorted: Vec<(f32, [u32; 3])> = triangles.iter().map(|t| (depth(t), *t)).collect();
@@ -182,7 +185,7 @@ fn far_to_near(triangles: &[[u32; 3]], points: &[Point]) -> Vec<[u32; 3]> {
     sorted.into_iter().map(|(_, t)| t).collect()
 }
 
-/// The samples of a box: 3 x 3 to the pixel.
+/// Samples of a box, 3 x 3 per pixel.
 struct Samples {
     rect: Rect,
     width: usize,
@@ -203,7 +206,7 @@ impl Samples {
         }
     }
 
-    /// Visits every sample whose middle lies in the triangle.
+    /// Calls `put` for every sample whose middle lies in the triangle and in front of the depth buffer.
     fn fill(
         &mut self,
         points: &[Point],
@@ -250,14 +253,14 @@ impl Samples {
         }
     }
 
-    /// An opaque sample hides what is behind it.
+    /// Writes an opaque sample, which hides everything behind it.
     fn cover(&mut self, at: usize, z: f32, surface: Surface) {
         let [r, g, b] = shade(&surface);
         self.depth[at] = z;
         self.color[at] = [r, g, b, 1.0];
     }
 
-    /// A translucent one is laid over what is there.
+    /// Blends a translucent sample over the present color.
     fn glaze(&mut self, at: usize, _z: f32, surface: Surface) {
         let alpha = surface.color[3];
         let [r, g, b] = shade(&surface);
@@ -266,7 +269,7 @@ impl Samples {
         self.color[at] = std::array::from_fn(|k| over[k] + (1.0 - alpha) * under[k]);
     }
 
-    /// The mean over each pixel's samples.
+    /// Returns the mean over the samples of each pixel.
     fn average(self) -> Drawing {
         let mut pixels = vec![[0.0f32; 4]; self.rect.area() as usize];
         for (row, samples) in self.color.chunks_exact(self.width.max(1)).enumerate() {

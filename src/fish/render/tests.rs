@@ -1,4 +1,4 @@
-//! What the renderer promises: the right place, the right size, the right way up, soft edges.
+//! Tests of the renderer: position, size, orientation, soft edges.
 
 use glam::DVec3;
 
@@ -28,7 +28,7 @@ fn draw(yaw_rad: f64, pitch_rad: f64) -> Drawing {
     Renderer::new(SIZE, Palette::Goldfish).draw(&camera(), IMAGE_PX, &posture)
 }
 
-/// (left, top, right, bottom) of what is more opaque than not, and its centroid.
+/// Returns (left, top, right, bottom) and the centroid of the pixels with alpha above one half.
 fn silhouette(drawing: &Drawing) -> ([f64; 4], [f64; 2]) {
     let mut edges = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
     let (mut sum, mut n) = ([0.0, 0.0], 0.0);

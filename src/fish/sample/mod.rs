@@ -1,6 +1,9 @@
-//! Footage of the virtual fish whose truth is known in every frame: a goldfish wandering in a planted
-//! tank, filmed from the side with a little sensor noise. What a first visit shows, and what the
-//! analysis is tested against (ALGORITHMS.md 4 and 9). Any frame can be made by itself.
+//! Sample film: footage of the virtual fish in which every pose is known exactly.
+//!
+//! A goldfish swims at random in a planted tank and is filmed from the side with a little sensor noise. The
+//! film is shown to new users, and the analysis is tested against it
+//! (docs/explanation/algorithms.md, "Quality measures"). Each frame can be drawn independently of the
+//! others.
 
 use rayon::prelude::*;
 
@@ -18,22 +21,22 @@ use crate::library::{Animal, Pose, Poses, View};
 use crate::random;
 use crate::raster::{Frame, RgbImage};
 
-/// What the sample shows.
+/// Parameters of the sample film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleParams {
-    /// How many frames, at least 1.
+    /// Number of frames, 1..=1000000.
     pub n_frames: usize,
-    /// Decides the path, the scene and the noise.
+    /// Random seed of the path, the scene and the noise.
     pub seed: u64,
     /// Frames a second, 1..=240.
     pub fps: f64,
-    /// Columns, 64..=7680.
+    /// Width in pixels, 64..=7680.
     pub width: u32,
-    /// Rows, 64..=4320.
+    /// Height in pixels, 64..=4320.
     pub height: u32,
-    /// The coat of the fish.
+    /// Colors of the fish.
     pub palette: Palette,
-    /// Standard deviation of the luma noise, of 255, 0..=20.
+    /// Standard deviation of the luma noise, in 8-bit levels, 0..=20.
     pub noise: f64,
 }
 
@@ -51,7 +54,7 @@ impl Default for SampleParams {
     }
 }
 
-/// The sample footage.
+/// Sample film.
 pub struct SampleFilm {
     params: SampleParams,
     strokes: Vec<Stroke>,
@@ -59,11 +62,11 @@ pub struct SampleFilm {
     noise: Vec<i8>,
 }
 
-/// Width of the scene on the tank's front pane, metres: the tank with a little around it.
+/// Width of the picture at the tank's front pane, in metres: the tank plus a margin. Free choice.
 const PANE_WIDTH_M: f64 = 0.64;
 
 impl SampleFilm {
-    /// Prepares the film; refuses sizes and rates out of range.
+    /// Returns the film. Fails if a parameter is out of range.
     pub fn new(params: SampleParams) -> Result<SampleFilm, Error> {
         check(&params)?;
         let size = Params::default().size(None);
@@ -91,17 +94,17 @@ impl SampleFilm {
         })
     }
 
-    /// The motion that is filmed.
+    /// Returns the motion of the fish.
     pub fn motion(&self) -> &Motion {
         self.film.motion()
     }
 
-    /// The scene without the fish, and without noise.
+    /// Returns the scene without fish and without noise.
     pub fn background(&self) -> &RgbImage {
         self.film.background()
     }
 
-    /// The size of the silhouette as it is drawn, translucent edges left out.
+    /// Returns the size of the drawn silhouette, without translucent edges.
     pub fn animal(&self) -> Animal {
         let mesh = self.film.renderer().mesh();
         let extent = |axis| {
@@ -114,8 +117,9 @@ impl SampleFilm {
         }
     }
 
-    /// What an analysis should measure, exactly: the silhouette is where the fish covers more than
-    /// half of a pixel. Axis, extents and midline are left out: they have no truth but a definition.
+    /// Returns the exact poses of all frames. The silhouette consists of the pixels that the fish covers by
+    /// more than one half. Axis, extents and midline are `None`: their values depend on the definition of
+    /// the measurement.
     pub fn truth(&self) -> Poses {
         let frames = (0..self.params.n_frames).into_par_iter();
         Poses {
@@ -131,11 +135,11 @@ impl SampleFilm {
         }
     }
 
-    /// The truth of one frame. Panics beyond the last.
+    /// Returns the exact pose of one frame. Panics beyond the last frame.
     pub fn true_pose(&self, frame_idx: usize) -> Pose {
         let stroke = &self.strokes[frame_idx];
         let (position, forward) = (stroke.position_m, stroke.forward());
-        // The direction in which the image of a point moves that moves along `forward`.
+        // Direction in which the image of the fish moves when the fish moves along `forward`.
         let toward = forward * position.z - position * forward.z;
         Pose {
             time_s: frame_idx as f64 / self.params.fps,
@@ -152,7 +156,7 @@ impl SampleFilm {
         }
     }
 
-    /// One frame, noise included. Panics beyond the last.
+    /// Draws one frame with noise into `frame`. Panics beyond the last frame.
     pub fn render(&self, frame_idx: usize, frame: &mut Frame) {
         self.film.render(frame_idx, frame);
         let (width, chroma_width) = (frame.width as usize, frame.chroma_width() as usize);
@@ -166,7 +170,7 @@ impl SampleFilm {
         }
     }
 
-    /// The stretch of the noise table that falls on one row of one plane.
+    /// Returns the part of the noise table for one row of one plane.
     fn noise_of(&self, frame_idx: usize, row: usize) -> &[i8] {
         let word = random::bits(self.params.seed, &[NOISE, frame_idx as u64, row as u64]);
         &self.noise[word as usize % NOISE_STARTS..]
@@ -193,14 +197,14 @@ impl FrameSource for SampleFilm {
     }
 }
 
-/// Frames are made some at a time, on every thread there is.
+/// Stream of the sample film. Frames are drawn in batches, on all threads.
 struct SampleStream<'a> {
     film: &'a SampleFilm,
     next: usize,
     ready: Vec<Frame>,
 }
 
-/// Frames made at a time.
+/// Number of frames in a batch. Free choice.
 const BATCH: usize = 16;
 
 impl FrameStream for SampleStream<'_> {
@@ -257,7 +261,8 @@ fn posture(stroke: &Stroke, size: Animal) -> Posture {
     }
 }
 
-/// Centroid, box and area of what is more covered than not; nothing when out of sight.
+/// Returns a pose with centroid, box and area of the pixels covered by more than one half. Its fields are
+/// empty if there are none.
 fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
     let rect = drawing.rect;
     let (mut n, mut sum) = (0u64, [0u64; 2]);
@@ -293,12 +298,12 @@ fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
     }
 }
 
-/// Keys of the noise among the seed's random numbers.
+/// First key word of the noise's random numbers.
 const NOISE: u64 = 0x6e_6f69_7365;
-/// Different places at which a row of noise may start.
+/// Number of positions in the noise table at which a row may start. Free choice.
 const NOISE_STARTS: usize = 1 << 17;
 
-/// Normal numbers, long enough for a row of `width` from any start.
+/// Returns a table of normally distributed noise, long enough for a row of `width` from any start.
 fn noise_table(seed: u64, sigma: f64, width: u32) -> Vec<i8> {
     let draw = |k: u64| (sigma * random::normal(seed, &[NOISE, k])).round() as i8;
     (0..NOISE_STARTS as u64 + u64::from(width))
@@ -307,7 +312,8 @@ fn noise_table(seed: u64, sigma: f64, width: u32) -> Vec<i8> {
         .collect()
 }
 
-/// Adds noise; chroma, which averages over a block, takes half of it.
+/// Adds noise to a row, divided by `divisor`. Chroma averages over a block and therefore takes half of the
+/// noise.
 fn add_noise(line: &mut [u8], noise: &[i8], divisor: i16) {
     for (value, &n) in line.iter_mut().zip(noise) {
         *value = (i16::from(*value) + i16::from(n) / divisor).clamp(0, 255) as u8;

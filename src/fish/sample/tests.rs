@@ -1,4 +1,4 @@
-//! What the sample promises: the truth is what is seen, and the same bytes every time.
+//! Tests of the sample film: the exact poses match the frames, and the frames are reproducible.
 
 use super::*;
 
@@ -68,7 +68,7 @@ fn the_true_centroid_is_where_the_frame_differs_from_the_background() {
         }
         let truth = film.true_pose(k).centroid_px.expect("it is in sight");
         let gap = (sum[0] / n - truth[0]).hypot(sum[1] / n - truth[1]);
-        // Colors belong to blocks of 2 x 2 pixels: the seen outline is that coarse.
+        // Chroma is stored per block of 2 x 2 pixels, so the visible outline is that coarse.
         assert!(gap < 1.5, "frame {k}: {gap} px");
     }
 }

@@ -1,5 +1,7 @@
-//! What a plan costs, summed from what the files hold: J of ALGORITHMS.md 6, its parts, and whether the
-//! file says the same. Costs are whole 65536ths of a circle; the file has them in radians, to 6 decimals.
+//! Cost of a plan, summed from the contents of the files and compared with the cost in the file: J and its
+//! parts (docs/explanation/algorithms.md, "Planning").
+//!
+//! Costs are whole turns (65536 to the circle). The file has them in radians, with 6 decimals.
 
 use super::graph::Graph;
 use super::steps::Taken;
@@ -16,55 +18,58 @@ use crate::flock::plan::trellis::Trellis;
 use crate::geometry::Turns;
 use crate::library::Library;
 
-/// How far from a whole number of turns 6 decimals of a radian may be.
+/// Tolerance when a cost in radians with 6 decimals is converted to turns. Rounding to 6 decimals changes a
+/// cost by at most 0.0053 turns.
 const ROUNDING_TURNS: f64 = 0.02;
 
-/// Nearer in the footage than this looks the same (ALGORITHMS.md 6, crowd).
+/// Source frames less than this time apart look alike, in seconds
+/// (docs/explanation/algorithms.md, "Planning").
 const LOOKALIKE_S: f64 = 0.3;
 
-/// A jump back by less costs for what it shows again.
+/// Longest jump back that costs extra for the frames it shows again, in seconds.
 const RETURN_S: f64 = 1.3;
 
-/// What everything costs.
+/// Costs of all states and jumps, for all plans of a flock.
 pub(super) struct Ledger<'a> {
     flock: &'a Flock,
     weights: Weights,
     crowd: Crowd,
-    /// Names states as the price lists do, barriers included.
+    /// Trellis of the planner. The cost functions use its state numbers, barriers included.
     trellis: Trellis,
     features: Vec<Feature>,
-    /// Of each state of the graph, its name in the trellis.
+    /// By state of the graph: its number in the trellis.
     names: Vec<u32>,
-    /// Of each individual, the names of what it shows.
+    /// By individual and frame: the trellis state shown.
     plans: Vec<Vec<u32>>,
     pub(super) dwell: usize,
-    /// The first frame of each segment, and at the end the number of frames.
+    /// First frame of each segment, and at the end the number of frames.
     pub(super) segments: Vec<usize>,
-    /// Future cost of each state of the graph, turns; `None` for a state from which playback cannot continue.
+    /// Future cost by state of the graph, in turns; `None` for a state from which playback cannot continue.
     pub(super) future: Vec<Option<u64>>,
 }
 
-/// One individual's costs.
+/// Costs of one individual's plan.
 pub(super) struct Bill {
-    /// What its boid wants at every frame.
+    /// Features that its boid asks for, by frame.
     wanted: Vec<Feature>,
-    /// Whom it should not look like.
+    /// Neighbors that it should not look like, by frame.
     lookalikes: Vec<Vec<Lookalike>>,
-    /// Cost of the jump to each frame, turns; 0 without a jump. The last entry is the jump from the end of a loop to its start.
+    /// Cost of the jump to each frame, in turns; 0 without a jump. The last entry is the jump from the end
+    /// of a loop to its start.
     jumps: Vec<u64>,
-    /// Cost of the plan, turns.
+    /// Cost of the plan, in turns.
     pub(super) total: u64,
 }
 
 impl Bill {
-    /// Cost of the jump to a frame, turns; 0 without a jump.
+    /// Returns the cost of the jump to a frame, in turns; 0 without a jump.
     pub(super) fn jump_at(&self, t: usize) -> u64 {
         self.jumps.get(t).copied().unwrap_or(0)
     }
 }
 
 impl<'a> Ledger<'a> {
-    /// The prices of a flock that shows `plans`, states of the graph by individual.
+    /// Returns the costs of a flock. `plans` holds the states of the graph that each individual shows.
     pub(super) fn new(
         library: &Library,
         flock: &'a Flock,
@@ -109,7 +114,7 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// Sums an individual's costs and compares them with what the file says.
+    /// Sums the costs of an individual and compares them with the file.
     pub(super) fn bill(&self, id: usize, jumps: &[Taken]) -> Result<Bill, Violation> {
         let mut bill = Bill {
             wanted: self.wanted(id),
@@ -157,7 +162,8 @@ impl<'a> Ledger<'a> {
         Ok(bill)
     }
 
-    /// The features that a boid asks for at every frame. Turn rates are differences within one segment, as in the planner.
+    /// Returns the features that a boid asks for at every frame. Turn rates are differences within one
+    /// segment, as in the planner.
     fn wanted(&self, id: usize) -> Vec<Feature> {
         let boid = &self.flock.individuals[id].boid;
         let of = |segment: &[usize]| {
@@ -167,7 +173,8 @@ impl<'a> Ledger<'a> {
         self.segments.windows(2).flat_map(of).collect()
     }
 
-    /// A jump back by less than 1.3 s costs `w_p` for every frame that it goes back, at most 65535 turns.
+    /// Returns the cost of a jump for the frames that it shows again, in turns, at most 65535. A jump back
+    /// of at most 1.3 s costs `w_p` per frame.
     fn repetition(&self, jump: &Taken) -> u64 {
         let [from, to] = jump.ends;
         let n_again = (f64::from(from.0) + 1.0 - f64::from(to.0)).max(0.0);
@@ -180,7 +187,7 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// What the file says no plan costs less than, crowd or not.
+    /// Returns the lower bound in the file, in turns.
     pub(super) fn lower_bound(&self, id: usize) -> Result<u64, Violation> {
         whole(
             id,
@@ -189,7 +196,8 @@ impl<'a> Ledger<'a> {
         )
     }
 
-    /// Cost of showing each state of the graph at frame `t`, turns. `in_flock` adds the costs of look-alikes.
+    /// Returns the cost of showing each state of the graph at frame `t`, in turns. `in_flock` adds the
+    /// crowd cost.
     pub(super) fn row(&self, graph: &Graph, bill: &Bill, t: usize, in_flock: bool) -> Vec<u64> {
         let mut crowd = vec![0; self.names.len()];
         if in_flock {
@@ -201,7 +209,7 @@ impl<'a> Ledger<'a> {
         self.names.iter().zip(crowd).map(price).collect()
     }
 
-    /// Every state on the same side less than 0.3 s away looks like it.
+    /// Adds the cost of a look-alike to every state on its mirror side less than 0.3 s away.
     fn add_lookalike(&self, graph: &Graph, near: &Lookalike, crowd: &mut [u32]) {
         let Some((frame, side)) = self.trellis.shown(near.state as usize) else {
             return;
@@ -236,14 +244,15 @@ impl<'a> Ledger<'a> {
     }
 }
 
-/// Least frames between two jumps.
+/// Returns the least number of frames between two jumps.
 pub(super) fn dwell(library: &Library, params: &Params) -> usize {
     let usual = library.clip_frames;
     let frames = params.dwell_frames.map_or(usual, |frames| frames as usize);
     frames.max(1)
 }
 
-/// Radians of the file as turns.
+/// Converts a cost of the file from radians to turns. Fails if it is negative or not a whole number of
+/// turns.
 fn whole(id: usize, part: &'static str, value: f64) -> Result<u64, Violation> {
     let turns = value * Turns::PER_RAD;
     let is_whole = turns >= -ROUNDING_TURNS && (turns - turns.round()).abs() <= ROUNDING_TURNS;

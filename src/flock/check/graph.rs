@@ -1,5 +1,7 @@
-//! What may follow what, read straight off the library: states are (frame of the component, mirror side),
-//! edges are "the next frame" and every jump on every side. Nothing here is sorted for speed.
+//! Playback graph, read directly from the library.
+//!
+//! States are (frame of the component, mirror side). Edges are the step to the next frame and every jump on
+//! every side. Simple maps are used instead of the planner's sorted arrays.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,30 +10,30 @@ use crate::flock::Flock;
 use crate::flock::plan::cost::Weights;
 use crate::library::Library;
 
-/// A jump on one side.
+/// Jump on one mirror side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
     pub(super) from: usize,
     pub(super) to: usize,
-    /// Turns.
+    /// Cost, in turns.
     pub(super) cost: u64,
 }
 
-/// The states in order of (side, frame), and all edges between them.
+/// States in order of (side, frame), and all edges between them.
 pub(super) struct Graph {
     states: Vec<(u32, bool)>,
     numbers: BTreeMap<(bool, u32), usize>,
-    /// The state that shows the next frame, where there is one.
+    /// State of the next frame on the same side, if there is one.
     pub(super) next: Vec<Option<usize>>,
     pub(super) jumps: Vec<Edge>,
-    /// The cost of (from, to).
+    /// Cost by (from, to), in turns.
     costs: BTreeMap<(usize, usize), u64>,
-    /// Both sides may be shown.
+    /// Whether both mirror sides may be shown.
     pub(super) mirror: bool,
 }
 
-/// Drops the jumps after which playback must end: the run at their target is shorter than the dwell, or no jump leaves it
-/// after the dwell.
+/// Removes the jumps after which playback must end: the run at their target is shorter than the dwell, or
+/// no jump leaves the run after the dwell.
 fn drop_dead_ends(costs: &mut BTreeMap<(usize, usize), u64>, next: &[Option<usize>], dwell: usize) {
     loop {
         let leaving: BTreeSet<usize> = costs.keys().map(|&(from, _)| from).collect();
@@ -96,7 +98,7 @@ impl Graph {
         self.states.len()
     }
 
-    /// What each state shows.
+    /// Returns the frame and mirror side of each state.
     pub(super) fn shown(&self) -> &[(u32, bool)] {
         &self.states
     }

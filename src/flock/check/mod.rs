@@ -1,10 +1,11 @@
-//! An independent check of a stored plan (ALGORITHMS.md 6, proofs b and c): `flockreel check-plan`.
+//! Independent check of a stored plan: `flockreel check-plan` (docs/explanation/algorithms.md, "Planning").
 //!
-//! From a library and a flock as their files hold them it verifies that every step is the next frame or
-//! a jump of the library, mirror sides, the dwell, every cost, and that nothing cheaper exists. What a
-//! state and a jump cost is asked of `plan::cost` and `plan::crowd`, which define it; how the plan was
-//! found is not: states, edges, sums and the recursion (from the last frame to the first, one step an
-//! edge) are its own.
+//! The check reads a library and a flock. Every step must be the next frame or a jump of the library.
+//! Mirror sides, dwell and costs must be right. No cheaper plan may exist.
+//!
+//! The costs of states and jumps come from `plan::cost`, `plan::crowd` and `plan::segment`, which define
+//! them. Everything else is independent of the search for plans. The check has its own states, edges, sums
+//! and recursion, which runs from the last frame to the first, one step per edge.
 
 mod cost;
 mod graph;
@@ -24,26 +25,24 @@ use super::{Flock, Individual};
 use crate::library::Library;
 use crate::progress::Progress;
 
-/// Individuals checked between two reports of progress.
+/// Individuals checked between two reports of progress. Free choice.
 const BATCH: usize = 16;
 
-/// What was found in order.
+/// Result of a check that found no violation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Report {
-    /// Individuals of the flock.
+    /// Number of individuals.
     pub n_individuals: usize,
-    /// Output frames of all of them.
+    /// Number of output frames of all individuals together.
     pub n_frames: usize,
-    /// Jumps in all plans.
+    /// Number of jumps in all plans.
     pub n_jumps: usize,
-    /// Edges looked at to prove it.
+    /// Number of edges checked for the proof of optimality.
     pub n_edges: u64,
 }
 
-/// Checks every individual of a flock, in order of id; fails with the first violation.
-///
-/// Reports the stage `checking`. A plan that does not claim to be the cheapest (`cost.exact` is false)
-/// is held to its steps, its costs and its lower bound.
+/// Checks every individual of a flock, in order of id. Fails with the first violation. Reports the stage
+/// `checking`.
 pub fn check(
     library: &Library,
     flock: &Flock,

@@ -1,23 +1,26 @@
-//! Whether a plan is the cheapest (ALGORITHMS.md 6, proof b), by duality.
+//! Proof that a plan is the cheapest, by duality (docs/explanation/algorithms.md, "Planning").
 //!
-//! W(t, s, k) is what the rest of a film costs from state s at frame t on, k frames after the last jump
-//! (k stops at the dwell, from where jumps are free). It is filled in from the last frame to the first; then
-//! every edge is asked whether it offers less: if none does, W holds whoever filled it in, and no plan
-//! costs less than the least W(0, s). Along the plan, cost so far plus W never falls: where it first
-//! rises above that least, the plan left the cheapest way. In a loop the first state is given, counts as
-//! just jumped to, and the first of the heir comes after the last frame.
+//! W(t, s, k) is the least cost from state s at frame t to the end of the film, k frames after the last
+//! jump. The count k stops at the dwell, from which jumps are allowed. W is computed from the last frame to
+//! the first. Every edge is then compared with W. If no edge offers less, no plan costs less than the least
+//! W(0, s), even if the computation of W had an error.
+//!
+//! Along the cheapest plan, the cost so far plus W is constant. At the first frame where the sum rises
+//! above the minimum, the plan leaves the optimum. In a loop the first state is given and counts as just
+//! jumped to. The first state of the heir (the individual as which it continues) follows the last frame.
 
 use super::cost::{Bill, Ledger};
 use super::graph::Graph;
 use super::violation::Violation;
 
-/// No way to the end.
+/// Cost of a state from which the end cannot be reached. Sums of four such costs do not overflow.
 const NEVER: u64 = u64::MAX / 4;
 
-/// W at one frame: `[k - 1][state]`.
+/// W at one frame: `[k - 1][state]`, in turns.
 type Column = Vec<Vec<u64>>;
 
-/// Checks that the plan of every segment is the cheapest, and that its lower bound is one. Returns how many edges were looked at.
+/// Checks that the plan of every segment is the cheapest, and that the lower bound of the file holds.
+/// Returns the number of edges checked.
 pub(super) fn check(
     graph: &Graph,
     ledger: &Ledger<'_>,
@@ -64,20 +67,21 @@ pub(super) fn check(
     }
 }
 
-/// A segment of a plan.
+/// Segment of a plan: the frames `first..end`.
 #[derive(Clone, Copy)]
 struct Part<'a> {
     first: usize,
     end: usize,
-    /// The state at the frame before it, and the frames since the last jump there; `None` for the first segment.
+    /// State at the frame before the segment, and the frames since the last jump there; `None` for the
+    /// first segment.
     start: Option<(usize, usize)>,
-    /// In a loop the state that it must begin with, and the one that comes after it.
+    /// In a loop, the state with which the segment must begin and the state that follows its end.
     ends: Option<(usize, usize)>,
-    /// Future cost by state, turns; `None` for the last segment.
+    /// Future cost by state, in turns; `None` for the last segment.
     future: Option<&'a [Option<u64>]>,
 }
 
-/// Frames since the last jump, 1 on its own frame; never above the dwell.
+/// Returns for each frame the frames since the last jump: 1 at the frame jumped to, at most the dwell.
 fn since_jump(graph: &Graph, (since_start, dwell): (usize, usize), states: &[usize]) -> Vec<usize> {
     let mut since = vec![since_start; states.len()];
     for t in 1..states.len() {
@@ -97,7 +101,7 @@ struct Search<'a> {
 }
 
 impl Part<'_> {
-    /// Future cost of ending with a state, turns.
+    /// Returns the future cost of ending in a state, in turns.
     fn beyond(&self, state: usize) -> u64 {
         self.future.and_then(|future| future[state]).unwrap_or(0)
     }
@@ -115,7 +119,7 @@ impl Search<'_> {
         let (first, end, id) = (part.first, part.end, self.id);
         let graph = self.graph;
         let row = |t: usize| ledger.row(graph, bill, t, true);
-        // For each frame: the least cost from there to the end, and the cost of the state shown.
+        // For each frame: W of the state shown, and the cost of showing it.
         let mut at_best = vec![0; end - first];
         let mut shown = vec![0; end - first];
         let least = self.cheapest(part, row, |t, costs, column| {
@@ -129,7 +133,7 @@ impl Search<'_> {
                 left_at = left_at.or(Some(t));
             }
             spent += shown[t - first];
-            // In a loop a jump may lead to what comes after the last frame.
+            // In a loop a jump may lead to the state after the last frame.
             if t + 1 < end || part.ends.is_some() {
                 spent += bill.jump_at(t + 1);
             }
@@ -145,8 +149,9 @@ impl Search<'_> {
         }
     }
 
-    /// The least cost of a plan of a segment, with the future cost of its last state; looks at every edge. `on_column` receives
-    /// the frame, the cost of each state there, and W, from the last frame to the first.
+    /// Returns the least cost of a plan of a segment, with the future cost of its last state, and checks
+    /// every edge. `on_column` receives the frame, the cost of each state there, and W, from the last frame
+    /// to the first.
     fn cheapest(
         &mut self,
         part: &Part<'_>,
@@ -198,7 +203,7 @@ impl Search<'_> {
         Ok(least)
     }
 
-    /// W at a frame from W at the next.
+    /// Returns W at a frame, from W at the next frame.
     fn fill(&self, costs: &[u64], after: &Column) -> Column {
         let mut now: Column = vec![vec![NEVER; costs.len()]; self.dwell];
         for (k, now) in now.iter_mut().enumerate() {
@@ -216,7 +221,7 @@ impl Search<'_> {
         now
     }
 
-    /// No edge from frame `t` to the next offers less than W says.
+    /// Checks that no edge from frame `t` to the next frame offers less than W.
     fn certify(
         &mut self,
         t: usize,

@@ -1,21 +1,21 @@
-//! Whether a plan can be played at all: its lists, its frames, its steps, and how long it dwells.
+//! Checks whether a plan can be played: its lists, frames, steps and dwell.
 
 use super::graph::Graph;
 use super::violation::Violation;
 use crate::flock::{Flock, Individual};
 
-/// A jump that a plan takes.
+/// Jump in a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// The output frame jumped to.
+    /// Output frame to which the jump leads.
     pub(super) t: usize,
-    /// The frame and mirror side before it and there.
+    /// Source frame and mirror side before and after the jump.
     pub(super) ends: [(u32, bool); 2],
-    /// Turns.
+    /// Cost, in turns.
     pub(super) cost: u64,
 }
 
-/// Every list that the check reads has an entry for every frame.
+/// Checks that every list that the check reads has one entry per frame.
 pub(super) fn lengths(flock: &Flock, id: usize, individual: &Individual) -> Result<(), Violation> {
     let wanted = flock.params.frames as usize;
     let boid = &individual.boid;
@@ -38,7 +38,7 @@ pub(super) fn lengths(flock: &Flock, id: usize, individual: &Individual) -> Resu
     Ok(())
 }
 
-/// What a plan shows, as states of the graph, if all of it may be shown.
+/// Returns the plan as states of the graph. Fails if one of them may not be shown.
 pub(super) fn states(
     graph: &Graph,
     id: usize,
@@ -55,7 +55,8 @@ pub(super) fn states(
     shown.enumerate().map(state).collect()
 }
 
-/// The first state of whom each individual becomes, if the flock is a loop.
+/// Returns, by individual, the first state of its heir: the individual as which it continues. `None` if the
+/// flock is no loop.
 pub(super) fn heirs(flock: &Flock, plans: &[Vec<usize>]) -> Result<Option<Vec<usize>>, Violation> {
     let mut is_taken = vec![false; plans.len()];
     let mut nexts = Vec::new();
@@ -73,8 +74,8 @@ pub(super) fn heirs(flock: &Flock, plans: &[Vec<usize>]) -> Result<Option<Vec<us
     Ok(flock.params.is_loop.then_some(nexts))
 }
 
-/// The jumps of a plan, if all its steps are allowed; in a loop `next` comes after the last frame, and
-/// the first counts as just jumped to.
+/// Returns the jumps of a plan. Fails if a step is not allowed. In a loop `next` follows the last frame,
+/// and the first frame counts as just jumped to.
 pub(super) fn jumps(
     graph: &Graph,
     dwell: usize,

@@ -1,4 +1,4 @@
-//! The check holds for what the planner makes, and is red for every way to spoil it.
+//! Tests of the check: plans of the planner pass, and every way to corrupt them is found.
 
 use super::*;
 use crate::flock::individual::rounded;
@@ -22,7 +22,8 @@ fn red(library: &Library, flock: &Flock) -> Violation {
     check(library, flock, &Silent).expect_err("spoiled")
 }
 
-/// The file's costs changed to what the steps add up to, so that only the plan is to blame.
+/// Returns the flock with the costs of individual `id` changed to the sums over its steps. Then only the
+/// plan can be wrong.
 fn with_honest_costs(library: &Library, mut flock: Flock, id: usize) -> Flock {
     for _ in 0..6 {
         let Err(Violation::Cost { part, found, .. }) = check(library, &flock, &Silent) else {
@@ -162,7 +163,8 @@ fn a_longer_dwell_than_was_kept_is_missed() {
     let least = least.min().expect("two jumps somewhere");
     assert!(least >= library.clip_frames);
     flock.params.dwell_frames = Some(least as u32 + 1);
-    // Individuals before the one that jumped so soon may now be cheaper than they need to be: no fault.
+    // Plans of earlier individuals meet the longer dwell too. A lower bound that is too low is no
+    // violation.
     let violation = red(&library, &flock);
     let jumped = matches!(violation, Violation::Dwell { since, .. } if since == least);
     assert!(jumped, "{violation}");
@@ -195,7 +197,7 @@ fn every_part_of_the_cost_is_recomputed() {
 #[test]
 fn a_plan_that_could_be_cheaper_is_told_where_it_goes_wrong() {
     let (library, mut flock) = planned(View::Side, "school");
-    // The other way round in the picture, all the while: every step is as legal as before.
+    // Mirrors all frames of the plan. Every step stays legal.
     let mirrored = &mut flock.individuals[3].mirrored;
     mirrored.iter_mut().for_each(|side| *side = !*side);
     let flock = with_honest_costs(&library, flock, 3);
@@ -207,7 +209,7 @@ fn a_plan_that_could_be_cheaper_is_told_where_it_goes_wrong() {
 #[test]
 fn a_jump_too_many_late_in_the_film_is_told_by_its_frame() {
     let (library, flock) = planned(View::Side, "school");
-    // The last frame shows what another jump leads to: legal, and seldom as cheap.
+    // The last frame takes another jump, which is legal but seldom as cheap.
     let spoiled = (0..4).rev().find_map(|id| {
         let mut spoiled = flock.clone();
         let one = &mut spoiled.individuals[id];
@@ -256,7 +258,8 @@ fn files_that_do_not_belong_together_are_told_first() {
         spoiled(|flock| _ = flock.individuals[2].mirrored.pop()),
         "wrong_length"
     );
-    // Whoever jumps costs less then, and whoever does not could have.
+    // With a lower `wx`, plans with jumps cost less than the file says. Plans without jumps may no longer
+    // be the cheapest.
     let cheaper_jumps = spoiled(|flock| flock.params.matching.wx = 0.4);
     assert!(["wrong_cost", "not_cheapest"].contains(&cheaper_jumps));
 }

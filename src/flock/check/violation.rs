@@ -1,114 +1,114 @@
-//! What can be wrong with a stored plan, one clear sentence each, with a stable code.
+//! Violations that the check of a stored plan can find. Each has one sentence and a stable code.
 
 use crate::geometry::Turns;
 
-/// The first thing found wrong. Individuals are named by id, frames are output frames from 0.
+/// First violation found. Individuals are named by id; frames are output frames, counted from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Violation {
-    /// The parameters are out of range.
+    /// A parameter is out of range.
     #[error("the flock's params: {0}")]
     Params(String),
-    /// The flock was made of another library.
+    /// Frame rate or picture size of flock and library differ.
     #[error("the flock was made of another library: frame rate or picture size differ")]
     OtherLibrary,
-    /// Individuals there are, and as `params.count` has it.
+    /// Number of individuals found, and the number in `params.count`.
     #[error("there are {0} individuals where params.count says {1}")]
     Count(usize, u32),
-    /// The place, and the id found there.
+    /// Position in the list of individuals, and the id found there.
     #[error("individual {1} stands in the place of individual {0}")]
     Order(usize, u32),
-    /// A list has not one entry for each frame of the flock.
+    /// A list does not have one entry per frame.
     #[error("individual {id}: {list} has {found} entries where params.frames says {wanted}")]
     Length {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The list's name in the file.
+        /// Name of the list in the file.
         list: &'static str,
-        /// Entries there are.
+        /// Number of entries found.
         found: usize,
-        /// Entries there should be.
+        /// Number of entries wanted.
         wanted: usize,
     },
-    /// A frame that playback does not show.
+    /// A source frame is outside of the library's component.
     #[error("individual {id}, frame {t}: source frame {frame} is not in the library's component")]
     OutsideComponent {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// When.
+        /// Output frame.
         t: usize,
-        /// The source frame.
+        /// Source frame.
         frame: u32,
     },
-    /// A mirror image where none is allowed.
+    /// A sprite is mirrored although `params.mirror` is false.
     #[error("individual {id}, frame {t}: mirrored, which params.mirror does not allow")]
     Mirror {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// When.
+        /// Output frame.
         t: usize,
     },
-    /// A step that is neither the next frame nor a jump.
+    /// A step leads neither to the next frame nor along a jump of the library.
     #[error(
         "individual {id}, frame {t}: from source frame {from} to {to}{} is neither the next frame nor a jump of the library",
         if *.turned { ", changing the mirror side," } else { "" }
     )]
     IllegalStep {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The frame stepped to.
+        /// Output frame to which the step leads.
         t: usize,
-        /// The source frame before.
+        /// Source frame before the step.
         from: u32,
-        /// The source frame after.
+        /// Source frame after the step.
         to: u32,
-        /// The mirror side changes.
+        /// Whether the step changes the mirror side.
         turned: bool,
     },
-    /// A jump too soon after the last one.
+    /// A jump follows the last one too soon.
     #[error(
         "individual {id}, frame {t}: jumps {since} frames after its last jump, the least is {dwell}"
     )]
     Dwell {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The frame jumped to.
+        /// Output frame to which the jump leads.
         t: usize,
         /// Frames since the last jump.
         since: usize,
-        /// Frames there must be.
+        /// Least number of frames between two jumps.
         dwell: usize,
     },
-    /// In a loop everybody goes on as somebody, no two as the same; without, nobody does.
+    /// `continues_as` is wrong. In a loop it must be a permutation of the ids; otherwise it must be null.
     #[error(
         "individual {id}: continues_as does not say, as params.loop has it, whose first frame follows its last"
     )]
     Heir {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
     },
-    /// A cost that is no sum of integers.
+    /// A cost in the file is not a whole number of turns (65536 to the circle).
     #[error("individual {id}: {part} is no whole number of 65536ths of a circle: {value} rad")]
     NotWhole {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The part's name in the file.
+        /// Name of the cost in the file.
         part: &'static str,
-        /// What the file says.
+        /// Value in the file, in radians.
         value: f64,
     },
-    /// A cost that is not what the plan's steps add up to.
+    /// A cost in the file differs from the sum over the plan's steps.
     #[error(
         "individual {id}: {part} says {:.6} rad, the plan's steps add up to {:.6} rad",
         rad(*.said), rad(*.found)
     )]
     Cost {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The part's name in the file.
+        /// Name of the cost in the file.
         part: &'static str,
-        /// What the file says, turns.
+        /// Value in the file, in turns.
         said: u64,
-        /// What was summed, turns.
+        /// Sum over the steps, in turns.
         found: u64,
     },
     /// A cheaper plan exists.
@@ -117,40 +117,40 @@ pub enum Violation {
         rad(*.cost), rad(*.cheapest)
     )]
     Suboptimal {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The first frame after which no way is as cheap as the cheapest.
+        /// First frame whose state makes the cheapest cost unreachable.
         t: usize,
-        /// The plan's cost, turns.
+        /// Cost of the plan, in turns.
         cost: u64,
-        /// The cheapest plan's cost, turns.
+        /// Cost of the cheapest plan, in turns.
         cheapest: u64,
     },
-    /// A plan cheaper than the bound exists, crowd aside.
+    /// Without crowd cost, a plan costs less than `cost.lower_bound`.
     #[error(
         "individual {id}: cost.lower_bound says {:.6} rad, yet a plan of {:.6} rad is possible",
         rad(*.said), rad(*.cheapest)
     )]
     LowerBound {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// What the file says, turns.
+        /// Value in the file, in turns.
         said: u64,
-        /// The cheapest plan's cost without the crowd, turns.
+        /// Cost of the cheapest plan without crowd cost, in turns.
         cheapest: u64,
     },
-    /// An edge offers less than the certificate says: a mistake of the check itself.
+    /// An edge offers less than the certificate says. This is a bug of the check itself.
     #[error("individual {id}, frame {t}: an edge offers less than the certificate says")]
     Certificate {
-        /// Whose.
+        /// Id of the individual.
         id: usize,
-        /// The edge's first frame.
+        /// First frame of the edge.
         t: usize,
     },
 }
 
 impl Violation {
-    /// The stable name.
+    /// Returns the stable code of the violation.
     pub fn code(&self) -> &'static str {
         match self {
             Violation::Params(_) => "bad_params",

@@ -1,5 +1,8 @@
-//! What lies behind a flock: the plate at the film's size, one color, nothing, or a given picture
-//! (ALGORITHMS.md 8); in the form of the film already, so that a frame begins with a copy.
+//! Background of a film: the footage's background at the film's size, one color, a given picture, or
+//! nothing.
+//!
+//! The background is kept in the pixel format of the film, so that each frame starts as a copy
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use super::front::Front;
 use super::params::Background;
@@ -11,20 +14,20 @@ use crate::raster::canvas::opaque;
 use crate::raster::resize::resized;
 use crate::raster::{Canvas, Frame, RgbImage, RgbaImage};
 
-/// A background, ready.
+/// Background of a film, ready for drawing.
 pub(super) struct Backdrop {
-    /// What sprites are drawn over.
+    /// Canvas over which sprites are drawn.
     pub(super) canvas: Canvas,
-    /// What is drawn over the sprites.
+    /// Occluders, drawn over the sprites.
     pub(super) front: Option<Front>,
-    /// Whether there is nothing behind.
+    /// Whether the background is transparent.
     pub(super) is_clear: bool,
     frame: Frame,
     rgba: Vec<u8>,
 }
 
 impl Backdrop {
-    /// A background that can be asked for by name; `occluders` are what stands before everyone in the plate.
+    /// Returns the background that a parameter selects. `occluders` are used only with `Background::Plate`.
     pub(super) fn of(
         background: Background,
         (plate, occluders): (&RgbImage, Option<&RgbaImage>),
@@ -56,7 +59,7 @@ impl Backdrop {
         backdrop
     }
 
-    /// A picture that fills the film.
+    /// Returns a given picture as the background, scaled to fill the film and cropped to its shape.
     pub(super) fn picture(picture: &RgbImage, size_px: [u32; 2], form: Form) -> Backdrop {
         Backdrop::ready(filling(picture, size_px), None, form)
     }
@@ -88,21 +91,23 @@ impl Backdrop {
         backdrop
     }
 
-    /// Gives transparent pixels a color, which nobody sees but a codec that cannot keep pixels apart.
+    /// Sets the color of transparent pixels. The color is invisible, but a codec that mixes neighboring
+    /// pixels lets some of it through.
     fn hide(&mut self, rgb: [u8; 3]) {
         for pixel in self.rgba.chunks_exact_mut(4) {
             pixel[..3].copy_from_slice(&rgb);
         }
     }
 
-    /// Makes a shot what it is before anybody is drawn.
+    /// Resets a shot to the background without animals.
     pub(super) fn begin(&self, shot: &mut Shot) {
         shot.frame.clone_from(&self.frame);
         shot.rgba.clone_from(&self.rgba);
     }
 }
 
-/// A picture as it fills a film: its middle, where it has another shape.
+/// Returns a picture scaled to cover the film. If the aspect ratios differ, the middle of the picture is
+/// used.
 pub(super) fn filling(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
     let scale = (f64::from(width) / f64::from(picture.width))
         .max(f64::from(height) / f64::from(picture.height));
@@ -122,7 +127,7 @@ pub(super) fn filling(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
     Canvas::of_rgb(&middle)
 }
 
-/// A picture's mean color.
+/// Returns the mean color of a picture.
 pub(super) fn mean(picture: &RgbImage) -> [u8; 3] {
     let mut sum = [0u64; 3];
     for pixel in picture.pixels.chunks_exact(3) {

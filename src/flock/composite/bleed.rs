@@ -1,14 +1,16 @@
-//! Color beyond the edges of alpha: transparent pixels next to visible ones take their color, so that a
-//! codec that shares color among neighbors, or smooths it, draws no dark rim (ALGORITHMS.md 8, alpha
-//! output).
+//! Color of transparent pixels next to visible ones.
+//!
+//! Transparent pixels near a visible pixel take its color. Without that, a codec that shares or smooths
+//! color among neighboring pixels would draw a dark rim (docs/explanation/algorithms.md, "Compositing").
 
 use crate::geometry::Rect;
 
-/// How far color goes, pixels: half of the largest chroma block and what a smoothing codec mixes.
+/// Distance that color spreads, in pixels: half of the largest chroma block plus the range of a smoothing
+/// codec.
 const REACH: usize = 8;
 
-/// Lets color out of what is visible in a box of a straight-alpha picture, along rows, then columns.
-/// Alpha stays as it is.
+/// Spreads color from the visible pixels in a box of a straight-alpha picture, first along columns, then
+/// along rows. Alpha stays the same.
 pub(super) fn bleed(rgba: &mut [u8], [width, height]: [u32; 2], rect: Rect) {
     let rect = rect.inflated(REACH as u32, width, height);
     let width = width as usize;
@@ -26,7 +28,7 @@ pub(super) fn bleed(rgba: &mut [u8], [width, height]: [u32; 2], rect: Rect) {
     }
 }
 
-/// Carries the color of the last visible pixel on, in the order given.
+/// Copies the color of the last visible pixel to the transparent pixels that follow it, in the given order.
 fn along(rgba: &mut [u8], pixels: impl Iterator<Item = usize>) {
     let mut color = [0; 3];
     let mut left = 0;

@@ -1,5 +1,8 @@
-//! Frames drawn ahead of whoever takes them, on a thread of their own: an encoder that starts or pauses costs no time
-//! as long as there is memory (ALGORITHMS.md 8).
+//! Drawing ahead of the consumer: frames are drawn on all threads while one more thread takes finished
+//! frames in order.
+//!
+//! A bounded number of finished frames may wait. An encoder that starts slowly or pauses then does not
+//! delay the drawing (docs/explanation/algorithms.md, "Compositing").
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
@@ -8,11 +11,13 @@ use rayon::prelude::*;
 
 use super::Shot;
 
-/// Bytes of frames that may wait, about; two to a thread in any case.
+/// Approximate memory for frames drawn ahead, in bytes. At least two frames per thread may wait in any
+/// case. Free choice.
 const AHEAD_BYTES: usize = 32 << 20;
 
-/// Has every one of `n_frames` prepared, in order, drawn on all threads, and taken, in order. Whoever prepares or takes
-/// may refuse: then its error comes back. `n_bytes`: of a frame, about.
+/// Draws `n_frames` frames. `prepare` and `take` are called for the frames in order; `draw` runs on all
+/// threads. `n_bytes` is the approximate size of a frame, in bytes. The first error of `prepare` or `take`
+/// ends the drawing and is returned.
 pub(super) fn draw_ahead<E: Send>(
     (n_frames, n_bytes): (usize, usize),
     prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
@@ -23,14 +28,14 @@ pub(super) fn draw_ahead<E: Send>(
     let (give, drawn) = channel::<Shot>();
     let (give_back, used) = channel();
     for _ in 0..n_shots {
-        // Its other end is just above.
+        // Cannot fail: the receiver `used` exists.
         give_back.send(Shot::default()).ok();
     }
     thread::scope(|scope| {
         let taker = scope.spawn(move || {
             for (frame_idx, shot) in drawn.iter().enumerate() {
                 take(frame_idx, &shot)?;
-                // Whoever has drawn all needs none.
+                // An error is ignored: without a receiver no buffer is needed.
                 give_back.send(shot).ok();
             }
             Ok(())
@@ -42,7 +47,7 @@ pub(super) fn draw_ahead<E: Send>(
     })
 }
 
-/// Draws until all is drawn, or nobody takes any more.
+/// Draws frames until all are drawn or the consumer has stopped.
 fn draw_all<E>(
     n_frames: usize,
     mut prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
@@ -52,7 +57,8 @@ fn draw_all<E>(
     let most = rayon::current_num_threads();
     let mut first = 0;
     while first < n_frames {
-        // What is there already, one at least; a taker that is gone gives none back.
+        // Waits for one free buffer, then takes the others that are free. Fails when the consumer has
+        // stopped.
         let Ok(shot) = used.recv() else { break };
         let n = most.min(n_frames - first);
         let mut shots: Vec<Shot> = (std::iter::once(shot).chain(used.try_iter()))
@@ -65,7 +71,7 @@ fn draw_all<E>(
         numbered.for_each(|(k, shot)| draw(first + k, shot));
         first += shots.len();
         for shot in shots {
-            // The taker's own error comes back.
+            // An error is ignored: a consumer that has stopped returns its own error.
             give.send(shot).ok();
         }
     }
@@ -79,7 +85,8 @@ mod tests {
 
     use super::*;
 
-    /// Draws 40 frames; the taker does not go on from frame `at` until frame `wanted` is drawn, and tells how many are.
+    /// Draws 40 frames. The consumer waits at frame `at` until `wanted` frames are drawn, for one second at
+    /// most. Returns the number of frames drawn at that time.
     fn drawn_when(at: usize, wanted: usize, n_bytes: usize) -> usize {
         let (n_drawn, mut seen) = (AtomicUsize::new(0), 0);
         let draw = |_, _: &mut Shot| {

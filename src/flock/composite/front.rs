@@ -1,8 +1,9 @@
-//! What stands before everyone: the wires of a cage, what lies on the pane. They are a part of the plate, so
-//! that they are drawn only where the plate lies behind.
+//! Occluders: objects between the camera and the animals, such as the wires of a cage or dirt on the pane.
+//! They belong to the footage's background and are drawn only with that background.
 //!
-//! Where they take the share w of a pixel the plate is B = w F + (1 - w) S. Everyone is drawn over S, and
-//! w F over everyone.
+//! An occluder of color F takes the share w of a pixel, and S is the scene behind it. The background is
+//! then B = w F + (1 - w) S. Animals are drawn over S, and w F over the animals
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use super::truth::ONE;
 use super::view::View;
@@ -10,13 +11,13 @@ use crate::geometry::Rect;
 use crate::raster::resize::resized;
 use crate::raster::{Canvas, RgbImage, RgbaImage};
 
-/// The occluders at the film's size.
+/// Occluders at the size of the film.
 pub(super) struct Front {
     canvas: Canvas,
 }
 
 impl Front {
-    /// The occluders as a view shows them.
+    /// Returns the occluders, scaled to a view.
     pub(super) fn of(occluders: &RgbaImage, view: &View) -> Front {
         let share = |pixel: &[u8]| [pixel[3]; 3];
         let rect = view.rect();
@@ -33,8 +34,9 @@ impl Front {
         Front { canvas }
     }
 
-    /// Leaves of a plate of the film's size what is behind them: S = (B - w F) / (1 - w). Drawn over that they are the plate
-    /// again, at any size: where resizing made them more than the plate shows, or less, they give way.
+    /// Replaces a background of the film's size by the scene behind the occluders, S = (B - w F) / (1 - w).
+    /// Drawing the occluders over S gives B again at any size: colors of occluders that resizing made too
+    /// bright or too dark for B are clamped.
     pub(super) fn take_off(&mut self, plate: &mut Canvas) {
         for (behind, front) in plate.pixels.iter_mut().zip(&mut self.canvas.pixels) {
             let through = i32::from(ONE as i16 - front[3]);
@@ -52,12 +54,12 @@ impl Front {
         }
     }
 
-    /// Draws them over a box of a canvas of the film's size.
+    /// Draws the occluders over a box of a canvas of the film's size.
     pub(super) fn draw(&self, on: &mut Canvas, rect: Rect) {
         on.over_box(&self.canvas, rect);
     }
 
-    /// How much of each pixel they leave to be seen, 16384ths.
+    /// Returns the share of each pixel that the occluders leave visible, in 16384ths.
     pub(super) fn left(&self) -> Vec<u16> {
         let left = |pixel: &[i16; 4]| ONE as u16 - pixel[3].unsigned_abs();
         self.canvas.pixels.iter().map(left).collect()

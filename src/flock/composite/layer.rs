@@ -1,5 +1,5 @@
-//! One individual as it is drawn into one frame: its sprite placed, and around a jump the second one
-//! faded in or out (ALGORITHMS.md 8).
+//! Drawing of one individual in one frame: its sprite, and around a jump a second sprite that fades in or
+//! out (docs/explanation/algorithms.md, "Compositing").
 
 use super::morph::bend;
 use super::params::Cut;
@@ -14,7 +14,7 @@ use crate::raster::blend::{haze, mix};
 use crate::raster::canvas::{Canvas, Cover};
 use crate::raster::resample::{Placement, Quad, Resampled, Room};
 
-/// What drawing needs besides the individual.
+/// Inputs of drawing that are the same for all individuals.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
     pub(super) sprites: &'a Sprites,
@@ -25,16 +25,16 @@ pub(super) struct Stage<'a> {
     pub(super) haze: Option<Haze>,
 }
 
-/// What is lost with distance.
+/// Loss of color with depth.
 #[derive(Clone, Copy)]
 pub(super) struct Haze {
-    /// The share that is left after each pixel of depth.
+    /// Share of the color that remains after each pixel of depth.
     pub(super) left_per_px: f64,
-    /// What takes the place of the rest.
+    /// Color that replaces the lost share.
     pub(super) color: Quad,
 }
 
-/// One individual at one frame.
+/// One individual in one frame.
 #[derive(Clone, Copy)]
 pub(super) struct Appearance<'a> {
     pub(super) individual: &'a Individual,
@@ -42,24 +42,23 @@ pub(super) struct Appearance<'a> {
     pub(super) fade: Option<&'a Fade>,
 }
 
-/// Draws individuals, one after the other, in memory that it keeps.
+/// Draws individuals one after the other, in memory that it reuses.
 #[derive(Default)]
 pub(super) struct Painter {
     packed: Vec<u8>,
-    /// What was drawn last.
+    /// Layer drawn last.
     pub(super) layer: Resampled,
     second: Resampled,
     mixed: Resampled,
 }
 
 impl Painter {
-    /// Draws an individual's layer for a picture of the film.
-    /// What is hidden by what is `nearer` may be left out.
+    /// Draws an individual into `layer`, in pixels of the film. Parts that `nearer` hides may be left out.
     pub(super) fn paint(&mut self, stage: &Stage, who: &Appearance, nearer: Option<&Cover>) {
         let is_bent = who.fade.is_some() && stage.cut == Cut::Morph;
         let room = Room {
             size: stage.view.size_px,
-            // Sprites are bent by all that they show.
+            // Morphing needs whole sprites.
             nearer: nearer.filter(|_| !is_bent),
         };
         self.paint_shifted(stage, who, room, [0.0; 2]);
@@ -73,8 +72,8 @@ impl Painter {
         }
     }
 
-    /// Draws an individual under what is on a canvas, which is nearer; returns its box. The layer is none then that
-    /// anybody may ask for.
+    /// Draws an individual under the content of a canvas, which is nearer. Returns the box of the
+    /// individual. The content of `layer` is unspecified afterwards.
     pub(super) fn paint_under(
         &mut self,
         stage: &Stage,
@@ -87,14 +86,14 @@ impl Painter {
             canvas.under(&self.layer, cover, stage.cpu);
             return self.layer.rect;
         }
-        // Nothing more is done to it: it need not be a layer first.
+        // Without fade and haze the sprite needs no intermediate layer.
         let (place, t) = (placement(stage, who), who.frame_idx);
         let frame = who.individual.source_frame[t];
         let sprite = (stage.stock).take(stage.sprites, frame, place.scale, &mut self.packed);
         canvas.draw_under(&sprite, &place, cover, stage.cpu)
     }
 
-    /// What was painted last, as the ground truth needs it; the layer is used up.
+    /// Returns the alpha of the layer drawn last, for the ground truth. May overwrite `layer`.
     pub(super) fn drawn(&mut self, stage: &Stage, who: &Appearance) -> Drawn {
         let place = placement(stage, who);
         let mut drawn = Drawn {
@@ -111,7 +110,7 @@ impl Painter {
         drawn
     }
 
-    /// Draws once more with room on all sides, to see what the border cut off.
+    /// Draws the individual with margins on all sides and returns its extent without clipping.
     fn whole(&mut self, stage: &Stage, who: &Appearance) -> Whole {
         let place = placement(stage, who);
         let reach_px = |frame: u32, scale: f64| {
@@ -124,7 +123,7 @@ impl Painter {
         });
         let shown = who.individual.source_frame[who.frame_idx];
         let room = reach_px(shown, place.scale).max(of_fade).ceil() as u32 + 4;
-        // From the nearest whole pixel inside of the picture, however far outside it is drawn.
+        // Moves the sprite to the middle by whole pixels, so that its sub-pixel position stays the same.
         let size = [2 * room, 2 * room];
         let shift = place
             .center_px
@@ -134,7 +133,7 @@ impl Painter {
         Whole::of(&self.layer.alpha(), self.layer.rect, shift)
     }
 
-    /// A box that ends inside of the picture on every side has not been clipped.
+    /// Returns whether the layer may be clipped: its box is empty or touches the border of the picture.
     fn is_clipped(&self, stage: &Stage) -> bool {
         let (rect, [width, height]) = (self.layer.rect, stage.view.size_px);
         let clipped_before = rect.x == 0 || rect.y == 0;
@@ -171,7 +170,7 @@ impl Painter {
     }
 }
 
-/// Where the main sprite goes in the film.
+/// Returns the placement of the main sprite in the film.
 fn placement(stage: &Stage, who: &Appearance) -> Placement {
     let (individual, t) = (who.individual, who.frame_idx);
     Placement {

@@ -1,10 +1,13 @@
-//! The film of a flock: real frames over the background, only where something is drawn
-//! (ALGORITHMS.md 8).
+//! The film of a flock: sprites composited over a background
+//! (docs/explanation/algorithms.md, "Compositing").
 //!
-//! Sprites are drawn near to far, each under those before it, premultiplied, by Catmull-Rom interpolation:
-//! what is hidden costs nothing, and whole pixels without rotation come out as they are. A frame starts
-//! from the background already in the encoder's form; what is drawn is converted tile by tile, so the cost
-//! follows the area seen. The ground truth comes from the same layers.
+//! Sprites are drawn from near to far, each under the sprites drawn before it, in premultiplied alpha with
+//! Catmull-Rom interpolation. Pixels that are already opaque are skipped. A sprite at scale 1, without
+//! rotation and at a whole-pixel position, is copied exactly.
+//!
+//! A frame starts as a copy of the background in the encoder's pixel format. Only tiles with sprites are
+//! converted again, so the cost grows with the area drawn. The ground truth is computed from the same
+//! layers.
 
 mod backdrop; // what lies behind
 mod bleed; // color beyond the edges of alpha
@@ -37,7 +40,7 @@ use crate::geometry::Rect;
 use crate::raster::canvas::{Cover, opaque};
 use crate::raster::{Canvas, ColorSpec, Frame, RgbImage, RgbaImage};
 
-/// Draws the frames of a flock, any of them from any thread.
+/// Draws the frames of a flock. Frames can be drawn in any order and from any thread.
 pub struct Compositor<'a> {
     library: &'a Library,
     flock: &'a Flock,
@@ -50,40 +53,40 @@ pub struct Compositor<'a> {
     stock: Stock,
     cpu: Level,
     n_frames: usize,
-    /// Per individual and output frame: which of its fades concerns it.
+    /// `[id][frame]`: index of the fade that is active at an output frame; `None` outside of fades.
     fade_at: Vec<Vec<Option<u32>>>,
     desks: Mutex<Vec<Desk>>,
 }
 
-/// The form in which frames are wanted.
+/// Pixel format of the drawn frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Opaque planes, as an encoder takes them.
+    /// Opaque planes, as encoders take them.
     Planar(ColorSpec),
     /// Straight-alpha RGBA.
     Straight,
 }
 
-/// One frame of the film, in the form asked for.
+/// One drawn frame of the film.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shot {
-    /// The planes; empty in the form `Straight`.
+    /// Planes; empty with `Form::Straight`.
     pub frame: Frame,
-    /// RGBA, by rows; empty in the form `Planar`.
+    /// Straight-alpha RGBA by rows; empty with `Form::Planar`.
     pub rgba: Vec<u8>,
-    /// What of whom can be seen, where that was asked for.
+    /// Ground truth of the frame, if the compositor computes it (`Compositor::with_truth`).
     pub truth: FrameTruth,
-    /// What lies behind this frame alone, filling the film; empty = the film's own backdrop.
+    /// Background of this frame only, scaled to fill the film; empty = the background of the film.
     pub behind: Frame,
 }
 
-/// What one thread draws on and with, kept from frame to frame.
+/// Working memory of one drawing thread, reused from frame to frame.
 struct Desk {
-    /// Everyone drawn so far, the nearest first, on nothing.
+    /// Sprites drawn so far, over a transparent background.
     canvas: Canvas,
-    /// What of the canvas has been drawn on.
+    /// Which parts of the canvas have been drawn on.
     cover: Cover,
-    /// The boxes of everyone, where color is to go beyond edges.
+    /// Boxes of the sprites. In a transparent film color is spread beyond their edges.
     boxes: Vec<Rect>,
     painter: Painter,
     shade: Shade,
@@ -91,8 +94,8 @@ struct Desk {
 }
 
 impl<'a> Compositor<'a> {
-    /// Ready to draw as the flock's own `render` parameters say, in the usual planes; over the plate
-    /// where they ask for nothing behind.
+    /// Returns a compositor for the flock's `render` parameters that draws planes. The footage's background
+    /// replaces `Background::Transparent`, because planes have no alpha.
     pub fn new(library: &'a Library, flock: &'a Flock) -> Compositor<'a> {
         let render = &flock.params.render;
         let size_px = render.size_px.unwrap_or(flock.image_size_px);
@@ -122,20 +125,21 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    /// The same in straight-alpha RGBA, with nothing behind where the parameters ask for that.
+    /// Switches to straight-alpha RGBA, with the background that the parameters select, transparent
+    /// included.
     pub fn straight(mut self) -> Compositor<'a> {
         self.form = Form::Straight;
         let background = self.flock.params.render.background;
         self.behind(background)
     }
 
-    /// The same, telling the ground truth of every frame.
+    /// Makes the compositor also compute the ground truth of every frame.
     pub fn with_truth(mut self) -> Compositor<'a> {
         self.with_truth = true;
         self
     }
 
-    /// The same before a picture, cut to the film's shape.
+    /// Replaces the background by a picture, scaled to fill the film and cropped to its shape.
     pub fn before(mut self, picture: &RgbImage) -> Compositor<'a> {
         self.backdrop = Backdrop::picture(picture, self.view.size_px, self.form);
         self
@@ -147,23 +151,23 @@ impl<'a> Compositor<'a> {
         self
     }
 
-    /// The same, but no more than `n_frames` of it.
+    /// Shortens the film to at most `n_frames` frames.
     pub fn first(mut self, n_frames: usize) -> Compositor<'a> {
         self.n_frames = self.n_frames.min(n_frames);
         self
     }
 
-    /// Frames of the film.
+    /// Returns the number of frames.
     pub fn n_frames(&self) -> usize {
         self.n_frames
     }
 
-    /// Width and height of the film.
+    /// Returns width and height of the film, in pixels.
     pub fn size_px(&self) -> [u32; 2] {
         self.view.size_px
     }
 
-    /// Draws one frame.
+    /// Draws one frame into `shot`, reusing its memory. Panics beyond the last frame.
     pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
         let mut desk = self.take_desk();
         desk.drawn.clear();
@@ -189,13 +193,14 @@ impl<'a> Compositor<'a> {
             .push(desk);
     }
 
-    /// What stands before everyone in a shot.
+    /// Returns the occluders in front of the animals. `None` if there are none, or if the shot has its own
+    /// background.
     fn front(&self, shot: &Shot) -> Option<&Front> {
         let front = self.backdrop.front.as_ref();
         front.filter(|_| shot.behind.planes.is_empty())
     }
 
-    /// How much of each pixel of a shot is left for everyone, 16384ths.
+    /// Returns the share of each pixel that the occluders leave to the animals, in 16384ths.
     fn left(&self, shot: &Shot) -> Vec<u16> {
         let [width, height] = self.view.size_px.map(|side| side as usize);
         match self.front(shot) {
@@ -204,7 +209,8 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    /// Turns what is on the desk into the form asked for, and wipes it off.
+    /// Puts the background under the canvas, converts the result to the film's pixel format, and clears the
+    /// canvas.
     fn develop(&self, desk: &mut Desk, shot: &mut Shot) {
         self.backdrop.begin(shot);
         let own = (!shot.behind.planes.is_empty())
@@ -233,8 +239,9 @@ impl<'a> Compositor<'a> {
         desk.boxes.clear();
     }
 
-    /// Draws every frame on all threads and gives each to `sink`, in order. Before a frame is drawn `prepare` may say
-    /// what lies behind it. Either may refuse: then its error comes back.
+    /// Draws all frames on all threads and passes each to `sink`, in order. `prepare` is called for each
+    /// frame before it is drawn, also in order, and may set `Shot::behind`. The first error of either ends
+    /// the drawing and is returned.
     pub fn render_all<E: Send>(
         &self,
         prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
@@ -265,7 +272,7 @@ impl<'a> Compositor<'a> {
         })
     }
 
-    /// Ties by id: the greater one is nearer.
+    /// Returns the individuals from near to far. At equal depth the larger id is nearer.
     fn near_to_far(&self, frame_idx: usize) -> Vec<Appearance<'a>> {
         let depth = |individual: &&Individual| match &individual.depth_m {
             Some(depth_m) => depth_m[frame_idx],
@@ -297,7 +304,7 @@ impl<'a> Compositor<'a> {
         let stage = self.stage();
         let outlines = self.shadows.as_ref().is_some_and(Shadows::are_outlines);
         if self.with_truth || outlines {
-            // Both ask for everyone whole.
+            // The ground truth and outline shadows need whole sprites, hidden parts included.
             desk.painter.paint(&stage, who, None);
             desk.put(self.cpu);
         }
@@ -323,7 +330,7 @@ impl<'a> Compositor<'a> {
 }
 
 impl Desk {
-    /// Puts what the painter has drawn under what is on the canvas.
+    /// Draws the painter's layer under the content of the canvas.
     fn put(&mut self, cpu: Level) {
         let layer = &self.painter.layer;
         self.canvas.under(layer, &mut self.cover, cpu);
@@ -333,7 +340,7 @@ impl Desk {
     }
 }
 
-/// The plate, and what stands before everyone in it.
+/// Returns the footage's background and its occluders.
 fn scene_of(library: &Library) -> (&RgbImage, Option<&RgbaImage>) {
     (&library.background, library.occluders.as_ref())
 }
@@ -353,7 +360,8 @@ fn mark(fade_at: &mut [Option<u32>], fade: &Fade, idx: u32) {
     }
 }
 
-/// Boxes that overlap by much become one, so that few pixels are gone over twice.
+/// Merges boxes whose common bounding box is no larger than their areas together. Few pixels are then
+/// processed twice.
 fn merge_overlapping(rects: &mut Vec<Rect>) {
     let mut at = 0;
     while at < rects.len() {

@@ -1,25 +1,30 @@
-//! A jump bridged by bending (ALGORITHMS.md 8, `"cut": "morph"`): where both sprites show the same part a
-//! few pixels apart, each is bent toward the other by its share before they are mixed, so that nothing is
-//! seen twice. Blocks are matched at half size, forward and backward; where the two disagree, nothing is
-//! bent and the cross-fade remains.
+//! Morphing at a jump (`"cut": "morph"`): both sprites are warped toward each other before they are mixed.
+//!
+//! Blocks of one sprite are searched in the other at half size, in both directions. Where the two
+//! directions agree, each sprite is warped by its share of the displacement, so that no body part appears
+//! twice. Where they disagree, the pixels stay in place and only fade
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use crate::geometry::Rect;
 use crate::raster::resample::{Quad, Resampled};
 
-/// Side of a block, and how far it is looked for, in pixels of the halved picture.
+/// Side of a block, in pixels of the half-size picture. Free choice.
 const BLOCK: i32 = 6;
+/// Search range of a block along each axis, in pixels of the half-size picture. Free choice.
 const REACH: i32 = 4;
-/// Forth and back may miss the start by so much, in the same pixels.
+/// Maximum distance between the start and the end of a match forward and back, in pixels of the half-size
+/// picture. Free choice.
 const AGREE_PX: f64 = 1.5;
 
-/// Where each block of one picture is found in the other, in full pixels; nothing where that is unsure.
+/// Displacement of each block of one picture to its match in the other, in full-size pixels.
 struct Flow {
     columns: i32,
     rows: i32,
     shifts: Vec<[f32; 2]>,
 }
 
-/// Bends `main` toward `second` by `weight`, and `second` toward `main` by the rest. Both then lie in one box.
+/// Warps `main` toward `second` by the share `weight`, and `second` toward `main` by the rest. Both then
+/// cover the same box. Does nothing if one of them is empty.
 pub(super) fn bend(main: &mut Resampled, second: &mut Resampled, weight: f64) {
     let rect = main.rect.union(&second.rect);
     if main.rect.is_empty() || second.rect.is_empty() {
@@ -32,7 +37,7 @@ pub(super) fn bend(main: &mut Resampled, second: &mut Resampled, weight: f64) {
         Flow::between(&small_b, &small_a),
     );
     let (forth_sure, back_sure) = (forth.agreeing(&back), back.agreeing(&forth));
-    // What is shown at x was at x less its share of the way.
+    // The pixel shown at x comes from x minus its share of the displacement.
     main.pixels = forth_sure.bent(&a, rect, weight as f32);
     second.pixels = back_sure.bent(&b, rect, 1.0 - weight as f32);
     for layer in [main, second] {
@@ -41,7 +46,7 @@ pub(super) fn bend(main: &mut Resampled, second: &mut Resampled, weight: f64) {
     }
 }
 
-/// A layer's pixels in a larger box.
+/// Returns a layer's pixels in a larger box. The added pixels are transparent.
 fn grown(layer: &Resampled, rect: Rect) -> Vec<Quad> {
     let mut pixels = vec![[0; 4]; rect.area() as usize];
     for ([x, y], row) in layer.shown() {
@@ -51,7 +56,7 @@ fn grown(layer: &Resampled, rect: Rect) -> Vec<Quad> {
     pixels
 }
 
-/// A picture at half size: brightness and alpha.
+/// Picture at half size: brightness and alpha of each pixel.
 struct Half {
     width: i32,
     height: i32,
@@ -82,7 +87,7 @@ impl Half {
         }
     }
 
-    /// Beyond its edges a picture is empty.
+    /// Returns the value at a pixel, or zero beyond the edges.
     fn at(&self, x: i32, y: i32) -> [i32; 2] {
         match (0..self.width).contains(&x) && (0..self.height).contains(&y) {
             true => self.values[(y * self.width + x) as usize],
@@ -107,14 +112,15 @@ impl Flow {
         }
     }
 
-    /// The flow where going there and back ends near the start, and none elsewhere.
+    /// Returns the flow with all displacements set to zero for which the way forward and back misses the
+    /// start by more than `AGREE_PX`.
     fn agreeing(&self, back: &Flow) -> Flow {
         let place = |column: i32, row: i32| (row * self.columns + column) as usize;
         let mut shifts = self.shifts.clone();
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let [dx, dy] = self.shifts[place(column, row)];
-                // The block of the other picture in which this one's middle ends.
+                // Block of the other picture that contains the displaced middle of this block.
                 let to = |at: i32, shift: f32, n: i32| {
                     let middle = at as f32 + 0.5 + shift / (2 * BLOCK) as f32;
                     (middle.floor() as i32).clamp(0, n - 1)
@@ -130,7 +136,7 @@ impl Flow {
         Flow { shifts, ..*self }
     }
 
-    /// The shift at a pixel, between the middles of the four blocks about it.
+    /// Returns the displacement at a pixel, interpolated between the middles of the four nearest blocks.
     fn at(&self, x: f32, y: f32) -> [f32; 2] {
         let side = (2 * BLOCK) as f32;
         let (u, v) = (x / side - 0.5, y / side - 0.5);
@@ -150,7 +156,7 @@ impl Flow {
         sum
     }
 
-    /// A picture moved along `share` of its flow.
+    /// Returns a picture moved by `share` of its flow.
     fn bent(&self, pixels: &[Quad], rect: Rect, share: f32) -> Vec<Quad> {
         let (width, height) = (rect.w as usize, rect.h as usize);
         let mut out = Vec::with_capacity(pixels.len());
@@ -166,7 +172,8 @@ impl Flow {
     }
 }
 
-/// The shift, in full pixels, with which a block of the other picture is most alike; the nearer the better.
+/// Returns the displacement, in full-size pixels, to the most similar block of the other picture. A cost
+/// per pixel of displacement prefers near matches.
 fn matched(from: &Half, to: &Half, left: i32, top: i32) -> [f32; 2] {
     let mut best = (i32::MAX, [0, 0]);
     for dy in -REACH..=REACH {
@@ -184,7 +191,7 @@ fn matched(from: &Half, to: &Half, left: i32, top: i32) -> [f32; 2] {
     best.1.map(|shift| (2 * shift) as f32)
 }
 
-/// Bilinear; beyond the edges there is nothing.
+/// Returns the bilinear interpolation at (u, v). Pixels beyond the edges are transparent.
 fn between_pixels(pixels: &[Quad], (width, height): (usize, usize), u: f32, v: f32) -> Quad {
     let (left, top) = (u.floor(), v.floor());
     let (fu, fv) = (u - left, v - top);
@@ -208,7 +215,7 @@ mod tests {
     use super::*;
     use crate::raster::resample::ONE;
 
-    /// A patterned disc about a point.
+    /// Returns a patterned disc around a point.
     fn disc(center: [f64; 2]) -> Resampled {
         let rect = Rect::of_size(64, 48);
         let pixels = (0..64 * 48)

@@ -1,61 +1,67 @@
-//! What a person may set about the film of a flock (ALGORITHMS.md 8): its size, what lies behind, how
-//! jumps are bridged, and which files are made. Nothing here changes what the flock does.
+//! Parameters of a flock's film: size, background, drawing at jumps, and files to write.
+//!
+//! These parameters change only the drawing. The flock's motion and its plans stay the same
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-/// Parameters of a flock's film; all have defaults.
+/// Parameters of a flock's film. Every field has a default.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Render {
-    /// Width and height of the film, pixels, 16..=8192 each, at most 8,294,400 (3840 x 2160) together; null = the footage's. The field of view stays
-    /// that of the footage; a film of another shape has bars.
+    /// Width and height of the film in pixels: 16..=8192 each, and at most 8,294,400 pixels (3840 x 2160)
+    /// in total. null = the size of the footage. The film always shows the whole picture of the footage. A
+    /// film of another aspect ratio has bars.
     pub size_px: Option<[u32; 2]>,
-    /// What lies behind: `plate`, `transparent`, or a color as `#rrggbb`. Where a format has no
-    /// transparency, the plate takes its place.
+    /// Background of the film: `plate` (the background of the footage), `transparent`, or a color as
+    /// `#rrggbb`. Formats without transparency use `plate` in place of `transparent`.
     #[schema(value_type = String)]
     pub background: Background,
-    /// How jumps are bridged.
+    /// Drawing method at a jump: `fade` or `morph`.
     pub cut: Cut,
-    /// How much of what is a body length farther is lost in haze, 0..=1; 0 = clear.
+    /// Share of an animal's color that haze replaces per body length of depth, 0..=1. 0 = no haze.
     pub haze_per_bl: f64,
-    /// How dark the shadow of everyone on the floor is, 0..=1; 0 = none, null = as it was filmed from above, and none from
-    /// the side.
+    /// Darkness of the animals' shadows on the floor: the share of the light that a shadow removes, 0..=1.
+    /// 0 = no shadows. null = the darkness measured in top view. With null, side view has no shadows, nor
+    /// has a library without a measured shadow.
     pub shadow: Option<f64>,
-    /// Files to make besides video.mp4.
+    /// Files to write in addition to video.mp4.
     pub formats: Vec<Format>,
-    /// Whether to make overlay.mp4: where everyone's boid is and where it heads (O's figure 10).
+    /// Whether to write overlay.mp4, which marks the position and heading of every boid (Okabe et al.,
+    /// figure 10).
     pub overlay: bool,
-    /// Whether to make ground-truth.zip and tracks.csv.
+    /// Whether to write ground-truth.zip and tracks.csv.
     pub ground_truth: bool,
 }
 
-/// The largest picture, as of footage: a frame is held in memory several times over.
+/// Maximum number of pixels in a frame, the same as for footage. Memory holds several copies of a frame.
 const MOST_PIXELS: u64 = 3840 * 2160;
 
-/// What lies behind a flock.
+/// Background of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Background {
-    /// The scene without the animal.
+    /// Background of the footage.
     Plate,
-    /// Nothing: the film has straight alpha.
+    /// No background: the film has straight alpha.
     Transparent,
     /// One color.
     Color([u8; 3]),
 }
 
-/// How a jump is bridged.
+/// Drawing method at a jump.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cut {
-    /// One sprite fades out while the other fades in.
+    /// Cross-fade: one sprite fades out while the other fades in.
     Fade,
-    /// Both are bent to each other while they fade, where that can be done.
+    /// Morph: a cross-fade in which both sprites are warped toward each other. Parts that cannot be matched
+    /// only fade.
     Morph,
 }
 
-/// A kind of file that shows a flock.
+/// File format of a flock's film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Format {
@@ -65,13 +71,13 @@ pub enum Format {
     Webm,
     /// ProRes 4444 in QuickTime, for editors.
     Mov,
-    /// A PNG picture for every frame.
+    /// One PNG picture per frame.
     Png,
-    /// A small animated GIF of the first seconds, without transparency.
+    /// Small animated GIF of the first seconds, without transparency.
     Gif,
-    /// A small animated WebP of the first seconds.
+    /// Small animated WebP of the first seconds.
     Webp,
-    /// The frame in the middle, as one picture.
+    /// Poster: the middle frame as one picture.
     Poster,
 }
 
@@ -91,7 +97,7 @@ impl Default for Render {
 }
 
 impl Render {
-    /// Checks every range; the sentence says which parameter is out of which range.
+    /// Checks the range of every field. The error names the field and its range.
     pub fn check(&self) -> Result<(), String> {
         for side in self.size_px.into_iter().flatten() {
             if !(16..=8192).contains(&side) {
@@ -118,7 +124,7 @@ impl Render {
 }
 
 impl Format {
-    /// Whether it can show what is behind the film.
+    /// Returns whether the format can store transparency.
     pub fn has_alpha(self) -> bool {
         !matches!(self, Format::Mp4 | Format::Gif)
     }

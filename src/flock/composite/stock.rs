@@ -1,5 +1,8 @@
-//! Sprites ready to be drawn, kept while there is room: most are shown several times by several
-//! individuals (ALGORITHMS.md 8). What is kept is bounded, however long the footage and the film.
+//! Cache of premultiplied sprites, shared by all threads.
+//!
+//! Most sprites are shown several times by several individuals. The memory of the cache is bounded,
+//! whatever the length of footage and film: the cache is emptied when the next sprite does not fit
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -7,10 +10,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::library::Sprites;
 use crate::raster::resample::Premultiplied;
 
-/// What is kept at most.
+/// Maximum size of the cached sprites, in bytes. Free choice.
 const MOST_BYTES: usize = 96 << 20;
 
-/// Premultiplied sprites by frame and level.
+/// Premultiplied sprites by frame and by level of halved pictures.
 #[derive(Default)]
 pub(super) struct Stock {
     shelf: Mutex<Shelf>,
@@ -23,7 +26,8 @@ struct Shelf {
 }
 
 impl Stock {
-    /// The sprite of a frame for being drawn at `scale`. `packed` is lent.
+    /// Returns the sprite of a frame, prepared for drawing at `scale`. A frame without a sprite gives an
+    /// empty one. `packed` is a buffer for reuse.
     pub(super) fn take(
         &self,
         sprites: &Sprites,

@@ -1,4 +1,5 @@
-//! What the film shows: whole sprites as they are, no boxes, the same from any thread.
+//! Tests of the compositor: sprites appear without boxes around them, and frames depend neither on threads
+//! nor on their order.
 
 use super::params::Cut;
 use super::*;
@@ -7,7 +8,7 @@ use crate::flock::{Params, plan_flock};
 use crate::library::View;
 use crate::progress::Silent;
 
-/// Nothing lies behind one frame alone.
+/// Prepares nothing: no frame has a background of its own.
 fn unprepared<E>(_: usize, _: &mut Shot) -> Result<(), E> {
     Ok(())
 }
@@ -93,7 +94,8 @@ fn nothing_changes_where_nobody_is() {
     }
 }
 
-/// The synthetic library with a red wire of three rows, of which the middle one hides all, before everybody.
+/// Returns the synthetic library with a red wire in front of the animals. The wire is three rows high, and
+/// its middle row is opaque.
 fn behind_a_wire(row: u32) -> Library {
     let mut library = synthetic::library(View::Top);
     let [width, height] = library.poses.image_size_px;
@@ -116,7 +118,7 @@ fn behind_a_wire(row: u32) -> Library {
 fn a_wire_is_before_everybody_on_the_plate_and_before_nobody_elsewhere() {
     const ROW: usize = 120;
     let library = behind_a_wire(ROW as u32);
-    // For whom the floor goes on behind the wire.
+    // The flock is made from the library without the wire, so that animals swim behind the wire.
     let mut flock = flock(&synthetic::library(View::Top), "swarm");
     let width = library.background.width as usize;
     let row = ROW * width..(ROW + 1) * width;
@@ -134,7 +136,7 @@ fn a_wire_is_before_everybody_on_the_plate_and_before_nobody_elsewhere() {
         );
         n_passing += usize::from(passes(&shot.truth));
         for rgb in shot.frame.to_rgb().pixels[3 * row.start..3 * row.end].chunks(3) {
-            // Chroma is shared with the rows beside it.
+            // Chroma is subsampled, so neighboring rows change the color of the wire.
             assert!(rgb[0] > rgb[1].saturating_add(60), "{rgb:?}");
         }
     }
@@ -173,7 +175,7 @@ fn overlapping_boxes_are_merged_and_those_apart_kept() {
     );
 }
 
-/// Every frame of a flock with its ground truth.
+/// Returns every frame of a flock with its ground truth.
 fn shots(library: &Library, flock: &Flock) -> Vec<Shot> {
     let film = Compositor::new(library, flock).with_truth();
     let mut shots = Vec::new();
@@ -219,7 +221,7 @@ fn the_truth_is_where_flock_json_says() {
                     .map(|v| v as f64);
                 let [cx, cy] = seen.centroid_px;
                 assert!((x..x + w).contains(&cx) && (y..y + h).contains(&cy));
-                // The long way of the box is that of the heading.
+                // The long side of the box lies along the heading.
                 let heading = individual.heading_rad[t];
                 let across = libm::cos(heading).abs() > 0.9 && view == View::Top;
                 assert!(!across || w > h, "{w} {h} at {heading}");
@@ -322,7 +324,7 @@ fn what_is_filmed_on_nothing_gives_over_the_plate_the_film() {
         }
     }
     assert!(n_clear > 320 * 240 / 2, "{n_clear}");
-    // Chroma is halved on the way through the planes; nothing else differs.
+    // The only difference is the subsampled chroma of the planes.
     let mean = error as f64 / (3.0 * 320.0 * 240.0);
     assert!(mean < 2.0, "{mean}");
 }
@@ -343,7 +345,7 @@ fn a_frame_of_another_film_lies_behind_where_it_is_given() {
         .filter(|(luma, label)| **label == 0 && luma.abs_diff(128) <= 1)
         .count();
     assert!(n_gray > 320 * 240 / 2, "{n_gray}");
-    // Without one the plate is back.
+    // Without its own background, a frame shows the background of the film.
     let mut plain = Shot::default();
     film.render(9, &mut plain);
     let mut fresh = Shot::default();

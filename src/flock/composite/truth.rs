@@ -1,55 +1,58 @@
-//! What of whom can be seen in a frame, told by the compositor from the very alpha it drew with:
-//! visible_i = alpha_i times the product of (1 - alpha_k) over all k nearer (ALGORITHMS.md 8), and what stands
-//! before them all.
+//! Ground truth of a frame: how much of each individual is visible, and where.
 //!
-//! Everything is counted in 16384ths, so that what that, all individuals and the background show of a pixel
-//! adds up to exactly one.
+//! The compositor computes it from the alpha with which it draws: visible_i = alpha_i times the product of
+//! (1 - alpha_k) over all nearer individuals k and the occluders
+//! (docs/explanation/algorithms.md, "Compositing").
+//!
+//! All shares are integers, in 16384ths. The shares of occluders, individuals and background add up to
+//! exactly one in every pixel.
 
 use crate::geometry::Rect;
 use crate::raster::Mask;
 
-/// Alpha 1, and the whole of a pixel.
+/// Alpha 1, or a whole pixel, in 16384ths.
 pub(super) const ONE: u32 = 1 << 14;
-/// What counts as shown.
+/// Least visible share of a pixel for which an individual gets the label of the pixel.
 const HALF: u32 = ONE / 2;
 
-/// The ground truth of one frame, in pixels of the film.
+/// Ground truth of one frame, in pixels of the film.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct FrameTruth {
-    /// Width and height of the film.
+    /// Width and height of the film, in pixels.
     pub size_px: [u32; 2],
-    /// By pixel: 0, or id + 1 of the individual that makes up at least half of it.
+    /// Label of each pixel, by rows: id + 1 of the individual that makes up at least half of the pixel, or
+    /// 0.
     pub labels: Vec<u16>,
-    /// Everyone, by id.
+    /// Visibility of each individual, by id.
     pub seen: Vec<Seen>,
-    /// By pixel: the share of its light that shadows take where they can be seen, 0 to 255; empty in a film without
-    /// shadows.
+    /// Share of the light that visible shadows remove from each pixel, 0..=255, by rows. Empty if the film
+    /// has no shadows.
     pub shadow: Vec<u8>,
 }
 
-/// One individual in one frame. Boxes are [x, y, width, height].
+/// Visibility of one individual in one frame.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Seen {
-    /// Where its centroid is drawn.
+    /// Position of the centroid in the film.
     pub centroid_px: [f64; 2],
-    /// Size relative to the footage's, times that of the film.
+    /// Scale of the sprite: film pixels per footage pixel.
     pub scale: f64,
-    /// The tightest box around its label; `None` when it has none.
+    /// Tightest box around the pixels with its label; `None` if there are none.
     pub visible_box: Option<Rect>,
-    /// Pixels of its label.
+    /// Number of pixels with its label.
     pub visible_area: u32,
-    /// Where its own alpha is at least a half, whoever is before it; within the picture.
+    /// Mask of the pixels where its own alpha is at least one half, covered or not. Clipped to the picture.
     pub silhouette: Mask,
-    /// The tightest box around its alpha of at least a half, whoever is before it; it may reach beyond
-    /// the picture. `None` when no pixel has that much.
+    /// Tightest box around all pixels where its own alpha is at least one half, covered or not:
+    /// `[x, y, width, height]`. It may extend beyond the picture. `None` if there are no such pixels.
     pub amodal_box: Option<[i64; 4]>,
-    /// Pixels of that, beyond the picture too.
+    /// Number of these pixels, including those beyond the picture.
     pub amodal_area: u32,
-    /// The share of its alpha that is in the picture and not covered, 0..=1.
+    /// Share of its total alpha that lies in the picture and is not covered, 0..=1.
     pub visibility: f64,
 }
 
-/// What was drawn of an individual: alpha in 16384ths over a box.
+/// Alpha with which an individual was drawn, in 16384ths, over a box.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Drawn {
     pub(super) id: u32,
@@ -57,11 +60,11 @@ pub(super) struct Drawn {
     pub(super) scale: f64,
     pub(super) rect: Rect,
     pub(super) alpha: Vec<u16>,
-    /// The same including what lies outside of the picture, where anything does.
+    /// Extent without clipping; `None` if the sprite lies inside the picture.
     pub(super) whole: Option<Whole>,
 }
 
-/// An individual's extent without regard to the picture's border.
+/// Extent of an individual without clipping at the picture's border.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Whole {
     amodal_box: Option<[i64; 4]>,
@@ -70,8 +73,11 @@ pub(super) struct Whole {
 }
 
 impl FrameTruth {
-    /// The truth of everyone drawn, near to far; ids are 0..n, each once. `shade` is below them, in 16384ths; `left` is
-    /// what stands before them all leaves of each pixel.
+    /// Returns the ground truth of a frame.
+    ///
+    /// `drawn` lists the individuals from near to far; their ids are 0..n, each once. `shade` is the alpha
+    /// of the shadows below them, and `left` the share of each pixel that the occluders leave. Both are in
+    /// 16384ths.
     pub(super) fn of(
         drawn: &[Drawn],
         shade: Option<&[u16]>,
@@ -85,7 +91,7 @@ impl FrameTruth {
             seen: vec![Seen::default(); drawn.len()],
             shadow: Vec::new(),
         };
-        // Each takes of it what those farther do not have.
+        // Each individual takes its visible share from `left`; farther individuals get the rest.
         for drawn in drawn {
             truth.seen[drawn.id as usize] = truth.look(drawn, &mut left);
         }
@@ -110,7 +116,7 @@ impl FrameTruth {
                 let visible = (u32::from(alpha) * u32::from(left[k]) + HALF) / ONE;
                 left[k] -= visible as u16;
                 visible_sum += u64::from(visible);
-                // Two halves: the nearer one has the pixel.
+                // If two individuals have exactly half a pixel each, the nearer one gets the label.
                 if visible >= HALF && labels[k] == 0 {
                     labels[k] = drawn.id as u16 + 1;
                     extent.add(i64::from(rect.x) + k as i64, i64::from(y));
@@ -144,7 +150,8 @@ impl FrameTruth {
 }
 
 impl Whole {
-    /// Of alpha over a box whose corner lies at `rect`'s less `shift`.
+    /// Returns the extent of the alpha over a box. The true position of the box is `rect` moved by minus
+    /// `shift`.
     pub(super) fn of(alpha: &[u16], rect: Rect, shift: [i64; 2]) -> Whole {
         let mut extent = Extent::default();
         let (mut amodal_area, mut alpha_sum) = (0, 0);
@@ -170,7 +177,7 @@ impl Whole {
     }
 }
 
-/// The tightest box around some pixels: left, top, right, bottom.
+/// Tightest box around some pixels: left, top, right, bottom. Right and bottom are exclusive.
 #[derive(Default)]
 struct Extent {
     edges: Option<[i64; 4]>,
@@ -260,8 +267,8 @@ mod tests {
     }
 
     proptest! {
-        /// Labels partition what is drawn: a pixel has the label of the one that makes up half of it,
-        /// nobody's shares add up to more than the whole, and boxes touch their labels on all sides.
+        /// Each pixel has the label of the individual that makes up half of it. No visibility exceeds 1,
+        /// and each box is tight around its label.
         #[test]
         fn labels_are_those_of_the_formula(
             layers in prop::collection::vec((0u32..6, 0u32..6, 1u32..5, 1u32..5, 0u16..=ONE as u16), 1..7),

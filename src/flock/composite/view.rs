@@ -1,21 +1,23 @@
-//! From pixels of the footage, in which a flock is placed, to pixels of the film: the same field of view
-//! at any size (ALGORITHMS.md 8). A film of another shape has bars beside the view or above and below it.
+//! Mapping from pixels of the footage, in which a flock is placed, to pixels of the film.
+//!
+//! The whole picture of the footage is scaled to fit the film and centered. If the aspect ratios differ,
+//! bars remain beside the picture, or above and below it (docs/explanation/algorithms.md, "Compositing").
 
 use crate::geometry::Rect;
 
-/// The footage's picture within a film.
+/// Position and scale of the footage's picture in the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct View {
-    /// Width and height of the film.
+    /// Width and height of the film, in pixels.
     pub(super) size_px: [u32; 2],
-    /// Pixels of the film to a pixel of the footage.
+    /// Film pixels per footage pixel.
     pub(super) scale: f64,
-    /// Where the view's upper left corner lies in the film.
+    /// Upper left corner of the picture, in pixels of the film.
     pub(super) offset_px: [f64; 2],
 }
 
 impl View {
-    /// The whole of a footage as large as a film of `size_px` lets it be, in its middle.
+    /// Returns the view that shows the whole picture as large as possible in the middle of the film.
     pub(super) fn fitted(footage_px: [u32; 2], size_px: [u32; 2]) -> View {
         if footage_px == size_px {
             return View {
@@ -34,7 +36,7 @@ impl View {
         }
     }
 
-    /// A point of the footage in the film.
+    /// Converts a point from footage pixels to film pixels.
     pub(super) fn point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
             self.offset_px[0] + x * self.scale,
@@ -42,7 +44,7 @@ impl View {
         ]
     }
 
-    /// The pixels of the film that show the footage's picture.
+    /// Returns the rectangle of the film that shows the picture.
     pub(super) fn rect(&self) -> Rect {
         let [width, height] = self.size_px;
         let [left, top] = self.offset_px.map(|px| px.round() as i64);

@@ -1,7 +1,9 @@
-//! What is added to the costs of some states at the frames of a block by the crowd (ALGORITHMS.md 6).
+//! Crowd costs that are added to states at the frames of a block
+//! (docs/explanation/algorithms.md, "Planning").
 //!
-//! It is added to states in a row, so only where it begins and where it ends is noted; the sums are taken
-//! as the stations are filled in. Who plays on moves such a row by a state a frame.
+//! Each cost is added to a range of consecutive states. Only its beginning and end are recorded, as
+//! differences; the costs are summed while the stations are processed. When a neighbor plays on, its range
+//! moves by one state per frame.
 
 use super::cost::CEILING;
 use super::landings::Way;
@@ -11,20 +13,20 @@ use super::viterbi::{Block, FRAMES};
 #[cfg(target_arch = "x86_64")]
 use crate::cpu::Level;
 
-/// What is added to each state of a trellis at the frames of one block.
+/// Costs added to each state of a trellis at the frames of one block.
 #[derive(Clone)]
 pub(super) struct Added {
-    /// By state, and one past the last: how much more is added than to the state before, at each frame of the
-    /// block, in the order of time; modulo 2^32.
+    /// By state, and one past the last: difference between the costs added to this state and to the state
+    /// before. One value per frame of the block, in order of time, modulo 2^32.
     more: Vec<[u32; FRAMES]>,
-    /// What is added to the station filled in last.
+    /// Cost added to the station processed last.
     now: [u32; FRAMES],
-    /// Whether anything is.
+    /// Whether any cost was added.
     is_any: bool,
 }
 
 impl Added {
-    /// Nothing.
+    /// Returns an empty set of costs.
     pub(super) fn new(n_states: usize) -> Added {
         Added {
             more: vec![[0; FRAMES]; n_states + 1],
@@ -33,10 +35,11 @@ impl Added {
         }
     }
 
-    /// Nothing again, after all stations were passed.
+    /// Removes all costs, after all stations were processed.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
-        // What ends with the last state, or begins with the first, is not passed.
+        // `pass` resets the entries that it processes. One of these two is not among them, depending on the
+        // direction.
         let n_states = self.more.len() - 1;
         self.more[0] = [0; FRAMES];
         self.more[n_states] = [0; FRAMES];
@@ -44,8 +47,8 @@ impl Added {
         self.is_any = false;
     }
 
-    /// Adds to states in a row, [first, one past the last], that move on by one a frame: `costs[k]` at moment
-    /// `first + k`.
+    /// Adds `costs[k]` at moment `first + k` to a range of states, given as first and one past the last.
+    /// The range moves on by one state per moment.
     #[inline(always)]
     pub(super) fn add(&mut self, [low, high]: [u32; 2], first: usize, costs: &[u32]) {
         self.is_any = true;
@@ -58,7 +61,7 @@ impl Added {
         }
     }
 
-    /// Adds all of it to the stations from `first` on; forgets what it passes.
+    /// Adds the costs to `out` for the stations from `first` on, and resets the entries that it processes.
     #[inline(always)]
     pub(super) fn pass(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         if !self.is_any {
@@ -78,7 +81,8 @@ impl Added {
     }
 }
 
-/// Going back, sums are those of the state after less what begins there, and lanes run against time.
+/// Adds the running sums to `out`. Backward in time the sum of a state is that of the next state minus the
+/// difference there, and lanes run against time.
 #[inline(always)]
 fn pass_on<'a, const BACK: bool>(
     block: &Block,
@@ -90,7 +94,7 @@ fn pass_on<'a, const BACK: bool>(
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "vectors of AVX2")]
-            // SAFETY: the line above made sure of AVX2.
+            // SAFETY: the guard of this match arm checks for AVX2.
             unsafe {
                 pass_avx2::<BACK>(now, more, out);
             }
@@ -111,7 +115,7 @@ fn pass_on<'a, const BACK: bool>(
     }
 }
 
-/// The same.
+/// AVX2 version of the portable code in `pass_on`.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]

@@ -1,31 +1,33 @@
-//! An independent proof that a plan is the cheapest (ALGORITHMS.md 6, proof b).
+//! Independent proof that a plan is the cheapest, by duality of linear programming
+//! (docs/explanation/algorithms.md, "Planning").
 //!
-//! Given what the recursion says each state costs at each frame, it looks at every edge once, sums
-//! the costs along forced runs one by one, and never asks how the plan was found: if no edge offers
-//! less and the plan costs what its end says, no plan costs less (linear programming duality).
+//! The potentials are the costs of reaching each state at each frame, as the recursion returns them. The
+//! proof checks every edge once and sums the costs along forced runs one by one. If no edge offers less
+//! than the potentials, and the plan costs what they say at its end, no plan costs less. How the plan was
+//! found does not matter.
 
 use super::trellis::Trellis;
 
-/// How a certificate fails.
+/// Reason why a certificate fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Violation {
-    /// An edge into `state` at frame `t` offers less than was said.
+    /// An edge into `state` at frame `t` offers less than the potentials say.
     CheaperEdge {
         /// Output frame.
         t: usize,
-        /// The state it leads to.
+        /// State to which the edge leads.
         state: usize,
     },
-    /// The plan ends where a cheaper end exists.
+    /// A cheaper end than that of the plan exists.
     CheaperEnd,
-    /// The plan takes a step that is no edge, at this frame.
+    /// The step to this frame is no edge.
     Impossible(usize),
-    /// The plan's steps sum to this.
+    /// Sum of the plan's steps, in turns, which is not the cost of the plan.
     Cost(u64),
 }
 
 /// Checks `potentials[t][state]` against every edge, and the path against the potentials.
-/// `cost_at(t, state)` is what showing a state costs.
+/// `cost_at(t, state)` returns the cost of showing a state, in turns.
 pub fn check(
     trellis: &Trellis,
     dwell: usize,
@@ -65,7 +67,7 @@ struct Edges<'a> {
 }
 
 impl Edges<'_> {
-    /// The sum of a path's steps, from its states alone.
+    /// Returns the sum of a path's steps, computed from its states.
     fn cost_of_path(&self, states: &[u32]) -> Result<u64, Violation> {
         let mut cost = u64::from((self.cost_at)(0, states[0] as usize));
         let mut since_jump = self.dwell;
@@ -83,7 +85,7 @@ impl Edges<'_> {
         Ok(cost)
     }
 
-    /// No edge that lands at frame `t` or continues into it offers less than was said.
+    /// Checks that no edge that lands at frame `t` or continues into it offers less than the potentials.
     fn check_into(&self, t: usize, v: &[Vec<u32>], plan_cost: u64) -> Result<(), Violation> {
         for state in 0..self.trellis.n_states() {
             if self.trellis.continues(state, 1) {
@@ -103,7 +105,7 @@ impl Edges<'_> {
         Ok(())
     }
 
-    /// A forced run of `dwell` frames from a landing, or as much of it as the film has left.
+    /// Checks the forced run of `dwell` frames after a landing, or the part of it that lies in the film.
     fn check_run(
         &self,
         t: usize,

@@ -1,11 +1,14 @@
-//! Plans that play into one another: the last frame of each into the first of whom it becomes
-//! (ALGORITHMS.md 6, loop).
+//! Plans of a loop: the last frame of each plan leads to the first frame of its heir's plan. The heir of an
+//! individual is the individual as which it continues (docs/explanation/algorithms.md, "Planning").
 //!
-//! Plans without that give a leader its first state, that of an heir follows from the plan before it, until
-//! one is the leader's own again; from there on the plan is found anew, exact among all that begin so, jump
-//! no sooner than a dwell after the first frame (as if it had just been jumped to), and end where the heir's
-//! first state follows. The recursion sees one frame more than the film has, at which only that state may
-//! be shown.
+//! Heirs form circles. The leader of a circle, its smallest id, takes the first state of its plan without
+//! loop conditions. The first state of each heir follows from the cheapest plan of the individual before
+//! it, until the circle is back at the leader. Each plan is then found exactly, with its first state given
+//! and the heir's first state after its last frame. The first state counts as just jumped to, so the next
+//! jump must wait for the dwell.
+//!
+//! The recursion sees one frame more than the film has. At that frame only the heir's first state is
+//! allowed.
 
 use std::iter;
 
@@ -16,42 +19,43 @@ use super::viterbi::{Block, FRAMES, Film, Path, Rows};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
-/// What a plan that may not be costs at least. Three of these and all costs of a loop's plan stay below
-/// 2^31.
+/// Least cost of a plan that is not allowed, in turns. Three of these plus all costs of a loop's plan stay
+/// below 2^31.
 pub(super) const FORBIDDEN: u32 = 1 << 28;
 
-/// Where a plan begins, and what follows its end.
+/// First state of a plan, and the state that follows its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ends {
-    /// The state at the first frame.
+    /// State at the first frame.
     pub first: u32,
-    /// The state after the last.
+    /// State after the last frame.
     pub next: u32,
 }
 
-/// What a loop asks of a plan.
+/// Conditions of a loop on a plan.
 #[derive(Clone, Copy)]
 pub(super) struct Asked<'a> {
-    /// To begin with it and go on for a dwell.
+    /// State with which the plan begins and plays on for a dwell; `None` = any.
     pub(super) first: Option<u32>,
     pub(super) then: Then<'a>,
 }
 
-/// What may be shown after the last frame.
+/// States allowed after the last frame.
 #[derive(Clone, Copy)]
 pub(super) enum Then<'a> {
+    /// Only this state.
     Only(u32),
-    /// What each state costs there.
+    /// Every state, with its cost, in turns.
     Any(&'a [u32]),
 }
 
-/// What each state costs in a plan of which something is asked.
+/// Costs of a plan under the conditions of a loop.
 #[derive(Clone)]
 pub(super) struct Closed<'a, R> {
     rows: R,
-    /// Nothing is asked of a plan that is no part of a loop.
+    /// Conditions; `None` outside of loops.
     asked: Option<Asked<'a>>,
-    /// The frame after the film's last.
+    /// Number of frames of the film, which is the index of the frame after the last.
     n_frames: usize,
     dwell: usize,
 }
@@ -94,7 +98,7 @@ impl Then<'_> {
 }
 
 impl Ends {
-    /// Whether a plan, with what follows it, is one.
+    /// Returns whether a plan, including the state after its last frame, has these ends.
     pub fn holds(&self, states: &[u32]) -> bool {
         states.first() == Some(&self.first) && states.last() == Some(&self.next)
     }
@@ -110,9 +114,11 @@ impl Planner<'_> {
         }
     }
 
-    /// The states that a loop's plans begin with, by id. Not from every state does a film of this length lead
-    /// back; if it does from any, then from one that is jumped to: where the leader of a circle of heirs
-    /// cannot begin as in its open plan, all those are tried, the cheapest first.
+    /// Returns the first states of a loop's plans, by id. Fails if no loop of this length closes.
+    ///
+    /// Playback does not return to every state after a film of this length. If it returns to any state, it
+    /// also returns to one at which a jump lands. If the leader of a circle cannot begin as in its open
+    /// plan, those states are tried, the cheapest first.
     pub(super) fn firsts(
         &self,
         open: &[Path],
@@ -143,7 +149,7 @@ impl Planner<'_> {
         Ok(firsts.into_iter().flatten().collect())
     }
 
-    /// Why there is none.
+    /// Returns the error for a circle without first states.
     fn no_circle(&self, progress: &dyn Progress) -> Error {
         match progress.cancelled() {
             true => Error::Cancelled,
@@ -151,7 +157,8 @@ impl Planner<'_> {
         }
     }
 
-    /// The states that are jumped to, by what the cheapest plan that begins with each costs.
+    /// Returns the states at which jumps land, sorted by the cost of the cheapest plan that begins with
+    /// each.
     fn beginnings(&self, wanted: &[Feature]) -> Vec<u32> {
         let costs = self.costs_before(wanted, &vec![0; self.model.trellis.n_states()]);
         let mut targets = self.model.trellis.targets().to_vec();
@@ -159,8 +166,9 @@ impl Planner<'_> {
         targets
     }
 
-    /// The cheapest that each of a circle can begin with, each the heir of the one before, when the first
-    /// of them begins with `first` and the last leads back to that; `None` if none does.
+    /// Returns the cheapest first state of each individual of a circle, in which each is the heir of the
+    /// one before. The first individual begins with `first`, and the last leads back to it. `None` if that
+    /// is impossible.
     fn circle(&self, first: u32, wanted: &[&[Feature]]) -> Option<Vec<u32>> {
         let mut back = vec![FORBIDDEN; self.model.trellis.n_states()];
         back[first as usize] = 0;
@@ -178,8 +186,9 @@ impl Planner<'_> {
         Some(firsts)
     }
 
-    /// What it costs to begin with each state and go on for a dwell, when what comes after the last frame costs
-    /// `then`; the cheapest 0, `FORBIDDEN` where no plan begins.
+    /// Returns the cost of beginning with each state and playing on for a dwell, in turns, if the states
+    /// after the last frame cost `then`. The cheapest has 0. States with which no plan begins have
+    /// `FORBIDDEN`.
     fn costs_before(&self, wanted: &[Feature], then: &[u32]) -> Vec<u32> {
         let mut costs = self
             .film_and_next()
@@ -194,7 +203,7 @@ impl Planner<'_> {
         costs
     }
 
-    /// What comes after the cheapest plan that begins with `first`.
+    /// Returns the state after the last frame of the cheapest plan that begins with `first`.
     fn next_after(&self, first: u32, wanted: &[Feature], then: &[u32]) -> Option<u32> {
         let rows = self.asking(wanted, Some(first), then);
         let path = self.film_and_next().cheapest_path(&rows)?;

@@ -1,8 +1,8 @@
-//! What it costs to show a state at a moment, in whole turns (65536 to the circle), so that the same
-//! plan comes out on any machine (ALGORITHMS.md 6).
+//! Cost of showing a state at a frame, in whole turns (65536 to the circle). Integers make plans the same
+//! on every machine (docs/explanation/algorithms.md, "Planning").
 //!
-//! In side view headings are compared; in top view the sprite is turned to any heading, so what is
-//! compared is how far animal and boid turn in a quarter of a second.
+//! In side view headings are compared. In top view a sprite can be rotated to any heading, so the turns of
+//! animal and boid within a quarter of a second are compared.
 
 use super::trellis::Trellis;
 use crate::flock::boids::vector::Vec3;
@@ -13,32 +13,34 @@ use crate::geometry::angle::mirrored_rad;
 use crate::geometry::{Turns, wrap_rad};
 use crate::library::{Jump, Library, View};
 
-/// Every cost of a state at a frame stays below.
+/// Upper limit, exclusive, of the cost of showing a state at a frame, in turns.
 pub const CEILING: u32 = 1 << 17;
 
-/// A unit vector's length in a feature.
+/// Length of a unit vector in a feature.
 const UNIT: f64 = 16384.0;
 
-/// Turn rates are compared over this time.
+/// Time over which turns are compared in top view, in seconds. Free choice.
 const TURN_SPAN_S: f64 = 0.25;
-/// A jump back over less time shows again what was just seen; of longer loops a viewer is not aware.
+/// Longest jump back that costs extra for showing frames again, in seconds. Viewers do not notice longer
+/// loops.
 const RETURN_S: f64 = 1.3;
 
-/// What is compared: of a state, or wanted by a boid.
+/// Quantities that are compared: those of a state, or those that a boid asks for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct Feature {
-    /// Heading; in top view the turn in a quarter second.
+    /// Heading, in turns. In top view the turn within a quarter of a second. With `MatchBy::Position` the
+    /// horizontal velocity.
     pub turns: u16,
-    /// ln(speed + v0) in turns, shifted to be positive.
+    /// ln(speed + v0), in turns, shifted to be positive. With `MatchBy::Position` the vertical velocity.
     pub log_speed: u16,
-    /// What the picture shows of a unit vector in the direction, 16384ths.
+    /// Length of the direction's projection into the picture, in 16384ths.
     pub level: i16,
-    /// What leads away from the viewer of it, 16384ths.
+    /// Component of the direction away from the viewer, in 16384ths.
     pub away: i16,
 }
 
-/// The weights as integers: 256ths, and turns.
+/// Weights as integers: in 256ths, and in turns.
 #[derive(Clone, Copy, Debug)]
 pub struct Weights {
     pub(super) heading: u32,
@@ -47,21 +49,21 @@ pub struct Weights {
     pub(super) rho_turns: u16,
     jump_turns: f64,
     epsilon: u64,
-    /// Turns for every frame that a jump goes back.
+    /// Cost of each frame that a jump goes back, in turns.
     again_turns: f64,
-    /// A jump back over more frames costs nothing for them.
+    /// Longest jump back that has this cost, in frames.
     most_again: u32,
     view: View,
     pub(super) by: MatchBy,
-    /// Weight of what leads along the line of sight.
+    /// Weight of differences along the line of sight.
     away: f32,
-    /// Whether it is known if the animal points away from the viewer or toward.
+    /// Whether poses tell if the animal points away from the viewer or toward the viewer.
     is_signed: bool,
     v0_bl_per_s: f64,
 }
 
 impl Weights {
-    /// The weights of a library's view; `rho` is no matter in top view.
+    /// Returns the weights for a library. In top view `rho` is not used.
     pub fn new(matching: &Matching, library: &Library) -> Weights {
         let fixed = |w: f64| (w * 256.0).round() as u32;
         let view = library.poses.view;
@@ -94,15 +96,15 @@ impl Weights {
         }
     }
 
-    /// What a jump costs, turns.
+    /// Returns the cost of a jump, in turns.
     pub fn of_jump(&self, jump: &Jump) -> u32 {
         let share = jump.cost as f64 / self.epsilon.max(1) as f64;
         let transition = (self.jump_turns * share).round().min(65535.0) as u32;
         transition + self.of_return(jump)
     }
 
-    /// The part of it that a jump costs for showing again what was just seen, turns below 2^16. On the other mirror side it is
-    /// not taken for the same.
+    /// Returns the part of a jump's cost for showing frames again, in turns, below 2^16. It is 0 for jumps
+    /// that change the mirror side, because mirrored frames look different.
     pub fn of_return(&self, jump: &Jump) -> u32 {
         let n_again = (jump.from + 1).saturating_sub(jump.to);
         let is_return = !jump.mirrored && n_again <= self.most_again;
@@ -114,8 +116,8 @@ impl Weights {
         }
     }
 
-    /// What showing `state` costs who wants `wanted`, turns, without the ceiling: heading (with
-    /// rotation), and speed.
+    /// Returns the costs of showing `state` where `wanted` is asked for, in turns, without the ceiling:
+    /// heading with rotation, and speed.
     pub fn of_state(&self, wanted: Feature, state: Feature) -> [u32; 2] {
         match self.by {
             MatchBy::Direction => {
@@ -131,7 +133,7 @@ impl Weights {
         }
     }
 
-    /// `of_state` where no depth counts.
+    /// Returns `of_state` for matching that does not compare directions in depth.
     #[inline(always)]
     fn of_gaps(&self, turns: [u16; 2], log_speeds: [u16; 2]) -> [u32; 2] {
         let [beyond, within] = self.parts(turns[0], turns[1]);
@@ -141,7 +143,7 @@ impl Weights {
         ]
     }
 
-    /// How far two headings are apart beyond rho, and within.
+    /// Returns the parts of the gap between two headings beyond rho and within rho, in turns.
     #[inline(always)]
     fn parts(&self, a: u16, b: u16) -> [u16; 2] {
         let gap = (a.wrapping_sub(b) as i16).unsigned_abs();
@@ -159,12 +161,14 @@ impl Weights {
         (self.speed * u32::from(a.abs_diff(b))) >> 8
     }
 
-    /// The chord between two directions whose headings are `beyond` turns apart, turns to the radian: the angle
-    /// between them where it is small. |a - b|^2 = (difference of levels)^2 + 2 levels (1 - cos beyond)
-    /// + (difference of aways)^2, the last with its weight.
+    /// Returns the chord between two directions in space whose headings are `beyond` turns apart. Its unit
+    /// is turns, so that a short chord equals the angle between the directions.
+    ///
+    /// |a - b|^2 = (difference of levels)^2 + 2 level_a level_b (1 - cos beyond) + (weighted difference of
+    /// aways)^2.
     #[inline(always)]
     fn chord_turns(&self, a: Feature, b: Feature, beyond: u32) -> u32 {
-        // Additions, products and one root in single precision: the same on any machine.
+        // Basic operations and one square root in single precision are the same on every machine.
         let half = beyond as f32 * (std::f32::consts::PI / 65536.0);
         let square = half * half;
         let sine = half * (1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0)));
@@ -175,14 +179,14 @@ impl Weights {
         (squared.sqrt() * (Turns::PER_RAD / UNIT) as f32 + 0.5) as u32
     }
 
-    /// The sum of `of_state`, below the ceiling.
+    /// Returns the sum of `of_state`, limited to values below `CEILING`.
     #[inline(always)]
     pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
         let [heading, speed] = self.of_state(wanted, state);
         (heading + speed).min(CEILING - 1)
     }
 
-    /// What a boid wants at every frame, from its track as the file holds it.
+    /// Returns the features that a boid asks for at every frame, from its track as stored in the file.
     pub fn wanted(&self, boid: &BoidTrack, fps: f64) -> Vec<Feature> {
         let turns = turn_rates(&boid.heading_rad, fps);
         let forward = |t: usize| boid.forward.as_ref().map_or([1.0, 0.0, 0.0], |all| all[t]);
@@ -216,7 +220,7 @@ impl Weights {
         }
     }
 
-    /// The part of a feature that tells a direction's foreshortening.
+    /// Returns a feature with only `level` and `away`, the foreshortening of a direction.
     fn in_space(&self, forward: Vec3) -> Feature {
         let away = if self.is_signed {
             forward[2]
@@ -231,7 +235,7 @@ impl Weights {
         }
     }
 
-    /// The features of every state of the trellis; barriers get zeros.
+    /// Returns the features of every state of the trellis; zeros for barriers.
     pub fn features(&self, trellis: &Trellis, motion: &[FrameMotion]) -> Vec<Feature> {
         let feature = |state| {
             let Some((frame, mirrored)) = trellis.shown(state) else {
@@ -263,7 +267,8 @@ impl Weights {
     }
 }
 
-/// The turn rate at every frame of a track: central differences, one-sided at the ends.
+/// Returns the turn rate at every frame of a track, in radians a second: central differences, one-sided at
+/// the ends.
 pub fn turn_rates(heading_rad: &[f64], fps: f64) -> Vec<f64> {
     let last = heading_rad.len().saturating_sub(1);
     (0..heading_rad.len())
@@ -275,8 +280,8 @@ pub fn turn_rates(heading_rad: &[f64], fps: f64) -> Vec<f64> {
         .collect()
 }
 
-/// A velocity in the picture in the place of heading and speed: a body length a second is a radian, and
-/// more than a quarter circle's worth is cut down to it, so that differences never wrap.
+/// Returns a feature that holds a velocity in the picture. A body length a second counts as a radian. Each
+/// component is clamped to a quarter circle, so that differences do not wrap.
 fn moving(velocity_bl_per_s: [f64; 2]) -> Feature {
     let [x, y] = velocity_bl_per_s
         .map(|bl_per_s| (bl_per_s * Turns::PER_RAD).round().clamp(-16383.0, 16383.0) as i16);
@@ -287,14 +292,16 @@ fn moving(velocity_bl_per_s: [f64; 2]) -> Feature {
     }
 }
 
-/// Clamped to half a circle either way, so that differences never wrap.
+/// Returns the turn within a quarter of a second, in turns. It is clamped to a quarter circle, so that
+/// differences do not wrap.
 fn turn_of_rate(turn_rad_per_s: f64) -> u16 {
     let turns = turn_rad_per_s * TURN_SPAN_S * Turns::PER_RAD;
     turns.round().clamp(-16383.0, 16383.0) as i16 as u16
 }
 
 fn log_speed(speed_bl_per_s: f64, v0_bl_per_s: f64) -> u16 {
-    // From 0.05 to 100 BL/s the logarithm spans -3 to 5: 2 radians to the 65536 would not hold it.
+    // The logarithm is clamped to -3..=3.2, or 0.05 to 24 body lengths a second: 6.2 radians fit 65536
+    // turns.
     let log = libm::log(speed_bl_per_s.clamp(0.0, 100.0) + v0_bl_per_s);
     ((log + 3.0).clamp(0.0, 6.2) * Turns::PER_RAD).round() as u16
 }

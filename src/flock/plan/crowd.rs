@@ -1,6 +1,9 @@
-//! Against clones: looking like a near neighbor costs (ALGORITHMS.md 6). Each individual looks out
-//! for those of smaller id whose plans were final when its own was made, so that anyone can recompute
-//! the cost. Distances are whole 32nds of a body length, weights a table: the same on any machine.
+//! Crowd cost: looking like a near neighbor has a cost, so that neighbors do not appear as clones
+//! (docs/explanation/algorithms.md, "Planning").
+//!
+//! Each individual watches those of smaller id whose plans were final when its own was made. The crowd cost
+//! can therefore be recomputed from the files. Distances are whole 32nds of a body length and the costs are
+//! a table, so results are the same on every machine.
 
 use std::ops::Range;
 
@@ -9,57 +12,57 @@ use super::viterbi::FRAMES;
 use crate::flock::individual::BoidTrack;
 use crate::geometry::Turns;
 
-/// Nearer in the footage than this looks the same.
+/// Source frames less than this time apart look alike, in seconds. Free choice.
 const LOOKALIKE_S: f64 = 0.3;
-/// The weight falls off as a Gaussian of this width.
+/// Standard deviation of the Gaussian by which the cost falls with distance, in body lengths. Free choice.
 const WIDTH_BL: f64 = 4.0;
-/// Farther than this costs nothing.
+/// Distance from which looking alike costs nothing, in body lengths. Free choice.
 const REACH_BL: f64 = 8.0;
-/// Places are rounded to so many parts of a body length.
+/// Resolution of positions, in parts per body length. Free choice.
 const PARTS: f64 = 32.0;
-/// Steps of the table to a squared body length.
+/// Table entries per squared body length. Free choice.
 const STEPS: usize = 16;
-/// Steps within reach; what comes after them costs nothing.
+/// Number of table entries within reach. One more entry holds 0.
 const N_STEPS: usize = (REACH_BL * REACH_BL) as usize * STEPS;
-/// So many are planned one after the other, each looking out for all before it; after them
-/// `ROUND` at a time, who look out for the rounds before.
+/// Number of individuals that are planned one after the other, each watching all before it. Later ones are
+/// planned `ROUND` at a time and watch the rounds before. Free choice.
 const ONE_BY_ONE: usize = 64;
-/// Individuals in a round.
+/// Number of individuals in a round. Free choice.
 const ROUND: usize = 16;
 
-/// So many distances are computed before any is looked up.
+/// Number of distances computed before their costs are looked up. Free choice.
 const IN_A_ROW: usize = 32;
 
-/// Where a boid is, in 32nds of a body length.
+/// Position of a boid, in 32nds of a body length.
 pub type Place = [i32; 3];
 
-/// Where boids are at one moment, by id, axis after axis.
+/// Positions of boids at one frame, axis after axis, by id.
 #[derive(Clone, Debug, Default)]
 pub struct Places {
     axes: [Vec<i32>; 3],
 }
 
-/// The crowd term's measures, in frames, parts and turns.
+/// Parameters of the crowd cost, in frames, 32nds of a body length, and turns.
 #[derive(Clone, Debug)]
 pub struct Crowd {
-    /// What looking alike costs by squared distance, turns below 2^16.
+    /// Cost of looking alike by squared distance, in turns, below 2^16.
     costs: Box<[u32; N_STEPS + 1]>,
-    /// Frames apart that still look alike.
+    /// Largest difference of source frames that look alike.
     window: u32,
     length_px: f64,
 }
 
-/// A neighbor that an individual should not look like at one moment.
+/// Neighbor that an individual should not look like at one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lookalike {
-    /// The neighbor's state.
+    /// State of the neighbor.
     pub state: u32,
-    /// What looking like it costs, turns.
+    /// Cost of looking like the neighbor, in turns.
     pub cost: u32,
 }
 
 impl Crowd {
-    /// `w_c` in radians; the animal's length in pixels.
+    /// Returns the crowd cost of weight `w_c`, in radians. `length_px` is the body length in pixels.
     pub fn new(w_c: f64, fps: f64, length_px: f64) -> Crowd {
         let cost = |step: usize| {
             if step == N_STEPS {
@@ -76,8 +79,9 @@ impl Crowd {
         }
     }
 
-    /// How many individuals number `id` looks out for: all of smaller id up to the 64th, from there on
-    /// those before its round of 16; nobody, when looking alike costs nothing.
+    /// Returns the number of individuals that individual `id` watches: all ids below this number. The first
+    /// 64 individuals watch all of smaller id, later ones all before their round of 16. The number is 0 if
+    /// looking alike costs nothing.
     pub fn n_watched(&self, id: usize) -> usize {
         match id {
             _ if self.costs[0] == 0 => 0,
@@ -86,18 +90,19 @@ impl Crowd {
         }
     }
 
-    /// The place at frame `t`.
+    /// Returns the position of a boid at frame `t`.
     pub fn place(&self, boid: &BoidTrack, t: usize) -> Place {
         boid.position_px[t].map(|px| (px / self.length_px * PARTS).round() as i32)
     }
 
-    /// What looking like one at `b` costs one at `a`, turns.
+    /// Returns the cost of an individual at `a` for looking like one at `b`, in turns.
     #[inline(always)]
     pub fn cost_at(&self, a: Place, b: Place) -> u32 {
         self.costs[self.step(a, b) as usize]
     }
 
-    /// The same of some others at `places`, at moment `moment` of what is told of each.
+    /// Writes the costs of individual `id` for looking like each of `others`, in turns, into the entries
+    /// `moment` of `costs`.
     #[inline(always)]
     pub fn costs_at(
         &self,
@@ -110,7 +115,7 @@ impl Crowd {
         let axes = places.axes.each_ref();
         let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(IN_A_ROW));
         for (costs, ((x, y), z)) in costs.chunks_mut(IN_A_ROW).zip(x.zip(y).zip(z)) {
-            // First the arithmetic of all, then the table.
+            // First the arithmetic of all distances, then the table.
             let mut steps = [0; IN_A_ROW];
             for (step, ((&x, &y), &z)) in steps.iter_mut().zip(x.iter().zip(y).zip(z)) {
                 *step = self.step(here, [x, y, z]);
@@ -121,7 +126,7 @@ impl Crowd {
         }
     }
 
-    /// Where in the table two places are.
+    /// Returns the table entry for the distance between two positions.
     #[inline(always)]
     fn step(&self, a: Place, b: Place) -> u32 {
         let mut square = 0;
@@ -129,11 +134,12 @@ impl Crowd {
             let gap = (a[axis] - b[axis]).clamp(-8191, 8191);
             square += gap * gap;
         }
-        // 32 x 32 parts to the squared body length, 16 steps to it as well.
+        // A squared body length has 32 x 32 squared parts and 16 table entries.
         (square as u32 >> 6).min(N_STEPS as u32)
     }
 
-    /// Whom to avoid looking like at frame `t`, of the planned others: (boid, states).
+    /// Returns the neighbors that a boid should not look like at frame `t`, among the planned others:
+    /// (boid, states).
     pub fn lookalikes<'a>(
         &self,
         boid: &BoidTrack,
@@ -150,7 +156,7 @@ impl Crowd {
             .collect()
     }
 
-    /// What being in `state` costs among `lookalikes`, turns.
+    /// Returns the cost of being in `state` among `lookalikes`, in turns.
     pub fn cost_of(&self, trellis: &Trellis, lookalikes: &[Lookalike], state: u32) -> u32 {
         let Some((frame, side)) = trellis.shown(state as usize) else {
             return 0;
@@ -166,12 +172,12 @@ impl Crowd {
             .sum()
     }
 
-    /// The states that look like each state: first, and one past the last.
+    /// Returns for each state the states that look like it: first, and one past the last.
     pub fn alike(&self, trellis: &Trellis) -> Vec<[u32; 2]> {
         let n = trellis.n_states();
         let near = |at: usize, other: usize| match (trellis.shown(at), trellis.shown(other)) {
             (Some(a), Some(b)) => a.1 == b.1 && a.0.abs_diff(b.0) <= self.window,
-            // A barrier is passed over; one at the edge does no harm.
+            // A barrier counts as alike. That is harmless, because no individual shows a barrier.
             _ => true,
         };
         (0..n)
@@ -192,7 +198,7 @@ impl Crowd {
 }
 
 impl Places {
-    /// Where one is.
+    /// Returns the position of one boid.
     pub fn of(&self, id: usize) -> Place {
         self.axes.each_ref().map(|axis| axis[id])
     }
@@ -210,18 +216,18 @@ impl FromIterator<Place> for Places {
     }
 }
 
-/// Plans that are final, as others look out for them.
+/// Final plans, prepared for the individuals that watch them.
 #[derive(Clone, Debug)]
 pub struct Settled {
-    /// `[t][id]`: the state shown.
+    /// `[t][id]`: state shown.
     states: Vec<Vec<u32>>,
-    /// `[t][id]`: for how many frames from this one on, at most `FRAMES`, what looks like it moves on by one a
-    /// frame.
+    /// `[t][id]`: number of steady frames from `t` on, at most `FRAMES`. While frames are steady, the range
+    /// of states that look like the state shown moves on by one state per frame.
     n_steady: Vec<Vec<u8>>,
 }
 
 impl Settled {
-    /// Nobody's.
+    /// Returns an empty set of plans for `n_frames` frames.
     pub fn new(n_frames: usize) -> Settled {
         Settled {
             states: vec![Vec::new(); n_frames],
@@ -229,7 +235,7 @@ impl Settled {
         }
     }
 
-    /// The next individual's states, given what looks like each.
+    /// Adds the states of the next individual. `alike` has the states that look like each state.
     pub fn push(&mut self, states: &[u32], alike: &[[u32; 2]]) {
         let alike = |t: usize| alike[states[t] as usize];
         let mut n_steady = 0;
@@ -241,12 +247,13 @@ impl Settled {
         }
     }
 
-    /// The states shown at frame `t`, by id.
+    /// Returns the states shown at frame `t`, by id.
     pub fn at(&self, t: usize) -> &[u32] {
         &self.states[t]
     }
 
-    /// For how many frames from `t` on, at most `FRAMES`, what looks like them moves on by one a frame.
+    /// Returns the number of steady frames from `t` on, by id, at most `FRAMES`. While frames are steady,
+    /// the range of states that look like the state shown moves on by one state per frame.
     pub fn steady_at(&self, t: usize) -> &[u8] {
         &self.n_steady[t]
     }

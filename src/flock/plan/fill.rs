@@ -1,7 +1,7 @@
-//! What showing each station costs at the frames of a block, all of which want something (ALGORITHMS.md 6):
-//! a lane for each frame.
+//! Costs of showing each station at the frames of a block, with one lane per frame
+//! (docs/explanation/algorithms.md, "Planning").
 //!
-//! `Weights::total` is the definition; the ways here are there to be fast, and give the same.
+//! `Weights::total` defines the costs. The vector code in this file returns the same integers, faster.
 
 use super::cost::{CEILING, Feature, Weights};
 use super::landings::Way;
@@ -12,7 +12,8 @@ use crate::cpu::Level;
 use crate::flock::params::MatchBy;
 
 impl Weights {
-    /// Fills in the `total` of the stations from `first` on, given the features of all states.
+    /// Writes `Weights::total` for the stations from `first` on. `wanted` has the feature asked for in each
+    /// lane, `features` the features of all states.
     #[inline(always)]
     pub(super) fn fill(
         &self,
@@ -40,7 +41,8 @@ impl Weights {
         }
     }
 
-    /// Given two states in their order and the places of their stations.
+    /// Writes the costs of pairs of consecutive states. `pairs` yields the features of two states and the
+    /// places for their costs.
     #[inline(always)]
     fn fill_pairs<'a>(
         &self,
@@ -57,7 +59,7 @@ impl Weights {
             {
                 let weights = [heading, rotation, speed];
                 #[expect(unsafe_code, reason = "vectors of AVX2")]
-                // SAFETY: the line above made sure of AVX2.
+                // SAFETY: the guard of this match arm checks for AVX2.
                 unsafe {
                     fill_avx2(block.way, (weights, rho), wanted, pairs);
                 }
@@ -73,11 +75,12 @@ impl Weights {
     }
 }
 
-/// The same where no depth counts, two stations side by side, by weights and a `rho` of 16 bits: of the whole
-/// gap; how much more of what is within `rho`; of speed.
+/// AVX2 version of `total` without directions in depth, for two stations at a time. It takes three 16-bit
+/// weights: that of the whole heading gap, that added for the part of the gap within `rho`, and that of the
+/// speed gap.
 ///
-/// Gaps are less by half of what they can be, that products of 16 bits hold them; what that takes off is a
-/// whole number of turns, and added again.
+/// Gaps are reduced by half of their range, so that signed 16-bit products can hold them. The reduction
+/// changes the cost by a whole number of turns, which is added again.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
@@ -88,8 +91,8 @@ fn fill_avx2<'a>(
     pairs: impl Iterator<Item = (&'a [Feature; 2], &'a mut [[u32; FRAMES]; 2])>,
 ) {
     use std::arch::x86_64::*;
-    // All lanes of each station take two bytes of its feature, at 0 or 8 of a pair. Compilers that see the
-    // numbers take three instructions in the place of this one.
+    // Copies two bytes of a station's feature, at offset 0 or 8 of the pair, to all lanes of that station.
+    // If the compiler saw the constant, it would use three instructions in place of one.
     let spread = |byte: u8| {
         let both = |at: u8| _mm_set1_epi16(i16::from_le_bytes([at + byte, at + byte + 1]));
         let [first, second] = way.stations_of([0, 8]).map(both);
@@ -128,7 +131,7 @@ fn fill_avx2<'a>(
             let total = _mm256_add_epi32(_mm256_add_epi32(of_gaps, of_speed), taken_off);
             _mm256_min_epu32(total, ceiling)
         };
-        // Of both stations the first four frames, and the last.
+        // The first four frames of both stations, then the last four.
         let zero = _mm256_setzero_si256();
         let early = total(
             _mm256_unpacklo_epi16(gap, within),
@@ -143,14 +146,14 @@ fn fill_avx2<'a>(
     }
 }
 
-/// Two features in a row.
+/// Loads two consecutive features.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
 #[expect(unsafe_code, reason = "vectors of AVX2")]
 fn load_pair(pair: &[Feature; 2]) -> std::arch::x86_64::__m128i {
     const { assert!(size_of::<Feature>() == 8) };
-    // SAFETY: two features are as long as a vector, which may lie anywhere.
+    // SAFETY: two features have the size of a vector, and the instruction needs no alignment.
     unsafe { std::arch::x86_64::_mm_loadu_si128(std::ptr::from_ref(pair).cast()) }
 }
 
@@ -173,7 +176,7 @@ mod tests {
         proptest::collection::vec(feature, n)
     }
 
-    /// Some that fit 16 bits, and some that do not.
+    /// Generates weights, some of which do not fit 16 bits.
     fn weights() -> impl Strategy<Value = Weights> {
         let weight = || prop_oneof![0u32..600, Just(32_767), Just(40_000)];
         let rho = prop_oneof![Just(0), 0u16..4000, Just(32_767), Just(1 << 15)];

@@ -1,22 +1,23 @@
-//! The jumps of a trellis as the recursion takes them (ALGORITHMS.md 6): for each station that one lands
-//! on, where one comes from; once as time runs, and once against it.
+//! Jumps of a trellis in the order in which the recursion takes them: by the station at which they land.
+//!
+//! There is one set of jumps for each direction of time (docs/explanation/algorithms.md, "Planning").
 
 use std::ops::Range;
 
-/// Which way the frames of a plan are gone through.
+/// Direction in which the frames of a plan are processed.
 ///
-/// Going on leads from each station to the next: stations are the states in their order as time
-/// runs, and against their order when going back.
+/// A station is a state numbered in that direction, so that playing on leads from each station to the next.
+/// Forward in time the stations are the states in their order, backward in the reverse order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
-    /// As time runs.
+    /// Forward in time.
     Ahead,
-    /// From the last frame to the first.
+    /// Backward, from the last frame to the first.
     Back,
 }
 
 impl Way {
-    /// The station of a state of `n_states`, or the state of a station.
+    /// Returns the station of a state, or the state of a station. `n_states` is the number of states.
     pub fn station(self, n_states: usize, state: usize) -> usize {
         match self {
             Way::Ahead => state,
@@ -24,7 +25,7 @@ impl Way {
         }
     }
 
-    /// What belongs to the stations of two states in a row, or to the states of two stations.
+    /// Converts a pair of values between the order of two consecutive states and that of their stations.
     pub fn stations_of<T>(self, [first, second]: [T; 2]) -> [T; 2] {
         match self {
             Way::Ahead => [first, second],
@@ -32,7 +33,7 @@ impl Way {
         }
     }
 
-    /// The stations of states in a row, or the states of stations.
+    /// Returns the stations of a range of states, or the states of a range of stations.
     pub fn stations(self, n_states: usize, states: Range<usize>) -> Range<usize> {
         match self {
             Way::Ahead => states,
@@ -41,38 +42,39 @@ impl Way {
     }
 }
 
-/// The stations landed on, those of few jumps first.
+/// Landing stations: the stations at which jumps land, sorted by their number of jumps.
 #[derive(Clone, Debug, Default)]
 pub struct Landings {
     stations: Vec<u32>,
-    /// The jumps to each, one station after the other.
+    /// Jumps to each landing station, one station after the other.
     jumps: Vec<Origin>,
     groups: Vec<Group>,
-    /// Where each station stands among those landed on; of no matter for others.
+    /// Rank of each station among the landing stations; unspecified for other stations.
     order: Vec<u32>,
 }
 
-/// Where a jump comes from, and what it costs.
+/// Origin and cost of a jump.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Origin {
-    /// The station left; those of one landing rise.
+    /// Station from which the jump comes. The origins of one landing station rise.
     pub from: u32,
-    /// Turns.
+    /// Cost, in turns.
     pub cost: u32,
 }
 
-/// Stations that equally many jumps lead to.
+/// Landing stations with the same number of jumps.
 #[derive(Clone, Debug)]
 struct Group {
-    /// Jumps to each.
+    /// Number of jumps to each station.
     n_jumps: usize,
     stations: Range<usize>,
-    /// The first of their jumps.
+    /// Index of the first of their jumps.
     first: usize,
 }
 
 impl Landings {
-    /// From jumps (landing, from, cost), sorted, between stations below `n_stations`.
+    /// Returns the landings of jumps (landing station, origin station, cost). The jumps must be sorted, and
+    /// all stations below `n_stations`.
     pub fn new(n_stations: usize, jumps: &[(u32, u32, u32)]) -> Landings {
         let mut into: Vec<&[(u32, u32, u32)]> = jumps.chunk_by(|a, b| a.0 == b.0).collect();
         into.sort_by_key(|into| into.len());
@@ -97,12 +99,13 @@ impl Landings {
         landings
     }
 
-    /// Number of stations that are landed on.
+    /// Returns the number of landing stations.
     pub fn n_landings(&self) -> usize {
         self.stations.len()
     }
 
-    /// Number of jumps to each of some stations, the stations, and the jumps to one after the other.
+    /// Returns for each group the number of jumps per station, the stations, and their jumps, one station
+    /// after the other.
     pub fn groups(&self) -> impl Iterator<Item = (usize, &[u32], &[Origin])> {
         self.groups.iter().map(|group| {
             let n_jumps = group.n_jumps * group.stations.len();
@@ -114,7 +117,7 @@ impl Landings {
         })
     }
 
-    /// Each station landed on, and the jumps to it.
+    /// Returns each landing station with its jumps.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &[Origin])> {
         self.groups().flat_map(|(n_jumps, stations, jumps)| {
             let stations = stations.iter().map(|&station| station as usize);
@@ -122,12 +125,12 @@ impl Landings {
         })
     }
 
-    /// Where a station landed on stands among all of them.
+    /// Returns the rank of a landing station among all of them.
     pub fn order(&self, station: usize) -> usize {
         self.order[station] as usize
     }
 
-    /// The station that jump number `rank` to the one at `order` comes from.
+    /// Returns the origin of jump number `rank` to the landing station of rank `order`.
     pub fn origin(&self, order: usize, rank: usize) -> usize {
         let group = self.groups.partition_point(|g| g.stations.end <= order);
         let group = &self.groups[group];

@@ -1,5 +1,9 @@
-//! Which sprite when: for each individual the sequence of real frames that follows its boid best,
-//! exactly (O 5.1; ALGORITHMS.md 6).
+//! Planning: which source frame each individual shows at each output frame.
+//!
+//! For each individual, the planner finds the sequence of real frames that follows its boid at the least
+//! cost, exactly (Okabe et al., section 5.1; docs/explanation/algorithms.md, "Planning"). `cost` and
+//! `crowd` define the costs, `viterbi` finds the cheapest path, `segment` and `circle` handle segments and
+//! loops.
 
 mod added;
 pub mod certificate;
@@ -35,26 +39,26 @@ use crate::cpu::Level;
 use crate::library::{Jump, Library};
 use crate::progress::Progress;
 
-/// The trellis and the costs of states and jumps, for all plans of one library and one set of parameters.
+/// Trellis and costs of states and jumps, for all plans of one library and one set of parameters.
 pub struct Model {
-    /// What may follow what.
+    /// States and the steps between them.
     pub trellis: Trellis,
-    /// Future cost by state, turns; `None` for a state from which playback cannot continue.
+    /// Future cost by state, in turns; `None` for a state from which playback cannot continue.
     pub future: Vec<Option<u32>>,
-    /// Least frames between two jumps.
+    /// Least number of frames between two jumps.
     pub dwell: usize,
     weights: Weights,
-    /// By state.
+    /// Features by state.
     features: Vec<Feature>,
     crowd: Crowd,
-    /// The states that look like each state.
+    /// By state: the states that look like it, as first and one past the last.
     alike: Vec<[u32; 2]>,
     fps: f64,
     shelf: Shelf,
 }
 
 impl Model {
-    /// Lays out the library's playback.
+    /// Returns the model of a library.
     pub fn new(library: &Library, motion: &[FrameMotion], params: &Params) -> Model {
         let weights = Weights::new(&params.matching, library);
         let dwell = params
@@ -79,7 +83,7 @@ impl Model {
         }
     }
 
-    /// The frames and mirror sides of states.
+    /// Returns the frame and mirror side of each state. Barriers are left out.
     pub fn shown(&self, states: &[u32]) -> Vec<(u32, bool)> {
         let shown = states.iter();
         shown
@@ -87,7 +91,7 @@ impl Model {
             .collect()
     }
 
-    /// What the jump from a state to another costs for showing again what was just seen, turns.
+    /// Returns the part of a jump's cost for showing frames again, in turns.
     fn return_cost(&self, from: u32, to: u32) -> u32 {
         let ends = [from, to].map(|state| self.trellis.shown(state as usize));
         let [Some((from, from_side)), Some((to, side))] = ends else {
@@ -101,34 +105,35 @@ impl Model {
         })
     }
 
-    /// The heading cost of a state at the first frame of a boid's track, turns.
+    /// Returns the heading cost of a state at the first frame of a boid's track, in turns.
     pub fn heading_cost(&self, boid: &BoidTrack, state: usize) -> u32 {
         let wanted = self.weights.wanted(boid, self.fps)[0];
         self.weights.of_state(wanted, self.features[state])[0]
     }
 }
 
-/// Everything that the plans of some frames are computed from.
+/// Planner of all individuals, for a whole film or for one segment.
 pub struct Planner<'a> {
     model: &'a Model,
-    /// By frame, where each boid is.
+    /// Positions of all boids, by frame.
     places: Vec<Places>,
     boids: &'a [BoidTrack],
-    /// By id, what was shown before; empty for the first segment. Otherwise frame 0 of `places` is the frame before the segment.
+    /// What was shown before the segment, by id; empty for the first segment. In later segments frame 0 of
+    /// `places` is that of the frame before the segment.
     standings: &'a [Standing],
-    /// No segment follows.
+    /// Whether no segment follows.
     is_last: bool,
-    /// Of each individual, in a loop.
+    /// In a loop, the ends of each plan, by id; else empty.
     ends: Vec<Ends>,
 }
 
 impl<'a> Planner<'a> {
-    /// For a whole film.
+    /// Returns a planner for a whole film.
     pub fn new(model: &'a Model, boids: &'a [BoidTrack]) -> Planner<'a> {
         Planner::of_segment(model, boids, &[], true)
     }
 
-    /// For a segment; `boids` are their tracks in that segment alone.
+    /// Returns a planner for a segment. `boids` are the tracks within that segment.
     pub fn of_segment(
         model: &'a Model,
         boids: &'a [BoidTrack],
@@ -153,12 +158,14 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Frames of `places` before the first frame that is planned.
+    /// Returns the number of entries of `places` before the first planned frame.
     fn n_before(&self) -> usize {
         usize::from(!self.standings.is_empty())
     }
 
-    /// The plans of all boids, by id, the last frame of each played into the first of the heir it has.
+    /// Returns the plans of all boids of a loop, by id. `heirs[id]` is the individual as which `id`
+    /// continues, so the last frame of its plan leads to the first frame of the heir's plan. Fails if no
+    /// loop of this length closes.
     pub fn plan_loop(mut self, heirs: &[u32], progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         if self.places.len() <= self.model.dwell {
             return Err(Error::LoopDoesNotClose(self.places.len()));
@@ -174,6 +181,7 @@ impl<'a> Planner<'a> {
         self.plan(progress)
     }
 
+    /// Returns the features that each boid asks for, by id and frame.
     fn wanted(&self) -> Vec<Vec<Feature>> {
         let before = vec![Feature::default(); self.n_before()];
         (self.boids.par_iter())
@@ -184,8 +192,9 @@ impl<'a> Planner<'a> {
             .collect()
     }
 
-    /// The plans of all boids, by id, each the cheapest among those that it looks out for; meanwhile
-    /// what each would cost alone.
+    /// Returns the plans of all boids, by id. Each plan is the cheapest, given the plans of the individuals
+    /// that it watches. The least cost of each individual without crowd cost is computed in parallel, as
+    /// the lower bound.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         let wanted = self.wanted();
         let mut settled = Settled::new(self.places.len());
@@ -199,7 +208,8 @@ impl<'a> Planner<'a> {
             .collect())
     }
 
-    /// The paths of all boids, by id, round after round; each round is settled before the next.
+    /// Returns the paths of all boids, by id, computed in rounds. The paths of a round are final before the
+    /// next round starts.
     fn paths(
         &self,
         wanted: &[Vec<Feature>],
@@ -243,8 +253,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The plan with its cost in parts, summed anew from the states; what is left of the path's cost is
-    /// the crowd's.
+    /// Returns the plan of a path with its cost in parts. The parts are summed from the states; the rest of
+    /// the path's cost is the crowd cost.
     fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
         let n_before = self.n_before();
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
@@ -271,7 +281,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// What a path costs among those settled, without the future cost of its last state, turns.
+    /// Returns the cost of a path, given the final plans of others, without the future cost of its last
+    /// state, in turns.
     fn cost_among(&self, id: usize, wanted: &[Feature], settled: &Settled, path: &Path) -> u32 {
         let model = self.model;
         let n_watched = model.crowd.n_watched(id);
@@ -290,13 +301,13 @@ impl<'a> Planner<'a> {
         cost
     }
 
-    /// What a path shows in the film.
+    /// Returns the states of a path within the film. A loop's path has one more state.
     fn film_of<'b>(&self, path: &'b Path) -> &'b [u32] {
         &path.states[..self.places.len()]
     }
 
-    /// What a path's jumps cost, turns, with that after the last frame of a loop; and the part of it for showing again what was
-    /// just seen.
+    /// Returns the cost of a path's jumps, in turns, and the part of it for showing frames again. In a loop
+    /// the jump after the last frame is included.
     fn jump_costs(&self, path: &Path) -> [u32; 2] {
         let steps = path.states.windows(2);
         let jumps = steps.filter(|step| step[1] != step[0] + 1);

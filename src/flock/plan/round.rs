@@ -1,5 +1,7 @@
-//! The plans of individuals that do not look out for one another, each on whatever thread is free; the first
-//! 64 look out for all before them and come one by one (ALGORITHMS.md 6).
+//! Rounds: plans of individuals that do not watch one another, computed on all threads.
+//!
+//! The first 64 individuals watch all individuals of smaller id, so each is a round of its own
+//! (docs/explanation/algorithms.md, "Planning").
 
 use rayon::prelude::*;
 
@@ -13,17 +15,18 @@ use super::viterbi::{Film, Path};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
-/// Individuals of consecutive ids.
+/// Individuals of consecutive ids that are planned in parallel.
 pub(super) struct Round<'a> {
     pub(super) planner: &'a Planner<'a>,
-    /// The id of the first.
+    /// Id of the first individual.
     pub(super) first: usize,
-    /// What each wants.
+    /// Features that each individual asks for, by frame.
     pub(super) wanted: &'a [Vec<Feature>],
 }
 
 impl Round<'_> {
-    /// The cheapest path of each among those settled.
+    /// Returns the cheapest path of each individual, given the final plans. Fails if an individual has
+    /// none.
     pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Path>, Error> {
         let wanted = self.wanted.par_iter().enumerate();
         wanted
@@ -31,7 +34,7 @@ impl Round<'_> {
             .collect()
     }
 
-    /// Cost of the cheapest path of each alone, without a future cost, turns.
+    /// Returns the cost of each individual's cheapest path without crowd cost and future cost, in turns.
     pub(super) fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
         let planner = self.planner;
         let open = Film {
@@ -49,7 +52,7 @@ impl Round<'_> {
         self.wanted.par_iter().enumerate().map(least).collect()
     }
 
-    /// In a loop, the costs of plans that begin and go on as they must.
+    /// Returns the costs with the conditions of a loop. Outside of loops they are unchanged.
     fn closed<'b>(&self, id: usize, rows: InCrowd<'b>) -> Closed<'b, InCrowd<'b>> {
         let ends = self.planner.ends.get(id);
         let asked = ends.map(|ends| Asked {
@@ -59,7 +62,8 @@ impl Round<'_> {
         self.planner.closed(rows, asked)
     }
 
-    /// The costs of plans that continue from what an individual has shown before.
+    /// Returns the costs with the condition that a plan continues from what the individual has shown
+    /// before.
     fn begun<'b, R>(&self, id: usize, rows: R) -> Begun<'b, R> {
         let standing = self.planner.standings.get(id);
         Begun {
@@ -70,6 +74,7 @@ impl Round<'_> {
         }
     }
 
+    /// Returns the cheapest path of one individual, given the final plans.
     fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Path, Error> {
         let planner = self.planner;
         let ends = planner.ends.get(id);

@@ -1,5 +1,7 @@
-//! What showing each state costs, a stretch of stations and a block of frames at a time
-//! (ALGORITHMS.md 6): alone, and among those whose plans are final.
+//! Costs of showing each state, for a range of stations and a block of frames at a time.
+//!
+//! `Alone` has the costs of one individual, `InCrowd` adds its crowd cost
+//! (docs/explanation/algorithms.md, "Planning").
 
 use std::ops::Range;
 
@@ -9,14 +11,15 @@ use super::cost::Feature;
 use super::crowd::Settled;
 use super::viterbi::{Block, FRAMES, Moments, Rows};
 
-/// So many others are looked at together: what is known of them stays in the nearest cache.
+/// Number of other individuals processed together, so that their data stay in the nearest cache. Free
+/// choice.
 const TOGETHER: usize = 256;
 
-/// Heading, rotation and speed alone.
+/// Costs of heading, rotation and speed.
 #[derive(Clone)]
 pub(super) struct Alone<'a> {
     pub(super) planner: &'a Planner<'a>,
-    /// By frame; past its end nothing in particular is wanted.
+    /// Features asked for, by frame. Past its end the default feature is used.
     pub(super) wanted: &'a [Feature],
 }
 
@@ -29,7 +32,7 @@ impl Rows for Alone<'_> {
     }
 }
 
-/// The same with what the crowd adds.
+/// Costs of `Alone` plus the crowd cost.
 #[derive(Clone)]
 pub(super) struct InCrowd<'a> {
     alone: Alone<'a>,
@@ -54,6 +57,7 @@ impl<'a> InCrowd<'a> {
     }
 
     #[inline(always)]
+    /// Collects the crowd cost for the frames of a block.
     fn gather(&mut self, block: &Block) {
         self.added.clear();
         let planner = self.alone.planner;
@@ -64,7 +68,7 @@ impl<'a> InCrowd<'a> {
         }
     }
 
-    /// What some of those looked out for add.
+    /// Collects the crowd cost of some of the watched individuals.
     #[inline(always)]
     fn gather_some(&mut self, moments: &Moments, others: Range<usize>) {
         let planner = self.alone.planner;

@@ -1,29 +1,32 @@
-//! Costs of a segment's plan that come from outside the segment: from frames shown before it and from the future.
+//! Costs of a segment's plan that come from outside the segment: from frames shown before it and from the
+//! future.
 //!
-//! It continues from the state shown last, which may have to play on before the next jump. Its last state adds a future cost
-//! F(s) = min over successors of (jump's cost + 0.995 F(s')) (Schoedl et al., Video Textures, 2000). With these the plan of
-//! the segment is found exactly.
+//! A plan continues from the state shown last, which may have to play on before the next jump. Its last
+//! state adds a future cost F(s) = min over successors s' of (cost of the jump + 0.995 F(s')) (Schoedl et
+//! al., Video Textures, 2000). The plan of a segment is exact with these costs.
 
 use super::circle::FORBIDDEN;
 use super::trellis::Trellis;
 use super::viterbi::{Block, FRAMES, Rows};
 
-/// What lies a frame later counts by so much less.
+/// Factor by which costs count less per frame in the future. Free choice.
 const DISCOUNT: f64 = 0.995;
-/// Rounds in which the future cost settles; what has not by then is told a little too low.
+/// Maximum number of iterations of the future cost. A future cost that has not converged by then is
+/// slightly too low. Free choice.
 const MOST_ROUNDS: usize = 256;
 
-/// What an individual has shown before a segment.
+/// State of an individual before a segment.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Standing {
-    /// The state shown last; `None` before the first segment.
+    /// State shown last; `None` before the first segment.
     pub state: Option<u32>,
-    /// Frames that it must play on before it may jump.
+    /// Number of frames that it must play on before it may jump.
     pub held: usize,
 }
 
 impl Standing {
-    /// Goes on with `states`. Two jumps are at least `dwell` frames apart; a flock may begin in the middle of a run.
+    /// Updates the standing after a segment that shows `states`. Two jumps are at least `dwell` frames
+    /// apart, but a flock may begin in the middle of a run.
     pub fn go_on(&mut self, states: &[u32], dwell: usize) {
         let is_first = self.state.is_none();
         let followed: Vec<u32> = (self.state.into_iter().chain(states.iter().copied())).collect();
@@ -39,15 +42,15 @@ impl Standing {
     }
 }
 
-/// Costs of the frames of a segment. With `from`, frame 0 is the last frame of the segment before, where only that state is
-/// allowed and costs nothing.
+/// Costs of the frames of a segment. With `from`, frame 0 is the last frame of the segment before; there
+/// only the state shown last is allowed, at no cost.
 #[derive(Clone)]
 pub(super) struct Begun<'a, R> {
     pub(super) rows: R,
-    /// The state shown last before the segment, and for how many frames it must play on.
+    /// State shown last before the segment, and the number of frames for which it must play on.
     pub(super) from: Option<(u32, usize)>,
     pub(super) n_frames: usize,
-    /// Future cost by state, turns; `None` for the last segment.
+    /// Future cost by state, in turns; `None` for the last segment.
     pub(super) future: Option<&'a [Option<u32>]>,
 }
 
@@ -56,7 +59,8 @@ impl<R: Rows> Rows for Begun<'_, R> {
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         self.rows.fill(block, first, out);
         for (lane, &t) in block.times.iter().enumerate() {
-            // Where it stands, and where it has gone on to: between them there is but one way.
+            // The state at frame 0 is given, and so is the state after the frames that it must play on.
+            // Only one path connects them.
             let only = |(state, held): (u32, usize)| match held.min(self.n_frames - 1) {
                 held if t == 0 || t == held => Some(state as usize + t),
                 _ => None,
@@ -79,8 +83,8 @@ impl<R: Rows> Rows for Begun<'_, R> {
     }
 }
 
-/// What playback costs from each state on, for ever: the jumps that it cannot do without, each at its price
-/// and discounted by when it comes.
+/// Returns the future cost of each state, in turns: the cost of the jumps that endless playback cannot
+/// avoid, discounted by when they come. `None` if playback cannot continue from a state.
 pub(in crate::flock) fn future_costs(trellis: &Trellis, dwell: usize) -> Vec<Option<u32>> {
     let after_dwell = (0..dwell).fold(1.0, |share, _| share * DISCOUNT);
     let mut future = vec![0.0f64; trellis.n_states()];
@@ -118,7 +122,8 @@ mod tests {
     use super::*;
     use crate::library::{Jump, Playback};
 
-    /// 0 to 39, from whose end one jumps back to the start for 7, and from 20 to 2 for 50.
+    /// Returns the trellis of frames 0 to 39 with two jumps: from 39 to 0 for 7 turns, from 20 to 2 for 50
+    /// turns.
     fn trellis() -> Trellis {
         let jump = |from, to, cost| Jump {
             from,
@@ -156,7 +161,7 @@ mod tests {
         let future = future_costs(&trellis, 4);
         let of = |frame| future[trellis.state(frame, false).expect("a state") as usize];
         assert!(of(39) > of(10) && of(10) > of(0), "{future:?}");
-        // Forty frames for 7: about 7 / (1 - 0.995^40) at the jump.
+        // One jump for 7 turns every forty frames: about 7 / (1 - 0.995^40) at the jump.
         assert!((36..=42).contains(&of(39).expect("playback goes on")));
         assert_eq!(future[0], None, "nothing leaves a barrier");
     }

@@ -1,28 +1,28 @@
-//! The plan of an individual and its cost, for a segment or a whole flock.
+//! Plan of an individual and its cost, for a segment or a whole film.
 
 use std::ops::AddAssign;
 
 use crate::flock::individual::{PlanCost, rounded};
 use crate::geometry::Turns;
 
-/// What one individual shows in some frames, and what that costs.
+/// Frames shown by one individual, and their cost.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plan {
-    /// States, one for each frame.
+    /// State shown at each frame.
     pub states: Vec<u32>,
-    /// What they cost.
+    /// Cost of the plan.
     pub cost: Spent,
 }
 
 impl Plan {
-    /// Goes on with another.
+    /// Appends a later plan and adds its cost.
     pub fn append(&mut self, later: Plan) {
         self.states.extend(later.states);
         self.cost += later.cost;
     }
 }
 
-/// What a plan costs, in its parts; turns.
+/// Cost of a plan in parts, in turns.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Spent {
     pub(super) heading: u64,
@@ -47,7 +47,7 @@ impl AddAssign for Spent {
 }
 
 impl Spent {
-    /// As files tell it.
+    /// Returns the cost as files store it: in radians, rounded to 6 decimals.
     pub fn told(&self) -> PlanCost {
         let rad = |turns: u64| rounded(turns as f64 / Turns::PER_RAD, 6);
         PlanCost {

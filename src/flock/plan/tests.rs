@@ -1,4 +1,4 @@
-//! Plans of whole flocks: their certificates, and their cost told from the outside.
+//! Tests of plans of whole flocks: their certificates, and their costs recomputed from the files.
 
 use super::*;
 use crate::flock::follow::segments;
@@ -13,7 +13,7 @@ use crate::geometry::Turns;
 use crate::library::View;
 use crate::progress::Silent;
 
-/// By a preset's name, or a school matched by what is named.
+/// Returns a flock of the named preset. `direction` and `position` are a school matched by that criterion.
 fn flock(view: View, name: &str) -> (Library, Flock) {
     let library = synthetic::library(view);
     let (preset, by) = match name {
@@ -31,7 +31,8 @@ fn flock(view: View, name: &str) -> (Library, Flock) {
     (library, flock)
 }
 
-/// J of one individual by the words of ALGORITHMS.md 6, in turns, from what the files hold.
+/// Returns the cost J of one individual, in turns, recomputed from the contents of the files
+/// (docs/explanation/algorithms.md, "Planning").
 fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
     let motion = motion_of(library, &Lens::of(library, &flock.params));
     let weights = Weights::new(&flock.params.matching, library);
@@ -148,8 +149,8 @@ fn the_plans_of_a_flock_hold_their_certificates() {
     }
 }
 
-/// The least cost of all paths, turns, by trying them all: each is a state shown at frame 0
-/// that goes on or jumps.
+/// Returns the least cost of all paths, in turns, by trying all of them. A path begins with any state at
+/// frame 0 and then plays on or jumps.
 fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u32>) -> u32 {
     let ends = planner.ends.first();
     if path.len() == wanted.len() + planner.ends.len() {
@@ -232,7 +233,7 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
     for seed in 0..16 {
         let params = Params {
             count: Some(1),
-            // Its frames come back after whole beats of ten only.
+            // Most cycles of this library are multiples of ten frames long.
             frames: 30 + 10 * (seed as u32 % 2),
             seed,
             is_loop: true,
@@ -247,7 +248,7 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
         let mut planner = Planner::new(&model, &boids);
         let wanted = [planner.model.weights.wanted(&boids[0], planner.model.fps)];
         let own = (one.source_frame[0], one.mirrored[0]);
-        // Nothing plays on into the first frame of all: to it one jumps.
+        // Frame 200 is the first of the component: only jumps lead to it.
         for (frame, side) in [own, (200, false)] {
             let first = planner.model.trellis.state(frame, side);
             let first = first.expect("a frame of the component");
@@ -278,7 +279,8 @@ fn a_loop_closes_wherever_any_film_of_its_length_leads_back_to_where_it_began() 
         plan_flock(&library, &params, &Silent)
     };
     for seed in 0..16 {
-        // There and back takes 10 or 20 frames, or 24 with a change of sides, which 10 more undo.
+        // Cycles of playback take 10 or 20 frames. A cycle of 24 frames changes the mirror side, and one of
+        // 10 frames can change it back.
         for frames in [30, 34, 40, 44, 48, 54] {
             let flock = plan(1 + seed as u32 % 3, frames, seed);
             assert!(flock.is_ok(), "{frames} frames, seed {seed}: {flock:?}");

@@ -1,40 +1,41 @@
-//! The states of playback laid out for the plan (ALGORITHMS.md 6): every frame of the component on
-//! every allowed mirror side, in runs of consecutive frames, and the jumps sorted by their target.
+//! Trellis: the states of playback, arranged for planning (docs/explanation/algorithms.md, "Planning").
 //!
-//! A barrier state stands before each run, so that "continue" is always "from the state before":
-//! nothing ever leaves a barrier.
+//! A state is a frame of the component on an allowed mirror side. States lie in runs of consecutive frames,
+//! and jumps are sorted by their target. A barrier state precedes each run. No step leaves a barrier, so
+//! playing on always leads from the state before.
 
 use super::landings::{Landings, Way};
 use crate::library::{Jump, Playback};
 
-/// Stands for the frame of a barrier.
+/// Frame number of a barrier.
 const NO_FRAME: u32 = u32::MAX;
 
-/// States, the jumps between them, and where each state's frame is.
+/// States and the jumps between them.
 #[derive(Clone, Debug)]
 pub struct Trellis {
     frames: Vec<u32>,
     mirrored: Vec<bool>,
     barriers: Vec<u32>,
-    /// Which run a state belongs to.
+    /// Run to which each state belongs.
     runs: Vec<u32>,
-    /// How many states of its run come up to each state, itself counted: 0 for barriers.
+    /// Number of states of its run up to each state, itself included; 0 for barriers.
     since: Vec<u32>,
-    /// How many come from it on, the last state first.
+    /// Number of states of its run from each state on, itself included; 0 for barriers. The last state
+    /// comes first.
     until: Vec<u32>,
-    /// States that some jump leads to, rising.
+    /// States at which jumps land, rising.
     targets: Vec<u32>,
-    /// `sources[first_source[k]..first_source[k + 1]]` lead to target k.
+    /// `sources[first_source[k]..first_source[k + 1]]` are the jumps to target k.
     first_source: Vec<u32>,
-    /// (state, cost in turns) of each jump, by target, then source.
+    /// (source state, cost in turns) of each jump, by target, then by source.
     sources: Vec<(u32, u32)>,
     ahead: Landings,
     back: Landings,
 }
 
 impl Trellis {
-    /// The trellis of a playback graph. `mirror` makes both sides of every frame states; `cost_of`
-    /// says what a jump costs, turns.
+    /// Returns the trellis of a playback graph. With `mirror`, both sides of every frame are states.
+    /// `cost_of` returns the cost of a jump, in turns.
     pub fn new(playback: &Playback, mirror: bool, cost_of: impl Fn(&Jump) -> u32) -> Trellis {
         let mut trellis = Trellis {
             frames: Vec::new(),
@@ -68,18 +69,18 @@ impl Trellis {
         trellis
     }
 
-    /// Number of states, barriers included.
+    /// Returns the number of states, barriers included.
     pub fn n_states(&self) -> usize {
         self.frames.len()
     }
 
-    /// The frame and mirror side of a state; `None` for a barrier.
+    /// Returns the frame and mirror side of a state; `None` for a barrier.
     pub fn shown(&self, state: usize) -> Option<(u32, bool)> {
         let frame = self.frames[state];
         (frame != NO_FRAME).then_some((frame, self.mirrored[state]))
     }
 
-    /// The state that shows a frame on a mirror side, if there is one.
+    /// Returns the state that shows a frame on a mirror side, if there is one.
     pub fn state(&self, frame: u32, mirrored: bool) -> Option<u32> {
         let half = match self.mirrored.last() {
             Some(true) => self.frames.len() / 2,
@@ -89,29 +90,29 @@ impl Trellis {
         if start >= self.frames.len() {
             return None;
         }
-        // Barriers sort just before the frame that follows them.
+        // A barrier sorts just before the frame that follows it.
         let side = &self.frames[start..start + half];
         let at = side.partition_point_with_barriers(frame);
         (at < half && side[at] == frame).then_some((start + at) as u32)
     }
 
-    /// The states that stand before runs and show nothing, rising.
+    /// Returns the barriers, rising.
     pub fn barriers(&self) -> &[u32] {
         &self.barriers
     }
 
-    /// The states that jumps lead to, rising.
+    /// Returns the states at which jumps land, rising.
     pub fn targets(&self) -> &[u32] {
         &self.targets
     }
 
-    /// The jumps to the `k`th target: (source state, cost in turns), sources rising.
+    /// Returns the jumps to the `k`th target: (source state, cost in turns), sources rising.
     pub fn sources(&self, k: usize) -> &[(u32, u32)] {
         let range = self.first_source[k] as usize..self.first_source[k + 1] as usize;
         &self.sources[range]
     }
 
-    /// What the jump from a state to another costs, turns; 0 where there is none.
+    /// Returns the cost of the jump from a state to another, in turns; 0 if there is none.
     pub fn jump_cost(&self, from: u32, to: u32) -> u32 {
         let k = self.targets.binary_search(&to);
         let sources = k.map_or(&[][..], |k| self.sources(k));
@@ -119,7 +120,7 @@ impl Trellis {
         at.map_or(0, |at| sources[at].1)
     }
 
-    /// The jumps as the recursion takes them, from station to station: as time runs, or against it.
+    /// Returns the jumps from station to station, in one direction of time.
     pub fn landings(&self, way: Way) -> &Landings {
         match way {
             Way::Ahead => &self.ahead,
@@ -127,8 +128,8 @@ impl Trellis {
         }
     }
 
-    /// How many states of its run one has gone through to each station when going that way, itself
-    /// counted; 0 for barriers.
+    /// Returns for each station the number of states of its run up to it, itself included, in one direction
+    /// of time; 0 for barriers.
     pub fn gone_through(&self, way: Way) -> &[u32] {
         match way {
             Way::Ahead => &self.since,
@@ -136,7 +137,7 @@ impl Trellis {
         }
     }
 
-    /// Whether `state + ahead` is reached from `state` by continuing alone.
+    /// Returns whether playing on from `state` leads to `state + ahead` without a jump.
     pub fn continues(&self, state: usize, ahead: usize) -> bool {
         let end = state + ahead;
         self.frames[state] != NO_FRAME && self.runs.get(end) == Some(&self.runs[state])
@@ -193,7 +194,7 @@ impl Trellis {
     }
 }
 
-/// Binary search in frames that rise but for barriers.
+/// Binary search in frames that rise, except for barriers.
 trait FramesWithBarriers {
     fn partition_point_with_barriers(&self, frame: u32) -> usize;
 }
@@ -203,7 +204,7 @@ impl FramesWithBarriers for [u32] {
         let (mut low, mut high) = (0, self.len());
         while low < high {
             let middle = low + (high - low) / 2;
-            // A barrier is never last: judge it by the frame after it.
+            // A barrier is never the last entry. The frame after it is compared.
             let (judged, at) = match self[middle] {
                 NO_FRAME => (self[middle + 1], middle + 1),
                 found => (found, middle),
@@ -214,7 +215,7 @@ impl FramesWithBarriers for [u32] {
                 high = middle;
             }
         }
-        // A barrier may be what is left: the frame stands after it.
+        // If the search ends at a barrier, the frame is the entry after it.
         low + usize::from(self.get(low) == Some(&NO_FRAME))
     }
 }

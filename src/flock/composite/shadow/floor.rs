@@ -1,5 +1,7 @@
-//! Shadows seen from the side: flat ellipses on the floor, which lies under the lowest place where anybody of the flock swims,
-//! farther up in the picture the farther it is, and paler the higher the animal swims.
+//! Shadows in side view: flat ellipses on a floor below the lowest animal of the flock.
+//!
+//! The shadow of a farther animal lies higher in the picture. The shadow of an animal is paler the higher
+//! the animal swims above the floor (docs/explanation/algorithms.md, "Shadows").
 
 use super::Shade;
 use crate::flock::Flock;
@@ -14,26 +16,29 @@ use crate::library::Library;
 use crate::order::median;
 use crate::raster::resample::ONE;
 
-/// Height above the floor at which an animal casts no shadow any more.
+/// Height above the floor from which an animal casts no shadow, in body lengths. Free choice.
 const HEIGHT_BL: f64 = 6.0;
-/// Half the length and the width of a shadow.
+/// Half the length of a shadow, in body lengths. Free choice.
 const HALF_LENGTH_BL: f64 = 0.6;
+/// Half the width of a shadow, in body lengths. Free choice.
 const HALF_WIDTH_BL: f64 = 0.26;
-/// Least half height of a shadow.
+/// Least half height of a shadow in the picture, in body lengths. Free choice.
 const LEAST_HALF_BL: f64 = 0.1;
-/// An animal that points at the camera is as wide as this share of its length.
+/// Least horizontal extent of a shadow as a share of its length, for headings that are nearly vertical in
+/// the picture. Free choice.
 const LEAST_ACROSS: f64 = 0.4;
 
-/// A floor that is seen from the side.
+/// Floor of the tank in side view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Floor {
     lens: Lens,
-    /// The depth of the tank's front and the height of the floor, body lengths from the camera, down.
+    /// Depth of the tank's front, in body lengths from the camera.
     front_bl: f64,
+    /// Height of the floor, in body lengths, positive down.
     floor_bl: f64,
 }
 
-/// A shadow in the picture: its middle, its half axes, and which share of the darkness asked for it has.
+/// Shadow in the film: center and half axes in pixels, and its share of the requested darkness, 0..=1.
 pub(super) struct Ellipse {
     center: [f64; 2],
     half: [f64; 2],
@@ -41,7 +46,7 @@ pub(super) struct Ellipse {
 }
 
 impl Floor {
-    /// Under the lowest place of anybody at any time.
+    /// Returns the floor: half a body height below the lowest position of any individual in any frame.
     pub(super) fn of(library: &Library, flock: &Flock) -> Floor {
         let lens = Lens::of(library, &flock.params);
         let tank = Tank::of(library, &lens, &motion_of(library, &lens), &flock.params);
@@ -63,7 +68,7 @@ impl Floor {
         floor
     }
 
-    /// The shadow of an individual.
+    /// Returns the shadow of an individual in one frame.
     pub(super) fn shadow(&self, who: &Appearance, view: &View) -> Ellipse {
         let (individual, t) = (who.individual, who.frame_idx);
         let [x, y, depth_bl] = self.place(individual, t);
@@ -79,7 +84,7 @@ impl Floor {
         }
     }
 
-    /// Where one is drawn, in the tank.
+    /// Returns the position of an individual in the tank, in body lengths.
     fn place(&self, individual: &Individual, t: usize) -> [f64; 3] {
         let behind_px = individual.boid.position_px[t][2];
         let depth_bl = match self.lens.is_flat() {
@@ -91,7 +96,7 @@ impl Floor {
 }
 
 impl Ellipse {
-    /// Draws it, as dark as asked for in its middle, softer toward its rim.
+    /// Draws the ellipse. Its center has the share of `darkness`; the alpha falls smoothly to 0 at the rim.
     pub(super) fn draw(&self, darkness: f64, shade: &mut Shade) {
         let [left, right] = [-1.0, 1.0].map(|side| self.center[0] + side * self.half[0]);
         let [top, bottom] = [-1.0, 1.0].map(|side| self.center[1] + side * self.half[1]);

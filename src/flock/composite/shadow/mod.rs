@@ -1,8 +1,9 @@
-//! Shadows, drawn below all animals. From above: the outline of each, moved to the side to which the light casts it, blurred
-//! and as dark as the animal's own shadow was filmed, whichever way its body is turned. From the side: ellipses on a
-//! floor (`floor`), where that is asked for.
+//! Shadows of the animals on the floor, drawn below all sprites.
 //!
-//! Where several shadows lie, the darkest is seen.
+//! In top view a shadow is the animal's outline, displaced away from the light, blurred, and as dark as it
+//! was filmed. The displacement does not depend on the heading. In side view shadows are ellipses on a
+//! floor (`floor`), and only if they are requested. Where shadows overlap, the darkest one counts
+//! (docs/explanation/algorithms.md, "Shadows").
 
 mod floor; // as seen from the side
 
@@ -14,30 +15,31 @@ use crate::geometry::Rect;
 use crate::library::{self, Library};
 use crate::raster::resample::{ONE, Resampled};
 
-/// Seen from above, where no shadow was measured but one is asked for: that of an animal on a floor below a lamp.
+/// Shadow for top view if shadows are requested but none was measured: an animal on a floor below a lamp.
+/// Free choice.
 const USUAL: library::Shadow = library::Shadow {
     darkness: 0.3,
     offset_bl: [0.06, 0.06],
     blur_bl: 0.09,
 };
-/// As many means over a box are nearly a Gaussian.
+/// Number of successive box filters that approximate a Gaussian.
 const N_MEANS: usize = 3;
 
-/// The shadows of a flock: their darkness and shape.
+/// Darkness and shape of a flock's shadows.
 pub(super) struct Shadows {
     darkness: f64,
     cast: Cast,
 }
 
 enum Cast {
-    /// Seen from above: how far outlines are moved and blurred, pixels of the footage.
+    /// Top view: displacement and blur of the outlines, in pixels of the footage.
     Outline { offset_px: [f64; 2], blur_px: f64 },
-    /// Seen from the side.
+    /// Side view: ellipses on a floor.
     Floor(Floor),
 }
 
 impl Shadows {
-    /// Those of a flock; `None` where there are none.
+    /// Returns the shadows of a flock; `None` if it has none.
     pub(super) fn of(library: &Library, flock: &Flock) -> Option<Shadows> {
         let asked = flock.params.render.shadow;
         let is_side = library.poses.view == library::View::Side;
@@ -54,12 +56,12 @@ impl Shadows {
         (darkness > 0.0).then_some(Shadows { darkness, cast })
     }
 
-    /// Whether they are made of what is drawn of the animals.
+    /// Returns whether the shadows are made of the outlines of drawn sprites.
     pub(super) fn are_outlines(&self) -> bool {
         matches!(self.cast, Cast::Outline { .. })
     }
 
-    /// Adds the shadow of an individual, of which `layer` was drawn.
+    /// Adds the shadow of an individual to `shade`. `layer` is the drawn sprite.
     pub(super) fn add(&self, who: &Appearance, layer: &Resampled, view: &View, shade: &mut Shade) {
         match &self.cast {
             Cast::Outline { offset_px, blur_px } => {
@@ -72,21 +74,21 @@ impl Shadows {
     }
 }
 
-/// The shadows of one frame.
+/// Shadows of one frame.
 #[derive(Default)]
 pub(super) struct Shade {
     size_px: [u32; 2],
-    /// The share of the light that they take, 16384ths, by rows.
+    /// Share of the light that shadows remove from each pixel, in 16384ths, by rows.
     alpha: Vec<u16>,
-    /// Where they lie.
+    /// Box that contains all shadows.
     rect: Rect,
-    /// An outline that is being blurred.
+    /// Outline that is being blurred.
     outline: Vec<u32>,
     line: Vec<u32>,
 }
 
 impl Shade {
-    /// No shadows, in a picture of a size.
+    /// Removes all shadows and sets the size of the picture.
     pub(super) fn begin(&mut self, size_px: [u32; 2]) {
         self.size_px = size_px;
         self.alpha.clear();
@@ -95,18 +97,18 @@ impl Shade {
         self.rect = Rect::default();
     }
 
-    /// The share of the light that they take of every pixel, 16384ths.
+    /// Returns the share of the light that shadows remove from each pixel, in 16384ths, by rows.
     pub(super) fn alpha(&self) -> &[u16] {
         &self.alpha
     }
 
-    /// Makes a place of the picture at least so dark.
+    /// Makes a pixel at least as dark as `alpha`.
     fn darken(&mut self, x: u32, y: u32, alpha: u16) {
         let before = &mut self.alpha[(y * self.size_px[0] + x) as usize];
         *before = (*before).max(alpha);
     }
 
-    /// Says that shadows may lie in a box too.
+    /// Extends the box of the shadows by `rect`.
     fn reach(&mut self, rect: Rect) {
         self.rect = match self.rect.is_empty() {
             true => rect,
@@ -114,6 +116,8 @@ impl Shade {
         };
     }
 
+    /// Adds the outline of a layer as a shadow: displaced by (dx, dy) pixels, blurred with standard
+    /// deviation `blur_px`, its alpha multiplied by `darkness`.
     fn add_outline(&mut self, layer: &Resampled, [dx, dy]: [i64; 2], blur_px: f64, darkness: f64) {
         let from = layer.rect;
         if from.is_empty() {
@@ -154,8 +158,9 @@ impl Shade {
         }
     }
 
-    /// Takes the mean over 2 `radius` + 1 pixels along each line of the outline: of `n` pixels `step` apart, in `n_lines` that
-    /// begin `apart` from each other. Beyond its ends there is nothing.
+    /// Applies a box filter of 2 `radius` + 1 pixels to each line of the outline. A line has `n` pixels,
+    /// `step` apart; the `n_lines` lines begin `apart` from each other. Pixels beyond the ends of a line
+    /// are 0.
     fn blur(&mut self, [n, step]: [usize; 2], [n_lines, apart]: [usize; 2], radius: usize) {
         let span = 2 * radius as u32 + 1;
         for first in (0..n_lines).map(|line| line * apart) {
@@ -171,7 +176,7 @@ impl Shade {
         }
     }
 
-    /// The shadows as a layer: black, where there are any.
+    /// Writes the shadows to a layer: black pixels with the alpha of the shadows.
     pub(super) fn layer(&self, layer: &mut Resampled) {
         let rect = self.rect;
         layer.begin(rect);
@@ -216,13 +221,13 @@ mod tests {
         };
         let mut shade = Shade::default();
         shade.begin([80, 60]);
-        // Twice is no darker.
+        // A shadow added twice is no darker.
         for _ in 0..2 {
             shade.add_outline(&square(rect), [6, -4], 2.0, 0.5);
         }
         let share = |x: usize, y: usize| f64::from(shade.alpha()[y * 80 + x]) / f64::from(ONE);
         assert!((share(36, 21) - 0.5).abs() < 0.01, "{}", share(36, 21));
-        // Half as dark on its edge, and nothing far outside.
+        // The edge has half the darkness. Far outside there is no shadow.
         let edge = (share(25, 21) + share(26, 21)) / 2.0;
         assert!((edge - 0.25).abs() < 0.02, "{edge}");
         assert!(share(23, 21) > 0.0 && share(23, 21) < share(26, 21));

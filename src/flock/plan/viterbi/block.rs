@@ -1,29 +1,30 @@
-//! Frames side by side (ALGORITHMS.md 6).
+//! Blocks of consecutive frames, processed side by side in the lanes of a vector
+//! (docs/explanation/algorithms.md, "Planning").
 
 use std::ops::Range;
 
 use crate::cpu::Level;
 use crate::flock::plan::landings::Way;
 
-/// Frames in the lanes of a vector.
+/// Number of lanes of a vector, and the most frames of a block.
 pub const FRAMES: usize = 8;
 
-/// Some frames of a film in a row, in the order in which they are gone through.
+/// Consecutive frames of a film, in the order in which they are processed.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// Which way.
+    /// Direction of time.
     pub way: Way,
-    /// Which instructions to use; this machine must have them.
+    /// Vector instructions to use; this machine must have them.
     pub cpu: Level,
-    /// States of the trellis.
+    /// Number of states of the trellis.
     pub n_states: usize,
-    /// The output frame in each lane. Lanes that stand for none come first and repeat that of the first that
-    /// does, or come last and repeat that of the last.
+    /// Output frame of each lane. Unused lanes come first and repeat the frame of the first used lane, or
+    /// come last and repeat that of the last used lane.
     pub times: [usize; FRAMES],
 }
 
 impl Block {
-    /// The lanes that stand for frames below `n_frames`.
+    /// Returns the lanes with frames below `n_frames`, in order of time.
     pub fn moments(&self, n_frames: usize) -> Moments {
         let steps = self.times.windows(2);
         let n_before = steps.clone().take_while(|t| t[0] == t[1]).count();
@@ -41,39 +42,41 @@ impl Block {
         }
     }
 
-    /// The state of a station.
+    /// Returns the state of a station.
     pub fn state(&self, station: usize) -> usize {
         self.way.station(self.n_states, station)
     }
 
-    /// The states of stations in a row; going back, the last comes first.
+    /// Returns the states of a range of stations. Backward in time the state of the last station comes
+    /// first.
     pub fn states(&self, stations: Range<usize>) -> Range<usize> {
         self.way.stations(self.n_states, stations)
     }
 
-    /// The stations of states in a row.
+    /// Returns the stations of a range of states.
     pub fn stations(&self, states: Range<usize>) -> Range<usize> {
         self.way.stations(self.n_states, states)
     }
 }
 
-/// The frames that lanes stand for, in the order of time.
+/// Frames of a block in order of time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Moments {
-    /// Moment k is lane k as time runs, and lane `FRAMES - 1 - k` against it.
+    /// Moments in use. Moment k is lane k forward in time, and lane `FRAMES - 1 - k` backward.
     pub range: Range<usize>,
-    /// The output frame of the first of the range.
+    /// Output frame of the first moment in use.
     first: usize,
 }
 
 impl Moments {
-    /// The output frame of a moment of the range.
+    /// Returns the output frame of a moment in use.
     pub fn frame(&self, moment: usize) -> usize {
         self.first + moment - self.range.start
     }
 }
 
-/// Frames of a block: no jump of one of them may lead to another that could jump.
+/// Returns the number of frames of a block. It is at most the dwell, so that a jump in a block never leads
+/// to another jump in the same block.
 pub(super) fn width(dwell: usize) -> usize {
     dwell.min(FRAMES)
 }

@@ -1,8 +1,8 @@
-//! The recursion itself, a block of frames at a time (ALGORITHMS.md 6).
+//! The recursion, one block of frames at a time (docs/explanation/algorithms.md, "Planning").
 //!
-//! First what goes on is followed from station to station, then all jumps of the block are taken; what
-//! they offer is kept until who landed may leave, `dwell` frames later. The same portable code is
-//! compiled once plainly and once for AVX2; results are the same integers.
+//! First the costs of playing on are carried from station to station (`front`). Then all jumps of the block
+//! are taken (`landing`). Their costs are kept (`offers`) until the path may jump again, `dwell` frames
+//! later. The same portable code is compiled with and without AVX2 and returns the same integers.
 
 use super::front::{self, Front, NO_LEAD, Stretch, Tally};
 use super::landing::Landing;
@@ -13,29 +13,30 @@ use super::{Block, FRAMES, Film, Rows, UNREACHED, block};
 use crate::cpu::Level;
 use crate::flock::plan::landings::Way;
 
-/// Stations whose costs are filled in at a time, so that they stay in the nearest cache.
+/// Number of stations whose costs are computed at a time, so that they stay in the nearest cache. Free
+/// choice.
 const STRETCH: usize = 64;
 
-/// The state of the recursion after a block.
+/// State of the recursion after a block.
 #[derive(Clone)]
 pub(super) struct Column {
     way: Way,
     dwell: usize,
-    /// Frames in all.
+    /// Number of frames.
     n_frames: usize,
-    /// Frames in a block.
+    /// Number of frames in a block.
     width: usize,
-    /// The clock of the block gone through next. Clocks count frames such that the last block is full: the
-    /// first frame's is `opening`, below `width`.
+    /// Clock of the next block. Clocks number the frames so that the last block is full. The first frame
+    /// has the clock `opening`, which is below `width`.
     clock: usize,
     opening: usize,
-    /// By station plus one; no path comes from before the first.
+    /// By station plus one. No path comes from entry 0.
     tallies: Vec<Tally>,
     offers: Offers,
 }
 
 impl Column {
-    /// Before the first of so many frames.
+    /// Returns the state before the first of `n_frames` frames.
     pub(super) fn new(film: &Film<'_>, way: Way, n_frames: usize) -> Column {
         let (n_states, width) = (film.trellis.n_states(), block::width(film.dwell));
         Column {
@@ -50,17 +51,17 @@ impl Column {
         }
     }
 
-    /// Blocks left to go through.
+    /// Returns the number of blocks still to be processed.
     pub(super) fn n_left(&self) -> usize {
         (self.opening + self.n_frames - self.clock) / self.width
     }
 
-    /// Goes on by a block.
+    /// Processes the next block.
     pub(super) fn advance<R: Rows>(&mut self, film: &Film<'_>, rows: &mut R, steps: Steps<'_>) {
         self.advance_on::<R, true>(film, rows, steps);
     }
 
-    /// Goes on by a block and keeps no way back.
+    /// Processes the next block without a trace.
     pub(super) fn advance_untraced<R: Rows>(&mut self, film: &Film<'_>, rows: &mut R) {
         self.advance_on::<R, false>(film, rows, Steps::default());
     }
@@ -75,7 +76,7 @@ impl Column {
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
                 #[expect(unsafe_code, reason = "the same code, compiled for AVX2")]
-                // SAFETY: the line above made sure of AVX2, which is all that the callee asks for.
+                // SAFETY: the guard of this match arm checks for AVX2, the only requirement of the callee.
                 unsafe {
                     self.advance_avx2::<R, TRACED>(film, rows, steps);
                 }
@@ -107,7 +108,7 @@ impl Column {
         self.clock += self.width;
     }
 
-    /// Every station from the one before it, or from a landing where that is cheaper.
+    /// Computes every station from the one before it, or from a landing if that is cheaper.
     #[inline(always)]
     fn go_on<R: Rows, const AVX2: bool, const TRACED: bool>(
         &mut self,
@@ -139,7 +140,7 @@ impl Column {
             #[cfg(target_arch = "x86_64")]
             if AVX2 {
                 #[expect(unsafe_code, reason = "the same, for AVX2")]
-                // SAFETY: who says AVX2 has made sure of it.
+                // SAFETY: callers set `AVX2` only after checking for it.
                 unsafe {
                     front.go_on_avx2::<TRACED>(stretch);
                 }
@@ -149,7 +150,7 @@ impl Column {
         }
     }
 
-    /// The cheapest jump to each station that jumps lead to.
+    /// Takes the cheapest jump to each landing station.
     #[inline(always)]
     fn land<const AVX2: bool, const TRACED: bool>(
         &mut self,
@@ -162,7 +163,7 @@ impl Column {
             ranks: ranks.iter_mut(),
         };
         for (n_jumps, stations, jumps) in film.trellis.landings(self.way).groups() {
-            // Most stations have but few jumps: loops of known length.
+            // Most landing stations have few jumps. A constant length makes these loops faster.
             match n_jumps {
                 1 => landing.some::<AVX2, TRACED>(stations, jumps.as_chunks::<1>().0),
                 2 => landing.some::<AVX2, TRACED>(stations, jumps.as_chunks::<2>().0),
@@ -183,32 +184,33 @@ impl Column {
         }
     }
 
-    /// The clock of the next block.
+    /// Returns the clock of the next block.
     pub(super) fn clock(&self) -> usize {
         self.clock
     }
 
-    /// The lanes of the last block that stand for frames.
+    /// Returns the lanes of the last block that hold frames.
     pub(super) fn lanes(&self) -> std::ops::Range<usize> {
         let is_first = self.clock == self.width;
         (if is_first { self.opening } else { 0 })..self.width
     }
 
-    /// V of who may jump in a lane of the last block, by station, turns.
+    /// Returns V, the least cost of paths that may jump, in a lane of the last block, by station, in turns.
     pub(super) fn values(&self, lane: usize) -> impl Iterator<Item = u32> {
         let stations = self.tallies[1..].iter();
         stations.map(move |tally| tally.values[lane].min(UNREACHED))
     }
 
-    /// `[ago][station]`: the least V, turns, at the last frame gone through of who landed so many frames
-    /// ago; the last of `dwell` is of all who landed before, and may jump.
+    /// Returns `[ago][station]`: the least cost, in turns, of paths to the last frame processed that landed
+    /// `ago` frames before. The last row, `dwell - 1`, has the paths that landed at least that many frames
+    /// before and may jump.
     pub(super) fn ends(&self, film: &Film<'_>) -> Vec<Vec<u32>> {
         let gone_through = film.trellis.gone_through(self.way);
         let last = self.width - 1;
         let sums: Vec<u32> = self.tallies[1..].iter().map(|t| t.sums[last]).collect();
         let landed = |ago: usize| {
             let mut values = vec![UNREACHED; gone_through.len()];
-            // Before the first frame nobody landed.
+            // No path landed before the first frame.
             let Some(clock) = self.clock.checked_sub(ago + 2) else {
                 return values;
             };

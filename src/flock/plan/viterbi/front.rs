@@ -1,58 +1,63 @@
-//! What goes on, from station to station (ALGORITHMS.md 6): the hot loop of the recursion's first stroke.
+//! Playing on from station to station: the inner loop of the first step of the recursion
+//! (docs/explanation/algorithms.md, "Planning").
 //!
-//! `Front::go_on` is the definition; the way for AVX2 is there to be fast, and gives the same.
+//! `Front::go_on` defines the results. The AVX2 version returns the same integers, faster.
 
 use super::{FRAMES, UNREACHED};
 #[cfg(target_arch = "x86_64")]
 use crate::flock::plan::lanes::{load, store};
 
-/// The lead that nobody offers. Sums stay below 2^31, so V fits 32 bits.
+/// Lead of a missing offer. Running sums stay below 2^31, so V fits 32 bits.
 pub(super) const NO_LEAD: i32 = UNREACHED as i32;
 
-/// A station at the frames of a block.
+/// Costs of one station at the frames of a block.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Tally {
-    /// V of who may jump, turns; `UNREACHED` or more where no path comes.
+    /// V: least cost of paths that may jump, in turns. `UNREACHED` or more if there is no path.
     pub(super) values: [u32; FRAMES],
-    /// Costs of all that goes on to here since the film began, turns.
+    /// Running sum of the costs along continuous playback to this station since the film began, in turns.
     pub(super) sums: [u32; FRAMES],
 }
 
-/// Stations in a row.
+/// Consecutive stations with their inputs and outputs.
 pub(super) struct Stretch<'a> {
-    /// As they were in the block before, and as they become.
+    /// Input: the block before. Output: this block.
     pub(super) tallies: &'a mut [Tally],
-    /// How many stations of its run one has gone through to each; 0 for barriers.
+    /// Number of stations of its run up to each station, itself included; 0 for barriers.
     pub(super) gone_through: &'a [u32],
-    /// Leads of those who landed `landed` frames ago, and have gone on to here.
+    /// Leads of paths that landed `landed` frames ago and have played on to each station.
     pub(super) offers: &'a [[i32; FRAMES]],
-    /// What each costs.
+    /// Cost of showing each station.
     pub(super) costs: &'a [[u32; FRAMES]],
-    /// In bits, where an offer is lower.
+    /// Output: one bit per lane, set where the offer is lower.
     pub(super) wins: &'a mut [u8],
 }
 
-/// V on its way from one station to the next, which it comes to a frame later: each lane's successor is
-/// the next lane of the next station. On that way costs add to the sum and to V, until a landing has a lower one.
+/// V and running sum on their way from one station to the next.
+///
+/// The next station is reached one frame later, so the successor of each lane is the next lane of the next
+/// station. The cost of each station is added to the sum and to V. Where an offer is lower than V, it
+/// replaces V.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
     at: Tally,
-    /// At the station before, in the last block.
+    /// Tally of the station before, in the last block.
     before: Tally,
-    /// All bits of the lanes that stand for frames of the film, and of those but that in which it begins.
+    /// All bits set in lanes that hold frames of the film.
     in_film: [u32; FRAMES],
+    /// All bits set in lanes other than that of the film's first frame.
     goes_on: [u32; FRAMES],
-    /// Frames of a block, at most `FRAMES`.
+    /// Number of frames in a block, at most `FRAMES`.
     width: usize,
-    /// Frames after a landing in which none may jump.
+    /// Number of frames after a landing in which no jump is allowed.
     landed: u32,
-    /// Whether every lane stands for a frame, none of them the film's first.
+    /// Whether every lane holds a frame and none holds the film's first frame.
     is_plain: bool,
 }
 
 impl Tally {
-    /// Where no path comes.
+    /// Tally of a station that no path reaches.
     pub(super) const NOWHERE: Tally = Tally {
         values: [UNREACHED; FRAMES],
         sums: [0; FRAMES],
@@ -60,9 +65,9 @@ impl Tally {
 }
 
 impl Front {
-    /// Before the first station, to which no path goes on.
+    /// Returns the front before the first station, which no path reaches by playing on.
     ///
-    /// `opening`: the lane in which the film begins, if it does in this block.
+    /// `opening` is the lane of the film's first frame, if that frame is in this block.
     pub(super) fn new(width: usize, dwell: usize, opening: Option<usize>) -> Front {
         let bits = |is_set: bool| -i32::from(is_set) as u32;
         let first = opening.unwrap_or(0);
@@ -77,7 +82,7 @@ impl Front {
         }
     }
 
-    /// Goes on over a stretch.
+    /// Processes a range of stations.
     pub(super) fn go_on(&mut self, stretch: Stretch<'_>) {
         let last = self.width - 1;
         let parts = stretch.offers.iter().zip(stretch.costs).zip(stretch.wins);
@@ -89,7 +94,7 @@ impl Front {
             (values[0], sums[0]) = (self.before.values[last], self.before.sums[last]);
             *win = 0;
             for lane in 0..FRAMES {
-                // Lanes that stand for no frame may wrap.
+                // Unused lanes may wrap.
                 let cost = costs[lane] & self.in_film[lane];
                 sums[lane] = sums[lane].wrapping_add(cost);
                 values[lane] = (values[lane] & self.goes_on[lane]).wrapping_add(cost);
@@ -106,7 +111,7 @@ impl Front {
         }
     }
 
-    /// The same.
+    /// AVX2 version of `go_on`.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     pub(super) fn go_on_avx2<const TRACED: bool>(&mut self, stretch: Stretch<'_>) {
@@ -116,7 +121,7 @@ impl Front {
         }
     }
 
-    /// The same; if not `TRACED`, it is not told where an offer is lower.
+    /// AVX2 version of `go_on`. Without `TRACED` the output `wins` is not written.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     #[inline(never)]
@@ -124,7 +129,7 @@ impl Front {
         use std::arch::x86_64::*;
         let unreached = _mm256_set1_epi32(UNREACHED as i32);
         let last = _mm256_set1_epi32(self.width as i32 - 1);
-        // The last lane of the block before, then all but the last.
+        // Shifts the lanes by one. The first lane comes from the last lane of the block before.
         let next = |lanes: __m256i, before: __m256i| {
             let before = match PLAIN {
                 true => before,
@@ -172,13 +177,13 @@ impl Front {
     }
 }
 
-/// The lead of what costs `value` where the sum is `sum`.
+/// Returns the lead of a cost `value` over the running sum `sum`.
 #[inline(always)]
 pub(super) fn lead(value: u32, sum: u32) -> i32 {
     value.wrapping_sub(sum) as i32
 }
 
-/// V of what has a lead over the sum.
+/// Returns V from a lead and the running sum.
 #[inline(always)]
 pub(super) fn value(lead: i32, sum: u32) -> u32 {
     (lead as u32).wrapping_add(sum)

@@ -1,6 +1,8 @@
-//! One of the two ways to where a plan's halves meet (ALGORITHMS.md 6): the recursion over its frames,
-//! and the way back. Above a budget of memory what led where is kept for a segment at a time, each
-//! played again from its checkpoint.
+//! One of the two halves of a plan: the recursion over its frames, and the walk back
+//! (docs/explanation/algorithms.md, "Planning").
+//!
+//! If the trace needs more memory than the budget, it is kept for one segment at a time. Each segment is
+//! then computed again from its checkpoint.
 
 use super::column::Column;
 use super::meeting::Stand;
@@ -8,25 +10,25 @@ use super::walk::{Trace, Walk};
 use super::{Film, Rows};
 use crate::flock::plan::landings::Way;
 
-/// The recursion at its last frame, and how it came there.
+/// Recursion after the last frame of the half, with its trace.
 pub(super) struct Half<'a, R> {
     pub(super) film: &'a Film<'a>,
     way: Way,
     rows: R,
     n_frames: usize,
-    /// Blocks of a segment.
+    /// Number of blocks in a segment.
     segment: usize,
     column: Column,
-    /// What its ends cost, as `Column::ends` has them.
+    /// Costs of its ends, as returned by `Column::ends`.
     pub(super) ends: Vec<Vec<u32>>,
-    /// Of the last segment.
+    /// Trace of the last segment.
     trace: Trace<'a>,
-    /// Before each segment, if there are several.
+    /// Recursion before each segment, if there are several.
     checkpoints: Vec<Column>,
 }
 
 impl<'a, R: Rows> Half<'a, R> {
-    /// Goes over `n_frames` > 0 frames, keeping what led where for `segment` blocks of them at a time.
+    /// Processes `n_frames` > 0 frames and keeps the trace of `segment` blocks at a time.
     pub(super) fn run(
         film: &'a Film<'a>,
         way: Way,
@@ -57,7 +59,7 @@ impl<'a, R: Rows> Half<'a, R> {
         half
     }
 
-    /// The states of the path that ends so, by age.
+    /// Returns the states of the path with the given end, by age.
     pub(super) fn walk(mut self, end: Stand) -> Vec<u32> {
         let mut walk = Walk::new(self.film, self.n_frames, end);
         self.checkpoints.pop();
@@ -71,7 +73,7 @@ impl<'a, R: Rows> Half<'a, R> {
         }
     }
 
-    /// Goes over a segment.
+    /// Processes one segment.
     fn play(&mut self) {
         self.trace.restart(self.column.clock());
         for _ in 0..self.segment.min(self.column.n_left()) {

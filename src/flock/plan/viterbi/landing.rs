@@ -1,4 +1,5 @@
-//! The cheapest jump to each station: the hot loop of the recursion's second stroke (ALGORITHMS.md 6).
+//! The cheapest jump to each station: the inner loop of the second step of the recursion
+//! (docs/explanation/algorithms.md, "Planning").
 
 use super::front::{Tally, lead};
 use super::offers::OffersOfBlock;
@@ -7,17 +8,18 @@ use crate::flock::plan::landings::Origin;
 #[cfg(target_arch = "x86_64")]
 use crate::flock::plan::lanes::{load, store, store_half};
 
-/// The landings of a block.
+/// Inputs and outputs of the landings of a block.
 pub(super) struct Landing<'a> {
-    /// By station plus one.
+    /// Tallies by station plus one.
     pub(super) tallies: &'a [Tally],
     pub(super) offers: OffersOfBlock<'a>,
-    /// Which jump was the cheapest, landing after landing.
+    /// Output: index of the cheapest jump, landing station after landing station.
     pub(super) ranks: std::slice::IterMut<'a, [u16; FRAMES]>,
 }
 
 impl Landing<'_> {
-    /// Lands on some stations, given the jumps to each; `RANKED`, or it is not kept which was the cheapest.
+    /// Computes the landings at some stations, given the jumps to each. Without `RANKED` the index of the
+    /// cheapest jump is not stored.
     #[inline(always)]
     pub(super) fn some<const AVX2: bool, const RANKED: bool>(
         &mut self,
@@ -27,7 +29,7 @@ impl Landing<'_> {
         #[cfg(target_arch = "x86_64")]
         if AVX2 {
             #[expect(unsafe_code, reason = "the same, for AVX2")]
-            // SAFETY: who says AVX2 has made sure of it.
+            // SAFETY: callers set `AVX2` only after checking for it.
             unsafe {
                 self.some_avx2::<RANKED>(stations, jumps);
             }
@@ -36,7 +38,7 @@ impl Landing<'_> {
         self.each::<RANKED>(stations, jumps);
     }
 
-    /// The definition.
+    /// Portable version of `some`, which defines its results.
     fn each<const RANKED: bool>(
         &mut self,
         stations: &[u32],
@@ -48,15 +50,15 @@ impl Landing<'_> {
             if RANKED && let Some(out) = self.ranks.next() {
                 *out = ranks.map(|rank| rank as u16);
             }
-            // What goes on to here has come from the station before.
+            // This entry belongs to the station before, from which playing on leads here.
             let sums = &self.tallies[station].sums;
             let leads = std::array::from_fn(|lane| lead(landed[lane], sums[lane]));
             self.offers.put(station, leads);
         }
     }
 
-    /// The least V, its own cost aside, with which a station is landed on after each frame of the
-    /// block, and by which of its jumps.
+    /// Returns the least V of a landing at a station after each frame of the block, and the index of the
+    /// cheapest jump. The cost of showing the station is not included.
     #[inline(always)]
     fn cheapest(&self, jumps: &[Origin]) -> ([u32; FRAMES], [u32; FRAMES]) {
         let mut best = [UNREACHED; FRAMES];
@@ -64,7 +66,7 @@ impl Landing<'_> {
         for (rank, jump) in (0u32..).zip(jumps) {
             let from = &self.tallies[jump.from as usize + 1].values;
             for lane in 0..FRAMES {
-                // Only a lane that stands for no frame may wrap.
+                // Only unused lanes may wrap.
                 let least = from[lane].wrapping_add(jump.cost).min(best[lane]);
                 ranks[lane] = if least == best[lane] {
                     ranks[lane]
@@ -77,7 +79,7 @@ impl Landing<'_> {
         (best, ranks)
     }
 
-    /// The same.
+    /// AVX2 version of `each`.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     #[inline(never)]

@@ -1,24 +1,26 @@
-//! Where the two halves of a plan meet (ALGORITHMS.md 6): one came as time runs, the other against it.
+//! Meeting of the two halves of a plan, one of which runs forward in time and the other backward
+//! (docs/explanation/algorithms.md, "Planning").
 //!
-//! Both know for each state what the cheapest way to it costs by how long ago it landed, so that a run
-//! of at least `dwell` frames may lie across the meeting.
+//! For each state, both halves know the least cost by the number of frames since the last landing. A run of
+//! at least `dwell` frames may therefore lie across the meeting.
 
 use super::half::Half;
 use super::{Film, Rows, UNREACHED};
 use crate::flock::plan::landings::Way;
 
-/// The end of a half.
+/// End of a half.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stand {
     pub(super) station: usize,
-    /// It landed so many frames ago; `dwell - 1`, at least so many, and may jump.
+    /// Number of frames since the landing. `dwell - 1` stands for this number or more; the path may then
+    /// jump.
     pub(super) ago: usize,
 }
 
-/// The cheapest way across, or the cheapest end where there is but one half.
+/// Cheapest connection of two halves, or the cheapest end if there is only one half.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meeting {
-    /// Turns.
+    /// Cost, in turns.
     pub(super) cost: u32,
     pub(super) first: Stand,
     pub(super) second: Stand,
@@ -26,8 +28,8 @@ pub(super) struct Meeting {
 
 const NOWHERE: Stand = Stand { station: 0, ago: 0 };
 
-/// The cheapest end of a plan that has one half, given what its ends cost; `None` when all are dead.
-/// Ties go to the latest landing, there to the smallest station.
+/// Returns the cheapest end of a plan with one half, given the costs of its ends. `None` if no end is
+/// reached. Ties go to the latest landing, then to the smallest station.
 pub(super) fn end(film: &Film<'_>, ends: &[Vec<u32>]) -> Option<Meeting> {
     debug_assert_eq!(ends.len(), film.dwell);
     let stands = ends.iter().enumerate().flat_map(|(ago, ends)| {
@@ -43,18 +45,18 @@ pub(super) fn end(film: &Film<'_>, ends: &[Vec<u32>]) -> Option<Meeting> {
     })
 }
 
-/// The cheapest way across; `None` when there is none. Ties go to going on,
-/// there to the latest landing in the first half and the smallest state; then to the first jump as `Landings`
-/// has them.
+/// Returns the cheapest connection of two halves; `None` if there is none. Ties go to playing on, then to
+/// the latest landing in the first half, then to the smallest state. Ties between jumps go to the first in
+/// the order of `Landings`.
 pub(super) fn across<R: Rows>(first: &Half<'_, R>, second: &Half<'_, R>) -> Option<Meeting> {
     let film = first.film;
     let (n_states, held) = (film.trellis.n_states(), film.dwell - 1);
     let mut best = (UNREACHED, NOWHERE, NOWHERE);
     let since = [&first.ends, &second.ends].map(|ends| at_least(ends));
     for ago in 0..held.max(1) {
-        // A run of `dwell` frames, two at least, that landed here and is left there.
+        // A run of at least `dwell` frames, and at least two, that lies across the meeting.
         let rest = held.saturating_sub(1) - ago;
-        // The state after the first's last is the second's last.
+        // The state after the last state of the first half is the last state of the second half.
         let after = since[1][rest].iter().rev().skip(1);
         let ways = since[0][ago].iter().zip(after).map(|(a, b)| a + b);
         if let Some((cost, state)) = ways.zip(0..).min()
@@ -89,7 +91,7 @@ pub(super) fn across<R: Rows>(first: &Half<'_, R>, second: &Half<'_, R>) -> Opti
     })
 }
 
-/// `[ago][station]`: the least of all that landed so many frames ago or more.
+/// Returns `[ago][station]`: the least cost of paths that landed `ago` or more frames ago.
 fn at_least(ends: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let mut least = ends.to_vec();
     for ago in (1..ends.len()).rev() {
@@ -101,7 +103,8 @@ fn at_least(ends: &[Vec<u32>]) -> Vec<Vec<u32>> {
     least
 }
 
-/// Which of those that landed so many frames ago or more costs least: the latest of them.
+/// Returns the cheapest end at a station among those that landed `ago` or more frames ago. Ties go to the
+/// latest landing.
 fn exactly(ends: &[Vec<u32>], station: usize, ago: usize) -> Stand {
     let ago = (ago..ends.len()).min_by_key(|&ago| ends[ago][station]);
     Stand {

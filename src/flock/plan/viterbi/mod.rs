@@ -1,14 +1,15 @@
-//! The exact plan: the cheapest path through the trellis (ALGORITHMS.md 6), by dynamic programming
-//! over frames.
+//! Exact planning: the cheapest path through the trellis, by dynamic programming over frames
+//! (docs/explanation/algorithms.md, "Planning").
 //!
-//! After a jump at least `dwell` frames are played; only the end of the plan may cut that run short, as
-//! its beginning may. So where a jump leads becomes known `dwell` frames before anything can
-//! leave from there, and a block of up to eight frames, if that is no more than `dwell`, is gone through
-//! in two strokes, its frames side by side in the lanes of a vector: first all that goes on
-//! (`column`), then all that jumps (`landing`).
+//! After a jump at least `dwell` frames are played. Only the beginning and the end of the plan may cut that
+//! run short. A state reached by a jump can therefore be left by another jump only `dwell` frames later.
+//! Frames are processed in blocks of up to eight, at most `dwell`, side by side in the lanes of a vector. A
+//! block takes two steps: first everything that plays on (`front`), then all jumps (`landing`). A plan read
+//! backward is a plan too. Both ends are therefore extended at once, on two threads, until the halves meet
+//! (`meeting`).
 //!
-//! And a plan read backward is a plan too: it is found from both ends at once, one half
-//! as time runs, the other against it, each on a thread of its own, until they meet (`meeting`).
+//! Terms: a station is a state numbered in the direction of processing, a landing is the arrival of a jump,
+//! and V is the least cost of a path that may jump.
 
 mod block;
 mod column;
@@ -30,30 +31,33 @@ use super::landings::Way;
 use super::trellis::Trellis;
 use crate::cpu::Level;
 
-/// No path leads here. Costs of a whole plan stay below (at most 10 000 frames of less than 2^17, and
-/// a jump of less than 2^16 each), and what is added to it along a film stays below 2^32.
+/// Cost of a state that no path reaches, in turns. A plan of 10,000 frames stays below it if each frame
+/// costs less than 2^17 and each jump less than 2^16. Sums of this value and all costs of a film stay below
+/// 2^32.
 pub(super) const UNREACHED: u32 = i32::MAX as u32;
 
-/// Memory for what led where in one half, before that is cut into segments.
+/// Maximum memory for the trace of one half, in bytes. A larger trace is kept one segment at a time. Free
+/// choice.
 const TRACE_BUDGET_BYTES: usize = 64 << 20;
 
-/// The cheapest way through the trellis for one individual.
+/// Cheapest path of one individual through the trellis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Path {
-    /// The state shown at each output frame.
+    /// State shown at each output frame.
     pub states: Vec<u32>,
-    /// Its cost, turns.
+    /// Cost, in turns.
     pub cost: u32,
 }
 
-/// What showing each state costs an individual.
+/// Costs of showing each state, for one individual.
 pub trait Rows {
-    /// Fills in the costs at the frames of `block` of the stations from `first` on, turns below 2^17.
-    /// The stations of a block are asked for from 0 up; barriers may cost anything below 2^17.
+    /// Writes the costs at the frames of `block` of the stations from `first` on, in turns. The stations of
+    /// a block are requested from 0 up. Costs are below 2^17, except where conditions of segments and loops
+    /// add more. Barriers may have any cost.
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]);
 }
 
-/// From the cost of a frame and a state.
+/// Costs given by a function of frame and state.
 impl<F: FnMut(usize, usize) -> u32> Rows for F {
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         for (station, out) in (first..).zip(out) {
@@ -62,28 +66,28 @@ impl<F: FnMut(usize, usize) -> u32> Rows for F {
     }
 }
 
-/// A film to be planned.
+/// Film to be planned.
 #[derive(Clone, Copy, Debug)]
 pub struct Film<'a> {
-    /// What may follow what.
+    /// States and the jumps between them.
     pub trellis: &'a Trellis,
-    /// Its length.
+    /// Number of frames.
     pub n_frames: usize,
-    /// Least frames between two jumps.
+    /// Least number of frames between two jumps.
     pub dwell: usize,
-    /// Which instructions to use; this machine must have them.
+    /// Vector instructions to use; this machine must have them.
     pub cpu: Level,
-    /// Where memory lies between plans.
+    /// Memory that is reused from plan to plan.
     pub shelf: &'a Shelf,
 }
 
 impl Film<'_> {
-    /// The cheapest path, exactly. `None` when no path is long enough.
+    /// Returns the cheapest path, exactly. `None` if no path is long enough.
     pub fn cheapest_path(&self, rows: &(impl Rows + Clone + Send + Sync)) -> Option<Path> {
         self.cheapest_path_by_segments(rows, self.segment_blocks())
     }
 
-    /// What the cheapest path costs, turns. `None` when no path is long enough.
+    /// Returns the cost of the cheapest path, in turns. `None` if no path is long enough.
     pub fn least_cost(&self, rows: &mut impl Rows) -> Option<u32> {
         let mut column = Column::new(self, Way::Ahead, self.n_frames);
         while column.n_left() > 0 {
@@ -93,22 +97,22 @@ impl Film<'_> {
         Some(end.cost)
     }
 
-    /// What the cheapest path costs that begins with each state as if just jumped to, by state, turns;
-    /// `UNREACHED` where none does.
+    /// Returns, by state, the cost of the cheapest path that begins with it as if just jumped to, in turns.
+    /// `UNREACHED` if there is no such path.
     pub fn costs_from(&self, rows: &mut impl Rows) -> Vec<u32> {
         let mut column = Column::new(self, Way::Back, self.n_frames);
         while column.n_left() > 0 {
             column.advance_untraced(self, rows);
         }
-        // The first frame gone through comes last, and stations against the states.
+        // The first frame of the film is processed last, and stations are in reverse order of states.
         let last = column.lanes().end - 1;
         let mut costs: Vec<u32> = column.values(last).collect();
         costs.reverse();
         costs
     }
 
-    /// What the cheapest way costs to every state that may jump, at every frame: what
-    /// the certificate checks.
+    /// Returns `[t][state]`: the least cost of a path to each state that may jump from there, in turns. The
+    /// certificate checks these values.
     pub fn potentials(&self, rows: &mut impl Rows) -> Vec<Vec<u32>> {
         let mut column = Column::new(self, Way::Ahead, self.n_frames);
         let mut columns = Vec::with_capacity(self.n_frames);
@@ -130,7 +134,7 @@ impl Film<'_> {
         }
     }
 
-    /// As `cheapest_path`, keeping what led where for `segment` blocks at a time.
+    /// Returns the cheapest path and keeps the trace for `segment` blocks at a time.
     fn cheapest_path_by_segments<R>(&self, rows: &R, segment: usize) -> Option<Path>
     where
         R: Rows + Clone + Send + Sync,
@@ -161,7 +165,7 @@ impl Film<'_> {
         Some(Path { states, cost })
     }
 
-    /// The output frame that is gone to after `age` others.
+    /// Returns the output frame that is processed after `age` others.
     fn time(&self, way: Way, age: usize) -> usize {
         match way {
             Way::Ahead => age,

@@ -1,30 +1,34 @@
-//! What landings offer, until those who landed may leave again (ALGORITHMS.md 6).
+//! Offers: the costs of paths that have just jumped, kept until they may jump again
+//! (docs/explanation/algorithms.md, "Planning").
+//!
+//! An offer is stored as a lead: its cost minus the running sum of costs along continuous playback. The
+//! lead stays constant while the path plays on.
 
 use std::ops::Range;
 
 use super::FRAMES;
 use super::front::NO_LEAD;
 
-/// The leads of landings of at least the last `dwell` frames, by the clock of the frame before the
-/// landing and by the station that is come to `dwell - 1` frames after it.
+/// Leads of the landings of at least the last `dwell` frames. They are stored by the clock of the frame
+/// before the landing, and by the station reached `dwell - 1` frames after the landing.
 #[derive(Clone, Debug)]
 pub(super) struct Offers {
-    /// `[station][slot]`: blocks one after the other, the first once more at the end where eight lanes of
-    /// two blocks are asked for.
+    /// `[station][slot]`: blocks one after the other. If eight lanes may span two blocks, the first block
+    /// is repeated at the end.
     leads: Vec<[i32; FRAMES]>,
     n_slots: usize,
-    /// Clocks that the slots hold, the last aside if it is the first once more.
+    /// Number of clocks that the slots hold, without the repeated block.
     n_clocks: usize,
     dwell: usize,
 }
 
 impl Offers {
-    /// None yet; blocks are of `width` frames.
+    /// Returns an empty store for blocks of `width` frames.
     pub(super) fn new(n_stations: usize, dwell: usize, width: usize) -> Offers {
         let n_clocks = dwell.next_multiple_of(width);
         let n_slots = n_clocks / width + usize::from(!dwell.is_multiple_of(width));
         Offers {
-            // Past the last station lie those who would have left the last run.
+            // Entries past the last station take landings whose run ends before the dwell.
             leads: vec![[NO_LEAD; FRAMES]; (n_stations + dwell - 1) * n_slots],
             n_slots,
             n_clocks,
@@ -32,7 +36,7 @@ impl Offers {
         }
     }
 
-    /// A place for the offers of a block's landings.
+    /// Returns the place for the offers of a block's landings.
     #[inline(always)]
     pub(super) fn block(&mut self, clock: usize) -> OffersOfBlock<'_> {
         let slot = clock % self.n_clocks / FRAMES;
@@ -46,8 +50,8 @@ impl Offers {
         }
     }
 
-    /// Those of who may leave each of some stations in a row, in the block that begins at `clock`;
-    /// `scratch` is as long.
+    /// Returns the offers of paths that may jump again, at a range of stations, in the block that begins at
+    /// `clock`. `scratch` has one entry per station.
     #[inline(always)]
     pub(super) fn of<'a>(
         &'a self,
@@ -66,7 +70,7 @@ impl Offers {
         scratch
     }
 
-    /// Those of landings after `clock`, by station.
+    /// Returns the offers of landings after `clock`, by landing station.
     pub(super) fn after(&self, clock: usize) -> impl Iterator<Item = i32> {
         let (slot, lane) = (
             clock % self.n_clocks / FRAMES,
@@ -77,9 +81,9 @@ impl Offers {
     }
 }
 
-/// Where the offers of a block are kept.
+/// Place for the offers of a block.
 pub(super) struct OffersOfBlock<'a> {
-    /// From the first station landed on.
+    /// Entries from that of landing station 0 on.
     leads: &'a mut [[i32; FRAMES]],
     n_slots: usize,
     slot: usize,
@@ -87,7 +91,7 @@ pub(super) struct OffersOfBlock<'a> {
 }
 
 impl OffersOfBlock<'_> {
-    /// Keeps the leads of landings on a station.
+    /// Stores the leads of landings at a station.
     #[inline(always)]
     pub(super) fn put(&mut self, station: usize, leads: [i32; FRAMES]) {
         let row = station * self.n_slots;

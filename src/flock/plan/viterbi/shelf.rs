@@ -1,15 +1,15 @@
-//! Memory for what led where, kept from one plan to the next: to ask the system for it anew takes as
-//! long as a tenth of a plan.
+//! Pool of memory for traces, kept from one plan to the next. Requesting that memory from the system takes
+//! about a tenth of the time of a plan.
 
 use std::sync::{Mutex, PoisonError};
 
-/// Memory that nobody uses at the moment.
+/// Pool of unused memory.
 #[derive(Debug, Default)]
 pub struct Shelf {
     spare: Mutex<Vec<Sheets>>,
 }
 
-/// Memory of one half of a plan.
+/// Memory for the trace of one half of a plan.
 #[derive(Debug, Default)]
 pub(super) struct Sheets {
     pub(super) ranks: Vec<u16>,
@@ -17,7 +17,7 @@ pub(super) struct Sheets {
 }
 
 impl Shelf {
-    /// Memory of at least so many numbers, of any content.
+    /// Returns memory for at least `n_ranks` and `n_wins` numbers, with unspecified content.
     pub(super) fn take(&self, n_ranks: usize, n_wins: usize) -> Sheets {
         let mut spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner);
         let mut sheets = spare.pop().unwrap_or_default();
@@ -31,6 +31,7 @@ impl Shelf {
         sheets
     }
 
+    /// Returns memory to the pool.
     pub(super) fn give_back(&self, sheets: Sheets) {
         let mut spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner);
         spare.push(sheets);

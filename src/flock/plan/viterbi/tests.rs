@@ -1,4 +1,4 @@
-//! The exact plan against all paths of small graphs, and against its certificate.
+//! Tests of exact plans: against all paths of small graphs, and against their certificates.
 
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use super::*;
 use crate::flock::plan::certificate;
 use crate::library::{Jump, Playback};
 
-/// A small playback graph, the costs of its states at every frame, and a dwell.
+/// Test case: a small playback graph, the costs of its states at every frame, and a dwell.
 #[derive(Clone, Debug)]
 struct Case {
     playback: Playback,
@@ -23,7 +23,7 @@ impl Case {
         Trellis::new(&self.playback, self.mirror, |jump| jump.cost as u32)
     }
 
-    /// What showing a state costs.
+    /// Returns the cost of showing a state.
     fn cost(&self, t: usize, state: usize) -> u32 {
         self.costs[(t * 31 + state * 7) % self.costs.len()]
     }
@@ -62,7 +62,7 @@ impl Case {
         certificate::check(&trellis, self.dwell, &cost_at, &columns, path)
     }
 
-    /// The least cost over all paths, by trying them all.
+    /// Returns the least cost over all paths, by trying all of them.
     fn by_brute_force(&self) -> Option<u64> {
         let trellis = self.trellis();
         let states = 0..trellis.n_states();
@@ -121,12 +121,12 @@ prop_compose! {
     }
 }
 
-/// Of small films, whose blocks are of few frames.
+/// Generates short films, whose blocks have few frames.
 fn case(most_frames: u32, most_jumps: usize) -> impl Strategy<Value = Case> {
     case_of(most_frames, most_jumps, 7, 4)
 }
 
-/// Of films of several blocks, whose runs after a jump end anywhere in one.
+/// Generates films of several blocks. Runs after a jump may end anywhere in a block.
 fn long_case() -> impl Strategy<Value = Case> {
     case_of(60, 120, 70, 20)
 }

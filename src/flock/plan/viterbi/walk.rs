@@ -1,35 +1,37 @@
-//! What led where, and the way back through it (ALGORITHMS.md 6): for each block the jumps that won each
-//! landing, and the stations at which a landing was cheaper than going on.
+//! Trace of the recursion, and the walk back through it (docs/explanation/algorithms.md, "Planning").
+//!
+//! For each block, the trace has the cheapest jump of each landing, and the stations at which a landing was
+//! cheaper than playing on.
 
 use super::meeting::Stand;
 use super::shelf::{Sheets, Shelf};
 use super::{FRAMES, Film, block};
 use crate::flock::plan::landings::Way;
 
-/// Places for what led where in a block.
+/// Place for the trace of one block.
 #[derive(Default)]
 pub(super) struct Steps<'a> {
-    /// By the landings' order, which of a station's jumps is the cheapest after each frame.
+    /// By rank of the landing station: index of its cheapest jump after each frame.
     pub(super) ranks: &'a mut [[u16; FRAMES]],
-    /// By station, in bits, the frames at which who landed `dwell - 1` frames ago is cheaper than who
-    /// may jump already.
+    /// By station, one bit per frame: set where a path that landed `dwell - 1` frames ago is cheaper than
+    /// all paths that may jump already.
     pub(super) wins: &'a mut [u8],
 }
 
-/// What led where, for some blocks in a row.
+/// Trace of some consecutive blocks.
 pub(super) struct Trace<'a> {
     shelf: &'a Shelf,
-    /// The clock at which the first block kept begins, and where the next will.
+    /// Clocks of the first block in the trace and of the next block.
     clocks: std::ops::Range<usize>,
     width: usize,
     n_landings: usize,
     n_stations: usize,
-    /// By block, as in `Steps`.
+    /// Trace by block, as in `Steps`.
     sheets: Sheets,
 }
 
 impl<'a> Trace<'a> {
-    /// With room for so many blocks.
+    /// Returns a trace with room for `n_blocks` blocks.
     pub(super) fn new(film: &Film<'a>, way: Way, n_blocks: usize) -> Trace<'a> {
         let n_landings = film.trellis.landings(way).n_landings();
         let (n_stations, shelf) = (film.trellis.n_states(), film.shelf);
@@ -44,17 +46,17 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// Bytes that a block takes.
+    /// Returns the memory of a block, in bytes.
     pub(super) fn block_bytes(film: &Film<'_>, way: Way) -> usize {
         2 * FRAMES * film.trellis.landings(way).n_landings() + film.trellis.n_states()
     }
 
-    /// Forgets all, to begin at `clock`.
+    /// Removes all blocks. The next block begins at `clock`.
     pub(super) fn restart(&mut self, clock: usize) {
         self.clocks = clock..clock;
     }
 
-    /// The places of the next block, all to be written.
+    /// Returns the place for the next block. The caller must overwrite all of it.
     #[inline(always)]
     pub(super) fn next_block(&mut self) -> Steps<'_> {
         let block = self.clocks.len() / self.width;
@@ -66,19 +68,19 @@ impl<'a> Trace<'a> {
         }
     }
 
-    /// The block and the lane of a clock.
+    /// Returns the block and the lane of a clock.
     fn place(&self, clock: usize) -> (usize, usize) {
         let age = clock - self.clocks.start;
         (age / self.width, age % self.width)
     }
 
-    /// Whether who landed `dwell - 1` frames before `clock` won.
+    /// Returns whether at `clock` a path that landed `dwell - 1` frames before was the cheapest.
     fn has_landed(&self, clock: usize, station: usize) -> bool {
         let (block, lane) = self.place(clock);
         self.sheets.wins[block * self.n_stations + station] >> lane & 1 != 0
     }
 
-    /// Which jump to the station at `order` was the cheapest after `clock`.
+    /// Returns the index of the cheapest jump after `clock` to the landing station of rank `order`.
     fn rank(&self, clock: usize, order: usize) -> usize {
         let (block, lane) = self.place(clock);
         let place = (block * self.n_landings + order) * FRAMES + lane;
@@ -92,30 +94,30 @@ impl Drop for Trace<'_> {
     }
 }
 
-/// A path read backward.
+/// Walk along a path, from its end backward.
 pub(super) struct Walk {
-    /// The states gone through, by age.
+    /// States of the path, by age: the number of frames processed before.
     states: Vec<u32>,
-    /// The clock of the first of them.
+    /// Clock of the first frame.
     opening: usize,
-    /// Frames whose states are not known yet.
+    /// Number of frames whose states are not known yet.
     n_left: usize,
     at: At,
 }
 
-/// Where a walk stands at the last frame whose state is not known yet.
+/// Position of a walk at the last frame whose state is not known yet.
 #[derive(Clone, Copy)]
 enum At {
-    /// At a station, free to jump.
+    /// At a station, where a jump is allowed.
     Free(usize),
-    /// At a station that was landed on so many frames before.
+    /// At a station (first value), a number of frames after a landing (second value).
     Landed(usize, usize),
-    /// Where the cheapest jump to the station at this order comes from.
+    /// At the origin of the cheapest jump to the landing station of this rank.
     Origin(usize),
 }
 
 impl Walk {
-    /// From a path's end.
+    /// Returns a walk that begins at the end of a path.
     pub(super) fn new(film: &Film<'_>, n_frames: usize, end: Stand) -> Walk {
         Walk {
             states: vec![0; n_frames],
@@ -128,7 +130,7 @@ impl Walk {
         }
     }
 
-    /// Goes back through all that is traced.
+    /// Walks back through all traced blocks.
     pub(super) fn back(&mut self, film: &Film<'_>, way: Way, trace: &Trace<'_>) {
         let landings = film.trellis.landings(way);
         while self.n_left > 0 && self.opening + self.n_left > trace.clocks.start {
@@ -156,7 +158,7 @@ impl Walk {
         }
     }
 
-    /// The states by age, all of which have been gone back through.
+    /// Returns the states by age. The walk must be complete.
     pub(super) fn finish(self) -> Vec<u32> {
         debug_assert_eq!(self.n_left, 0);
         self.states
