@@ -29,6 +29,11 @@ pub trait FrameSource: Send + Sync {
     /// Starts reading at the first frame.
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError>;
 
+    /// Returns the number of the first frame in the footage: not 0 for a part of it.
+    fn first_frame(&self) -> usize {
+        0
+    }
+
     /// Calls `visit` with `n` frames spread evenly over the video, in order. The k-th is the middle frame of
     /// the k-th of `n` equal parts (see [`spread_idx`]).
     ///
@@ -75,7 +80,8 @@ pub fn spread_idx(n_frames: usize, n: usize) -> Vec<usize> {
     (0..n).map(|k| (2 * k + 1) * n_frames / (2 * n)).collect()
 }
 
-/// A part of a video, as a video of its own: its frames and times count from the start of the part.
+/// A part of a video, as a video of its own: its frames count from the start of the part, its times from the
+/// start of the video.
 pub struct Part<'a> {
     source: &'a dyn FrameSource,
     /// Frame indices in the source.
@@ -114,8 +120,11 @@ impl FrameSource for Part<'_> {
             stream: self.source.open()?,
             frames: self.frames.clone(),
             n_read: 0,
-            start_s: 0.0,
         }))
+    }
+
+    fn first_frame(&self) -> usize {
+        self.frames.start
     }
 
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
@@ -131,8 +140,6 @@ struct PartStream<'a> {
     stream: Box<dyn FrameStream + 'a>,
     frames: Range<usize>,
     n_read: usize,
-    /// Time of the first frame of the part in the source, seconds.
-    start_s: f64,
 }
 
 impl FrameStream for PartStream<'_> {
@@ -142,11 +149,8 @@ impl FrameStream for PartStream<'_> {
                 return Ok(None);
             };
             self.n_read += 1;
-            if self.n_read == self.frames.start + 1 {
-                self.start_s = time_s;
-            }
             if self.n_read > self.frames.start {
-                return Ok(Some(time_s - self.start_s));
+                return Ok(Some(time_s));
             }
         }
         Ok(None)

@@ -31,7 +31,7 @@ pub enum Error {
     /// Nothing moves at the point that `animal_at` gives.
     #[error(
         "nothing that moves is at {},{} in frame {}",
-        .0.point[0], .0.point[1], .0.frame
+        .0.at_px[0], .0.at_px[1], .0.frame
     )]
     NothingAtPoint(AnimalAtParam),
     /// The masks uploaded with the footage show no animal.
@@ -129,6 +129,19 @@ impl Error {
             _ => return None,
         };
         Some(Evidence { frames, boxes_px })
+    }
+
+    /// Returns the error with its frame number counted from the start of the footage, if the part that was analyzed starts at
+    /// frame `first`.
+    pub(super) fn after(mut self, first: usize) -> Error {
+        match &mut self {
+            Error::NothingAtPoint(at) => at.frame += first as u32,
+            Error::AnimalTooLarge { frame, .. } | Error::SeveralAnimals { frame, .. } => {
+                *frame += first;
+            }
+            _ => {}
+        }
+        self
     }
 
     /// Returns the stable error code.

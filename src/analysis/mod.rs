@@ -39,7 +39,7 @@ use params::{CutSprites, ScaleMode};
 use std::sync::Arc;
 
 use crate::cpu;
-use crate::footage::FrameSource;
+use crate::footage::{FrameSource, Part};
 use crate::library::{Library, LibraryStats, View};
 use crate::progress::Progress;
 use crate::raster::RgbImage;
@@ -50,6 +50,9 @@ pub const LEAST_FRAMES: usize = 16;
 
 /// Analyses a footage and returns its library: background, poses, sprites, transitions.
 ///
+/// Where the parameters select a part of the footage, only that part is measured. Frames keep their numbers and
+/// times in the footage; those outside of the part have no animal.
+///
 /// `background` is an image of the empty scene, if one exists. The sprites are stored in `scratch`, where the
 /// library reads them. The result depends only on the footage, the background and the parameters, not on the
 /// machine or the number of threads.
@@ -57,6 +60,26 @@ pub const LEAST_FRAMES: usize = 16;
 /// Fails if the footage cannot become a library (docs/explanation/algorithms.md, "Refused footage"), and with
 /// `Cancelled` soon after `progress` reports it.
 pub fn analyze(
+    source: &dyn FrameSource,
+    background: Option<&RgbImage>,
+    params: &Params,
+    cpu: cpu::Level,
+    scratch: &Arc<dyn Scratch>,
+    progress: &dyn Progress,
+) -> Result<Library, Error> {
+    let part = Part::of(source, params.from_s, params.to_s);
+    let first = part.first_frame();
+    let inner = params.counted_from(first);
+    let mut library = analyze_part(&part, background, &inner, cpu, scratch, progress)
+        .map_err(|error| error.after(first))?;
+    if params.from_s.is_some() || params.to_s.is_some() {
+        library.place_in_footage(first, source.format().n_frames_hint);
+    }
+    Ok(library)
+}
+
+/// Analyses a part of a footage. Frames count from the start of the part.
+fn analyze_part(
     source: &dyn FrameSource,
     background: Option<&RgbImage>,
     params: &Params,

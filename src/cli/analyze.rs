@@ -128,10 +128,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         Some(masked) => masked,
         None => &video,
     };
-    let part = Part::of(source, params.from_s, params.to_s);
-    let library = analysis::analyze(&part, background, &params, level, &scratch, &progress)
+    let library = analysis::analyze(source, background, &params, level, &scratch, &progress)
         .map_err(|error| {
-            show_refusal(&part, &error, &args.output);
+            show_refusal(source, &error, &args.output);
             Error::work(error.code(), &error)
         })?;
     let footage = footage_summary(video.files())?;
@@ -139,6 +138,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
     write_views(&args.output, &library)?;
     if let Some(path) = &args.overlay {
+        let part = Part::of(source, params.from_s, params.to_s);
         overlay::film(&part, &library.poses, path, &progress)
             .map_err(|error| Error::work(error.code(), &error))?;
     }
@@ -229,7 +229,7 @@ fn read_animal_at(text: &str) -> Result<Value, Error> {
             "--animal-at takes FRAME:X,Y, such as 120:310,95: {text}"
         ))
     })?;
-    Ok(json!({"frame": frame, "point": point}))
+    Ok(json!({"frame": frame, "at_px": point}))
 }
 
 /// Reads X,Y,W,H or X,Y,W,H@FROM-TO.

@@ -126,13 +126,12 @@ impl Input {
             Some(masked) => masked,
             None => &video,
         };
-        let part = Part::of(source, self.params.from_s, self.params.to_s);
-        let film = Counted::new(&part, progress);
+        let film = Counted::new(source, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
-            .map_err(|cause| refusal::illustrated(&part, cause))?;
+            .map_err(|cause| refusal::illustrated(source, cause))?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
-            &part,
+            &Part::of(source, self.params.from_s, self.params.to_s),
             &library.poses,
             &attempt.folder().join("overlay.mp4"),
             progress,

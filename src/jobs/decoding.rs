@@ -7,18 +7,18 @@ use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit
 use crate::raster::Frame;
 
 /// A film whose reading is counted.
-pub(super) struct Counted<'a, S> {
+pub(super) struct Counted<'a, S: ?Sized> {
     source: &'a S,
     listener: &'a Listener,
 }
 
-impl<'a, S: FrameSource> Counted<'a, S> {
+impl<'a, S: FrameSource + ?Sized> Counted<'a, S> {
     pub(super) fn new(source: &'a S, listener: &'a Listener) -> Counted<'a, S> {
         Counted { source, listener }
     }
 }
 
-impl<S: FrameSource> FrameSource for Counted<'_, S> {
+impl<S: FrameSource + ?Sized> FrameSource for Counted<'_, S> {
     fn format(&self) -> FootageFormat {
         self.source.format()
     }

@@ -21,8 +21,8 @@ pub fn film(
     let mut overlay = Overlay::new(poses);
     let mut stream = source.open()?;
     let mut frame = Frame::default();
-    let n_frames = poses.frames.len();
-    for frame_idx in 0..n_frames {
+    let (first, n_frames) = (source.first_frame(), poses.frames.len());
+    for frame_idx in first..n_frames {
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }

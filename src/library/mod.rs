@@ -3,6 +3,7 @@
 //! The types here are plain values without I/O. `formats` writes and reads them (docs/reference/formats.md,
 //! "library.json").
 
+mod part;
 pub mod playback;
 pub mod pose;
 pub mod sprites;

@@ -134,6 +134,17 @@ impl Sprites {
         self.width as usize * self.height as usize * 4
     }
 
+    /// Adds frames without a sprite before the first frame and after the last.
+    pub(super) fn surround(&mut self, n_before: usize, n_after: usize) {
+        let n_frames = n_before + self.mattes.len() + n_after;
+        self.mattes.splice(0..0, (0..n_before).map(|_| None));
+        self.mattes.resize(n_frames, None);
+        if let Some(scales) = &mut self.scales {
+            scales.splice(0..0, (0..n_before).map(|_| 1.0));
+            scales.resize(n_frames, 1.0);
+        }
+    }
+
     /// Returns the number of frames of the footage, including frames without a sprite.
     pub fn n_frames(&self) -> usize {
         self.mattes.len()

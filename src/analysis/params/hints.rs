@@ -16,7 +16,8 @@ pub struct AnimalAtParam {
     /// Frame number, counted from 0.
     pub frame: u32,
     /// A point on the animal, pixels.
-    pub point: [f64; 2],
+    #[serde(alias = "point")]
+    pub at_px: [f64; 2],
 }
 
 /// A box in which nothing counts as the animal.
@@ -34,6 +35,20 @@ pub struct IgnoreParam {
 }
 
 impl Params {
+    /// Returns the parameters for a part of the footage that starts at frame `first`: frame numbers count from there.
+    /// Times still count from the start of the footage.
+    pub(in crate::analysis) fn counted_from(&self, first: usize) -> Params {
+        let counted = |frame: u32| frame.saturating_sub(first as u32);
+        let mut params = self.clone();
+        if let Some(at) = &mut params.animal_at {
+            at.frame = counted(at.frame);
+        }
+        if let Some(head) = &mut params.head {
+            head.frame = counted(head.frame);
+        }
+        params
+    }
+
     /// Returns the boxes to ignore at a time, clipped to an image of the given size.
     pub fn ignored_at(&self, time_s: f64, [width, height]: [u32; 2]) -> Vec<Rect> {
         let holds = |ignore: &&IgnoreParam| {
@@ -51,9 +66,9 @@ impl Params {
     pub(super) fn check_hints(&self) -> Result<(), String> {
         check_span("", self.from_s, self.to_s)?;
         if let Some(at) = self.animal_at
-            && at.point.iter().any(|v| !v.is_finite())
+            && at.at_px.iter().any(|v| !v.is_finite())
         {
-            return Err("animal_at.point must be two finite numbers".into());
+            return Err("animal_at.at_px must be two finite numbers".into());
         }
         if self.ignore.len() > MOST_IGNORED {
             let n = self.ignore.len();

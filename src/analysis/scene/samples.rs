@@ -36,6 +36,8 @@ pub(super) struct Samples {
     pub(super) ignored: Vec<Vec<Rect>>,
     /// The sample and the point in it that the parameter `animal_at` gives, pixels.
     pub(super) pinned: Option<(usize, [f64; 2])>,
+    /// Number in the footage of the frame with index 0.
+    first_frame: usize,
     fps: f64,
 }
 
@@ -72,23 +74,26 @@ impl Samples {
         let mut frame_idx = spread_idx(format.n_frames_hint, n_kept);
         frame_idx.truncate(frames.len());
         let pinned = match params.animal_at {
-            Some(at) => Some((pin(source, at, &mut frames, &mut frame_idx)?, at.point)),
+            Some(at) => Some((pin(source, at, &mut frames, &mut frame_idx)?, at.at_px)),
             None => None,
         };
         let size = [format.width, format.height];
-        let ignored = |&idx: &usize| params.ignored_at(idx as f64 / format.fps, size);
+        let first_frame = source.first_frame();
+        let ignored =
+            |&idx: &usize| params.ignored_at((first_frame + idx) as f64 / format.fps, size);
         Ok(Samples {
             ignored: frame_idx.iter().map(ignored).collect(),
             frames,
             frame_idx,
             pinned,
+            first_frame,
             fps: format.fps,
         })
     }
 
-    /// Returns the time of a sample, seconds from the first frame.
+    /// Returns the time of a sample, seconds from the start of the footage.
     pub(super) fn time_s(&self, k: usize) -> f64 {
-        self.frame_idx[k] as f64 / self.fps
+        (self.first_frame + self.frame_idx[k]) as f64 / self.fps
     }
 
     /// Returns whether every sample comes with a mask of the animal.

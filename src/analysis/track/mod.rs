@@ -129,7 +129,7 @@ pub fn follow(
     let candidates: Vec<&[Candidate]> = seen.iter().map(|s| s.candidates.as_slice()).collect();
     let pin = params.animal_at.and_then(|at| {
         let candidates = candidates.get(at.frame as usize)?;
-        Some((at.frame as usize, nearest_to(candidates, at.point)?))
+        Some((at.frame as usize, nearest_to(candidates, at.at_px)?))
     });
     // A pinned animal is followed even when a larger one is in view.
     let follow = if pin.is_some() {

@@ -49,7 +49,10 @@ fn of_two_animals_the_one_that_is_pointed_at_is_followed() {
     let point = film.centroid_px(60).expect("it is shown");
     let other = turned(point);
     let pointing_at = |point| {
-        let animal_at = Some(AnimalAtParam { frame: 60, point });
+        let animal_at = Some(AnimalAtParam {
+            frame: 60,
+            at_px: point,
+        });
         let params = Params {
             animal_at,
             ..Params::default()
@@ -78,7 +81,10 @@ fn pointing_at_nothing_is_told() {
         if y > height / 2.0 { 5.0 } else { height - 5.0 },
     ];
     for (frame, point) in [(60, point), (N_FRAMES as u32, [x, y])] {
-        let animal_at = Some(AnimalAtParam { frame, point });
+        let animal_at = Some(AnimalAtParam {
+            frame,
+            at_px: point,
+        });
         let params = Params {
             animal_at,
             ..Params::default()
@@ -137,7 +143,7 @@ fn a_part_of_a_film_is_a_film_of_its_own() {
     for k in 0..60 {
         whole.next_frame(&mut expected).unwrap();
         let time_s = of_part.next_frame(&mut found).unwrap().expect("a frame");
-        assert!((time_s - f64::from(k) / 30.0).abs() < 1e-9, "{time_s}");
+        assert!((time_s - f64::from(30 + k) / 30.0).abs() < 1e-9, "{time_s}");
         assert_eq!(found, expected, "frame {k}");
     }
     assert_eq!(of_part.next_frame(&mut found).unwrap(), None);
@@ -151,4 +157,52 @@ fn a_part_of_a_film_is_a_film_of_its_own() {
     let beyond = Part::of(&film, Some(100.0), None);
     assert_eq!(beyond.format().n_frames_hint, 0);
     assert_eq!(beyond.open().unwrap().next_frame(&mut found).unwrap(), None);
+}
+
+#[test]
+fn measured_part_keeps_the_frame_numbers_and_times_of_the_film() {
+    let film = Staged::plain();
+    let at_px = film.centroid_px(60).expect("it is shown");
+    let params = Params {
+        from_s: Some(1.0),
+        to_s: Some(4.0),
+        animal_at: Some(AnimalAtParam { frame: 60, at_px }),
+        ..Params::default()
+    };
+    let library = film.analyzed(&params).expect("a library");
+    let frames = &library.poses.frames;
+    assert_eq!(
+        (frames.len(), library.sprites.n_frames()),
+        (N_FRAMES, N_FRAMES)
+    );
+    for (k, pose) in frames.iter().enumerate() {
+        assert!((pose.time_s - k as f64 / 30.0).abs() < 1e-6, "frame {k}");
+        if !(30..120).contains(&k) {
+            assert!(
+                !pose.detected() && !library.sprites.is_present(k),
+                "frame {k}"
+            );
+        }
+    }
+    assert!(frames.iter().filter(|pose| pose.detected()).count() > 80);
+    let found = frames[60].centroid_px.expect("the animal");
+    assert!((found[0] - at_px[0]).hypot(found[1] - at_px[1]) < 6.0);
+    assert!(
+        library
+            .playback
+            .component
+            .iter()
+            .all(|frame| (30..120).contains(frame))
+    );
+    let nowhere = Params {
+        animal_at: Some(AnimalAtParam {
+            frame: 60,
+            at_px: [1.0, 1.0],
+        }),
+        ..params
+    };
+    match film.analyzed(&nowhere).expect_err("nothing is there") {
+        Error::NothingAtPoint(at) => assert_eq!(at.frame, 60),
+        other => panic!("{other}"),
+    }
 }
