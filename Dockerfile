@@ -1,7 +1,7 @@
 # syntax=docker/dockerfile:1
-# Two stages on one Debian release, so that the C library is the same: `builder` makes the program with
-# the page inside, the second holds the program and ffmpeg alone. The packages come from
-# scripts/system-packages.sh, as for `make`.
+# Two stages on the same Debian release, so that the C library matches. `builder` builds the program with the
+# page embedded. The second stage contains the program, ffmpeg and curl. scripts/system-packages.sh lists the
+# packages, as for `make`.
 
 FROM rust:1.95-slim-bookworm AS builder
 SHELL ["/bin/sh", "-euc"]
@@ -26,5 +26,5 @@ HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
     CMD ["curl", "-fsS", "-o", "/dev/null", "http://127.0.0.1:8080/healthz"]
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["flockreel"]
-# On loopback: run it with `--network host`, or make a token and bind to 0.0.0.0 (README).
+# The service listens on loopback. Run with `--network host`, or create a token and bind to 0.0.0.0 (README).
 CMD ["serve", "--data", "/data"]

@@ -1,5 +1,5 @@
-# What can be done with flockreel. `make help` lists it; `make run` and `make test` are the two commands
-# that a fresh Debian with Rust, a C compiler and make needs.
+# Commands of flockreel; `make help` lists them. On a fresh Debian with Rust, a C compiler and make,
+# `make run` and `make test` install what they need.
 
 CARGO ?= cargo
 DATA ?= data
@@ -13,10 +13,10 @@ DEBUG = target/debug/flockreel
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-run: build ## install what is missing, build, start the service and its page
+run: build ## install missing packages, build, and start the service with its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit scale-test truth-test page-test contract-test ## install what the tests need and run them all
+test: unit scale-test truth-test page-test contract-test ## install the packages that tests need, and run all tests
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,55 +26,56 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit scale-test truth-test page-test contract-test docs deny ## everything that CI checks
+check: fmt clippy unit scale-test truth-test page-test contract-test docs deny ## run all checks of CI
 	@echo "all checks passed"
 
-fmt: ## the formatting
+fmt: ## check the formatting
 	$(CARGO) fmt --check
 
-clippy: target/vendor ## the lints, warnings as errors
+clippy: target/vendor ## run the lints, with warnings as errors
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 
-unit: target/vendor ## the tests in Rust
+unit: target/vendor ## run the Rust tests
 	@scripts/system-packages.sh test
 	$(CARGO) test --locked
 
-# Store, queue and API once more, as they are, on the other engine; and what needs several machines.
+# Tests of store, queue and API on PostgreSQL and a bucket, and tests that need several machines.
 SCALE_TESTS = $(CARGO) test --locked --lib store:: && $(CARGO) test --locked --lib -- --ignored store:: && \
 	$(CARGO) test --locked --test it -- jobs:: api:: && $(CARGO) test --locked --test it -- --ignored scale::
-scale-test: target/vendor ## the service on a PostgreSQL and an S3 store that are started for it, with workers that are killed
+scale-test: target/vendor ## test the service on PostgreSQL and an S3 store, with workers that are killed
 	@scripts/with-servers.sh sh -c '$(SCALE_TESTS)'
 
-guards: target/vendor ## every guard of a promise taken out once: its test must fail (docs/GUARDS.md)
+guards: target/vendor ## disable each protection of a promise once: its test must fail
 	@scripts/system-packages.sh test contract-test
 	@scripts/venv.sh target/contract-venv tests/contract/requirements.txt
 	python3 -B tests/guards/run.py --write
 	scripts/with-servers.sh python3 -B tests/guards/run.py --write
 
-race: target/vendor ## eight processes race for 2000 jobs, on SQLite and on PostgreSQL
+race: target/vendor ## let eight processes race for 2000 jobs, on SQLite and on PostgreSQL
 	FLOCKREEL_RACE_JOBS=2000 $(CARGO) test --locked --test it -- --nocapture jobs::races
 	FLOCKREEL_RACE_JOBS=2000 scripts/with-servers.sh $(CARGO) test --locked --test it -- --nocapture jobs::races
 
-# The program that the tests built, here and below: `cargo build` would build the dependencies anew, without the tests' features.
-truth-test: target/vendor ## a flock's ground truth, read by the field's own tools
+# These targets use the program that the tests built. `cargo build` would build the dependencies again,
+# because it selects fewer features.
+truth-test: target/vendor ## read the ground truth of a flock with pycocotools and TrackEval
 	$(CARGO) test --locked --no-run
 	@scripts/python-tests.sh truth $(DEBUG)
 
-page-test: vendor ## the page in a browser, against a really started service
+page-test: vendor ## test the page in a browser, against a running service
 	$(CARGO) test --locked --no-run
 	@scripts/python-tests.sh page $(DEBUG)
 
-contract-test: target/vendor ## the API against its own description, by schemathesis
+contract-test: target/vendor ## test the API against its OpenAPI document, with schemathesis
 	$(CARGO) test --locked --no-run
 	@scripts/python-tests.sh contract $(DEBUG)
 
-soak: target/vendor ## two hundred kills while films are uploaded
+soak: target/vendor ## kill the service two hundred times during uploads
 	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads
 
-# Not part of `check`: an emulated processor takes half an hour. ARM_TESTS=analysis::distance runs the kernels' alone.
+# Not part of `check`, because it takes half an hour. ARM_TESTS=analysis::distance selects the kernels only.
 ARM = aarch64-unknown-linux-gnu
 ARM_TESTS ?=
-arm-test: target/vendor ## the tests of the library on an emulated ARM processor, with its own vector instructions
+arm-test: target/vendor ## run the library's tests on an emulated ARM processor, with its vector instructions
 	@scripts/system-packages.sh arm-test
 	@rustup target list --installed 2>/dev/null | grep -q $(ARM) || rustup target add $(ARM)
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
@@ -82,17 +83,17 @@ arm-test: target/vendor ## the tests of the library on an emulated ARM processor
 	CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc PROPTEST_CASES=8 \
 	$(CARGO) test --locked --lib --target $(ARM) --target-dir target/arm $(ARM_TESTS)
 
-docs: target/vendor ## the documentation, warnings as errors
+docs: target/vendor ## build the documentation, with warnings as errors
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 
-deny: ## licences, bans and sources of the dependencies, offline
+deny: ## check licences, bans and sources of the dependencies, offline
 	@if $(CARGO) deny --version >/dev/null 2>&1; then \
 		$(CARGO) deny --offline check bans licenses sources; \
 	else \
 		echo "cargo deny: SKIPPED, not installed (cargo install --locked cargo-deny)"; \
 	fi
 
-bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
+bench: build ## measure the speed against ffmpeg, OpenCV and SciPy
 	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
 	@target/bench-venv/bin/python -c "import numpy, scipy, cv2, faiss, mesa, networkx" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless faiss-cpu mesa networkx
 	@scripts/system-packages.sh bench
@@ -107,34 +108,34 @@ bench: build ## the speed of the program against ffmpeg, OpenCV and SciPy
 	python3 bench/render.py target/demo/library $(RELEASE)
 	target/bench-venv/bin/python bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
-accuracy: build target/bench-venv/ready ## the poses against the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
+accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
 	target/bench-venv/bin/python bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST))
 
-# The tools of bench/ that read films and pictures.
+# Python packages of the scripts in bench/ that read films and pictures.
 target/bench-venv/ready:
 	@python3 -m venv target/bench-venv
 	@target/bench-venv/bin/pip install -q numpy opencv-python-headless pillow
 	@touch $@
 
-ablation: target/vendor target/bench-venv/ready ## every rule of the measurement switched off once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
+ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
 	target/bench-venv/bin/python bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
-flocks: build target/bench-venv/ready ## whether flocks move as their animals do: make flocks GENERATOR=goldfish.py [FOOTAGE=folder]
+flocks: build target/bench-venv/ready ## compare flocks with the films of their animals: make flocks GENERATOR=goldfish.py [FOOTAGE=folder]
 	target/bench-venv/bin/python bench/flocks.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
-papers: build ## the papers as printed against ours, on films with truth: docs/PAPERS.md
+papers: build ## compare the papers' methods as printed with flockreel, on films with known truth
 	python3 bench/papers.py $(RELEASE)
 
-vendor: ## the page's libraries, from web/package-lock.json
+vendor: ## build the page's libraries from web/package-lock.json
 	@scripts/vendor.sh
 
-clean-data: ## forget all footage, libraries and flocks
+clean-data: ## delete the data folder with all footage, libraries and flocks
 	rm -rf $(DATA)
 
 build: vendor
 	@scripts/system-packages.sh build run
 	$(CARGO) build --release --locked
 
-# The program embeds this folder; checks do not need what is in it.
+# The program embeds this folder. It may be empty for checks.
 target/vendor:
 	@mkdir -p $@

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Whether each rule of the measurement earns its place: a few films with every rule switched off, one by one.
+"""Measures what each rule of the measurement contributes, by switching off one rule at a time on a few films.
 
     ablation.py GENERATOR [--footage FOLDER] [--films FOLDER]
 
-One program is built of a copy of the sources in which every rule of ablation.toml has a switch. Films are those of
-cases.py and the first seconds of labelled recordings. What was measured stays in target/ablation as long as sources and
-rules are the same. Writes bench/results/ablation.json and, from that, docs/ABLATION.md.
+One program is built from a copy of the sources in which every rule of ablation.toml has a switch. The films
+are those of cases.py and the first seconds of labeled recordings. Scores are kept in target/ablation for as
+long as the program is unchanged. Writes bench/results/ablation.json and a page of tables made from it.
 """
 import argparse, concurrent.futures, hashlib, json, os, pathlib, re, shutil, subprocess, tempfile, tomllib, zipfile
 
@@ -33,18 +33,18 @@ pub fn rule_off(name: &str) -> bool {
 CASES = ("title_card-3002", "camera_bump-3002", "lights_dim-3002", "infrared-3002", "mains_banding-3002", "resting_animal-3002",
          "hand_at_start-3002", "tether-3002", "surface_mirror-3002", "large_animal-3022", "hard-2", "silver-3")
 CLIPS = {"mouse_round_arena": 20, "mouse_homecage_bedding": 12, "dog_side_with_hand": 10, "zebrafish_juvenile_single": 10}
-# A film is better or worse by this many points, or when it is refused.
+# Smallest change of a film's score that counts, points of 100. A refusal always counts. Free choice.
 CLEARLY = 1.0
 
 
 def off(name):
-    """The switch of a rule; asked once, for it stands in inner loops."""
+    """Returns the expression that reads the switch of a rule. It caches the result for use in inner loops."""
     return ("({ static OFF: std::sync::OnceLock<bool> = std::sync::OnceLock::new(); "
             f'*OFF.get_or_init(|| crate::rule_off("{name}")) }})')
 
 
 def lay_out(rules):
-    """The sources with their switches; files that stay the same keep their time, and others go."""
+    """Writes the sources with their switches. Unchanged files keep their time, removed ones are deleted."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     texts = {name: (ROOT / name).read_bytes() for name in filter(None, listed.split("\0")) if (ROOT / name).is_file()}
     for rule in rules:
@@ -74,14 +74,14 @@ def build():
 
 
 def mattes_halo(library):
-    """Alpha far outside the contour of the mattes, of all alpha."""
+    """Returns the share of alpha that is far outside the contour of the mattes."""
     with zipfile.ZipFile(library / "mattes.zip") as archive:
         pictures = (cv2.imdecode(np.frombuffer(archive.read(name), np.uint8), cv2.IMREAD_UNCHANGED) for name in archive.namelist())
         return halo([rgba[..., 3] for rgba in pictures if rgba is not None and rgba.ndim == 3 and rgba.shape[2] == 4 and rgba[..., 3].any()])
 
 
 def measure(program, film, rule):
-    """Points of 100: frames right, heads right, halo; or the code of a refusal."""
+    """Returns scores in points of 100 (frames right, heads right, halo, ...), or the code of a refusal."""
     name, path, flags, known = film
     with tempfile.TemporaryDirectory() as folder:
         library = pathlib.Path(folder) / "library"
@@ -108,7 +108,7 @@ def measure(program, film, rule):
 
 
 def change(with_rule, without):
-    """What a film loses without a rule, points; below 0 where it gains."""
+    """Returns what a film loses without a rule, in points; negative if it gains."""
     if "refused" in with_rule or "refused" in without:
         return 100.0 * (("refused" in without) - ("refused" in with_rule))
     gains = [with_rule[key] - without[key] for key in ("right", "heads", "view", "animals")] + [without["halo"] - with_rule["halo"]]

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""How right the poses are: on generated films, on films that go wrong (cases.py), and on labelled recordings.
+"""Measures the accuracy of poses, on generated films, films with faults (cases.py) and labeled recordings.
 
     accuracy.py FLOCKREEL GENERATOR [--footage FOLDER] [--against FLOCKREEL] [--films FOLDER]
 
-GENERATOR is a script called as `GENERATOR STEM --seed N [--hard] [--colour C]` that writes STEM.mp4, STEM.truth.json and
-STEM.background.png. Films are kept in the folder (target/accuracy). Writes bench/results/accuracy.json and, from that,
-docs/ACCURACY.md. With --against the generated films are measured by another program too: errors and processor time.
+GENERATOR is a script called as `GENERATOR STEM --seed N [--hard] [--colour C]`. It writes STEM.mp4,
+STEM.truth.json and STEM.background.png. Films are kept in the folder, by default target/accuracy. Writes
+bench/results/accuracy.json and a page of tables made from it (docs/measurements.md). --against measures
+errors and processor time of another program on the generated films.
 """
 import argparse, concurrent.futures, json, math, os, pathlib, resource, statistics, subprocess, sys, tempfile
 
@@ -13,7 +14,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 RESULTS = HERE / "results" / "accuracy.json"
 PAGE = HERE.parent / "docs" / "ACCURACY.md"
 SEEDS = (1, 2, 3)
-# Right is within this share of the body length; far is beyond the second.
+# A centroid error up to RIGHT is right, above FAR is far off; in body lengths.
 RIGHT, FAR = .1, .25
 
 
@@ -27,7 +28,7 @@ def quantile(values, share):
 
 
 def analyze(program, film, *flags):
-    """The poses and the advice, or the code of the refusal; and the processor time, seconds."""
+    """Returns the poses, or the code of the refusal, and the processor time in seconds."""
     with tempfile.TemporaryDirectory() as folder:
         library = pathlib.Path(folder) / "library"
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -41,12 +42,12 @@ def analyze(program, film, *flags):
 
 
 def score_case(poses, truth):
-    """Frame by frame against a known truth, in body lengths; `sure` and `heads` are pairs (confidence, is right)."""
+    """Returns scores against a known truth, in body lengths, and two lists of (confidence, is right)."""
     rows = truth["frames"]
     length_px = quantile([max(row["box_px"][2:]) for row in rows if row.get("centroid_px")], .9)
     found = flips = n_aside = invented = n_there = 0
     off, sure, heads, turns = [], [], [], []
-    # A container may repeat the last frame.
+    # A container may repeat the last frame, so the lists may differ in length.
     for pose, row in zip(poses["frames"], rows):
         if not row["centroid_px"] or row["centroid_px"][0] is None:
             invented += pose["detected"]
@@ -55,7 +56,7 @@ def score_case(poses, truth):
         if not pose["detected"]:
             continue
         found += 1
-        # The generator counts pixels from (0, 0), flockreel from (0.5, 0.5).
+        # The generator has pixel centers at integers, flockreel at half-integers.
         gap = math.dist(pose["centroid_px"], [v + .5 for v in row["centroid_px"]]) / length_px
         off.append(gap)
         sure.append((pose["confidence"], gap <= RIGHT))
@@ -75,7 +76,11 @@ def score_case(poses, truth):
 
 
 def calibration(films):
-    """Ten bins from .5 to 1; every film weighs the same. The expected error, and how far bins of 200 frames are off."""
+    """Compares confidence with the share of right frames, in ten bins from .5 to 1.
+
+    Every film has the same weight. Returns the bins, the expected calibration error, and the largest error of
+    bins with at least 200 frames.
+    """
     bins = [[0.0, 0.0, 0.0, 0] for _ in range(10)]
     films = [pairs for pairs in films if pairs]
     for pairs in films:
@@ -110,7 +115,7 @@ def score_labels(poses, labels):
 
 
 def generated(program, generator, folder):
-    """The papers' own setting: films of 1200 frames, camera and animal known. Scores by score.py."""
+    """Scores films of 1200 frames with known camera and animal, as in the papers, by score.py."""
     scores = {}
     for kind, flags in (("plain", []), ("hard", ["--hard"])):
         for seed in SEEDS:
@@ -164,7 +169,7 @@ def measure(args):
 
 
 def bars(results):
-    """(what, figure, bar, whether it is met)."""
+    """Returns (measure, figure, limit, whether it holds)."""
     cases = results["cases"].values()
     measured = [score for score in cases if "refused" not in score]
     n = sum(score["n"] for score in measured)

@@ -1,15 +1,17 @@
-"""The whole analysis against ffmpeg's decoding alone and against a loop in Python with OpenCV.
+"""Measures an analysis against ffmpeg's decoding alone and against a loop in Python with OpenCV.
 
     python3 bench/analyze.py [PROGRAM [FILM]]      PROGRAM: target/release/flockreel
 
-Takes turns, five rounds, on the same film (1200 frames of 640x480 from `flockreel sample` unless one is
-given); the medians count. Wanted: at most 1.6 times `ffmpeg` decoding to YUV, at least 5 times as fast as
-`opencv_loop.py`, below 300 MB for the program and its children together (their peaks, sampled every
-20 ms, proportional set size), also for the film nine times over. `ffmpeg to a pipe` is what any reader
-that is fed by a decoder of its own must wait for, however fast it is. Ends with 1 when any of these does not hold. Run it with a Python that has
-opencv-python-headless; without, that comparison is left out and said to be.
-"""
+The steps alternate for five rounds on one film, by default 1200 frames of 640x480 from `flockreel sample`,
+and the medians are compared. Exits with 1 unless all of these hold:
 
+- at most 1.6 times the time of `ffmpeg` decoding to YUV
+- at least 5 times as fast as `opencv_loop.py`; skipped with a message without opencv-python-headless
+- less than 300 MB for the program and its children together (proportional set size, sampled every 20 ms),
+  also for the film repeated nine times
+
+`ffmpeg to a pipe` is a lower bound for every program that reads from its own decoder.
+"""
 import importlib.util
 import os
 import pathlib
@@ -41,7 +43,7 @@ def main():
         rounds = {name: [] for name in steps}
         for name in list(steps) * (N_ROUNDS + 1):
             rounds[name].append(seconds_of(steps[name]))
-        # The first round reads everything from the disk.
+        # The first round fills the disk cache and is not counted.
         long = folder / "long.mp4"
         run("ffmpeg", "-v", "error", "-stream_loop", 8, "-i", film, "-c", "copy", long)
         memory_mb = [peak_mb([program, "analyze", path, "-o", folder / "library"]) for path in (film, long)]
@@ -75,7 +77,7 @@ def seconds_of(command):
 
 
 def peak_mb(command):
-    """Most memory of a command and its children at one time, MB."""
+    """Returns the peak memory of a command and its children, MB."""
     process = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     most = 0
     waiting = threading.Thread(target=process.wait)
@@ -93,7 +95,7 @@ def family(pid):
             for task in pathlib.Path(f"/proc/{parent}/task").iterdir():
                 found += [int(child) for child in (task / "children").read_text().split()]
         except OSError:
-            pass  # it has ended
+            pass  # the process has ended
     return found
 
 

@@ -1,15 +1,19 @@
 #!/usr/bin/env python3
-"""Boids a second: flockreel's against a loop of NumPy and scipy.spatial.cKDTree, and against Mesa's BoidFlockers.
+"""Measures the speed of the boids against a loop of NumPy with scipy.spatial.cKDTree, and against Mesa.
 
     bench/boids.py [--count 100000] [--steps 10] [--engine PROGRAM]
 
-The loop does the same three rules on the same number of agents with the same 16 nearest neighbors within 6 body
-lengths, as densely (1.5 square body lengths to an agent), in the plane, without field of view, wander or overlap; it may
-use all cores where SciPy can. Mesa's model holds the same number of agents, as densely and seeing 16 others on average.
-It compares all with all, so that a step of 100 000 would take a quarter of an hour: a sample of them is timed, and what
-remains of a step is left out. Its rate with 1000 agents, where there are few to compare with, is told beside it. Each
-rate is the best of three runs. Prints a line of JSON and ends with 1 when flockreel makes less than 20 times the loop's
-agent-steps a second, or 1000 times Mesa's. Needs numpy and scipy; Mesa with networkx if it is to be compared.
+The loop applies the three rules to the same number of boids at the same density (1.5 square body lengths per
+boid). Each boid has the 16 nearest neighbors within 6 body lengths. The loop works in the plane, without
+field of view, wander or overlap. SciPy may use all cores.
+
+Mesa's BoidFlockers has the same number of boids at the same density, and 16 visible neighbors on average. It
+compares all pairs, and a step of 100 000 boids would take a quarter of an hour. So only the steps of a sample
+of its boids are timed. Its rate with 1000 boids is reported too.
+
+Each rate is the best of three runs. Prints one line of JSON. Exits with 1 unless flockreel makes 20 times the
+boid-steps per second of the loop and 1000 times those of Mesa. Requires numpy and scipy; Mesa and networkx
+are optional.
 """
 import argparse
 import json
@@ -22,7 +26,7 @@ from scipy.spatial import cKDTree
 
 LEAST_OF_LOOP, LEAST_OF_MESA = 20, 1000
 STEP_S, CRUISE, TURN = 1 / 30, 1.0, 3.0
-ROOM_BL2 = 1.5  # square body lengths to an agent, as in benches/boids.rs
+ROOM_BL2 = 1.5  # square body lengths per boid, as in benches/boids.rs
 MESA_SAMPLE, FEW, N_RUNS = 100, 1000, 3
 
 
@@ -49,7 +53,7 @@ def main():
 
 
 def loop_rate(count, steps):
-    """Agent-steps a second of the loop."""
+    """Returns the boid-steps per second of the loop."""
     draw = np.random.default_rng(1)
     side = (ROOM_BL2 * count) ** 0.5
     places, turns = draw.uniform(0, side, (count, 2)), draw.uniform(0, 2 * np.pi, count)
@@ -84,7 +88,7 @@ def step(places, velocities, side):
 
 
 def mesa_rate(count):
-    """Agent-steps a second of Mesa's example with so many agents, from a sample of them; None without it."""
+    """Returns the boid-steps per second of Mesa's example, from a sample of its boids; None without Mesa."""
     try:
         from mesa.examples.basic.boid_flockers.model import BoidFlockers
     except ImportError:

@@ -1,7 +1,7 @@
-"""Films of one animal to which something happens, with their truth: light, camera, company, rest, files.
+"""Films of one animal with typical faults, and their truth: light, camera, other objects, rest, file formats.
 
-Each case takes a film of the generator (goldfish.py) and changes its frames and its truth. A frame of the truth that
-has no centroid shows no animal.
+Each case takes a film of the generator (goldfish.py) and changes its frames and its truth. A frame without a
+centroid in the truth shows no animal.
 """
 import json, pathlib, subprocess, sys, zipfile
 
@@ -13,7 +13,7 @@ ABSENT = {"absent": True, "centroid_px": None}
 
 
 class Base:
-    """A film of the generator, with its scene and its truth."""
+    """A film of the generator, with its background and its truth."""
 
     def __init__(self, generator, folder, seed, *flags, n_frames=N_FRAMES):
         name = "-".join(["base", str(seed), str(n_frames), *flags]).replace("--", "")
@@ -34,7 +34,7 @@ class Base:
         return image + self.rng.normal(0, sigma, image.shape)
 
     def mask(self, k):
-        """The animal's own pixels in frame k, 0..1: what differs from the scene inside its box."""
+        """Returns the mask of the animal in frame k, 0 to 1: where its box differs from the background."""
         x, y, w, h = self.poses[k]["box_px"]
         box = slice(max(y - 2, 0), y + h + 2), slice(max(x - 2, 0), x + w + 2)
         differs = np.abs(self.frames[k][box].astype(np.float32) - self.scene[box]).max(-1) > 12
@@ -53,7 +53,7 @@ def shifted(image, x, y):
     return cv2.warpAffine(image, np.float32([[1, 0, x], [0, 1, y]]), size, borderMode=cv2.BORDER_REPLICATE)
 
 
-# Each yields (picture, pose) for every frame of a base film.
+# Each function yields (picture, pose) for every frame of a base film.
 
 def black_lead(base, n_black):
     for k, pose in enumerate(base.poses):
@@ -143,7 +143,7 @@ CHANGES = {
     infrared: (.3, .5, .7), mains_banding: (.04, .08, .12), resting_animal: (.5, .7, .85), hand_at_start: (1.0, 1.5, 2.5),
     tether: (1, 3, 5), surface_mirror: (.4, .7, .9), time_lapse: (5, 10, 10),
 }
-LARGE = (.28, .34, .38)  # length, metres, in a tank of .6
+LARGE = (.28, .34, .38)  # lengths of the animal in m, in a tank of 0.6 m
 FILES = {
     "pictures.zip": None,
     "raw.h264": ["-c:v", "libx264", "-crf", "18", "-bsf:v", "h264_mp4toannexb", "-f", "h264"],
@@ -153,7 +153,7 @@ FILES = {
 
 
 def encode(path, rows, fps=30):
-    """Writes a film of (picture, pose) rows; returns the poses."""
+    """Writes a film of (picture, pose) rows and returns the poses."""
     coder, poses = None, []
     for image, pose in rows:
         if coder is None:
@@ -169,7 +169,7 @@ def encode(path, rows, fps=30):
 
 
 def films(generator, folder):
-    """Films every case that is not there yet; returns (name, path of the film, path of its truth, flags of analyze)."""
+    """Makes the missing films. Returns (name, path, path of the truth, flags of analyze) for each case."""
     folder.mkdir(parents=True, exist_ok=True)
     made = []
 
@@ -191,7 +191,7 @@ def films(generator, folder):
             add(name, folder / f"{name}.mp4", make)
     for seed, length in zip((3022, 3023, 3024), LARGE):
         def make(path):
-            # Small, because the generator's fish is made of points, and enlarged.
+            # The generator draws its fish as points, so make it small and enlarge it.
             small = ["--size", "160x120", "--length", str(length), "--height", f"{.55 * length:.3f}", "--crf", "8"]
             base = Base(generator, folder, seed, *small)
             rows = ((cv2.resize(image, (640, 480), interpolation=cv2.INTER_CUBIC), {

@@ -1,13 +1,15 @@
-"""The distance engine against SciPy, with equal values, in one run.
+"""Measures the distance engine against SciPy and FAISS, and checks that the distances are equal.
 
     python3 bench/distance.py [--frames 1200] [--size 96x64] [--clip-frames 8] [--engine PROGRAM]
 
-Makes sprites, lets `benches/distance.rs` time the engine alone, recomputes d with
-scipy.spatial.distance.cdist(..., "cityblock") on one core from the same RGBA bytes by ALGORITHMS.md 5,
-checks that d and the window sums D are equal, compares with FAISS (L1, one core, 32-bit floats) where that is
-installed, and prints one line of JSON. The share of the machine's own psadbw peak is that of sprites without
-a blank byte, of which all are compared, measured in turn with it: the median of fifteen turns.
-Fails when they are not equal, or when the engine is less than 60 times faster. Needs numpy and scipy.
+Makes sprites and times the engine alone by `benches/distance.rs`. Recomputes d from the same RGBA bytes with
+scipy.spatial.distance.cdist(..., "cityblock") on one core (docs/explanation/algorithms.md, "Distances"), and
+checks d and the window sums D for equality. FAISS is optional and runs with L1 on one core, in 32-bit floats.
+Prints one line of JSON.
+
+The share of the machine's psadbw peak is measured with sprites without a blank byte, which are all compared.
+Both are timed in turn, and the median of fifteen turns counts. Exits with 1 if the distances differ or the
+engine is less than 60 times as fast as SciPy. Requires numpy and scipy.
 """
 
 import argparse
@@ -19,7 +21,7 @@ import sys
 import tempfile
 import time
 
-# One core: before numpy is loaded.
+# Select one core, before numpy is loaded.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ[name] = "1"
 
@@ -64,7 +66,7 @@ def main():
 
 
 def make_sprites(n_frames, width, height):
-    """A shaded ellipse that swims and bends, with noise and soft alpha: (N, h, w, 4) bytes."""
+    """Returns sprites of a shaded ellipse that swims and bends, with noise and soft alpha: (N, h, w, 4)."""
     rng = np.random.default_rng(1)
     y, x = np.mgrid[:height, :width]
     sprites = np.zeros((n_frames, height, width, 4), np.uint8)
@@ -88,7 +90,7 @@ def run_engine(args, width, height, folder):
 
 
 def faiss_seconds(sprites):
-    """Seconds that FAISS takes for the same matrix; None where it is not installed."""
+    """Returns the time of FAISS for the same matrix, seconds; None if it is not installed."""
     try:
         import faiss
     except ImportError:
@@ -101,7 +103,7 @@ def faiss_seconds(sprites):
 
 
 def scipy_distances(sprites):
-    """Seconds that cdist takes, and d as whole numbers."""
+    """Returns the time of cdist, seconds, and the distances d as integers."""
     u = premultiplied(sprites).astype(np.float64)
     start = time.perf_counter()
     d = cdist(u, u, "cityblock")
@@ -109,14 +111,14 @@ def scipy_distances(sprites):
 
 
 def premultiplied(sprites):
-    """U of every sprite, a row each."""
+    """Returns the premultiplied bytes of every sprite, one row each."""
     alpha = sprites[..., 3:].astype(np.int64)
     color = (alpha * sprites[..., :3] + 127) // 255
     return np.concatenate([color, alpha], axis=-1).reshape(len(sprites), -1)
 
 
 def window_sums(d, clip_frames):
-    """D(i, j) = sum over k < f of d(i + k, j + k)."""
+    """Returns the window sums D(i, j) = sum over k < f of d(i + k, j + k)."""
     n_clips = len(d) - clip_frames + 1
     return sum(d[k : k + n_clips, k : k + n_clips] for k in range(clip_frames))
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Whether flocks move and look as their animals do: figures of planned flocks, over recordings and generated films.
+"""Compares planned flocks with the films of their animals, in motion and appearance.
 
     flocks.py FLOCKREEL GENERATOR [--footage FOLDER] [--films FOLDER] [--only NAME...]
 
-Each film is analyzed with default settings, and flocks of 300 frames are planned with three seeds and as many animals as have
-room. Shown and filmed speeds are those of the centroid over two frames, body lengths a second, at frames two or more away from
-a jump; shown ones are divided by the scale of the sprite. Writes bench/results/flocks.json and, from that, docs/FLOCKS.md.
+Each film is analyzed with default settings. Flocks of 300 frames are planned with three seeds and as many
+individuals as have room. Speeds, shown and filmed, are those of the centroid over two frames in body lengths
+per second, at least two frames away from a jump. Shown speeds are divided by the scale of the sprite. Writes
+bench/results/flocks.json and a page of tables made from it (docs/measurements.md).
 """
 import argparse, json, math, pathlib, shutil, statistics, subprocess, tempfile
 
@@ -23,9 +24,9 @@ CLIPS = ("goldfish_black_water", "mouse_round_arena", "zebrafish_juvenile_single
 GENERATED = ("plain-1", "silver-2", "dark-3")
 SEEDS, N_FRAMES = (1, 2, 3), 300
 REST, MOVING = .1, .3
-# Frames either side of a jump that a fade may change, and one more.
+# Frames on each side of a jump that a fade may change, plus one.
 AROUND = 3
-# By figure: what it says, its bar, how it is written, and for which films it is.
+# For each figure: its label, the check of its limit, its format, and the views that it applies to.
 ALL, SIDE, TOP = ("side", "top"), ("side",), ("top",)
 BARS = {
     "as_filmed": ("shown speed within 25 % or .05 BL/s of the filmed one", lambda v: v > .85, "{:.1%}", ALL),
@@ -52,12 +53,12 @@ def wrap(angle):
 
 
 def class_of(speed, usual):
-    """0 rest, 1 slow, 2 go, 3 dart."""
+    """Returns 0 for rest, 1 slow, 2 go, 3 dart."""
     return np.select([speed < REST, speed < .5 * usual, speed < 2 * usual], [0, 1, 2], 3)
 
 
 def film_speeds(poses, length_px):
-    """By frame, nan where the animal was not found before or after."""
+    """Returns the speed at each frame, body lengths/s; nan if the animal is missing before or after."""
     nan = [math.nan, math.nan]
     centroids = np.array([pose["centroid_px"] or nan for pose in poses["frames"]], float)
     speeds = np.full(len(centroids), math.nan)
@@ -66,7 +67,7 @@ def film_speeds(poses, length_px):
 
 
 def loops_share(one):
-    """Frames in runs of at most 32 played for the third time in a row or more."""
+    """Returns the share of frames in loops: runs of 2 to 32 frames shown at least three times in a row."""
     states = [2 * frame + side for frame, side in zip(one["source_frame"], one["mirrored"])]
     looped = 0
     for t in range(len(states)):
@@ -75,7 +76,10 @@ def loops_share(one):
 
 
 def lookalikes(flock):
-    """Share of animals and frames with another within 3 body lengths that shows nearly the same frame on the same side."""
+    """Returns the share of individuals and frames with a similar neighbor.
+
+    The neighbor is within 3 body lengths and shows a frame at most 10 frames away, on the same side.
+    """
     people = flock["individuals"]
     places = np.array([one["centroid_px"] for one in people], float)
     frames = np.array([one["source_frame"] for one in people])
@@ -87,7 +91,10 @@ def lookalikes(flock):
 
 
 def overlap(flock, poses):
-    """Share of the bodies' area that lies under or over another body: ellipses of the outlines' areas and lengths, every 10th frame."""
+    """Returns the share of the bodies' area that overlaps other bodies, over every 10th frame.
+
+    A body is an ellipse with the area and length of its outline.
+    """
     width, height = (side // 2 for side in poses["image_size_px"])
     y, x = np.mgrid[0:height, 0:width]
     covered, total = 0, 0
@@ -139,7 +146,7 @@ def motion(flock, poses, component):
 
 
 def sprites_of(folder, poses):
-    """Sprites as they are compared (RGB times alpha, and alpha), in top view turned to heading 0; None where there is none."""
+    """Returns each sprite as premultiplied RGB and alpha, in top view rotated to heading 0, or None."""
     def compared(frame):
         path = folder / f"{frame:06}.png"
         rgba = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) if path.exists() else None
@@ -151,14 +158,14 @@ def sprites_of(folder, poses):
         if poses["view"] == "side" or not heading:
             return planes
         height, width = planes.shape[:2]
-        # cv2 turns counterclockwise in the picture for a positive angle; a heading is clockwise.
+        # cv2 rotates counterclockwise in the picture for a positive angle; a heading is clockwise.
         turn = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), np.degrees(heading), 1)
         return cv2.warpAffine(planes.astype(np.float32), turn, (width, height)).round().astype(np.int32)
     return [compared(frame) for frame in range(len(poses["frames"]))]
 
 
 def halo(alphas):
-    """Alpha more than 2.5 pixels outside the contour of a half, of all alpha: median over 20 pictures."""
+    """Returns the share of alpha more than 2.5 px outside the contour at 1/2, the median of 20 pictures."""
     shares = []
     for alpha in alphas[::max(1, len(alphas) // 20)]:
         alpha = np.pad(alpha, 8)
@@ -168,8 +175,11 @@ def halo(alphas):
 
 
 def stray(film, truth, background):
-    """Of the pixels of every 10th frame that differ from the background by more than 12 levels: those more than 2 px outside of
-    every label of an animal or a shadow."""
+    """Returns the share of changed pixels that no label explains, over every 10th frame.
+
+    Changed pixels differ from the background by more than 12 levels. Labels are those of animals and shadows;
+    a pixel more than 2 px outside of all of them is unexplained.
+    """
     video, t, n_changed, n_stray = cv2.VideoCapture(str(film)), 0, 0, 0
     background = cv2.imread(str(background)).astype(np.int16)
     while (read := video.read())[0]:
@@ -185,8 +195,11 @@ def stray(film, truth, background):
 
 
 def blobs(run, library, folder, poses):
-    """Mean number of connected components of what differs from the background by more than 12 levels, each with at least 30 % of
-    one animal's area, over a film of 20 animals at 1.5 body lengths from each other."""
+    """Returns the mean number of separate bodies in a film of 20 individuals, 1.5 body lengths apart.
+
+    A body is a connected component that differs from the background by more than 12 levels, with at least 30
+    % of the animal's area.
+    """
     film = folder / "blobs.mp4"
     run("flock", library, "-o", film, "--count", 20, "--spacing", 1.5, "--frames", 200)
     background = cv2.imread(str(library / "background.png")).astype(np.int16)
@@ -200,7 +213,7 @@ def blobs(run, library, folder, poses):
 
 
 def cuts_above_natural(flock, sprites, poses):
-    """Share of the jumps around which some step between drawn frames is above the 99th percentile of the film's steps."""
+    """Returns the share of jumps with a step between drawn frames above the film's 99th percentile."""
     top = poses["view"] == "top"
     turned = lambda sprite: sprite[::-1] if top else sprite[:, ::-1]
     look = lambda frame, is_mirrored: turned(sprites[frame]) if is_mirrored else sprites[frame]
@@ -224,7 +237,7 @@ def cuts_above_natural(flock, sprites, poses):
 
 
 def measure(program, name, film, flags):
-    """The mean of each figure over the seeds, or the code of a refusal."""
+    """Returns the mean of each figure over the seeds, or the code of a refusal."""
     library = PLACE / name
     shutil.rmtree(library, ignore_errors=True)
     run = lambda *words: subprocess.run([str(word) for word in (program, *words)], capture_output=True, text=True)

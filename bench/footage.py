@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Every film of a folder through the really started service: upload, analysis, flock of 20 x 400.
+"""Sends every film of a folder through the service: upload, analysis, flock of 20 x 400.
 
     bench/footage.py FOLDER [--program target/release/flockreel] [--out target/footage]
 
-Prints a line for each film and keeps its flock and poses in the output folder, to be looked at. A film
-may be refused; the reason is printed. Fails when a job ends in any other way or hangs.
+Prints a line for each film and keeps its flock and poses in the output folder for inspection. A film may be
+refused, and the code is printed. Exits with an error if a job does not end within 600 s.
 """
 import argparse, json, pathlib, subprocess, sys, tempfile, time
 import urllib.error, urllib.request

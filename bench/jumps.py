@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""List the jumps of the centroid in poses.json: frames to look at.
+"""Lists the jumps of the centroid in poses.json, as frames to inspect.
 
     jumps.py POSES.json... [--above 0.3]
 
-A jump is more than --above body lengths (80th percentile of length_px over uncut frames) between two
-consecutive frames. Prints a line for each file and one for each jump: frame, jump in body lengths, the
-quotient of the areas. A fast animal jumps for real: look at the frames.
+A jump is a step of more than --above body lengths between consecutive frames. The body length is the 80th
+percentile of length_px over uncut frames. Prints one line for each file and one for each jump: frame, step in
+body lengths, ratio of the areas. A fast animal also makes such steps.
 """
 import argparse, json, math
 

@@ -1,8 +1,8 @@
-"""The usual way in Python: OpenCV's MOG2 background model and connected components, frame by frame.
+"""A common approach in Python: OpenCV's MOG2 background model and connected components, frame by frame.
 
     opencv_loop.py FILM
 
-Prints the centroid and area of the largest component of each frame as CSV; nothing more is measured.
+Prints centroid and area of the largest component of each frame as CSV.
 """
 
 import sys

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""The two papers as they are printed against flockreel, on films whose truth is known.
+"""Compares flockreel with the two papers as printed, on films with known truth.
 
     papers.py FLOCKREEL [--seeds 1,2,3] [--frames 1200]
 
-Films the virtual fish, analyzes each film three ways (as N and O are printed, the same with N (7) the
-right way round, and by default) and writes the table of docs/PAPERS.md.
+Films the virtual fish and analyzes each film in three ways. The first is as Nakajima et al. and Okabe et al.
+are printed, the second corrects equation 7 of Nakajima et al., the third has default settings. Writes a table
+of the scores (docs/measurements.md).
 """
 import json, pathlib, statistics, subprocess, sys, tempfile
 
@@ -31,7 +32,7 @@ def run(*words):
 
 
 def score_all(program, seeds, frames, folder):
-    """For each way the scores of each film."""
+    """Returns the scores of each film, by way of analysis."""
     scores = {name: [] for name, _ in WAYS}
     for seed in seeds:
         film, truth, camera = (folder / f"{seed}{end}" for end in (".mp4", ".truth.json", ".camera.json"))

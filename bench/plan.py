@@ -1,18 +1,24 @@
 #!/usr/bin/env python3
-"""How long plans take: 20 individuals x 400 frames over 1200 frames with both mirrors; 1000 x 1000 over the same,
-and over 1200 frames of one side; 20 x 400 over 50 000 frames, exactly as well.
+"""Measures the time of plans, from 20 individuals x 400 frames to 1000 x 1000, and over 50 000 source frames.
 
     bench/plan.py [--engine PROGRAM] [--library DIR] [--small-only]
 
-Runs benches/plan.rs, on a library made by code or on one given, prints a line of JSON for each case with its
-bar in seconds, and ends with 1 when a bar is missed. Times are of the plan alone, the least of some runs.
+The cases are:
+
+- 20 x 400 over 1200 source frames with both mirror sides
+- 1000 x 1000 over the same frames, and over one side of them
+- 20 x 400 over 50 000 source frames
+
+Runs benches/plan.rs on a generated library or on DIR, and prints one line of JSON for each case with its
+limit in seconds. Times are those of the plan alone, the minimum of some runs. Exits with 1 if a limit is
+missed.
 """
 import argparse
 import json
 import subprocess
 import sys
 
-# Individuals, frames, runs, what else to say, and the most seconds wanted on all threads.
+# Individuals, frames, runs, further arguments, and the time limit with all threads in seconds.
 CASES = [(20, 400, 30, [], 0.030), (1000, 1000, 1, [], 3.0), (1000, 1000, 1, ["--one-side"], 3.0),
          (20, 400, 1, ["--of=50000"], None)]
 

@@ -1,14 +1,18 @@
-"""Rendering a flock against encoding alone: how much longer the film takes than x264 takes for the same frames.
+"""Measures the rendering of a flock against encoding the same frames with x264 alone.
 
     python3 bench/render.py LIBRARY_DIR [PROGRAM]      PROGRAM: target/release/flockreel
 
-Two films: 20 individuals x 400 frames at the footage's size (wanted: below 1.25), and 500 individuals x 100 frames at
-1920x1080 (wanted: below 1.5). Each is planned once; then filming that plan (`rendered_s`: from the first sprite
-drawn to the named file) and ffmpeg encoding the same frames from a raw file with x264 veryfast (crf 18, 4 threads) are
-measured in turn, five rounds; the medians count. The program looks less closely for motion than that preset does, so
-ffmpeg encodes them with the very settings of the program too; how much larger the file is then is told. The frames in
-the file are those that are drawn, for those of the film have lost what is costly to encode. Last, the memory of filming
-400 and 10 000 frames. Ends with 1 when a ratio is missed or memory grows.
+Two films are rendered: 20 individuals x 400 frames at the size of the footage, and 500 individuals x 100
+frames at 1920x1080. The ratio of the times must be below 1.25 and 1.5. Each film is planned once. Then two
+steps alternate for five rounds, and their medians are compared:
+
+- rendering the plan (`rendered_s`, from the first sprite to the finished file)
+- ffmpeg encoding the same frames from a raw file with x264 veryfast (crf 18, 4 threads)
+
+The program uses a cheaper motion search than that preset. ffmpeg therefore also encodes with the program's
+settings, and the increase of the file size is reported. The raw frames are the drawn ones, because encoded
+frames have lost detail. Last, the peak memory for 400 and 10 000 frames is compared. Exits with 1 if a ratio
+is missed or the memory grows.
 """
 
 import json
@@ -23,7 +27,7 @@ from pathlib import Path
 
 N_ROUNDS = 5
 ENCODER = ["-c:v", "libx264", "-preset", "veryfast", "-profile:v", "high", "-crf", "18", "-threads", "4"]
-# As src/media/encode/coding.rs has it.
+# The encoder settings of src/media/encode/coding.rs.
 OWN = [*ENCODER, "-x264-params", "cpu-independent=1:subme=1:me=dia"]
 
 
@@ -69,7 +73,7 @@ def ratio(program, library, folder, flock, film, most):
 
 
 def memory(program, library, folder):
-    """Peak resident memory of the program while it films 400 and 10 000 frames."""
+    """Compares the peak resident memory for rendering 400 and 10 000 frames."""
     peaks = {}
     for n_frames in (400, 10_000):
         plan, video = folder / "flock.json", folder / "flock.mp4"
@@ -77,7 +81,7 @@ def memory(program, library, folder):
         words = ["/usr/bin/time", "-v", program, "flock", library, "-o", video, "--from", plan, "--ground-truth", folder / "truth"]
         said = run(words, stderr=subprocess.PIPE).stderr
         peaks[n_frames] = int(re.search(r"Maximum resident set size \(kbytes\): (\d+)", said).group(1)) / 1024
-        # What grows is the plan itself, which is read whole.
+        # Subtract the plan, which is read as a whole and grows with the number of frames.
         peaks[n_frames] -= plan.stat().st_size / 2**20
     short, long = peaks.values()
     print(f"memory beside the plan: {short:.0f} MB for 400 frames, {long:.0f} MB for 10 000")

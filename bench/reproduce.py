@@ -1,15 +1,18 @@
 #!/usr/bin/env python3
-"""A flock of one on the animal's own path is the footage again: how far off it is, in levels of 255.
+"""Measures how exactly a flock of one on the animal's own path reproduces the footage, in levels of 255.
 
     bench/reproduce.py PROGRAM LIBRARY_DIR FOOTAGE [LIBRARY_DIR FOOTAGE ...]
 
-Takes the longest run of frames in which the animal is whole (at most 400), makes a flock.json of one individual that
-shows them where they were filmed, without a jump, films it as pictures and as MP4, and prints the mean absolute
-difference from the footage within the animal's box, over R, G and B (wanted: below 2, as pictures). Beside it: `again`, the
-same of the footage itself encoded once more with the program's settings; `scene`, what no picture of the scene could
-foresee: how far the footage is off the background where the animal is not; and `without`, how far it is off within
-the box without the animal. ffmpeg makes RGB of films, exactly rounded. Needs numpy and cv2. Ends with 1 when a bar is
-missed.
+Takes the longest run of frames in which the animal is whole, at most 400. Makes a flock.json of one
+individual that shows these frames at their original place without a jump, and renders it as pictures and as
+MP4. Prints mean absolute differences from the footage over R, G and B:
+
+- `pictures` and `mp4`: the renderings, within the animal's box; the pictures must be below 2
+- `again`: the footage encoded once more with the program's settings, within the box
+- `scene`: the background, outside of the box, which no rendering could predict
+- `without`: the background, within the box
+
+ffmpeg converts films to RGB with exact rounding. Requires numpy and cv2. Exits with 1 if a limit is missed.
 """
 import json
 import pathlib
@@ -70,7 +73,7 @@ def measure(program, library, footage, folder):
 
 
 def along_its_own_path(program, library, poses, folder):
-    """A flock.json as the program writes it, of one individual that shows these frames where they were."""
+    """Returns a flock.json of one individual that shows these frames where they were filmed."""
     plan, n_frames = folder / "plan.json", len(poses)
     run(program, "flock", library, "-o", folder / "one", "--format", "png", "--count", "1", "--frames", "2", "--plan", plan)
     flock = json.loads(plan.read_text())
@@ -94,7 +97,7 @@ def along_its_own_path(program, library, poses, folder):
 
 
 def longest_run(frames):
-    """The first frame and the number of those in a row in which the animal is whole."""
+    """Returns the first frame and the length of the longest run of frames in which the animal is whole."""
     best, first = (0, 0), 0
     for idx, pose in enumerate(frames):
         if not pose["detected"] or pose["cut"]:

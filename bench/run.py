@@ -1,10 +1,10 @@
-"""O's own run against ffmpeg alone: 1200 frames of one fish, 20 individuals, 400 frames, 640x480.
+"""Measures the run of Okabe et al. against ffmpeg: 1200 frames, 20 individuals x 400 frames, 640x480.
 
     python3 bench/run.py [PROGRAM]      PROGRAM: target/release/flockreel
 
-`analyze` and `flock` together, against decoding those 1200 frames to rgb24 and encoding 400 frames by
-x264 veryfast (the flock's own frames, from a raw file). Both are measured in turn, three rounds; the
-medians count. Ends with 1 when the ratio is 3 or more.
+The time of `analyze` plus `flock` is compared with that of ffmpeg: decoding the 1200 frames to rgb24, plus
+encoding 400 frames with x264 veryfast. The encoded frames are those of the flock, from a raw file. The steps
+alternate for three rounds, and the medians are compared. Exits with 1 if the ratio is 3 or more.
 """
 
 import os
@@ -49,7 +49,7 @@ def measure(program, folder):
         size = ["-f", "rawvideo", "-pix_fmt", "yuv420p", "-s", "640x480", "-r", "30"]
         ffmpeg(*size, "-i", raw, "-c:v", "libx264", "-preset", "veryfast", folder / "encoded.mp4")
 
-    analyze(), make_flock()  # the raw frames to encode; and everything read once before the clock runs
+    analyze(), make_flock()  # makes the raw frames to encode, and warms the disk cache
     ffmpeg("-i", flock, "-frames:v", "400", "-f", "rawvideo", "-pix_fmt", "yuv420p", raw)
 
     steps = [("ffmpeg decode 1200", decode), ("ffmpeg encode 400", encode), ("analyze 1200", analyze), ("flock 20 x 400", make_flock)]

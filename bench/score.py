@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Score poses.json against the truth of a generated film.
+"""Scores poses.json against the truth of a generated film.
 
     score.py POSES.json TRUTH.json [--worst]
 
-The truth is that of a film generator: frames with centroid_px, forward, position_m; animal with
-length_m. `flockreel sample --truth` writes poses.json's own form, which is understood too. Prints
-one JSON object: the measures of ALGORITHMS.md 9 and the shares behind them.
+TRUTH.json comes from a film generator: frames with centroid_px, forward and position_m; animal with length_m.
+The poses.json format of `flockreel sample --truth` is also accepted. Prints one JSON object with errors and
+shares (docs/explanation/algorithms.md, "Quality measures").
 """
 import json, math, sys
 
@@ -21,7 +21,7 @@ def wrap(angle):
 
 def main():
     poses, truth = (json.load(open(path)) for path in sys.argv[1:3])
-    # goldfish.py counts pixels from (0, 0), flockreel's own files from (0.5, 0.5).
+    # goldfish.py has pixel centers at integers, flockreel at half-integers.
     offset = 0 if "schema" in truth else .5
     centroid, heading, flips, angles, z = [], [], [], [], []
     n_seen = n_detected = 0

@@ -1,11 +1,14 @@
-"""How fast the service is beside the usual tools, in one run on one machine (RELIABILITY.md, H5).
+"""Measures the speed of the service against common tools (docs/explanation/promises.md, "Overload").
 
-    python3 bench/service.py target/release/flockreel [FILM] [--write docs/SERVICE.md]
+    python3 bench/service.py target/release/flockreel [FILM] [--write PAGE]
 
-Upload of 1 GiB over loopback against cp and fsync to the same disk, with the memory that it added; small JSON
-answers a second, and the slow ones, idle and while analyses keep the workers busy; a film in ranges against nginx.
-FILM is what is analyzed meanwhile; without one the program films its own. Wants wrk, nginx and curl. Each figure is the
-median of three runs, of uploads against the copy just before each; of films the best of three, of both.
+- Upload of 1 GiB over loopback, against cp and fsync to the same disk, and the memory that it adds.
+- Requests for small JSON, per second and 99th percentile, idle and while analyses run.
+- Download of a film in ranges, against nginx.
+
+FILM is the film of the analyses; without it, the program makes one. Requires wrk, nginx and curl. Each figure
+is the median of three runs; an upload is compared with the copy just before it. The downloads are the best of
+three runs. --write writes the table to a page.
 """
 
 import hashlib
@@ -69,7 +72,7 @@ def free_port():
 
 
 def upload_speed(service, address, film, folder):
-    """A film with a box of a GiB after its last one, which no player reads."""
+    """Uploads a film with a box of 1 GiB at its end, which players ignore."""
     large = folder / "large.mp4"
     small = Path(film).read_bytes()
     with large.open("wb") as out:
@@ -80,9 +83,9 @@ def upload_speed(service, address, film, folder):
     Path(f"/proc/{service.pid}/clear_refs").write_text("5")
     before = memory_mb(service.pid, "VmRSS")
     copied, uploaded, answer = [], [], None
-    # In turns, each on a disk that has nothing left to do: a disk is not as fast after some gigabytes as before them.
+    # Copy and upload in turns, each after a sync, because disks slow down after some gigabytes.
     for run in range(RUNS):
-        with large.open("r+b") as out:  # the same bytes again would cost nothing
+        with large.open("r+b") as out:  # make the bytes differ: equal uploads are stored once
             out.seek(-1, os.SEEK_END)
             out.write(bytes([run]))
         os.sync()

@@ -1,12 +1,12 @@
-"""How fast transitions are found, and how that grows with the footage.
+"""Measures the search for transitions, and how its time grows with the number of frames.
 
-    python3 bench/transitions.py [--library DIR] [--most 50000] [--engine PROGRAM] [--write docs/SCALING.md]
+    python3 bench/transitions.py [--library DIR] [--most 50000] [--engine PROGRAM] [--write PAGE]
 
-With a library: all distances between its clips against the search for transitions below its epsilon,
-each on one core and on all. Then the search from end to end for 1, 2, 5, 10, 20 and 50
-thousand sprites of 96 x 64 drawn by code (the two largest approximately too), each in a process of its own, with seconds, peak memory and
-the exponent that fits them (least squares on logarithms). Wanted: 20,000 in under 60 s and 1 GB.
-Ends with 1 when that does not hold. `--write` puts the table into a page. No packages needed.
+With --library: compares all distances between clips with the search below the library's epsilon, each on one
+core and on all cores. Then runs the search for 1, 2, 5, 10, 20 and 50 thousand generated sprites of 96 x 64,
+each in its own process. The two largest also run approximately. Prints seconds, peak memory, and the exponent
+of growth, by least squares on logarithms. Exits with 1 unless 20 000 frames take less than 60 s and 1 GB.
+--write writes the table to a page. Requires no packages.
 """
 
 import argparse

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README with the program itself: scripts/pictures.sh [PROGRAM]
+# Makes the pictures of the README with flockreel: scripts/pictures.sh [PROGRAM]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=$(realpath "${1:-target/release/flockreel}")

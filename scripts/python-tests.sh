@@ -1,12 +1,13 @@
 #!/bin/sh
-# Runs the tests that are written in Python, each kind from a pinned virtual environment under target/. Fails, saying
-# why, when what they need cannot be had; FLOCKREEL_SKIP="page contract truth" leaves out the kinds it names.
+# Runs the tests written in Python. Each kind has a virtual environment with pinned packages below target/.
+# Fails with a reason if a requirement cannot be installed. FLOCKREEL_SKIP="page contract truth" skips the
+# named kinds.
 #
-#   scripts/python-tests.sh KIND PROGRAM     the flockreel program to test, and of it
-#       truth       tests/truth: the ground truth of a flock read by pycocotools and TrackEval
-#       page        tests/page: the page against a server of its own, in Debian's chromium
-#       contract    tests/contract: schemathesis over the OpenAPI document of a really started service
-#                   (RELIABILITY.md, H6): no 5xx, no answer that the document does not name
+#   scripts/python-tests.sh KIND PROGRAM     PROGRAM: the flockreel program to test; KIND:
+#       truth       tests/truth: reads the ground truth of a flock with pycocotools and TrackEval
+#       page        tests/page: tests the page of a running service in Debian's chromium
+#       contract    tests/contract: runs schemathesis on the OpenAPI document of a running service; no
+#                   response has a 5xx status or is undocumented (docs/explanation/promises.md, "Contract")
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -14,7 +15,7 @@ kind=$1
 program=$2
 venv=target/$kind-venv
 
-# What did not run is not well: only who says so goes without.
+# Tests that cannot run count as failed, unless the caller skips them.
 missing() {
     printf '%s tests: CANNOT RUN, %s; FLOCKREEL_SKIP=%s leaves them out\n' "$kind" "$1" "$kind" >&2
     exit 1

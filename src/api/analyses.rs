@@ -1,4 +1,6 @@
-//! Analyses: footage to library, as a job.
+//! POST /v1/analyses: queues a job that measures a footage and makes a library.
+//!
+//! The request names stored footage, or its body is the video itself, which is then stored first.
 
 use axum::body::Body;
 use axum::extract::{FromRequest, Query, Request, State};
@@ -21,19 +23,22 @@ use crate::ids::{FootageId, JobId, LibraryId};
 use crate::jobs::analysis::{Input, enqueue};
 use crate::store::footage::Added;
 
-/// What to measure, and how.
+/// Footage to measure, and parameters of the analysis.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnalysisRequest {
+    /// Footage to measure.
     #[schema(value_type = uuid::Uuid)]
     footage_id: FootageId,
-    /// Overrides of the defaults, or of `preset` (`papers`).
+    /// Parameters to override. They override the values of `preset` (`papers`), or the defaults if there is
+    /// no preset.
     #[serde(default)]
     #[schema(value_type = AnalysisOverrides)]
     params: Map<String, Value>,
 }
 
-/// Parameters to override, those of `preset` (`papers`) or the defaults.
+/// Parameters of an analysis to override. They override the values of `preset` (`papers`), or the defaults if
+/// there is no preset.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
@@ -45,34 +50,47 @@ pub(super) struct AnalysisOverrides {
     params: Params,
 }
 
-/// The job, and the library that it will make.
+/// The queued job, and the library that it makes.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct AnalysisAccepted {
+    /// Job that measures the footage.
     #[schema(value_type = uuid::Uuid)]
     job_id: JobId,
+    /// Library that the job makes. It exists once the job is done.
     #[schema(value_type = uuid::Uuid)]
     library_id: LibraryId,
-    /// The footage: of a film that came with the request, its new id or that of the same bytes before.
+    /// Measured footage. A video that came with the request has a new id, or the id of footage with the same
+    /// bytes that is stored already.
     #[schema(value_type = uuid::Uuid)]
     footage_id: FootageId,
 }
 
-/// The film to measure and how, in one form.
+/// Form with a video to measure.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
     reason = "it only describes the form in the OpenAPI document"
 )]
 pub(super) struct AnalysisForm {
+    /// Video, zip of numbered pictures, or TIFF of several pages.
     #[schema(value_type = String, format = Binary)]
     video: Vec<u8>,
+    /// Picture of the scene without the animal, of the same width and height as the video.
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
-    /// JSON.
+    /// Parameters to override, as JSON.
     params: Option<AnalysisOverrides>,
 }
 
-/// Measure the animal of a footage, or of a film that comes with the request: as the raw body, or as a form.
+/// Start an analysis: footage to library.
+///
+/// Queues a job that measures the animal. The body is JSON with the id of stored footage, a form with a
+/// video, or a raw video. A raw video is measured with the default parameters.
+///
+/// The response is 202. `Location` is the address of the job, and `Link` that of the future library. With
+/// `Prefer: wait=N`, a job that ends in time gives 201. Unknown footage and wrong parameters fail with
+/// `invalid_params`. If too many jobs are queued or running, the call fails with `quota_exceeded` or
+/// `queue_full`.
 #[utoipa::path(post, path = "/v1/analyses", params(Naming),
     request_body(content((AnalysisRequest = "application/json"), ([u8] = "application/octet-stream"),
         (AnalysisForm = "multipart/form-data"))), responses(
@@ -105,6 +123,7 @@ pub(super) async fn create_analysis(
     measure(&state, &caller, footage_id, params).await
 }
 
+/// Queues the analysis and returns 202.
 async fn measure(
     state: &AppState,
     caller: &Caller,

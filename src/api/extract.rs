@@ -1,4 +1,4 @@
-//! What handlers take from a request, parsed at the door: every failure is a problem with a code.
+//! Extractors: the parts of a request that handlers take. Every failure is a problem with a code.
 
 use std::convert::Infallible;
 
@@ -12,7 +12,7 @@ use uuid::Uuid;
 use super::Problem;
 use crate::code::Code;
 
-/// An id in the path; what is no id names nothing.
+/// Id in the path. A malformed id fails with `not_found`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Id(pub Uuid);
 
@@ -26,7 +26,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Id {
     }
 }
 
-/// An id and a file's name in the path.
+/// Id and file name in the path.
 #[derive(Clone, Debug)]
 pub(super) struct FileOf(pub Uuid, pub String);
 
@@ -40,7 +40,7 @@ impl<S: Send + Sync> FromRequestParts<S> for FileOf {
     }
 }
 
-/// A JSON body.
+/// JSON body. Fails with `malformed_request`, `invalid_params`, `unsupported_media_type` or `too_large`.
 #[derive(Clone, Debug)]
 pub(super) struct Json<T>(pub T);
 
@@ -55,7 +55,7 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
     }
 }
 
-/// Method and headers, for conditional requests.
+/// Method and headers of a conditional or range request.
 #[derive(Clone, Debug)]
 pub(super) struct Conditions {
     /// GET or HEAD.

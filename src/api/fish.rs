@@ -1,4 +1,5 @@
-//! Virtual fish: driven by a library's poses, as a job.
+//! Virtual fish: start the job that makes one from the poses of a library, and read or delete it and its
+//! files.
 
 use axum::body::Body;
 use axum::extract::State;
@@ -27,9 +28,12 @@ const FILES: Files = &[
     ("video.mp4", "video/mp4"),
 ];
 
-/// What to make it of, and how: overrides of the defaults, or of `preset` (`papers`).
+/// Library and parameters of a virtual fish.
+///
+/// The parameters override the values of `preset` (`papers`), or the defaults if there is no preset.
 #[derive(Debug, Deserialize, ToSchema)]
 pub(super) struct FishRequest {
+    /// Library whose poses move the fish.
     #[schema(value_type = Uuid)]
     library_id: LibraryId,
     #[serde(flatten)]
@@ -37,33 +41,47 @@ pub(super) struct FishRequest {
     params: Map<String, Value>,
 }
 
-/// The job, and the virtual fish that it will make.
+/// The queued job, and the virtual fish that it makes.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct FishAccepted {
+    /// Job that makes the virtual fish.
     #[schema(value_type = Uuid)]
     job_id: JobId,
+    /// Virtual fish that the job makes. It exists once the job is done.
     #[schema(value_type = Uuid)]
     fish_id: FishId,
 }
 
-/// One virtual fish.
+/// Summary of a virtual fish.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct FishView {
     id: Uuid,
+    /// Job that made the virtual fish.
     job_id: Uuid,
+    /// Library whose poses move the fish.
     library_id: Uuid,
-    /// Whether it came of the sample that the program made itself.
+    /// Whether it was made from the sample of an empty data folder.
     sample: bool,
+    /// Size of all files, bytes.
     size_bytes: i64,
+    /// Time of creation, RFC 3339 in UTC.
     created_at: String,
-    /// The parameters it was made with.
+    /// All parameters of the virtual fish, including defaults.
     #[schema(value_type = Params)]
     params: Value,
     #[serde(flatten)]
     summary: Summary,
 }
 
-/// Make a virtual fish of a library, or of one that is still being made.
+/// Start making a virtual fish.
+///
+/// Queues a job that renders a fish moved by the poses of a library. If the analysis of the library is still
+/// queued or running, the job waits for it.
+///
+/// The response is 202. `Location` is the address of the job, and `Link` that of the future virtual fish.
+/// With `Prefer: wait=N`, a job that ends in time gives 201. An unknown library and wrong parameters fail
+/// with `invalid_params`. If too many jobs are queued or running, the call fails with `quota_exceeded` or
+/// `queue_full`.
 #[utoipa::path(post, path = "/v1/fish", request_body = FishRequest, responses(
     (status = 202, body = FishAccepted, headers(("location" = String), ("link" = String))),
     (status = 201, body = FishAccepted, headers(("location" = String)), description = "done within the wait asked for"),
@@ -84,7 +102,7 @@ pub(super) async fn create_fish(
     Ok(accepted(job_id, &result, FishAccepted { job_id, fish_id }))
 }
 
-/// Every virtual fish, newest first.
+/// List all virtual fish, newest first.
 #[utoipa::path(get, path = "/v1/fish", params(Paging), responses(
     (status = 200, body = Page<FishView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -101,7 +119,9 @@ pub(super) async fn list_fish(
     Page::of(rows, paging, |row| row.id, FishView::of)
 }
 
-/// One virtual fish at a glance.
+/// Get one virtual fish: a summary and its parameters.
+///
+/// Fails with `not_ready` if its job is not done. The message names the job and its state.
 #[utoipa::path(get, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = FishView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -114,7 +134,7 @@ pub(super) async fn get_fish(
     Ok(axum::Json(FishView::of(find(&state, &caller, id).await?)?))
 }
 
-/// Delete a virtual fish.
+/// Delete a virtual fish and its job.
 #[utoipa::path(delete, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "it is gone"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -128,7 +148,12 @@ pub(super) async fn delete_fish(
     gone(state.context.store.delete_film(id).await?)
 }
 
-/// A file of a virtual fish: model.glb, video.mp4.
+/// Download a file of a virtual fish.
+///
+/// - `video.mp4`: the fish in front of the background of the footage
+/// - `model.glb`: an animated 3-D model (binary glTF)
+///
+/// Range and conditional requests are supported.
 #[utoipa::path(get, path = "/v1/fish/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -157,6 +182,8 @@ pub(super) async fn get_fish_file(
     download.answer(&state.context.store, &conditions).await
 }
 
+/// Returns a virtual fish. Fails with `not_ready` if its job is not done, and with `not_found` if there is
+/// none.
 async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Film, Problem> {
     match state.context.store.fish(id, &caller.reach).await? {
         Some(fish) => Ok(fish),

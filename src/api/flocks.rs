@@ -1,4 +1,4 @@
-//! Flocks: made of a library, as a job.
+//! Flocks: start the job that makes a flock, preview a flock, and read or delete flocks and their files.
 
 use axum::body::Body;
 use axum::extract::{FromRequest, Request, State};
@@ -44,12 +44,16 @@ pub(super) const FILES: Files = &[
     ("video.mp4", "video/mp4"),
 ];
 
-/// The most that individuals times frames of a preview may be: what takes a second or so.
+/// Largest product of individuals and frames of a preview: about a second of computing.
 const MOST_PREVIEWED: u64 = 200_000;
 
-/// What to make it of, and how: overrides of the defaults, or of `preset` (`papers`).
+/// Library and parameters of a flock.
+///
+/// The parameters override the values of `preset`, or the defaults if there is no preset. The presets are
+/// `school`, `swarm`, `mill`, `scatter`, `zonal` and `papers`.
 #[derive(Debug, Deserialize, ToSchema)]
 pub(super) struct FlockRequest {
+    /// Library to make the flock from.
     #[schema(value_type = Uuid)]
     library_id: LibraryId,
     #[serde(flatten)]
@@ -57,36 +61,43 @@ pub(super) struct FlockRequest {
     params: Map<String, Value>,
 }
 
-/// The job, and the flock that it will make.
+/// The queued job, and the flock that it makes.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct FlockAccepted {
+    /// Job that makes the flock.
     #[schema(value_type = Uuid)]
     job_id: JobId,
+    /// Flock that the job makes. It exists once the job is done.
     #[schema(value_type = Uuid)]
     flock_id: FlockId,
-    /// The library that it is made of, there or still to be made.
+    /// Library that the flock is made from. If it does not exist yet, the job waits for it.
     #[schema(value_type = Uuid)]
     library_id: LibraryId,
 }
 
-/// A film, and the flock to make of it, in one form.
+/// Form with a video to make a flock from.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
     reason = "it only describes the form in the OpenAPI document"
 )]
 pub(super) struct FlockForm {
+    /// Video, zip of numbered pictures, or TIFF of several pages.
     #[schema(value_type = String, format = Binary)]
     footage: Vec<u8>,
+    /// Picture of the scene without the animal, of the same width and height as the video.
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
-    /// How to make the flock, JSON.
+    /// Parameters of the flock to override, as JSON.
     params: Option<FlockOverrides>,
-    /// How to measure the film, JSON.
+    /// Parameters of the analysis to override, as JSON.
     analysis: Option<AnalysisOverrides>,
 }
 
-/// Parameters to override, those of `preset` or the defaults.
+/// Parameters of a flock to override.
+///
+/// They override the values of `preset`, or the defaults if there is no preset. The presets are `school`,
+/// `swarm`, `mill`, `scatter`, `zonal` and `papers`.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
@@ -98,24 +109,37 @@ pub(super) struct FlockOverrides {
     params: Params,
 }
 
-/// One flock.
+/// Summary of a flock.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct FlockView {
     id: Uuid,
+    /// Job that made the flock.
     job_id: Uuid,
+    /// Library that the flock was made from.
     library_id: Uuid,
-    /// Whether it came of the sample that the program made itself.
+    /// Whether it was made from the sample of an empty data folder.
     sample: bool,
+    /// Size of all files, bytes.
     size_bytes: i64,
+    /// Time of creation, RFC 3339 in UTC.
     created_at: String,
-    /// The parameters it was made with.
+    /// All parameters of the flock, including defaults.
     #[schema(value_type = Params)]
     params: Value,
     #[serde(flatten)]
     summary: Summary,
 }
 
-/// Make a flock of a library, or of one that is still being made; or, as a form, of a film.
+/// Start making a flock.
+///
+/// Queues a job that simulates, plans and films a flock. The body is JSON with the id of a library. If its
+/// analysis is still queued or running, the flock's job waits for it. The body may also be a form with a
+/// video: the video is stored and analyzed first.
+///
+/// The response is 202. `Location` is the address of the job, and `Link` that of the future flock. With
+/// `Prefer: wait=N`, a job that ends in time gives 201. An unknown library and wrong parameters fail with
+/// `invalid_params`. If too many jobs are queued or running, the call fails with `quota_exceeded` or
+/// `queue_full`.
 #[utoipa::path(post, path = "/v1/flocks",
     request_body(content((FlockRequest = "application/json"), (FlockForm = "multipart/form-data"))), responses(
     (status = 202, body = FlockAccepted, headers(("location" = String), ("link" = String))),
@@ -138,7 +162,7 @@ pub(super) async fn create_flock(
     make(&state, &caller, (library_id, after_job), params).await
 }
 
-/// The whole way in one call: the film is stored, its analysis queued, and the flock after it.
+/// Stores a video, queues its analysis, and queues the flock after that.
 async fn create_flock_of_film(
     state: &AppState,
     caller: &Caller,
@@ -158,7 +182,7 @@ async fn create_flock_of_film(
     make(state, caller, (library_id, Some(job_id)), params).await
 }
 
-/// A flock of a library, after the job that makes it.
+/// Queues a flock and returns 202. If `after_job` is given, the flock waits for that job.
 async fn make(
     state: &AppState,
     caller: &Caller,
@@ -179,8 +203,14 @@ async fn make(
     ))
 }
 
-/// A flock simulated and planned at once, without a film: what `flock.json` will say of it. Individuals times frames
-/// are at most 200,000.
+/// Preview a flock without a video.
+///
+/// Simulates and plans a flock while the client waits. The response is its `flock.json`. Nothing is stored.
+/// The library must exist.
+///
+/// The number of individuals (20 if `count` is null) times `frames` is at most 200,000, else the call fails
+/// with `invalid_params`. Previews run one at a time. A preview that cannot start within 20 seconds fails
+/// with `busy`.
 #[utoipa::path(post, path = "/v1/flocks/preview", request_body = FlockRequest, responses(
     (status = 200, content_type = "application/json", body = Value),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -207,7 +237,7 @@ pub(super) async fn preview_flock(
     Ok((json, flock).into_response())
 }
 
-/// Every flock, newest first.
+/// List all flocks, newest first.
 #[utoipa::path(get, path = "/v1/flocks", params(Paging), responses(
     (status = 200, body = Page<FlockView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -224,7 +254,9 @@ pub(super) async fn list_flocks(
     Page::of(rows, paging, |row| row.id, FlockView::of)
 }
 
-/// One flock at a glance.
+/// Get one flock: a summary, its parameters and advice.
+///
+/// Fails with `not_ready` if its job is not done. The message names the job and its state.
 #[utoipa::path(get, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = FlockView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -237,7 +269,7 @@ pub(super) async fn get_flock(
     Ok(axum::Json(FlockView::of(find(&state, &caller, id).await?)?))
 }
 
-/// Delete a flock.
+/// Delete a flock and its job.
 #[utoipa::path(delete, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "it is gone"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -251,9 +283,17 @@ pub(super) async fn delete_flock(
     gone(state.context.store.delete_film(id).await?)
 }
 
-/// A file of a flock: flock.json, plan.svg, video.mp4; tracks.csv and ground-truth.zip unless declined; and,
-/// where `render` asks for them, poster.png, video.webm, video.mov, frames.zip, preview.gif, preview.webp,
-/// overlay.mp4.
+/// Download a file of a flock.
+///
+/// - `video.mp4`: the film
+/// - `flock.json`: all data of the flock
+/// - `plan.svg`: chart of the headings of boids and individuals
+/// - `tracks.csv`, `ground-truth.zip`: the ground truth, unless `render.ground_truth` is false
+/// - `video.webm`, `video.mov`, `frames.zip`, `preview.gif`, `preview.webp`, `poster.png`: if
+///   `render.formats` names them, by default only `poster.png`
+/// - `overlay.mp4`: the film with the position and heading of every boid, if `render.overlay` is true
+///
+/// Range and conditional requests are supported. A file that was not made fails with `not_found`.
 #[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -269,7 +309,7 @@ pub(super) async fn get_flock_file(
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
     let flock = find(&state, &caller, id).await?;
-    // What a browser cannot show is saved.
+    // A browser cannot show these, so it saves them.
     let kind = match media_type {
         "application/zip" | "video/quicktime" => "attachment",
         _ => "inline",
@@ -283,7 +323,7 @@ pub(super) async fn get_flock_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-/// The name under which a file is saved.
+/// Returns the name under which a browser saves the file.
 fn label_of(name: &str, id: Uuid) -> String {
     match name {
         "flock.json" => format!("flock-{id}.json"),
@@ -294,6 +334,7 @@ fn label_of(name: &str, id: Uuid) -> String {
     }
 }
 
+/// Returns a flock. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
 pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Film, Problem> {
     match state.context.store.flock(id, &caller.reach).await? {
         Some(flock) => Ok(flock),

@@ -1,5 +1,7 @@
-//! Footage: uploaded videos (RELIABILITY.md, store rules: upload; S4, S5). What is refused leaves
-//! nothing behind; the original is given back only as a file to keep.
+//! Footage: uploaded videos (docs/explanation/promises.md, "Names are labels" and "Bad input").
+//!
+//! A refused upload leaves no files. The original video is sent only as an attachment, so a browser never
+//! interprets it (docs/explanation/promises.md, "Nothing served runs as a page").
 
 use axum::body::Body;
 use axum::extract::{Query, Request, State};
@@ -27,31 +29,33 @@ use crate::store::footage::{Added, Footage, VIDEO};
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub(super) struct FootageView {
     id: Uuid,
-    /// What the sender called it.
+    /// Name given by the sender; may be empty.
     name: String,
-    /// SHA-256 of the video, hexadecimal.
+    /// SHA-256 of the video file, hexadecimal.
     sha256: String,
+    /// Size of the video, the background and the masks together, bytes.
     size_bytes: i64,
-    /// Width and height, square pixels.
+    /// Width and height of the picture, square pixels.
     image_size_px: [i64; 2],
-    /// Frames a second.
+    /// Frame rate, frames per second.
     fps: f64,
-    /// How many frames there seem to be.
+    /// Estimated number of frames. An analysis counts them exactly.
     n_frames_hint: i64,
-    /// Whether a picture of the empty scene came with it.
+    /// Whether a picture of the scene without the animal was uploaded with it.
     has_background: bool,
-    /// Whether masks came with it that say which of it is the animal.
+    /// Whether masks of the animal were uploaded with it.
     has_masks: bool,
-    /// Made by the program itself.
+    /// Whether the program itself made this footage, as the sample of an empty data folder.
     sample: bool,
+    /// Time of the upload, RFC 3339 in UTC.
     created_at: String,
 }
 
-/// What is said of a raw upload.
+/// Query parameters of an upload.
 #[derive(Debug, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 pub(super) struct Naming {
-    /// What to call it: a label for people.
+    /// Name of the footage, for people. Default: the file name in the form; empty for a raw body.
     pub(super) name: Option<String>,
 }
 
@@ -62,18 +66,27 @@ pub(super) struct Naming {
     reason = "it only describes the form in the OpenAPI document"
 )]
 pub(super) struct FootageForm {
+    /// Video, zip of numbered pictures, or TIFF of several pages.
     #[schema(value_type = String, format = Binary)]
     video: Vec<u8>,
+    /// Picture of the scene without the animal, of the same width and height as the video.
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
-    /// A mask for each frame: a gray video, a zip of pictures or a TIFF, white where the animal is; soft values count in
-    /// part.
+    /// One mask per frame, as a gray video, a zip of pictures or a TIFF. White is the animal, black the rest.
+    /// Gray is the share of the pixel that the animal covers.
     #[schema(value_type = Option<String>, format = Binary)]
     masks: Option<Vec<u8>>,
 }
 
-/// Upload a video, a zip of numbered pictures or a TIFF of several pages: as the raw body, or as a form with `video`
-/// and, if there are such, `background` and `masks`. The alpha channel of a footage is taken for its masks.
+/// Upload footage.
+///
+/// The body is the file itself, or a form with `video` and optional `background` and `masks`. The file is a
+/// video, a zip of numbered pictures, or a TIFF of several pages. Without masks, its alpha channel serves as
+/// masks.
+///
+/// If the same files are stored already, the response is 200 with the existing footage. A file that cannot be
+/// used is refused with a code such as `not_a_video`, `too_long` or `masks_differ`. Large files on slow
+/// networks are better sent with `/v1/uploads`.
 #[utoipa::path(post, path = "/v1/footage", params(Naming),
     request_body(content(([u8] = "application/octet-stream"), (FootageForm = "multipart/form-data"))),
     responses(
@@ -97,14 +110,15 @@ pub(super) async fn create_footage(
     Ok((status, location, axum::Json(FootageView::of(footage))).into_response())
 }
 
-/// In a task of its own, so that a sender who hangs up now leaves no half of it behind.
+/// Checks an upload and stores it as footage. It runs in its own task, so a client that disconnects cannot
+/// interrupt it halfway.
 pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, Problem> {
     let context = state.context.clone();
     let admitted = tokio::spawn(async move { admit::admit(&context, arrival).await });
     Ok(admitted.await.unwrap_or(Err(Error::Panicked))?)
 }
 
-/// Every footage, newest first.
+/// List all footage, newest first.
 #[utoipa::path(get, path = "/v1/footage", params(Paging), responses(
     (status = 200, body = Page<FootageView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -121,7 +135,7 @@ pub(super) async fn list_footage(
     Page::of(rows, paging, |row| row.id, |row| Ok(FootageView::of(row)))
 }
 
-/// One footage.
+/// Get one footage.
 #[utoipa::path(get, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = FootageView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -136,7 +150,9 @@ pub(super) async fn get_footage(
     )))
 }
 
-/// Delete a footage with all that came of it: libraries, flocks, virtual fish and jobs.
+/// Delete footage and everything made from it.
+///
+/// Its libraries, flocks, virtual fish and jobs are deleted too. Running jobs are stopped.
 #[utoipa::path(delete, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "it is gone"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -150,7 +166,9 @@ pub(super) async fn delete_footage(
     gone(state.context.store.delete_footage(id).await?)
 }
 
-/// The video as it was uploaded, to keep: never shown in place.
+/// Download the uploaded video.
+///
+/// It is always sent as an attachment. Range and conditional requests are supported.
 #[utoipa::path(get, path = "/v1/footage/{id}/file", params(("id" = Uuid, Path)), responses(
     (status = 200, content_type = "application/octet-stream"),
     (status = 206, content_type = "application/octet-stream"),
@@ -177,6 +195,7 @@ pub(super) async fn get_footage_file(
     download.answer(&state.context.store, &conditions).await
 }
 
+/// Returns footage. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
 pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Footage, Problem> {
     match state.context.store.footage(id, &caller.reach).await? {
         Some(footage) => Ok(footage),

@@ -1,8 +1,11 @@
-//! Idempotency-Key on every POST that makes something (RELIABILITY.md, store and queue rules): the same
-//! key with the same body gets the same answer again, with another body 422, and 409 while the first
-//! still runs. Kept for a day, for each owner and route by itself; a 5xx is never kept.
+//! `Idempotency-Key` on every POST that creates something (docs/explanation/promises.md).
 //!
-//! A JSON body is read and hashed before the request runs; others are hashed on their way to the disk.
+//! The same key with the same body returns the stored response. Another body gets 422, and a key whose first
+//! request still runs gets 409. Keys are kept for a day, separately for each owner and route. Server errors
+//! and other transient errors are not stored. A request that is repeated after a crash runs again with the
+//! same ids (`jobs::allotted`), so it creates nothing twice.
+//!
+//! A JSON body is read and hashed before the request runs. Other bodies are hashed while they are received.
 
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -27,7 +30,7 @@ use crate::jobs::{self, allotted};
 use crate::store::Store;
 use crate::store::idempotency::{Answer, Begun, LEASE_MS, Scope};
 
-/// The routes that make something.
+/// Routes that create something and accept a key.
 pub(super) const ROUTES: [&str; 5] = [
     "/v1/footage",
     "/v1/analyses",
@@ -35,15 +38,16 @@ pub(super) const ROUTES: [&str; 5] = [
     "/v1/fish",
     "/v1/uploads",
 ];
-/// The header that carries the key.
+/// Name of the header with the key.
 pub(super) const KEY: &str = "idempotency-key";
-/// A key is renewed so often while its request is under way.
+/// Interval at which a key is renewed while its request runs: a third of its lease.
 const RENEWED: Duration = Duration::from_millis(LEASE_MS as u64 / 3);
 const REPLAYED: HeaderName = HeaderName::from_static("idempotent-replayed");
+/// Longest key, bytes. Free choice.
 const MAX_KEY_BYTES: usize = 255;
-/// What may come after the end of a form.
+/// Most bytes that a handler may leave unread, such as those after the end of a form. Free choice.
 const MAX_EPILOGUE_BYTES: usize = 64 << 10;
-/// The headers that belong to an answer; all others are set anew.
+/// Headers that are stored with a response. All others are set again when it is replayed.
 const KEPT: [HeaderName; 7] = [
     header::CONTENT_TYPE,
     header::LOCATION,
@@ -53,10 +57,10 @@ const KEPT: [HeaderName; 7] = [
     HeaderName::from_static("upload-length"),
     HeaderName::from_static("upload-expires"),
 ];
-/// The headers that say what is asked for, as the body does elsewhere.
+/// Headers that describe what to create. They are hashed with the body.
 const ASKED: [&str; 2] = ["upload-length", "upload-metadata"];
 
-/// Answers a request with a key that was answered before; runs and keeps any other.
+/// Middleware: replays the stored response to a key, or runs the request and stores its response.
 pub(super) async fn run_once(
     State(state): State<AppState>,
     request: Request,
@@ -113,8 +117,8 @@ async fn run_keyed(
     keep(held, answer, &tally).await
 }
 
-/// Runs a request, and says `every` so often that it is under way still, where others would take its silence
-/// for its process's death.
+/// Runs a request and renews its key at the interval `every`. Otherwise other processes that share the store
+/// would assume that this one died. A process that has the store to itself renews nothing.
 async fn renewing<Run: Future>(
     context: &jobs::Context,
     scope: &Scope,
@@ -140,7 +144,7 @@ async fn renewing<Run: Future>(
     }
 }
 
-/// The kept answer, where the body is the one that it answers.
+/// Returns the stored response. Fails with `idempotency_key_reused` if the body differs from the first one.
 async fn replay(answer: Answer, tally: &Tally, max_bytes: u64) -> Result<Response, Problem> {
     let sha256 = tally.rest(max_bytes).await.ok_or(Code::BodyCutOff)?;
     if sha256 != answer.body_sha256 {
@@ -159,7 +163,8 @@ async fn replay(answer: Answer, tally: &Tally, max_bytes: u64) -> Result<Respons
     Ok(response)
 }
 
-/// Keeps the answer if it is one to keep and the body was read to its end.
+/// Stores the response, unless it is transient or the body was not read to its end. Returns the response.
+/// Fails if storing it fails.
 async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Response, Problem> {
     if !is_kept(answer.status()) || answer.extensions().get::<MayPass>().is_some() {
         return Ok(answer);
@@ -183,7 +188,8 @@ async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Respons
         headers: serde_json::json!(headers).to_string(),
         answer: body.to_vec(),
     };
-    // Held until the answer is noted: a sender who hangs up meanwhile, or a database that fails, gives it back.
+    // The key stays held until the response is stored. If the client disconnects or the database fails
+    // before, dropping `held` releases the key.
     if let Some((store, scope)) = &held.0 {
         store.finish_key(scope, &kept).await?;
     }
@@ -191,7 +197,7 @@ async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Respons
     Ok(Response::from_parts(parts, Body::from(body)))
 }
 
-/// Successes and the sender's own faults; not what another moment would answer otherwise.
+/// Returns whether a response with this status is stored: successes and permanent client errors.
 fn is_kept(status: StatusCode) -> bool {
     let passes = [
         StatusCode::REQUEST_TIMEOUT,
@@ -201,8 +207,8 @@ fn is_kept(status: StatusCode) -> bool {
     status.as_u16() < 500 && !passes.contains(&status)
 }
 
-/// A key whose request is under way; given back when it ends without an answer to keep, also where the
-/// sender hung up.
+/// Key of a running request. Dropping it releases the key if no response was stored, for example because the
+/// client disconnected.
 struct Held(Option<(Store, Scope)>);
 
 impl Drop for Held {
@@ -218,7 +224,7 @@ impl Drop for Held {
     }
 }
 
-/// A body that is hashed while somebody else reads it.
+/// A body that is hashed while it is read. Clones share the same stream.
 #[derive(Clone)]
 struct Tally(Arc<Mutex<Reading>>);
 
@@ -258,7 +264,8 @@ impl Tally {
         polled
     }
 
-    /// Reads what nobody read, at most `max_bytes`; the hash of the whole, if it came to its end.
+    /// Reads the rest of the body, at most `max_bytes`. Returns the hash of the whole request, or `None` if
+    /// the body is longer or cut off.
     async fn rest(&self, max_bytes: u64) -> Option<Vec<u8>> {
         let mut left = max_bytes;
         let mut stream = std::pin::pin!(poll_fn(|context| self.poll(context)));
@@ -304,7 +311,7 @@ mod tests {
             key: "k".into(),
         };
         store.begin_key(&scope, None, 0).await.unwrap();
-        // The one writer is busy.
+        // The only writer connection is busy.
         let mut busy = Box::pin(store.is_writable());
         assert!(futures_util::poll!(&mut busy).is_pending());
         let held = Held(Some((store.clone(), scope.clone())));

@@ -1,4 +1,4 @@
-//! Libraries: what was measured, with pictures.
+//! Libraries: the results of analyses, with their pictures and files.
 
 use axum::body::Body;
 use axum::extract::State;
@@ -38,29 +38,33 @@ const FILES: Files = &[
     ("mattes.zip", "application/zip"),
 ];
 
-/// The one file that is not kept.
+/// Name of the file that is not stored, but computed for each request.
 const NUMBERS: &str = "distance.npy";
 
-/// What one analysis yielded.
+/// Summary of a library, the result of one analysis.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct LibraryView {
     id: Uuid,
+    /// Job that made the library.
     job_id: Uuid,
+    /// Footage that was measured.
     footage_id: Uuid,
-    /// What the footage is called.
+    /// Name of the footage.
     name: String,
-    /// Whether it came of the sample that the program made itself.
+    /// Whether it was made from the sample of an empty data folder.
     sample: bool,
+    /// Size of all files, bytes.
     size_bytes: i64,
+    /// Time of creation, RFC 3339 in UTC.
     created_at: String,
-    /// The parameters it was made with.
+    /// All parameters of the analysis, including defaults.
     #[schema(value_type = crate::analysis::Params)]
     params: Value,
     #[serde(flatten)]
     summary: Summary,
 }
 
-/// Every library, newest first.
+/// List all libraries, newest first.
 #[utoipa::path(get, path = "/v1/libraries", params(Paging), responses(
     (status = 200, body = Page<LibraryView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -77,7 +81,9 @@ pub(super) async fn list_libraries(
     Page::of(rows, paging, |row| row.id, LibraryView::of)
 }
 
-/// One library at a glance.
+/// Get one library: a summary, its parameters and advice.
+///
+/// Fails with `not_ready` if its job is not done. The message names the job and its state.
 #[utoipa::path(get, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = LibraryView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -92,7 +98,9 @@ pub(super) async fn get_library(
     )?))
 }
 
-/// Delete a library with all that was made of it.
+/// Delete a library and everything made from it.
+///
+/// Its flocks, virtual fish and jobs are deleted too. Running jobs are stopped.
 #[utoipa::path(delete, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "it is gone"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -106,10 +114,21 @@ pub(super) async fn delete_library(
     gone(state.context.store.delete_library(id).await?)
 }
 
-/// A file of a library: library.json, poses.json, poses.csv, background.png, occluders.png, distance.png,
-/// candidates.png, headings.svg, trajectory.svg, confidence.svg, transitions.svg, overlay.mp4, sprites.zip, mattes.zip; and
-/// distance.npy, which is computed anew each time and comes whole. occluders.png is there where something is known to stand
-/// before the animal (`occluders` in library.json).
+/// Download a file of a library.
+///
+/// - `library.json`, `poses.json`, `poses.csv`: the measured data
+/// - `background.png`: the scene without the animal
+/// - `occluders.png`: objects in front of the animal, only if any are known (`occluders` in library.json)
+/// - `distance.png`, `candidates.png`: the distances between clips, and the pairs of similar clips
+/// - `distance.npy`: the distances as a NumPy array, for footage of at most 8192 frames
+/// - `headings.svg`, `trajectory.svg`, `confidence.svg`, `transitions.svg`: charts
+/// - `overlay.mp4`: the footage with its poses drawn over it
+/// - `sprites.zip`: the sprites, one PNG per frame
+/// - `mattes.zip`: the animal cut out of every frame as filmed, one PNG per frame
+///
+/// Range and conditional requests are supported. Only `distance.npy` is always sent whole: it is computed for
+/// each request. It fails with `too_many_frames` for longer footage, and with `busy` if another computation
+/// does not end within 20 seconds.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -138,7 +157,7 @@ pub(super) async fn get_library_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-/// The distances as numbers. They are made of files that never change: whoever has them keeps them.
+/// Returns distance.npy. The library's files never change, so clients may cache the result forever.
 async fn numbers(
     state: &AppState,
     library: &Library,
@@ -168,6 +187,7 @@ async fn numbers(
     )
 }
 
+/// Returns a library. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
 pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Library, Problem> {
     match state.context.store.library(id, &caller.reach).await? {
         Some(library) => Ok(library),

@@ -1,5 +1,8 @@
-//! Links to a file of a flock that need no token and end by themselves (RELIABILITY.md, S6): to show a film to
-//! somebody else, or to open it in another program. How they are signed and checked is `access/link`.
+//! Signed links to a file of a flock. They need no token and expire
+//! (docs/explanation/promises.md, "Owners are isolated").
+//!
+//! A link shows a film to another person, or opens it in another program. `access/link` signs and checks
+//! links.
 
 use std::ops::RangeInclusive;
 
@@ -20,28 +23,29 @@ use super::timestamp::rfc3339;
 use crate::code::Code;
 use crate::jobs::clock::now_ms;
 
-/// How long a link may hold, seconds.
+/// Range of the lifetime of a link, seconds: a minute to a week. Free choice.
 const LINK_S: RangeInclusive<i64> = 60..=604_800;
 
-/// To which file, and for how long.
+/// File and lifetime of a link.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LinkRequest {
-    /// One of the flock's files.
+    /// Name of one of the flock's files.
     #[serde(default = "video")]
     #[schema(default = "video.mp4")]
     file: String,
-    /// Seconds, 60..=604800 (a week).
+    /// Lifetime of the link, seconds, 60..=604800 (a week).
     #[serde(default = "an_hour")]
     #[schema(minimum = 60, maximum = 604_800, default = 3600)]
     expires_s: i64,
 }
 
-/// A link that needs no token.
+/// A signed link.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct LinkView {
-    /// The path with its signature, on this host.
+    /// Path with signature, relative to this host.
     url: String,
+    /// Time at which the link expires, RFC 3339 in UTC.
     expires_at: String,
 }
 
@@ -53,7 +57,10 @@ fn an_hour() -> i64 {
     3600
 }
 
-/// Make a link to a file of a flock that needs no token and ends by itself.
+/// Create a link to a file of a flock.
+///
+/// The link needs no token: until it expires, everyone who has it can read this one file. Fails with
+/// `not_found` for an unknown flock or file name, and with `invalid_params` for a lifetime out of range.
 #[utoipa::path(post, path = "/v1/flocks/{id}/links", params(("id" = Uuid, Path)),
     request_body = LinkRequest, responses(
     (status = 201, body = LinkView),

@@ -1,16 +1,18 @@
-//! HTTP: the table of routes and what they share (DESIGN.md, REST API; RELIABILITY.md, S4 to S7).
+//! The HTTP API: the table of routes, the middleware around them, and the state that handlers share.
 //!
-//! Handlers are thin: extract, one call, answer. What an error means to HTTP is `problem`'s alone.
+//! A handler parses the request, makes one call to `store` or `jobs`, and responds. Only `problem` maps error
+//! codes to HTTP statuses. The OpenAPI document is generated from the handlers
+//! (docs/explanation/promises.md, "Contract").
 
-mod access; // who may ask, and the headers of every answer
-mod idempotency; // same key and body, same answer
+mod access; // authentication, rate limits, response headers
+mod idempotency; // same key and body, same response
 mod problem;
 pub mod server; // the accept loop
 
 mod download;
-mod extract; // ids, JSON, conditions
+mod extract; // ids, JSON bodies, conditional headers
 mod paging;
-mod receive; // bodies to disk
+mod receive; // request bodies to disk
 mod timestamp;
 
 mod analyses;
@@ -20,8 +22,8 @@ mod footage;
 mod jobs;
 mod libraries;
 mod links;
-mod page; // the page, the pages about the API
-mod seen; // health, metrics, ids of requests
+mod page; // the web page, /docs, /openapi.json
+mod seen; // health, metrics, request ids
 mod uploads;
 
 use std::ops::Deref;
@@ -55,28 +57,29 @@ use crate::jobs::supervisor::recover;
 use crate::store::Store;
 use crate::{media, store};
 
-/// The largest JSON body.
+/// Largest JSON body, bytes. Free choice.
 const MAX_JSON_BYTES: usize = 1 << 20;
-/// The longest wait for the next piece of a body.
+/// Longest wait for the next chunk of a body (docs/explanation/promises.md, "Slow clients"). Free choice.
 const BODY_PIECE: Duration = Duration::from_secs(30);
 
-/// What handlers share. Every layer has one of its own for every request, so that cloning it must cost nothing.
+/// State shared by all handlers. Every layer clones it for every request, so it is only a reference-counted
+/// pointer.
 #[derive(Clone)]
 pub struct AppState(Arc<Shared>);
 
-/// What is behind an [`AppState`].
+/// Contents of an [`AppState`].
 pub struct Shared {
-    /// The settings.
+    /// Settings of the process.
     pub config: Config,
-    /// The store, and the way to wake the workers.
+    /// Store, limits of the queue, and the signal that wakes the workers.
     pub context: Context,
-    /// The media tool and the walls around it, or why there is none; asked for at the start.
+    /// Version and sandbox of the media tool, found at the start; or the reason why there is no usable tool.
     pub walls: Result<media::Walls, String>,
-    /// How often each owner may ask.
+    /// Rate limits of owners and addresses.
     rates: Rates,
-    /// What is counted of requests.
+    /// Counters of HTTP requests.
     requests: Requests,
-    /// What is told of everything.
+    /// All metrics of the service.
     metrics: Metrics,
 }
 
@@ -89,7 +92,8 @@ impl Deref for AppState {
 }
 
 impl AppState {
-    /// Opens the data folder, mends what a crash left, and looks for the media tool.
+    /// Opens the store, recovers from a crash, and searches for the media tool. Fails if the store cannot be
+    /// opened. A missing media tool is only logged.
     pub async fn open(config: Config) -> Result<AppState, store::Error> {
         let store = Store::open(config.storage.clone()).await?;
         let mut context = Context::new(store, config.crew.threads_per_worker());
@@ -115,7 +119,7 @@ impl AppState {
     }
 }
 
-/// The whole service over a state: the same for the program and for tests.
+/// Returns the router of the whole service. The program and the tests use the same one.
 pub fn router(state: AppState) -> Router {
     let (routes, mut document) = table().split_for_parts();
     openapi::add_headers(&mut document);
@@ -150,7 +154,7 @@ pub fn router(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(requests, observe))
 }
 
-/// Every route with its entry in the OpenAPI document.
+/// Returns all API routes with their entries in the OpenAPI document.
 fn table() -> OpenApiRouter<AppState> {
     OpenApiRouter::with_openapi(openapi::Document::openapi())
         .routes(routes!(footage::create_footage, footage::list_footage))
@@ -185,7 +189,8 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(metrics::get_metrics))
 }
 
-/// Nothing new is begun once the service stops; what is there can still be read.
+/// Middleware: refuses writes with `stopping` once the service stops. Reads are still served
+/// (docs/explanation/promises.md, "Graceful stop").
 async fn refuse_while_stopping(
     State(state): State<AppState>,
     request: Request,
@@ -202,7 +207,7 @@ fn panicked(_: Box<dyn std::any::Any + Send>) -> Response {
     Problem::from(Code::Internal).into_response()
 }
 
-/// JSON of a row of ours.
+/// Parses JSON from a stored row. Fails with `internal` and logs the cause.
 fn stored<T: serde::de::DeserializeOwned>(json: &str) -> Result<T, Problem> {
     serde_json::from_str(json).map_err(|error| {
         tracing::error!(%error, "a stored row cannot be read");

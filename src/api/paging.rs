@@ -1,4 +1,7 @@
-//! Lists, page by page: newest first, an opaque cursor to the next page (ECOSYSTEM.md 6).
+//! Paging of lists: newest first, with a cursor to the next page.
+//!
+//! The cursor is the id of the last item of a page. Items that are added or deleted meanwhile therefore
+//! do not shift the following pages.
 
 use axum::extract::{FromRequestParts, Query};
 use axum::http::request::Parts;
@@ -9,32 +12,34 @@ use uuid::Uuid;
 use super::Problem;
 use crate::code::Code;
 
+/// Largest page, items. Free choice.
 const MAX_LIMIT: i64 = 200;
 
-/// Which page is wanted.
+/// Query parameters of a list.
 #[derive(Clone, Copy, Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct Paging {
-    /// How many at most, 1..=200.
+    /// Maximum number of items, 1..=200.
     #[serde(default = "fifty")]
     #[param(minimum = 1, maximum = 200, default = 50)]
     pub limit: i64,
-    /// `next_cursor` of the page before.
+    /// `next_cursor` of the previous page. Without it the first page is returned.
     pub cursor: Option<Uuid>,
 }
 
-/// One page.
+/// One page of a list.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub(super) struct Page<T> {
-    /// The things, newest first.
+    /// Items, newest first.
     pub items: Vec<T>,
-    /// Where the next page begins; null at the end.
+    /// Cursor of the next page; null on the last page.
     pub next_cursor: Option<Uuid>,
 }
 
 impl<T> Page<T> {
-    /// A page of rows that were asked for with `limit` + 1.
+    /// Returns a page of `rows`, which must be queried with a limit of `limit` + 1: the extra row shows that
+    /// there is a next page.
     pub(super) fn of<Row>(
         mut rows: Vec<Row>,
         paging: Paging,

@@ -1,4 +1,4 @@
-//! Errors as application/problem+json (RFC 9457). The only place that knows which status a code has.
+//! Errors as `application/problem+json` (RFC 9457). Only this module maps codes to HTTP statuses.
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
@@ -9,42 +9,43 @@ use crate::code::Code;
 use crate::formats::params;
 use crate::{jobs, store};
 
-/// Seconds after which it makes sense to ask again.
+/// Value of `Retry-After`, seconds. Free choice.
 const RETRY_AFTER_S: u64 = 5;
 
-/// An answer that is not what was asked for.
+/// An error response.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// The stable reason.
+    /// Stable code of the reason.
     pub code: Code,
-    /// What happened this time, for people.
+    /// Description of this occurrence, for people.
     pub detail: String,
 }
 
-/// Marks an answer that the same request may not meet again.
+/// Marks a response with a transient error: retrying may succeed. It is an extension of the response that
+/// `idempotency` reads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MayPass;
 
-/// The body of every answer that is not a success.
+/// Body of every error response (RFC 9457).
 #[derive(Serialize, ToSchema)]
 pub(super) struct ProblemBody {
-    /// Where the code is explained.
+    /// Address of the explanation of the code.
     #[serde(rename = "type")]
     type_url: String,
-    /// What the code means.
+    /// Meaning of the code.
     title: &'static str,
-    /// The HTTP status.
+    /// HTTP status.
     status: u16,
-    /// What happened this time.
+    /// Description of this occurrence.
     detail: String,
-    /// The stable code.
+    /// Stable error code.
     code: &'static str,
-    /// What to do about it.
+    /// Advice on what to do.
     advice: &'static str,
 }
 
 impl Problem {
-    /// A problem with its own sentence.
+    /// Returns a problem with a description of its own.
     pub fn new(code: Code, detail: impl Into<String>) -> Problem {
         Problem {
             code,
@@ -52,8 +53,8 @@ impl Problem {
         }
     }
 
-    /// Whether the same request may be answered otherwise at another time: it failed inside, or on a machine that
-    /// had too much to do.
+    /// Returns whether retrying the same request may succeed: after a server error, or if a media tool hit
+    /// its limits, which may be due to a busy machine.
     pub(super) fn may_pass(&self) -> bool {
         let is_of_the_moment = matches!(
             self.code,
@@ -62,13 +63,13 @@ impl Problem {
         is_of_the_moment || !status_of(self.code).is_client_error()
     }
 
-    /// There is nothing of that id: the same answer as for an id of somebody else.
+    /// Returns `not_found`. An id of another owner gets the same response as an unknown id.
     pub fn not_found() -> Problem {
         Code::NotFound.into()
     }
 }
 
-/// The answer to a DELETE: 204, or that there was nothing of that id.
+/// Returns the response to a DELETE: 204, or `not_found` if nothing was deleted.
 pub(super) fn gone(was_there: bool) -> Result<StatusCode, Problem> {
     match was_there {
         true => Ok(StatusCode::NO_CONTENT),
@@ -100,7 +101,7 @@ impl From<params::Error> for Problem {
     }
 }
 
-/// An internal error is logged here and its cause stays here.
+/// Converts an error. The cause of an internal error or of a full disk is logged and not sent to the client.
 fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
     match code {
         Code::Internal | Code::DecoderCrashed => {
@@ -155,7 +156,7 @@ impl IntoResponse for Problem {
     }
 }
 
-/// The status of each code.
+/// Returns the HTTP status of a code.
 pub(super) fn status_of(code: Code) -> StatusCode {
     match code {
         Code::NotAVideo
@@ -200,7 +201,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::AddressTooLong => StatusCode::URI_TOO_LONG,
         Code::BodyTimeout => StatusCode::REQUEST_TIMEOUT,
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
-        // A status of tus that HTTP has no name for.
+        // Status 460 comes from the tus protocol and has no name in HTTP.
         Code::ChecksumMismatch => StatusCode::from_u16(460).unwrap_or(StatusCode::BAD_REQUEST),
         Code::TusVersionNotSupported => StatusCode::PRECONDITION_FAILED,
         Code::AlreadyFinished

@@ -1,4 +1,8 @@
-//! Bodies to disk: one way for raw bodies and multipart fields (RELIABILITY.md, store rules, H2).
+//! Request bodies to disk: the same code receives raw bodies and the fields of forms
+//! (docs/explanation/promises.md, "Size limits").
+//!
+//! Files go to a draft folder and are hashed and synced on the way. Every file has a size limit. The free
+//! space of the disk is checked before and during the transfer.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -21,12 +25,12 @@ use crate::store::intake::Intake;
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
-/// The longest wait for the next piece of a body.
+/// Longest wait for the next chunk of a body. Free choice.
 pub(super) const PIECE: Duration = Duration::from_secs(30);
-/// Bytes after which the room on the disk is looked at again: others fill it too, and a body need not say how long
-/// it is.
+/// Number of bytes after which the free space of the disk is checked again. Other requests fill the disk too,
+/// and a body need not declare its length. Free choice.
 pub(super) const CHECK_EVERY_BYTES: u64 = 8 << 20;
-/// Beginnings of the media types of bodies that are footage, or a form with one.
+/// Prefixes of the media types of bodies that are footage, or a form with footage.
 const FILM_TYPES: [&str; 5] = [
     "multipart/",
     "video/",
@@ -34,13 +38,14 @@ const FILM_TYPES: [&str; 5] = [
     "application/zip",
     "image/tiff",
 ];
-/// The largest given background.
+/// Largest background picture, bytes. Free choice.
 const MAX_BACKGROUND_BYTES: u64 = 64 << 20;
 
-/// What a form says besides its files: JSON objects by the names of their fields.
+/// JSON objects of a form, by field name. A form may hold them beside its files.
 pub(super) type Wishes = BTreeMap<&'static str, Map<String, Value>>;
 
-/// Receives a footage, raw or as a form with `video` and, if given, `background` and `masks`.
+/// Receives footage as a raw body, or as a form with `video` and optional `background` and `masks`. `name` is
+/// the label of the footage; if it is `None`, the file name in the form is used.
 pub(super) async fn receive(
     state: &AppState,
     request: Request,
@@ -51,7 +56,7 @@ pub(super) async fn receive(
     Ok(arrival)
 }
 
-/// The same, from a form that may hold wishes besides.
+/// Like [`receive`], but a form may also hold the JSON fields named in `wishes`.
 pub(super) async fn receive_with(
     state: &AppState,
     request: Request,
@@ -88,7 +93,7 @@ async fn receive_form(
     (name, owner): (Option<String>, Owner),
     wishes: &[&'static str],
 ) -> Result<(Arrival, Wishes), Problem> {
-    // Each field has a limit of its own.
+    // Every field has its own limit.
     DefaultBodyLimit::disable().apply(&mut request);
     let malformed = |sentence: &str| Problem::new(Code::MalformedRequest, sentence);
     let mut form = Multipart::from_request(request, state)
@@ -132,6 +137,7 @@ async fn receive_form(
     Ok((arrival, wished))
 }
 
+/// Reads a JSON field of a form, at most [`MAX_JSON_BYTES`] long.
 async fn receive_wish(mut field: Field<'_>) -> Result<Map<String, Value>, Problem> {
     let mut text = Vec::new();
     loop {
@@ -157,7 +163,8 @@ async fn next_field(form: &mut Multipart) -> Result<Option<Field<'_>>, Problem> 
     }
 }
 
-/// Takes a stream to its end: counted, hashed, synced, and only while there is room.
+/// Writes a stream to a file of the draft. Returns its size and hash. Fails if the stream exceeds
+/// `limit_bytes`, stalls or is cut off, or if the disk is full.
 async fn receive_file<S, E>(
     state: &AppState,
     mut stream: S,
@@ -207,10 +214,10 @@ where
     }
 }
 
-/// What can be refused before the body is read.
+/// Refuses a body whose declared length exceeds the limit, before it is read.
 fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
     let most = match is_form(request) {
-        // Masks, a background and wishes besides, and what parts them.
+        // A form may also hold masks, a background, JSON fields, and the boundaries between them.
         true => limit_bytes
             .saturating_mul(2)
             .saturating_add(MAX_BACKGROUND_BYTES + (4 << 20)),
@@ -222,13 +229,14 @@ fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
     }
 }
 
-/// How long the body is to be, where its sender says so.
+/// Returns the declared length of the body, bytes; `None` if there is none.
 fn body_bytes(request: &Request) -> Option<u64> {
     let length = request.headers().get(header::CONTENT_LENGTH)?;
     length.to_str().ok()?.parse().ok()
 }
 
-/// Whether `n_bytes` more fit on the disk besides the reserve (RELIABILITY.md, R7).
+/// Fails with `storage_full` if `n_bytes` more would use the reserve of the disk
+/// (docs/explanation/promises.md, "Full disk").
 pub(super) fn check_room(state: &AppState, n_bytes: u64) -> Result<(), Problem> {
     let room = state.context.store.blobs().room_bytes();
     let room = room.map_err(store::Error::Io)?;
@@ -238,7 +246,7 @@ pub(super) fn check_room(state: &AppState, n_bytes: u64) -> Result<(), Problem> 
     }
 }
 
-/// Whether the body is a footage, or a form with one, and not a request in JSON.
+/// Returns whether the media type of the body is that of footage or of a form, not of JSON.
 pub(super) fn is_film(request: &Request) -> bool {
     let media_type = request.headers().get(header::CONTENT_TYPE);
     let media_type = media_type.and_then(|value| value.to_str().ok());
@@ -252,7 +260,7 @@ fn is_form(request: &Request) -> bool {
     media_type.is_some_and(|text| text.to_ascii_lowercase().starts_with("multipart/"))
 }
 
-/// What it means that a body did not come to its end.
+/// Returns the code for a body that ended early: `body_timeout` or `body_cut_off`.
 pub(super) fn of_broken_body(error: &dyn std::error::Error) -> Code {
     match is_too_slow(error) {
         true => Code::BodyTimeout,
@@ -267,8 +275,9 @@ fn from_multipart(error: &MultipartError) -> Problem {
     Problem::new(Code::MalformedRequest, error.body_text())
 }
 
-/// A name as a label: its last part, without what controls a terminal or turns text around
-/// (RELIABILITY.md, S4); at most 200 characters.
+/// Returns a file name as a label: its last path component, without control characters and without characters
+/// that change the direction of text, at most 200 characters
+/// (docs/explanation/promises.md, "Names are labels").
 pub(super) fn label(name: &str) -> String {
     let last = name.rsplit(['/', '\\']).next().unwrap_or_default();
     let turns_text = |c: char| matches!(c, '\u{200e}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');

@@ -1,6 +1,6 @@
-//! Times as the API writes them: RFC 3339 in UTC, to the millisecond; in headers as HTTP has them.
+//! Timestamps of the API: RFC 3339 in UTC with milliseconds for JSON, and HTTP dates for headers.
 
-/// `2026-11-21T09:30:00.000Z`; `ms` counts from 1970 and is not negative.
+/// Returns a time such as `2026-11-21T09:30:00.000Z`. `ms` is in milliseconds since 1970, >= 0.
 pub(super) fn rfc3339(ms: i64) -> String {
     let (days, ms_of_day) = (ms.div_euclid(86_400_000), ms.rem_euclid(86_400_000));
     let (year, month, day) = civil(days);
@@ -9,7 +9,8 @@ pub(super) fn rfc3339(ms: i64) -> String {
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{ms:03}Z")
 }
 
-/// `Sat, 21 Nov 2026 09:30:00 GMT` (RFC 9110); `ms` counts from 1970 and is not negative.
+/// Returns a time such as `Sat, 21 Nov 2026 09:30:00 GMT` (RFC 9110). `ms` is in milliseconds since 1970, >=
+/// 0.
 pub(super) fn http_date(ms: i64) -> String {
     const DAYS: [&str; 7] = ["Thu", "Fri", "Sat", "Sun", "Mon", "Tue", "Wed"];
     const MONTHS: [&str; 12] = [
@@ -23,8 +24,8 @@ pub(super) fn http_date(ms: i64) -> String {
     format!("{weekday}, {day:02} {month} {year:04} {hour:02}:{minute:02}:{second:02} GMT")
 }
 
-/// Year, month and day of a count of days since 1970. Years are counted from March, so that the
-/// leap day is the last of its year; 400 years have 146,097 days.
+/// Returns year, month and day of a number of days since 1970-01-01. Internally a year begins in March, so
+/// the leap day is its last day. An era of 400 years has 146,097 days.
 fn civil(days: i64) -> (i64, i64, i64) {
     let from_march_0000 = days + 719_468;
     let (era, day_of_era) = (

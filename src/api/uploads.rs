@@ -1,6 +1,6 @@
 //! Resumable uploads: tus 1.0.0 with creation, creation-with-upload, termination, checksum and expiration
-//! (RELIABILITY.md, R1 and H3). An upload ends as a footage by the same admission as any other; the answer
-//! to its last bytes names it in Link. What the gate refuses is gone, and the reason is the answer.
+//! (docs/explanation/promises.md, "No upload is lost"). A complete upload becomes footage. If the video is
+//! refused, the upload is deleted, and the response to the last bytes gives the reason.
 
 use axum::body::{Body, BodyDataStream};
 use axum::extract::{Request, State};
@@ -33,10 +33,10 @@ const RESUMABLE: HeaderName = HeaderName::from_static("tus-resumable");
 const OFFSET: HeaderName = HeaderName::from_static("upload-offset");
 const LENGTH: HeaderName = HeaderName::from_static("upload-length");
 const PIECE_TYPE: &str = "application/offset+octet-stream";
-/// Bytes after which what came is synced and noted: what a crash can cost at most.
+/// Bytes between two syncs, the most that a crash loses. A request with a checksum is synced only at its end.
 const SAFE_EVERY: i64 = CHECK_EVERY_BYTES as i64;
 
-/// Says of every answer of these routes which protocol it speaks, and refuses other versions.
+/// Middleware: adds the tus version to responses below /v1/uploads, and refuses requests of other versions.
 pub(super) async fn speak_tus(request: Request, next: Next) -> Response<Body> {
     let path = request.uri().path();
     if path != "/v1/uploads" && !path.starts_with("/v1/uploads/") {
@@ -54,7 +54,7 @@ pub(super) async fn speak_tus(request: Request, next: Next) -> Response<Body> {
     answer
 }
 
-/// What of tus is spoken here.
+/// Describe the upload protocol in the headers `Tus-*`: extensions, checksums, and largest upload in bytes.
 #[utoipa::path(options, path = "/v1/uploads", responses((status = 204, description = "in the headers Tus-*")))]
 pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<Body> {
     let headers = [
@@ -68,7 +68,10 @@ pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<
     (StatusCode::NO_CONTENT, headers).into_response()
 }
 
-/// Begin an upload: Upload-Length in bytes, Upload-Metadata with `filename`; first bytes may come along.
+/// Start a resumable upload.
+///
+/// `Upload-Length` is the size in bytes, `filename` in `Upload-Metadata` the name. The body may hold the
+/// first bytes. PATCH sends the others to `Location`. An upload without new bytes expires after 24 hours.
 #[utoipa::path(post, path = "/v1/uploads", request_body(content = [u8], content_type = "application/offset+octet-stream"),
     responses(
     (status = 201, headers(("location" = String), ("upload-offset" = i64), ("upload-expires" = String))),
@@ -100,7 +103,7 @@ pub(super) async fn create_upload(
     store.sweep_uploads(now_ms()).await?;
     let location = [(header::LOCATION, format!("/v1/uploads/{}", upload.id))];
     let hold = store.hold_upload(upload.id).await;
-    // A request that comes again under its key after a crash goes on with what it made then.
+    // A request repeated after a crash gets the same id from its Idempotency-Key, and finds its upload.
     let reach = Reach::Of(upload.owner.clone());
     if let Some(upload) = store.upload(upload.id, &reach, now_ms()).await? {
         return Ok((StatusCode::CREATED, location, standing(&upload)).into_response());
@@ -113,7 +116,7 @@ pub(super) async fn create_upload(
     Ok((StatusCode::CREATED, location, standing(&upload)).into_response())
 }
 
-/// How much of an upload is safe.
+/// Get the state of an upload. Send the next bytes from `Upload-Offset` on.
 #[utoipa::path(head, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, headers(("upload-offset" = i64), ("upload-length" = i64), ("upload-expires" = String))),
     (status = "4XX", description = "as problem+json, of which HEAD has no body"),
@@ -126,13 +129,17 @@ pub(super) async fn head_upload(
     find(&state, &caller.reach, id).await?;
     let hold = state.context.store.hold_upload(id).await;
     let upload = find(&state, &caller.reach, id).await?;
-    // The process ended between the last byte and the admission.
+    // The process may have ended after the last byte, before the upload became footage.
     let upload = end_if_whole(&state, upload).await?;
     drop(hold);
     Ok((StatusCode::OK, standing(&upload)).into_response())
 }
 
-/// Send the next bytes, from Upload-Offset on; with Upload-Checksum they count only as a whole.
+/// Send the next bytes of an upload.
+///
+/// `Upload-Offset` must equal the stored offset, else the call fails with `offset_differs`. If the connection
+/// breaks, the bytes received are kept. With `Upload-Checksum` only a complete and matching body is kept. The
+/// last bytes make the footage, which `Link` names. If the video is refused, the response says why.
 #[utoipa::path(patch, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)),
     request_body(content = [u8], content_type = "application/offset+octet-stream"), responses(
     (status = 204, headers(("upload-offset" = i64), ("upload-expires" = String), ("link" = String)),
@@ -162,7 +169,7 @@ pub(super) async fn patch_upload(
     Ok((StatusCode::NO_CONTENT, standing(&upload)).into_response())
 }
 
-/// Give an upload up. The footage that it became, if it did, stays.
+/// Cancel an upload and delete its bytes. Footage that it has become is kept.
 #[utoipa::path(delete, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "it is gone"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -184,7 +191,8 @@ async fn find(state: &AppState, reach: &Reach, id: Uuid) -> Result<Upload, Probl
     upload.ok_or_else(Problem::not_found)
 }
 
-/// Takes the bytes of a request; what came before a cut stays, unless a checksum was to vouch for it.
+/// Appends the body of a request to an upload, and turns a complete upload into footage. If the body is cut
+/// off, the bytes received so far are kept, unless the request has a checksum.
 async fn take(
     state: &AppState,
     hold: &Hold,
@@ -210,7 +218,7 @@ async fn take(
             came_bytes -= piece.len() as i64;
             break Err(Code::TooLarge.into());
         }
-        // Others fill the disk too.
+        // Other requests fill the disk too, so the free space is checked again from time to time.
         let before = came_bytes - piece.len() as i64;
         if before / SAFE_EVERY != came_bytes / SAFE_EVERY
             && let Err(problem) = check_room(state, 0)
@@ -256,8 +264,8 @@ async fn next_piece(
     }
 }
 
-/// Makes a footage of an upload whose bytes are all there. In a task of its own, so that a sender who hangs
-/// up now leaves no half of it behind.
+/// Turns a complete upload into footage. An incomplete one is returned unchanged. If the video is refused,
+/// the upload is deleted; after a transient error it is kept.
 async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Problem> {
     if upload.offset_bytes < upload.size_bytes || upload.footage_id.is_some() {
         return Ok(upload);
@@ -286,7 +294,7 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
     }
 }
 
-/// Where an upload stands, as headers.
+/// Returns the state of an upload as headers: offset, length, expiry, and the footage in `Link`.
 fn standing(upload: &Upload) -> HeaderMap {
     let expires = super::timestamp::http_date(upload.expires_ms);
     let link = upload
@@ -312,7 +320,7 @@ fn number(headers: &HeaderMap, name: &HeaderName) -> Result<i64, Problem> {
     number.ok_or_else(|| Problem::new(Code::MalformedRequest, malformed()))
 }
 
-/// The value of `filename` in Upload-Metadata; empty where there is none.
+/// Returns `filename` or `name` of Upload-Metadata, or an empty string. Fails if it cannot be parsed.
 fn file_name(headers: &HeaderMap) -> Result<String, Problem> {
     let malformed = || Problem::new(Code::MalformedRequest, "Upload-Metadata cannot be read");
     let Some(pairs) = headers.get("upload-metadata") else {
@@ -336,7 +344,7 @@ fn is_piece(headers: &HeaderMap) -> bool {
     media_type.is_some_and(|value| value.as_bytes() == PIECE_TYPE.as_bytes())
 }
 
-/// A hash that the bytes of one request are to have.
+/// Expected hash of the body of one request.
 struct Checksum {
     hasher: Hasher,
     wanted: Vec<u8>,

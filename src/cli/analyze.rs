@@ -1,4 +1,5 @@
-//! `flockreel analyze VIDEO -o LIBRARY_DIR`: measure the animal in a video, without a server.
+//! `flockreel analyze VIDEO -o LIBRARY_DIR`: measures the animal in a video and writes a library, without a
+//! server (docs/reference/command-line.md).
 
 use std::fs::File;
 use std::io::Read;
@@ -23,74 +24,83 @@ use crate::media::{self, Limits, Tool, Video, read_image};
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The footage: one animal before a camera that stands still; a video, or pictures in a folder, a zip or a TIFF.
+    /// Footage of one animal, filmed with a fixed camera: a video, or pictures in a folder, a zip or a TIFF.
     video: PathBuf,
-    /// The folder to write the library to.
+    /// Folder to write the library to.
     #[arg(short, long, value_name = "LIBRARY_DIR")]
     output: PathBuf,
-    /// A picture of the scene without the animal; estimated when absent.
+    /// Picture of the scene without the animal. Default: estimated from the footage.
     #[arg(long, value_name = "IMAGE")]
     background: Option<PathBuf>,
-    /// A mask for each frame, white where the animal is, gray where in part: a video, or pictures in a folder, a zip or a
-    /// TIFF. Footage with an alpha channel needs none.
+    /// One mask per frame: a video, or pictures in a folder, a zip or a TIFF. White is the animal, black the
+    /// rest, and gray the share of a pixel that the animal covers. Default: the alpha channel of the footage,
+    /// if it has one.
     #[arg(long, value_name = "DIR|VIDEO")]
     masks: Option<PathBuf>,
-    /// The calibrated camera, as JSON: {"z_min_m": 0.7, "pane_px_per_m": 1000, ...}.
+    /// Calibrated camera, which gives results in metres, as JSON: {"z_min_m": 0.7, "pane_px_per_m": 1000,
+    /// ...}.
     #[arg(long, value_name = "JSON_FILE")]
     camera: Option<PathBuf>,
-    /// The animal's length from nose to tail tip, metres.
+    /// Length of the animal from the nose to the tip of the tail, metres. Needs --animal-height.
     #[arg(long, value_name = "M", requires = "animal_height")]
     animal_length: Option<f64>,
-    /// The height of the animal's whole silhouette, fins included, metres.
+    /// Height of the animal's silhouette, fins included, metres. Needs --animal-length.
     #[arg(long, value_name = "M", requires = "animal_length")]
     animal_height: Option<f64>,
-    /// From where the animal is seen; guessed when absent.
+    /// View from which the animal was filmed. Default: guessed.
     #[arg(long, value_name = "side|top")]
     view: Option<String>,
-    /// Follow the largest animal when several move.
+    /// Follow the largest animal if several move. Default: the footage is refused.
     #[arg(long)]
     follow_largest: bool,
-    /// Frames a second, whatever the file says: 0.01 to 1000. Every picture is then used once.
+    /// Frame rate, frames per second, 0.01 to 1000. Every picture of the file is then used once. Default: as
+    /// the file says.
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
-    /// Measure from this second of the film on; frames and times are counted from there.
+    /// Start of the measured part, seconds from the first frame of the file. Frame numbers and times in the
+    /// library count from here. Default: the first frame.
     #[arg(long, value_name = "SECONDS")]
     from: Option<f64>,
-    /// Measure up to this second of the film.
+    /// End of the measured part, seconds from the first frame of the file. Default: the last frame.
     #[arg(long, value_name = "SECONDS")]
     to: Option<f64>,
-    /// The animal is the thing at this point of this frame.
+    /// Position of the animal in one frame: frame number and pixels, such as 120:310,95. The analysis follows
+    /// the object at this point.
     #[arg(long, value_name = "FRAME:X,Y")]
     animal_at: Option<String>,
-    /// Take nothing in this box for the animal, pixels; or only from one second to another. May be given again.
+    /// Box in which nothing counts as the animal, pixels, for the whole film or a range of seconds, such as
+    /// 10,20,200,40@0-2.5. Repeatable.
     #[arg(long, value_name = "X,Y,W,H[@FROM-TO]")]
     ignore: Vec<String>,
-    /// Width of a pixel over its height, whatever the file says.
+    /// Width of a pixel divided by its height, 0.1 to 10. Default: as the file says.
     #[arg(long, value_name = "R")]
     pixel_aspect: Option<f64>,
-    /// Frames in a clip.
+    /// Clip length in frames, 1 to 120. Default: 8 at 30 frames per second, in proportion to the frame rate.
     #[arg(long, value_name = "F")]
     clip_frames: Option<u32>,
-    /// How much each frame of a clip counts: uniform or binomial.
+    /// Weights of the frames of a clip in distances: uniform (default), or binomial, where the middle counts
+    /// most.
     #[arg(long, value_name = "uniform|binomial")]
     clip_weights: Option<String>,
-    /// At which size sprites are cut out: native (as filmed) or depth (at one height).
+    /// Scale of sprites: native (default, as filmed), or depth, which gives all sprites of a side view one
+    /// height.
     #[arg(long, value_name = "native|depth")]
     scale_mode: Option<String>,
-    /// Clips nearer than this are alike; a multiple of the natural step when absent.
+    /// Distance below which two clips are similar. Default: a multiple of the median distance of successive
+    /// clips.
     #[arg(long, value_name = "E")]
     epsilon: Option<u64>,
-    /// Write the video once more with what was measured drawn over it.
+    /// Also write the video with the measured poses drawn over it.
     #[arg(long, value_name = "MP4")]
     overlay: Option<PathBuf>,
-    /// Start from a preset: papers.
+    /// Preset to start from: papers, the method of the two papers. Other flags override its values.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     #[command(flatten)]
     set: Set,
 }
 
-/// Analyses the video and writes the library.
+/// Analyzes the video and writes the library. Prints advice about the footage to stderr.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
     for path in [
@@ -150,7 +160,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     Ok(Some(summary(&library, &args.output, &advice)))
 }
 
-/// Writes the frames that show why a film was refused beside where its library would be, and says where.
+/// Writes a picture of the frames that show why a video was refused, beside the output folder. Prints its
+/// path.
 fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) {
     let Some(picture) = refusal::picture(film, error) else {
         return;
@@ -165,7 +176,7 @@ fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) 
     }
 }
 
-/// What people look at: the table and the pictures.
+/// Writes the files for people: the table of poses and the charts.
 fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
     let table = ("poses.csv", csv::write_poses(&library.poses));
     for (name, text) in svg::pictures(library).into_iter().chain([table]) {
@@ -176,7 +187,7 @@ fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
     Ok(())
 }
 
-/// The parameters that the flags ask for, over the preset.
+/// Returns the preset with the parameters set by flags.
 fn params_of(args: &Args) -> Result<Params, Error> {
     let mut wanted = Map::new();
     let mut put = |name: &str, value: Option<Value>| {
@@ -217,7 +228,7 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
 }
 
-/// Reads FRAME:X,Y.
+/// Parses FRAME:X,Y.
 fn read_animal_at(text: &str) -> Result<Value, Error> {
     let parts = text.split_once(':').and_then(|(frame, point)| {
         let (x, y) = point.split_once(',')?;
@@ -232,7 +243,7 @@ fn read_animal_at(text: &str) -> Result<Value, Error> {
     Ok(json!({"frame": frame, "at_px": point}))
 }
 
-/// Reads X,Y,W,H or X,Y,W,H@FROM-TO.
+/// Parses X,Y,W,H or X,Y,W,H@FROM-TO.
 fn read_ignore(text: &str) -> Result<Value, Error> {
     let wanted = || {
         let example = "10,20,200,40 or 10,20,200,40@0-2.5";
@@ -270,7 +281,7 @@ fn read_json(path: &Path) -> Result<Value, Error> {
         .map_err(|cause| Error::Usage(format!("{} is not JSON: {cause}", path.display())))
 }
 
-/// Hashes the bytes of all files, one after the other.
+/// Returns the total size and the SHA-256 of all files, in order.
 fn footage_summary(files: &[PathBuf]) -> Result<FootageSummary, Error> {
     let (mut hash, mut n_bytes) = (Sha256::new(), 0);
     let mut chunk = vec![0; 1 << 20];
@@ -291,7 +302,7 @@ fn footage_summary(files: &[PathBuf]) -> Result<FootageSummary, Error> {
     Ok(FootageSummary { sha256, n_bytes })
 }
 
-/// From where the animal is seen, how sure that is, and how to change it.
+/// Returns a sentence that tells the view, its probability, and the flag that changes it.
 fn view_sentence(poses: &Poses) -> String {
     let (seen, other) = match poses.view {
         View::Side => ("from the side", "top"),

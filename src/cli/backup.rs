@@ -1,5 +1,5 @@
-//! `flockreel backup DIR`: a copy of the data folder, beside a running service too (RELIABILITY.md, R11). It is
-//! restored by starting on it: `flockreel serve --data DIR`.
+//! `flockreel backup DIR`: copies the data folder, even while a service uses it
+//! (docs/explanation/promises.md, "Restore and upgrade"). To restore, run `flockreel serve --data DIR`.
 
 use std::path::PathBuf;
 
@@ -14,14 +14,15 @@ use crate::config::{Database, Storage};
 /// Arguments of `backup`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// Where the copy goes: a folder that is not there yet.
+    /// Folder for the copy. It must not exist yet.
     #[arg(value_name = "DIR")]
     target: PathBuf,
     #[command(flatten)]
     storage: Storage,
 }
 
-/// Copies; what was begun and not ended lies beside as `DIR.partial`.
+/// Copies the data folder. An interrupted copy remains as `DIR.partial`. Fails for a PostgreSQL
+/// database, which is copied with its own tools.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     if args.target.file_name().is_none() || args.target.exists() {
         let sentence = format!(

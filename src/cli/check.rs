@@ -1,5 +1,7 @@
-//! `flockreel check`: the invariants I1 to I6 of the data folder (RELIABILITY.md), beside a running service too.
-//! Every file is read and hashed. Exit status 0 where all is well, 1 with one line for each fault.
+//! `flockreel check`: verifies the invariants I1 to I6 of the data folder (docs/explanation/promises.md),
+//! even while a service uses it.
+//!
+//! Every file is read and hashed. Exit status 0 if all invariants hold, else 1 with one line per fault.
 
 use std::time::Duration;
 
@@ -14,7 +16,7 @@ use crate::jobs::clock::now_ms;
 use crate::store::check::Fault;
 use crate::store::{self, Store};
 
-/// A fault that is not there a moment later was something under way.
+/// Delay before a second check. A fault that is gone by then was an operation in progress. Free choice.
 const MOMENT: Duration = Duration::from_secs(2);
 
 /// Arguments of `check`.
@@ -24,7 +26,7 @@ pub struct Args {
     storage: Storage,
 }
 
-/// Verifies, and names every fault on stderr.
+/// Checks the data folder and prints every fault to stderr.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     let faults = runtime.block_on(async {
@@ -45,7 +47,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     }
 }
 
-/// A store that must be there: a name mistyped makes no new one.
+/// Opens an existing store. Fails if there is none, so a mistyped name does not create one.
 pub(super) async fn existing(storage: Storage) -> Result<Store, Error> {
     if let Database::Sqlite(file) = storage.database()
         && !file.is_file()
@@ -56,6 +58,7 @@ pub(super) async fn existing(storage: Storage) -> Result<Store, Error> {
     Store::open_beside(storage).await.map_err(from_store)
 }
 
+/// Returns all faults. If other processes may use the store, only faults that persist are returned.
 async fn faults(store: &Store) -> Result<Vec<Fault>, store::Error> {
     let mut faults = store.check_after_crash(now_ms()).await?;
     if !faults.is_empty() && !store.is_alone() {

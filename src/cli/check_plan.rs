@@ -1,5 +1,5 @@
-//! `flockreel check-plan LIBRARY flock.json`: whether a stored plan is what it says, for scientists and for
-//! CI (ALGORITHMS.md 6, proofs b and c). Exit status 0 for a plan that holds, 2 with the first violation.
+//! `flockreel check-plan LIBRARY_DIR FLOCK_JSON`: checks that a stored plan is valid and optimal
+//! (docs/explanation/algorithms.md, "Planning"). Exit status 0 if it is, else 2 with the first violation.
 
 use std::path::PathBuf;
 
@@ -12,10 +12,10 @@ use crate::formats::flock_json;
 /// Arguments of `check-plan`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that `analyze` made.
+    /// Folder of the library, written by `analyze`.
     #[arg(value_name = "LIBRARY_DIR")]
     library: PathBuf,
-    /// What `flock --plan` wrote.
+    /// Plan of the flock, written by `flock --plan`.
     #[arg(value_name = "FLOCK_JSON")]
     plan: PathBuf,
 }
@@ -71,7 +71,7 @@ mod tests {
         };
         let analysis = analysis::Params::default();
         library_dir::write(dir.path(), &library, &analysis, &footage).unwrap();
-        // Planned from what the files hold, as the command does.
+        // The plan is made from the stored library, which the command reads too.
         let library = crate::cli::read_library(dir.path(), dir.path())
             .unwrap()
             .library;

@@ -1,6 +1,8 @@
-//! Settings from a file (ECOSYSTEM.md, config): flags win over environment variables, those over the file of
-//! `--config`, that over the defaults. One definition: a setting is an option that has an environment variable,
-//! and the file replaces its default, so that `--help` shows what holds.
+//! Settings from a TOML file. Flags override environment variables, which override the file of `--config`,
+//! which overrides the defaults.
+//!
+//! A setting is any option that has an environment variable, so there is only one definition of settings. The
+//! file replaces the defaults of the options, so `--help` shows the values in effect.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -11,16 +13,16 @@ use toml::{Table, Value};
 
 use super::{Cli, Error};
 
-/// The environment variable that names the file.
+/// Environment variable with the path of the file.
 const VARIABLE: &str = "FLOCKREEL_CONFIG";
-/// The one setting that a file cannot have: which file.
+/// Id of the option for the file itself, which a file cannot set.
 const CONFIG: &str = "config";
 
-/// Values by the ids of their options.
+/// Values by option id.
 type Settings = BTreeMap<String, String>;
 
-/// Reads the arguments over the file that they name, if they name one. Where the arguments themselves are
-/// wrong, or ask for help, clap says so and ends the program.
+/// Parses the arguments, with defaults from the settings file if there is one. Fails if the file is invalid.
+/// If the arguments are invalid or ask for help, clap prints a message and ends the process.
 pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
     let file = named_in(arguments).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
     let command = match file {
@@ -31,7 +33,7 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
     Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit()))
 }
 
-/// The file of `--config FILE` or `--config=FILE`, the last one given.
+/// Returns the file of the last `--config FILE` or `--config=FILE`.
 fn named_in(arguments: &[OsString]) -> Option<PathBuf> {
     let flags = arguments
         .iter()
@@ -44,6 +46,7 @@ fn named_in(arguments: &[OsString]) -> Option<PathBuf> {
     named.last()
 }
 
+/// Reads the file. Fails if it is no TOML, or has an unknown setting or an invalid value.
 fn read(file: &Path) -> Result<Settings, Error> {
     let wrong = |what: &str| Error::Usage(format!("{what}: {}", file.display()));
     let text = std::fs::read_to_string(file);
@@ -71,7 +74,7 @@ fn read(file: &Path) -> Result<Settings, Error> {
     Ok(settings)
 }
 
-/// Every option that has an environment variable: its flag, and whether it is one without a value.
+/// Returns all options that have an environment variable, by id: the flag, and whether it takes no value.
 fn settings_of(command: &Command) -> BTreeMap<String, (String, bool)> {
     let mut known = BTreeMap::new();
     for command in command.get_subcommands() {
@@ -98,7 +101,7 @@ fn text_of(value: &Value, is_switch: bool) -> Option<String> {
     }
 }
 
-/// Whether `serve` would take the value as a flag; the reason in one line where it would not.
+/// Checks that `serve` accepts the value as a flag. Fails with the reason in one line.
 fn check(flag: &str, text: &str, is_switch: bool) -> Result<(), String> {
     let given = match (is_switch, text) {
         (false, _) => vec![format!("--{flag}={text}")],
@@ -115,7 +118,7 @@ fn check(flag: &str, text: &str, is_switch: bool) -> Result<(), String> {
     Err(line.trim_start_matches("error: ").to_owned())
 }
 
-/// The command with the file's values in the place of its settings' defaults, subcommands too.
+/// Returns the command and its subcommands with the settings as defaults of their options.
 fn with_defaults(command: Command, settings: &Settings) -> Command {
     command
         .mut_args(|option| {

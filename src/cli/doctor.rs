@@ -1,5 +1,5 @@
-//! `flockreel doctor`: what this machine has of what flockreel needs, and what each lack means in plain
-//! words (RELIABILITY.md, "The gate": what is missing is said). Exit 0 when nothing is, else 1.
+//! `flockreel doctor`: checks whether this machine has everything that flockreel needs, and explains the
+//! effect of each missing part. Exit status 0 if nothing is missing, else 1.
 
 use std::path::Path;
 
@@ -17,17 +17,17 @@ pub struct Args {
     storage: Storage,
 }
 
-/// One thing that was looked at.
+/// Result of one check.
 struct Finding {
-    /// Its stable name.
+    /// Stable name.
     name: String,
-    /// What was found.
+    /// Description of what was found.
     found: String,
-    /// What it means that it is missing, where it is.
+    /// Effect of the missing part; `None` if nothing is missing.
     lack: Option<String>,
 }
 
-/// Looks at everything and prints what it finds.
+/// Runs all checks and prints their results. Fails if a part is missing.
 pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
     let mut findings = vec![finding("flockreel", env!("CARGO_PKG_VERSION"), None)];
     tools(&mut findings);
@@ -69,7 +69,7 @@ fn tools(findings: &mut Vec<Finding>) {
 }
 
 fn walls(findings: &mut Vec<Finding>) {
-    // Where there is no tool, that has been said.
+    // `tools` has already reported a missing tool.
     let Ok(walls) = media::walls() else { return };
     for (layer, lack) in &walls.layers {
         let name = format!("sandbox.{}", layer.name());

@@ -1,42 +1,43 @@
-//! Why a command ends without success, in one line, what to do about it, and the exit code that goes with it
-//! (DESIGN.md, Command line). Which code of `code.rs` is whose fault is decided here for the
-//! command line, as `api/problem.rs` decides it for HTTP.
+//! Errors of commands, with advice and exit status (docs/reference/command-line.md).
+//!
+//! This module decides which error codes are the user's fault (2) and which are internal failures (1), as
+//! `api/problem.rs` does for HTTP.
 
 use crate::code::Code;
 
-/// The reasons; each prints as one clear line, lower case, the value last.
+/// Reasons why a command failed. Each prints as one line in lower case, with the value at the end.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The arguments make no sense together, or a file named by them cannot be read.
+    /// The arguments are inconsistent, or a file that they name cannot be read.
     #[error("{0}")]
     Usage(String),
-    /// The work was refused or failed, for a reason that has a code.
+    /// The work was refused or failed, for a reason with a code.
     #[error("{sentence} ({code})")]
     Work {
-        /// The stable reason.
+        /// Stable code.
         code: Code,
-        /// What happened, and what to do next.
+        /// Description for people.
         sentence: String,
     },
-    /// `doctor` found things missing, and has said which.
+    /// `doctor` found missing parts and has printed them.
     #[error("this machine lacks what flockreel needs or wants, as told above: {n_lacks}")]
     Lacks {
-        /// How many.
+        /// Number of missing parts.
         n_lacks: usize,
     },
     /// A file or folder could not be read or written.
     #[error("{what}: {cause}")]
     Io {
-        /// What was tried, with the path.
+        /// Operation that failed, with the path.
         what: String,
-        /// What the system said.
+        /// Error of the system.
         #[source]
         cause: std::io::Error,
     },
 }
 
 impl Error {
-    /// A reason that has a code: the error of an algorithm or of the gate.
+    /// Returns the error of an algorithm or a media tool, with its code.
     pub fn work(code: Code, error: &dyn std::error::Error) -> Error {
         Error::Work {
             code,
@@ -44,18 +45,18 @@ impl Error {
         }
     }
 
-    /// The gate's reason.
+    /// Returns the error of a media tool.
     pub fn work_of_media(error: &crate::media::Error) -> Error {
         Error::work(error.code(), error)
     }
 
-    /// For `map_err`: a file operation named by what it tried.
+    /// Returns a function for `map_err` that adds the operation to an I/O error.
     pub fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> Error {
         let what = what.into();
         move |cause| Error::Io { what, cause }
     }
 
-    /// Returns what to do about it, where the reason has a code.
+    /// Returns advice on what to do, if the reason has a code.
     pub fn advice(&self) -> Option<&'static str> {
         match self {
             Error::Work { code, .. } => Some(code.advice()),
@@ -63,7 +64,7 @@ impl Error {
         }
     }
 
-    /// 2 where the person can mend it (usage or input), 1 where something failed inside.
+    /// Returns the exit status: 2 for bad usage or bad input, 1 for an internal failure.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) => 2,

@@ -1,5 +1,5 @@
-//! `flockreel fish`: the virtual fish that swims as the animal swam, as a video or as a model for 3-D
-//! programs (DESIGN.md, Command line).
+//! `flockreel fish`: writes a virtual fish that swims like the animal, as a video or a 3-D model
+//! (docs/explanation/algorithms.md, "Virtual fish").
 
 use std::path::{Path, PathBuf};
 
@@ -17,16 +17,17 @@ use crate::raster::{ColorSpec, Frame};
 /// Arguments of `fish`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that `analyze` wrote.
+    /// Folder of the library, written by `analyze`.
     #[arg(value_name = "LIBRARY_DIR")]
     library: PathBuf,
-    /// What to write: a video (.mp4) or a model (.glb).
+    /// File to write: a video (.mp4) or an animated 3-D model (.glb).
     #[arg(short, long, value_name = "MP4_OR_GLB")]
     output: PathBuf,
-    /// The animal on the left, the virtual fish on the right.
+    /// Show the animal on the left and the virtual fish on the right. Needs .mp4.
     #[arg(long)]
     side_by_side: bool,
-    /// `papers`: a stiff upright fish, moved by the values as they were measured.
+    /// Preset to start from: `papers`, a rigid, upright fish that follows the measured values without
+    /// smoothing.
     #[arg(long, value_name = "NAME")]
     preset: Option<String>,
     /// Its coat: goldfish, silver or bronze.
@@ -36,7 +37,7 @@ pub struct Args {
     set: Set,
 }
 
-/// Makes the virtual fish.
+/// Writes the virtual fish.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
     media::look_for(&[Tool::Ffmpeg]);
@@ -102,7 +103,7 @@ fn write_video(library: &Library, motion: Motion, args: &Args) -> Result<(), Err
     writer.finish().map_err(refused)
 }
 
-/// The file name's ending in lower case; empty when it has none.
+/// Returns the extension of the file name in lower case; empty if there is none.
 fn extension(path: &Path) -> String {
     let ending = path.extension().unwrap_or_default();
     ending.to_string_lossy().to_lowercase()

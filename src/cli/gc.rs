@@ -1,5 +1,7 @@
-//! `flockreel gc`: removes what nobody refers to any more (RELIABILITY.md, store rules and R5). The service does so
-//! at its start; this is for one that runs for months, and for looking first (`--dry-run`).
+//! `flockreel gc`: removes data that nothing refers to (docs/explanation/promises.md, "No orphans").
+//!
+//! The service does this at its start and from time to time. The command does it at once, or only reports
+//! what it would remove (`--dry-run`).
 
 use std::io::Write;
 use std::time::SystemTime;
@@ -18,12 +20,12 @@ use crate::jobs::clock::now_ms;
 pub struct Args {
     #[command(flatten)]
     storage: Storage,
-    /// Say what would be removed, and remove nothing.
+    /// Print what would be removed, and remove nothing.
     #[arg(long)]
     dry_run: bool,
 }
 
-/// Counts, removes unless told not to, and says what.
+/// Removes unused data, unless `--dry-run` is set, and prints its counts.
 pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     let waste = runtime.block_on(async {

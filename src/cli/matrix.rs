@@ -1,5 +1,5 @@
-//! `flockreel matrix`: the distances between the clips of a library, as numbers or as a picture
-//! (DESIGN.md, Command line; ALGORITHMS.md 5).
+//! `flockreel matrix`: writes the distances between the clips of a library, as numbers or as a picture
+//! (docs/explanation/algorithms.md, "Distances").
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -15,21 +15,21 @@ use crate::formats::npy;
 /// Arguments of `matrix`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that `analyze` wrote.
+    /// Folder of the library, written by `analyze`.
     #[arg(value_name = "LIBRARY_DIR")]
     library: PathBuf,
-    /// Where to write: a name that ends in .npy for numbers, in .png for a picture.
+    /// File to write: .npy for numbers (NumPy, at most 8192 frames), .png for a picture.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Compare each clip with the others' mirror images.
+    /// Compare each clip with the mirror images of the clips.
     #[arg(long)]
     mirrored: bool,
-    /// Draw the pairs nearer than epsilon, and over them the transitions that were kept.
+    /// Draw the pairs of similar clips (distance below epsilon) and the transitions among them. Needs .png.
     #[arg(long)]
     candidates: bool,
 }
 
-/// Writes the distance matrix.
+/// Writes the distance matrix. Fails for numbers of more than 8192 frames.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let format = Format::of(&args.output)?;
     if args.candidates && matches!(format, Format::Numbers) {

@@ -1,7 +1,8 @@
-//! The command line: one file a command (DESIGN.md, Command line).
+//! The command line: one file per command (docs/reference/command-line.md).
 //!
-//! Results go to files, progress and errors to stderr, and with `--json` one line of JSON to
-//! stdout (`token` prints to stdout without it too). Exit codes: 0; 2 for bad usage or input; 1 for a failure inside.
+//! Results go to files, progress and errors to stderr. `--json` prints one line of JSON to stdout. `token`,
+//! `gc` and `doctor` print to stdout in any case. Exit status: 0 for success, 2 for bad usage or bad input, 1
+//! for an internal failure.
 
 pub mod analyze;
 pub mod backup;
@@ -48,12 +49,13 @@ pub struct Cli {
     /// Print a one-line JSON summary to stdout when done.
     #[arg(long, global = true)]
     json: bool,
-    /// What to log to stderr, for example `debug` or `flockreel::jobs=debug`.
+    /// Filter of the log on stderr, such as `debug` or `flockreel::jobs=debug`. Default: `info` for `serve`
+    /// and `worker`, else `warn`.
     #[arg(long, global = true, env = "FLOCKREEL_LOG", value_name = "FILTER")]
     log: Option<String>,
     #[command(flatten)]
     media: config::Media,
-    /// How log lines are written: for people, or a JSON object a line.
+    /// Format of log lines: plain text, or one JSON object per line.
     #[arg(
         long,
         global = true,
@@ -62,53 +64,53 @@ pub struct Cli {
         value_name = "FORMAT"
     )]
     log_format: LogFormat,
-    /// A file of settings (TOML), each called as its flag: `max-upload-bytes = 1000000`. Flags win over
-    /// environment variables, those over the file, that over the defaults.
+    /// File with settings (TOML). Its keys are the names of flags: `max-upload-bytes = 1000000`. Flags
+    /// override environment variables, which override the file, which overrides the defaults.
     #[arg(long, global = true, env = "FLOCKREEL_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     command: Command,
 }
 
-/// The commands, in the order in which a newcomer meets them.
+/// The commands, in the order of the help.
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Start the service: API, page and workers in one process.
     Serve(serve::Args),
-    /// Run the jobs of a service on a further machine: workers alone.
+    /// Run jobs of a service on another machine, without API and page.
     Worker(worker::Args),
-    /// Make, list and revoke the tokens with which the service is reached from elsewhere.
+    /// Create, list and revoke the tokens that give access to the service from other machines.
     Token(token::Args),
-    /// Verify that the data folder is sound: every file has its row and its hash, every job one legal state.
+    /// Check the data folder: every file must match its row and hash, and every job must have a valid state.
     Check(check::Args),
-    /// Remove what nobody refers to any more: leftovers of crashes, uploads that were given up.
+    /// Remove unused data: leftovers of crashes, and expired uploads, sessions and stored responses.
     Gc(gc::Args),
-    /// Copy the data folder, beside a running service too; `serve --data` on the copy restores it.
+    /// Copy the data folder, even while a service uses it. To restore, run `serve --data` on the copy.
     Backup(backup::Args),
-    /// Measure the animal in a video: footage to library.
+    /// Measure the animal in a video and write a library.
     Analyze(analyze::Args),
-    /// Make a flock out of a library, as a video.
+    /// Make a flock from a library and write it as a video.
     Flock(flock::Args),
-    /// Check a flock's plan: every step, every cost, and that nothing cheaper exists.
+    /// Check the plan of a flock: every step, every cost, and that no cheaper plan exists.
     CheckPlan(check_plan::Args),
-    /// Let the virtual fish swim as the animal swam, as a video or a model.
+    /// Make a virtual fish that swims like the animal, as a video or a 3-D model.
     Fish(fish::Args),
     /// Write the distance matrix of a library, as numbers or as a picture.
     Matrix(matrix::Args),
-    /// Write the animal of every frame as a picture with transparency.
+    /// Write the animal of every frame as a picture with a transparent background.
     Sprites(sprites::Args),
-    /// Film the virtual fish: footage whose truth is known.
+    /// Write sample footage: a virtual fish whose exact poses are known.
     Sample(sample::Args),
-    /// Say what this machine has of what flockreel needs, and what each lack means.
+    /// Check whether this machine has everything that flockreel needs, and explain what is missing.
     Doctor(doctor::Args),
 }
 
-/// What a command did: the one line of JSON that `--json` prints.
+/// Result of a command: the line of JSON that `--json` prints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary(pub Value);
 
-/// Runs the command and says how it went; never panics on a user's input.
+/// Runs the command and returns the exit status. Invalid input never causes a panic.
 pub fn main(arguments: &[OsString]) -> ExitCode {
     let cli = match config_file::parse(arguments) {
         Ok(cli) => cli,
@@ -118,7 +120,7 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
         }
     };
     let serves = matches!(cli.command, Command::Serve(_) | Command::Worker(_));
-    // Everything worth knowing of a service, only warnings of the other commands.
+    // Services log all their events, other commands only warnings.
     let default = if serves { "info" } else { "warn" };
     let _log = logging::start(cli.log.as_deref().unwrap_or(default), cli.log_format);
     if serves {
@@ -156,14 +158,14 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
     }
 }
 
-/// Reads a library for a command whose output goes to `output`, beside which there is room for what memory
-/// should not hold.
+/// Reads a library for a command that writes to `output`. Temporary data that is too large for memory goes to
+/// the same disk.
 fn read_library(folder: &Path, output: &Path) -> Result<StoredLibrary, Error> {
     library_dir::read(folder, scratch_beside(output))
         .map_err(|error| Error::Usage(format!("not a library: {}: {error}", folder.display())))
 }
 
-/// Room on the disk that the output goes to, in the nearest folder that is there already.
+/// Returns temporary storage on the disk of the output, in its nearest existing parent folder.
 fn scratch_beside(output: &Path) -> Arc<dyn Scratch> {
     let folder = output.ancestors().find(|folder| folder.is_dir());
     Arc::new(Spill::into(folder.unwrap_or(Path::new("."))))
@@ -179,13 +181,13 @@ fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
     }
 }
 
-/// Refuses to start a command that takes strangers' films where the sandbox is not as demanded; what is
-/// missing otherwise is logged.
+/// Fails if the sandbox lacks a layer that `--sandbox` requires. Other missing layers are logged. Commands
+/// that read videos of untrusted people call this at their start.
 fn check_walls() -> Result<(), Error> {
     media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
     match media::demanded_walls() {
         Err(error @ media::Error::SandboxIncomplete { .. }) => Err(Error::Usage(error.to_string())),
-        // That there is no ffmpeg is said where it is looked for.
+        // The search for ffmpeg reports a missing ffmpeg.
         Err(_) => Ok(()),
         Ok(walls) => {
             for (layer, lack) in walls.layers {
@@ -199,7 +201,7 @@ fn check_walls() -> Result<(), Error> {
     }
 }
 
-/// Writes lines to stdout, for commands whose answer is text.
+/// Writes lines to stdout, for commands whose result is text.
 fn print_lines(lines: &[String]) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     lines.iter().try_for_each(|line| writeln!(out, "{line}"))

@@ -1,5 +1,5 @@
-//! What a person at a terminal sees of a computation: a bar on a terminal, plain lines otherwise
-//! (DESIGN.md: progress goes to stderr). One listener serves every command.
+//! Progress of a command on stderr: a bar on a terminal, plain lines otherwise. All commands share this
+//! module.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
@@ -8,20 +8,21 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::progress::Progress;
 
-/// A plain line is written when a stage begins and each time another quarter of it is done.
+/// Number of steps of a stage. A plain line is written at its start and after each step. Free choice.
 const PLAIN_STEPS: f64 = 4.0;
+/// Number of positions of the bar. Free choice.
 const TICKS: u64 = 1000;
 
-/// Shows stage and fraction on stderr.
+/// Shows the stage and its progress on stderr.
 pub struct Listener {
-    /// The bar, when stderr is a terminal.
+    /// The bar; `None` if stderr is no terminal.
     bar: Option<ProgressBar>,
-    /// Stage and last step written, for plain lines and for the bar's label.
+    /// The last stage and step shown.
     last: Mutex<(&'static str, u32)>,
 }
 
 impl Listener {
-    /// A bar when stderr is a terminal, plain lines otherwise.
+    /// Returns a listener that shows a bar if stderr is a terminal, else plain lines.
     pub fn new() -> Listener {
         let bar = std::io::stderr().is_terminal().then(|| {
             let bar = ProgressBar::new(TICKS);

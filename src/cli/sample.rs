@@ -1,4 +1,5 @@
-//! `flockreel sample`: footage of the virtual fish, and its true poses (DESIGN.md, Command line).
+//! `flockreel sample`: writes footage of a virtual fish, and its true poses
+//! (docs/explanation/algorithms.md, "Virtual fish").
 
 use std::path::PathBuf;
 
@@ -15,27 +16,27 @@ use crate::raster::Frame;
 /// Arguments of `sample`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The video to write.
+    /// Video to write (.mp4).
     #[arg(short, long, value_name = "MP4")]
     output: PathBuf,
     /// Also write the true poses, in the format of poses.json.
     #[arg(long, value_name = "JSON")]
     truth: Option<PathBuf>,
-    /// How many frames.
+    /// Number of frames, 1 to 1000000.
     #[arg(long, default_value_t = 1200)]
     frames: usize,
-    /// Another number gives another path, scene and noise.
+    /// Random seed of the path, the scene and the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Frames a second.
+    /// Frame rate, frames per second, 1 to 240.
     #[arg(long, default_value_t = 30.0)]
     fps: f64,
-    /// Width and height of the picture, pixels.
+    /// Width and height of the picture, pixels, 64x64 to 7680x4320.
     #[arg(long, default_value = "640x480", value_name = "WxH", value_parser = parse_size)]
     size: [u32; 2],
 }
 
-/// Films the virtual fish.
+/// Writes the video and, if requested, the true poses.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = SampleParams {
         n_frames: args.frames,
@@ -79,7 +80,7 @@ fn write_video(film: &SampleFilm, args: &Args, listener: &Listener) -> Result<()
     writer.finish().map_err(refused)
 }
 
-/// A size as people type it.
+/// Parses a size such as `640x480`. Returns width and height.
 pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').map(|(w, h)| (w.parse(), h.parse()));
     match sides {

@@ -1,4 +1,4 @@
-//! `flockreel serve`: API, page and workers in one process (RELIABILITY.md, R4 for its end).
+//! `flockreel serve`: API, page and workers in one process (docs/explanation/promises.md, "Graceful stop").
 
 use std::net::SocketAddr;
 
@@ -23,13 +23,13 @@ pub struct Args {
     config: Config,
 }
 
-/// Serves until it is told to stop.
+/// Serves until SIGTERM or SIGINT.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let config = args.config;
     super::check_walls()?;
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     let served = runtime.block_on(serve(config));
-    // A job that does not let go must not hold the process: it is rescued at the next start.
+    // A job that does not stop must not keep the process alive. The next start rescues it.
     runtime.shutdown_background();
     served.map(|()| None)
 }
@@ -78,6 +78,7 @@ async fn serve(config: Config) -> Result<(), Error> {
     Ok(())
 }
 
+/// Returns a listener and its address. Port 0 in `bind` selects a free port.
 pub(super) async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
     let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
     let listener = TcpListener::bind(bind).await.map_err(cannot)?;
@@ -85,7 +86,8 @@ pub(super) async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr)
     Ok((listener, address))
 }
 
-/// Beyond this machine nobody is answered without a token: where none is good, nobody could be.
+/// Fails if the service would listen beyond loopback without a valid token in the database, because it would
+/// then refuse every request. `--auth required` disables this check.
 async fn refuse_open_door(config: &Config) -> Result<(), Error> {
     if config.bind.ip().is_loopback() || config.auth == Auth::Required {
         return Ok(());
@@ -105,6 +107,7 @@ async fn refuse_open_door(config: &Config) -> Result<(), Error> {
     }
 }
 
+/// Waits for SIGTERM or SIGINT.
 pub(super) async fn wait_for_signal() -> Result<(), Error> {
     let listen = |kind| signal(kind).map_err(Error::io("waiting for signals"));
     let mut terminate = listen(SignalKind::terminate())?;
@@ -116,6 +119,7 @@ pub(super) async fn wait_for_signal() -> Result<(), Error> {
     Ok(())
 }
 
+/// Converts an error of the store. A store that is in use, or belongs to another database, is a usage error.
 pub(super) fn from_store(error: store::Error) -> Error {
     match error {
         store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),

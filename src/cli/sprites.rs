@@ -1,4 +1,4 @@
-//! `flockreel sprites LIBRARY_DIR -o DIR`: the animal of every frame as a picture with straight alpha.
+//! `flockreel sprites LIBRARY_DIR -o DIR`: writes the sprite of every frame as a PNG with straight alpha.
 
 use std::path::PathBuf;
 
@@ -11,9 +11,9 @@ use crate::formats::{picture, picture_archive};
 /// Arguments of `sprites`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The library.
+    /// Folder of the library, written by `analyze`.
     library: PathBuf,
-    /// The folder to write 000000.png ... to; frames without the animal are left out.
+    /// Folder for the pictures 000000.png and so on, named by frame. Frames without the animal have none.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }

@@ -1,6 +1,8 @@
-//! `flockreel token`: who may reach the service (RELIABILITY.md, S6). It works on the data folder,
-//! beside a running service too, which knows of a new or revoked token with the next request. A new
-//! token goes to stdout, once.
+//! `flockreel token`: creates, lists and revokes access tokens
+//! (docs/explanation/promises.md, "Owners are isolated").
+//!
+//! The command writes to the database directly, even while a service runs. Changes take effect with the next
+//! request. A new token is printed to stdout once.
 
 use std::io::Write;
 
@@ -28,39 +30,40 @@ pub struct Args {
 
 #[derive(Debug, Subcommand)]
 enum Action {
-    /// Make a token and print it: it cannot be shown again.
+    /// Create a token and print it. It cannot be shown again.
     Create(CreateArgs),
-    /// List every token, without its secret.
+    /// List all tokens, without their secrets.
     List,
-    /// End a token and whoever signed in with it.
+    /// Revoke a token and end the browser sessions that use it.
     Revoke {
-        /// The part of the token between the underscores.
+        /// Id of the token: the part between the underscores. The whole token is accepted too.
         id: String,
     },
 }
 
 #[derive(Debug, clap::Args)]
 struct CreateArgs {
-    /// What to call it.
+    /// Name of the token, for people.
     #[arg(long)]
     name: String,
-    /// What it may do: see, make, or both with everybody's things.
+    /// Permissions: `read` only reads, `write` also creates and deletes, `admin` does both for the data of
+    /// all owners.
     #[arg(long, default_value = "write",
         value_parser = PossibleValuesParser::new(Scope::ALL.map(Scope::name)))]
     scope: String,
-    /// How long it holds, such as 30d, 12h or 90m; for ever unless given.
+    /// Lifetime of the token, such as 30d, 12h or 90m. Default: unlimited.
     #[arg(long, value_parser = duration_ms, value_name = "TIME")]
     expires: Option<i64>,
-    /// How many jobs may be queued or running at once.
+    /// Maximum number of jobs of the owner that are queued or running at once.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(i64).range(0..), value_name = "N")]
     quota: i64,
-    /// Whose things it reaches: the id of another token, to take its place, or `local` for what was made
-    /// without a token. Its own unless given.
+    /// Owner whose data the token accesses: the id of another token, which this one can replace, or `local`
+    /// for data that was created without a token. Default: a new owner without data.
     #[arg(long, value_name = "ID")]
     owner: Option<String>,
 }
 
-/// Makes, lists or revokes; the answer is JSON for programs, lines for people.
+/// Creates, lists or revokes tokens. The result is one line of JSON with `json`, else plain lines.
 pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     runtime.block_on(async {
@@ -78,7 +81,7 @@ pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
     })
 }
 
-/// A new token alone; tokens one a line.
+/// Prints a new token, or a list with one line per token.
 fn print_lines(answer: &Value) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
     let written = match answer {
@@ -129,7 +132,7 @@ async fn list(store: &Store) -> Result<Value, Error> {
 }
 
 async fn revoke(store: &Store, id: &str) -> Result<Value, Error> {
-    // Whoever has the whole token at hand need not take it apart.
+    // The whole token is accepted in place of its id.
     let id = id.strip_prefix("frl_").unwrap_or(id);
     let id = id.split('_').next().unwrap_or(id);
     match store.revoke_token(id, now_ms()).await.map_err(from_store)? {
@@ -152,7 +155,7 @@ fn described(token: &Token) -> Value {
     })
 }
 
-/// A whole number of days, hours or minutes.
+/// Parses a whole number of days, hours or minutes, such as `30d`. Returns milliseconds, > 0.
 fn duration_ms(text: &str) -> Result<i64, String> {
     let wrong = || "a whole number with d, h or m, such as 30d".to_owned();
     let unit = text.chars().next_back().ok_or_else(wrong)?;

@@ -1,6 +1,8 @@
-//! `flockreel worker`: workers without API and page, on as many machines as there are jobs for, beside a
-//! service on the same PostgreSQL and the same files (RELIABILITY.md, R2 to R4). The queue is all that they
-//! and the service say to each other.
+//! `flockreel worker`: workers without API and page, on any number of machines
+//! (docs/explanation/promises.md, "No job is lost", "Stalled workers cannot overwrite" and "Graceful stop").
+//!
+//! They share a PostgreSQL database and the stored files with a service, and communicate with it only through
+//! the queue.
 
 use std::time::Duration;
 
@@ -28,11 +30,11 @@ pub struct Args {
     watch: Watch,
 }
 
-/// Works until it is told to stop.
+/// Runs jobs until SIGTERM or SIGINT.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
     let worked = runtime.block_on(work(args));
-    // A job that does not let go must not hold the process: another worker rescues it.
+    // A job that does not stop must not keep the process alive. Another worker rescues it.
     runtime.shutdown_background();
     worked.map(|()| None)
 }

@@ -1,5 +1,5 @@
-//! Admission: received bytes become a footage, or are refused with the gate's reason and leave
-//! nothing behind (RELIABILITY.md, store rules and gate). One way in for every upload.
+//! Admission: received files become a footage, or are refused with a stable code and leave nothing behind
+//! (docs/explanation/promises.md, "Bad input" and "No upload is lost"). Every upload takes this path.
 
 use uuid::Uuid;
 
@@ -12,24 +12,24 @@ use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
-/// Files received into a draft, synced and hashed, and what the sender calls them.
+/// Files received into a draft, synced and hashed, with their label and owner.
 pub struct Arrival {
-    /// Holds the files.
+    /// The draft that holds the files.
     pub draft: Draft,
     /// The video.
     pub video: BlobFile,
-    /// The given background, if there is one.
+    /// The given background, if any.
     pub background: Option<BlobFile>,
-    /// The given masks, if there are any.
+    /// The given masks, if any.
     pub masks: Option<BlobFile>,
-    /// A label for people.
+    /// Label given by the sender.
     pub name: String,
-    /// Whose it is.
+    /// Owner of the footage.
     pub owner: Owner,
 }
 
-/// Looks at the files, once there is a place for that, and stores them; the same bytes as before give the
-/// footage of then.
+/// Checks the files and stores them. Returns the existing footage if the owner has already stored the same
+/// files. Waits for a permit of `places`; fails with [`Error::Busy`] if none becomes free.
 pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> {
     let place = context.places.take().await?;
     let (arrival, format) = tokio::task::spawn_blocking(move || {
@@ -47,7 +47,7 @@ pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> 
     Ok(store.add_footage(footage, arrival.draft, &files).await?)
 }
 
-/// Everything that can be said of the files without decoding the video.
+/// Checks the files without decoding the video. Returns the properties of the video.
 fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
     let limits = Limits::default();
     let path = arrival.draft.path().join(VIDEO);

@@ -1,25 +1,29 @@
-//! The ids under which a request makes things (RELIABILITY.md, store and queue rules: Idempotency-Key).
-//! A request with a key has them allotted before it runs, and the same ones when it comes again after
-//! a crash: then what is there already is found under its id and not made twice. Any other code gets
-//! fresh ids. They belong to the task, so that no function between the door and the queue knows of them.
+//! Ids of the things that a request creates. A request with an Idempotency-Key gets a fixed sequence of ids,
+//! and the same ids if it is repeated after a crash. Things that it has already created are then found by id
+//! and not created twice (docs/explanation/promises.md, "Durable answers").
+//!
+//! Other code gets new random ids. The sequence is stored in the task, so that it need not be passed through
+//! every function between API and queue.
 
 use std::cell::Cell;
 
 use uuid::Uuid;
 
-/// How many ids one request may ask for.
+/// Maximum number of ids in the sequence of a request. Free choice; a power of two, because the lowest bits
+/// of an id hold its number.
 const MAX: u128 = 16;
 
 tokio::task_local! {
     static ALLOTTED: (Uuid, Cell<u128>);
 }
 
-/// Runs a request whose things have ids of this family, in the order in which it asks for them.
+/// Runs a request whose ids derive from `family`, numbered in the order in which the request asks for them.
 pub async fn under<F: Future>(family: Uuid, request: F) -> F::Output {
     ALLOTTED.scope((family, Cell::new(0)), request).await
 }
 
-/// The next id: of the request's family, if it has one.
+/// Returns the next id of the request's sequence. Returns a new id if the request has no sequence or has used
+/// it up.
 pub fn next_id() -> Uuid {
     let of_family = ALLOTTED.try_with(|(family, n_given)| {
         let n = n_given.replace(n_given.get() + 1);

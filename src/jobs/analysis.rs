@@ -1,5 +1,6 @@
-//! The analysis job: footage to library (ALGORITHMS.md 2 to 5), left as the folder of DESIGN.md
-//! with the pictures that the page shows beside it.
+//! The analysis job: makes a library from footage (docs/explanation/algorithms.md, from "Background" to
+//! "Transitions and playback"). It writes the library folder (docs/reference/formats.md, "library.json") and
+//! the pictures that the web page shows.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -23,7 +24,7 @@ use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
 use crate::{cpu, store};
 
-/// The stages, with their measured shares.
+/// Stages with their share of the running time; measured.
 pub const STAGES: Stages = &[
     ("background", 0.15),
     ("tracking", 0.35),
@@ -32,53 +33,53 @@ pub const STAGES: Stages = &[
     ("overlay", 0.3),
 ];
 
-/// What an analysis needs.
+/// Input of an analysis.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Input {
     /// The footage to measure.
     pub footage_id: FootageId,
-    /// How.
+    /// Parameters of the analysis.
     pub params: Params,
 }
 
-/// What is worth knowing of a library at a glance.
+/// Summary of a library.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = LibrarySummary)]
 pub struct Summary {
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
     /// Width and height of the picture, pixels.
     pub image_size_px: [u32; 2],
-    /// From where the animal is seen: `side` or `top`.
+    /// Camera view of the animal: `side` or `top`.
     pub view: String,
-    /// Frames of the footage.
+    /// Number of frames of the footage.
     pub n_frames: usize,
     /// Share of the frames in which the animal was found, 0..=1.
     pub detected_share: f64,
-    /// Pairs of moments that look alike.
+    /// Number of transitions: pairs of similar clips between which playback can jump.
     pub n_transitions: usize,
-    /// Share of the frames that playback can use for ever, 0..=1.
+    /// Share of the frames between which playback can continue endlessly, 0..=1.
     pub component_share: f64,
-    /// Frames in a clip.
+    /// Number of frames in a clip.
     pub clip_frames: usize,
-    /// Length of the animal when seen at length (80th percentile), pixels.
+    /// Length of the animal, pixels: 80th percentile over the frames. Null if unknown.
     pub length_px: Option<f64>,
-    /// What the library lacks and how to film better, the gravest first, then what is worth knowing of the film's
-    /// file; empty for a good library of a good file.
+    /// Weaknesses of the library and how to film better, most serious first, followed by remarks on the video
+    /// file. Empty if there are none.
     #[serde(default)]
     pub advice: Vec<Advice>,
 }
 
-/// One thing that a library or a flock lacks, or that is worth knowing of a film's file.
+/// A weakness of a library or flock, or a remark on a video file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct Advice {
-    /// Its stable name, such as `little_playback` or `lacks_up`.
+    /// Stable code, such as `little_playback` or `lacks_up`.
     pub code: String,
-    /// The same for people.
+    /// The advice as a sentence.
     pub sentence: String,
 }
 
-/// What the parameters say of the film itself.
+/// Returns the parameters that concern the decoding of the video.
 pub fn hints(params: &Params) -> Hints {
     Hints {
         fps: params.fps,
@@ -87,8 +88,8 @@ pub fn hints(params: &Params) -> Hints {
     }
 }
 
-/// Queues an analysis, after the job that makes its footage if that is not done yet. Returns the job's id and
-/// the id that the library will have.
+/// Queues an analysis. If `after_job` is given, the analysis starts after that job, which makes its footage.
+/// Returns the id of the job and the id that the library will have.
 pub async fn enqueue(
     context: &Context,
     input: &Input,
@@ -101,7 +102,7 @@ pub async fn enqueue(
 }
 
 impl Input {
-    /// Measures the footage and writes the library.
+    /// Measures the footage, writes the library into the folder of the attempt, and returns the result's row.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let footage = attempt.footage(self.footage_id)?;
         let limits = Limits {
@@ -199,7 +200,7 @@ impl Summary {
 }
 
 impl Advice {
-    /// One piece of advice, as results hold it.
+    /// Returns a piece of advice in the form stored with results.
     pub(super) fn new(code: &str, sentence: &impl ToString) -> Advice {
         Advice {
             code: code.to_owned(),
@@ -207,7 +208,7 @@ impl Advice {
         }
     }
 
-    /// What a library lacks, the gravest first, then what is worth knowing of its film's file.
+    /// Returns the weaknesses of a library, most serious first, followed by remarks on its video file.
     pub fn all(library: &Library, params: &Params, notes: &[Note]) -> Vec<Advice> {
         let all = analysis::stats::advice(library, params);
         let of_library = all.iter().map(|one| Advice::new(one.code(), one));

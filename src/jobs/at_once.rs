@@ -1,5 +1,5 @@
-//! What is computed while somebody waits for it (DESIGN.md, REST API): a flock without its film, and the distances of
-//! a library as numbers. No job is queued and nothing of it is kept; who hangs up ends it.
+//! Computations during a request: a planned flock without its video, and all distances of a library as
+//! numbers. They queue no job and store no result. The computation is cancelled if the client disconnects.
 
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
@@ -17,7 +17,7 @@ use crate::formats::{flock_json, npy};
 use crate::progress::Progress;
 use crate::store::{Draft, Spill, libraries::Library};
 
-/// A flock of a library, simulated and planned: its `flock.json`.
+/// Simulates and plans a flock. Returns its `flock.json`.
 pub async fn flock(context: &Context, library: &Library, params: Params) -> Result<Vec<u8>, Error> {
     let plan = move |stored: StoredLibrary, _: &Draft, waiting: &Waiting| {
         let flock = plan_flock(&stored.library, &params, waiting)?;
@@ -26,7 +26,7 @@ pub async fn flock(context: &Context, library: &Library, params: Params) -> Resu
     compute(context, library, plan).await
 }
 
-/// All distances between the clips of a library: its `distance.npy`, in a file without a name.
+/// Computes the distances between all clips of a library. Returns an unnamed file with the `distance.npy`.
 pub async fn distances(context: &Context, library: &Library) -> Result<File, Error> {
     let write = |stored: StoredLibrary, draft: &Draft, waiting: &Waiting| {
         let library = stored.library;
@@ -55,7 +55,7 @@ pub async fn distances(context: &Context, library: &Library) -> Result<File, Err
     compute(context, library, write).await
 }
 
-/// Computes something of a library, as soon as there is a place for that.
+/// Runs a computation on a library. Waits for a permit; fails with [`Error::Busy`] if none becomes free.
 async fn compute<Made: Send + 'static>(
     context: &Context,
     library: &Library,
@@ -81,7 +81,7 @@ async fn compute<Made: Send + 'static>(
     made.await.unwrap_or(Err(Error::Panicked))
 }
 
-/// Somebody waits, until cancelled.
+/// Progress of a computation during a request. It is cancelled when the request is dropped.
 struct Waiting(CancellationToken);
 
 impl Progress for Waiting {

@@ -1,4 +1,4 @@
-//! What one run of a job is given, and what it gives back.
+//! Input and output of one attempt at a job.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,25 +14,25 @@ use crate::store::jobs::finish::Made;
 use crate::store::owners::Reach;
 use crate::store::{Draft, Fetched, Spill, Store, footage, libraries};
 
-/// One run of a job: where to write, how to load, whom to report to.
+/// One attempt at a job: its folder, its access to stored data, and its progress reports.
 pub struct Attempt<'a> {
-    /// Progress out, cancellation in.
+    /// Receives progress and passes on cancellation.
     pub listener: &'a Listener,
-    /// Threads to use, at least 1.
+    /// Number of threads to use, at least 1.
     pub threads: usize,
     draft: &'a Draft,
     store: &'a Store,
     runtime: &'a Handle,
 }
 
-/// What a run made; the files lie in its draft.
+/// Result of an attempt. The files are in its draft.
 #[derive(Clone, Debug)]
 pub struct Product {
-    /// What was made, and of what.
+    /// Kind of the result, and its source.
     pub made: Made,
-    /// The parameters in full, JSON.
+    /// All parameters, JSON.
     pub params: String,
-    /// What is worth knowing at a glance, JSON.
+    /// Summary for overviews, JSON.
     pub summary: String,
 }
 
@@ -53,17 +53,19 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// The folder that this run's files go to; fresh, and thrown away unless the run is finished.
+    /// Returns the folder for the files of this attempt. It is empty at the start, and removed unless the job
+    /// is finished.
     pub fn folder(&self) -> &Path {
         self.draft.path()
     }
 
-    /// Where the run may put aside what memory should not hold.
+    /// Returns a temporary storage for data that is too large for memory.
     pub fn scratch(&self) -> Arc<dyn Scratch> {
         Arc::new(Spill::into(self.folder()))
     }
 
-    /// A footage's row; must be called on a blocking thread.
+    /// Returns the row of a footage. Must be called on a blocking thread. Fails if the footage does not
+    /// exist.
     pub fn footage(&self, id: FootageId) -> Result<footage::Footage, Error> {
         let row = self
             .runtime
@@ -71,7 +73,8 @@ impl<'a> Attempt<'a> {
         row.ok_or(Error::InputAbsent(id.0))
     }
 
-    /// A library's row, and its files as files of this machine; must be called on a blocking thread.
+    /// Returns the row of a library and its files as local files. Must be called on a blocking thread. Fails
+    /// if the library does not exist.
     pub fn library(&self, id: LibraryId) -> Result<(libraries::Library, Fetched), Error> {
         let row = self
             .runtime
@@ -81,13 +84,14 @@ impl<'a> Attempt<'a> {
         Ok((row, files))
     }
 
-    /// Files of the store as files of this machine; must be called on a blocking thread.
+    /// Returns stored files as local files. Must be called on a blocking thread.
     pub fn fetch(&self, folder: &str, names: &[&str]) -> Result<Fetched, Error> {
         Ok(self.runtime.block_on(self.store.fetch(folder, names))?)
     }
 }
 
-/// Where the files of a result lie in the store: the fence keeps two runs apart.
+/// Returns the folder of a result in the blob store. It contains the fence, so that two attempts never share
+/// a folder.
 pub(super) fn folder_of(made: Made, result: Uuid, fence: i64) -> String {
     let kind = match made {
         Made::Sample(_) => "footage",

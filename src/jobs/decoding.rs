@@ -1,4 +1,4 @@
-//! A film that counts the frames it gives and the time that they took, for the meters.
+//! A video source that measures decoding for the metrics: number of frames and time.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use super::Listener;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
 use crate::raster::Frame;
 
-/// A film whose reading is counted.
+/// A video source that reports its frames and its reading time to the listener.
 pub(super) struct Counted<'a, S: ?Sized> {
     source: &'a S,
     listener: &'a Listener,

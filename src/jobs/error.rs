@@ -1,34 +1,34 @@
-//! Why a job did not finish.
+//! Errors of jobs.
 
 use crate::code::Code;
 use crate::footage::SourceError;
 use crate::{analysis, fish, flock, formats, media, store};
 
-/// The reasons, one variant for each part that can refuse or fail.
+/// Reasons why a job did not finish, one variant per failing part.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The input, as it was stored, cannot be read by this version.
+    /// This version cannot read the stored input.
     #[error("the job's input cannot be read: {0}")]
     Input(#[from] serde_json::Error),
-    /// The footage or library is no longer there.
+    /// The input footage or library no longer exists.
     #[error("what the job was to be made of is not there: {0}")]
     InputAbsent(uuid::Uuid),
-    /// The footage could not be opened, or the video not written.
+    /// The footage could not be opened, or a video could not be written.
     #[error(transparent)]
     Media(#[from] media::Error),
     /// A video could not be read to its end.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// The analysis ended without a library.
+    /// The analysis failed.
     #[error(transparent)]
     Analysis(#[from] analysis::Error),
-    /// The same, where the film itself shows why.
+    /// The analysis failed, and frames of the footage show the reason.
     #[error("{cause}")]
     Refused {
-        /// The reason.
+        /// The error of the analysis.
         #[source]
         cause: analysis::Error,
-        /// The frames that show it, JPEG.
+        /// The frames that show the reason, JPEG.
         picture: Vec<u8>,
     },
     /// The flock could not be made.
@@ -37,37 +37,37 @@ pub enum Error {
     /// The virtual fish could not be made.
     #[error(transparent)]
     Fish(#[from] fish::Error),
-    /// A library's folder could not be written or read.
+    /// A library folder could not be read or written.
     #[error(transparent)]
     LibraryDir(#[from] formats::library_dir::Error),
-    /// The library is too long for a whole matrix.
+    /// The distance matrix of the library would be too large.
     #[error(transparent)]
     Numbers(#[from] formats::npy::Error),
-    /// The store said no.
+    /// The store failed.
     #[error(transparent)]
     Store(#[from] store::Error),
-    /// A file of the job's own folder failed.
+    /// A file of the attempt could not be read or written.
     #[error("a file of the job failed: {0}")]
     Io(#[from] std::io::Error),
     /// The computation panicked.
     #[error("the computation stopped unexpectedly")]
     Panicked,
-    /// It took longer than a job may.
+    /// The job exceeded its time limit.
     #[error("the job took longer than a job may")]
     OverTime,
-    /// What it writes would fill the disk.
+    /// The disk has too little space for the job's output.
     #[error("there is too little room on the disk for what the job makes")]
     NoRoom,
-    /// As much is done for those who wait as there are places for.
+    /// No permit for work during a request became free in time (`places`).
     #[error("too much is asked for at once: ask again soon")]
     Busy,
-    /// Somebody cancelled, or the worker drains.
+    /// A user cancelled the job, or the process is stopping.
     #[error("the job was cancelled")]
     Cancelled,
 }
 
 impl Error {
-    /// The stable code.
+    /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self {
             Error::Input(_) => Code::InvalidParams,
@@ -89,7 +89,7 @@ impl Error {
         }
     }
 
-    /// The picture of the reason, JPEG, where there is one.
+    /// Returns the JPEG that shows the reason, if there is one.
     pub fn picture(&self) -> Option<&[u8]> {
         match self {
             Error::Refused { picture, .. } => Some(picture),
@@ -97,8 +97,8 @@ impl Error {
         }
     }
 
-    /// Whether another attempt may succeed: a file system or database that failed for a moment, but
-    /// never bad input and never a panic.
+    /// Returns whether another attempt may succeed. True for errors of the file system, the database and the
+    /// start of media tools; false for bad input, a full disk and panics.
     pub fn may_pass(&self) -> bool {
         match self {
             Error::Store(_) | Error::Io(_) | Error::Media(media::Error::Io { .. }) => {

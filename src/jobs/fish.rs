@@ -1,5 +1,6 @@
-//! The fish job: poses to virtual fish (ALGORITHMS.md 4; N 7), left as `video.mp4` before the
-//! footage's own background, and `model.glb`.
+//! The fish job: makes a virtual fish from the poses of a library
+//! (docs/explanation/algorithms.md, "Virtual fish"; Nakajima et al., section 7). It writes `video.mp4`, in
+//! front of the background of the footage, and `model.glb`.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -16,33 +17,34 @@ use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
 
-/// The stages, with their shares.
+/// Stages with their share of the running time.
 pub const STAGES: Stages = &[("loading", 0.05), ("rendering", 0.95)];
 
-/// What a virtual fish needs.
+/// Input of a virtual fish.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Input {
-    /// The library whose poses drive it.
+    /// The library whose poses drive the fish.
     pub library_id: LibraryId,
-    /// How.
+    /// Parameters of the virtual fish.
     pub params: Params,
 }
 
-/// What is worth knowing of a virtual fish at a glance.
+/// Summary of a virtual fish.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = FishSummary)]
 pub struct Summary {
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
     /// Width and height of the picture, pixels.
     pub image_size_px: [u32; 2],
-    /// Frames of the video.
+    /// Number of frames of the video.
     pub frames: usize,
-    /// Frames in which the fish is in sight.
+    /// Number of frames in which the fish is visible.
     pub visible_frames: usize,
 }
 
-/// Queues a virtual fish, after the job that makes its library if that is not done yet.
+/// Queues a virtual fish. If `after_job` is given, it starts after that job, which makes its library. Returns
+/// the id of the job and the id that the fish will have.
 pub async fn enqueue(
     context: &Context,
     input: &Input,
@@ -55,7 +57,7 @@ pub async fn enqueue(
 }
 
 impl Input {
-    /// Drives, writes the model, renders.
+    /// Moves the fish, writes model and video into the folder of the attempt, and returns the result's row.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let (_, files) = attempt.library(self.library_id)?;
         attempt.listener.report("loading", 0.0);

@@ -1,5 +1,6 @@
-//! Between a job's computation and its worker: the computation reports and asks whether to go on,
-//! the worker reads and cancels, and at the end learns how long each stage took. Cheap on both sides; the worker decides how often rows are written.
+//! Communication between a running computation and its worker. The computation reports its progress and asks
+//! whether to stop. The worker reads the progress, cancels, and finally reads the times of the stages. Both
+//! sides are cheap; the worker decides how often it writes to the database.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -7,20 +8,19 @@ use std::time::{Duration, Instant};
 
 use crate::progress::Progress;
 
-/// The stages of a kind of job, in order, with the share of the whole that each takes; the shares
-/// add up to 1.
+/// Stages of a kind of job, in order, with the share of the running time of each. The shares add up to 1.
 pub type Stages = &'static [(&'static str, f64)];
 
-/// Where a computation is.
+/// Position of a computation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Position {
-    /// The stage under way.
+    /// Current stage.
     pub stage: &'static str,
-    /// How much of the whole is done, 0..=1; never falls.
+    /// Completed share of the whole job, 0..=1; never decreases.
     pub progress: f64,
 }
 
-/// One computation's line to its worker.
+/// Progress and cancellation of one computation.
 #[derive(Debug)]
 pub struct Listener {
     stages: Stages,
@@ -29,7 +29,7 @@ pub struct Listener {
     times: Mutex<Times>,
 }
 
-/// How long each stage took so far, and since when the one under way goes on.
+/// Time spent in past stages, start of the current one, and statistics of decoding.
 #[derive(Debug)]
 struct Times {
     past: Vec<(&'static str, Duration)>,
@@ -39,7 +39,7 @@ struct Times {
 }
 
 impl Listener {
-    /// A computation that goes through these stages.
+    /// Returns the listener of a computation with these stages.
     pub fn new(stages: Stages) -> Listener {
         Listener {
             stages,
@@ -62,16 +62,16 @@ impl Listener {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Where the computation is.
+    /// Returns the position of the computation.
     pub fn position(&self) -> Position {
-        // A panic while reporting cannot leave half a position: it is written whole.
+        // The position is written as a whole, so a panic cannot leave it incomplete.
         *self
             .position
             .lock()
             .unwrap_or_else(|broken| broken.into_inner())
     }
 
-    /// How long each stage took so far: those of the table, the one under way last.
+    /// Returns the time spent in each stage so far. Only the stages of the job are included.
     pub fn stage_times(&self) -> Vec<(&'static str, Duration)> {
         let under_way = self.position().stage;
         let times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
@@ -81,14 +81,14 @@ impl Listener {
         all
     }
 
-    /// Notes frames that were decoded in a time.
+    /// Adds decoded frames and the time that they took.
     pub fn count_decoded(&self, n_frames: u64, took: Duration) {
         let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
         times.n_decoded += n_frames;
         times.decoding += took;
     }
 
-    /// Frames decoded, and the time that took.
+    /// Returns the number of decoded frames and the time that they took.
     pub fn decoded(&self) -> (u64, Duration) {
         let times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
         (times.n_decoded, times.decoding)
@@ -101,7 +101,7 @@ impl Listener {
         times.since = Instant::now();
     }
 
-    /// The share of the whole at a point of a stage; nothing for a stage that is not in the table.
+    /// Returns the completed share of the job at a fraction of a stage; `None` for an unknown stage.
     fn overall(&self, stage: &str, fraction: f64) -> Option<f64> {
         let at = self.stages.iter().position(|(name, _)| *name == stage)?;
         let before: f64 = self.stages[..at].iter().map(|(_, share)| share).sum();

@@ -1,4 +1,4 @@
-//! What tells the animal apart in a footage besides its colors: masks that came with it, or its own alpha channel.
+//! Given masks of the animal: mask videos that came with the footage, or the alpha channel of the footage.
 
 use std::path::Path;
 
@@ -6,23 +6,24 @@ use super::Error;
 use crate::footage::{FrameSource, Masked, Visit};
 use crate::media::{Hints, Limits, Video};
 
-/// A mask that is less than this somewhere is one, 0..=255.
+/// Alpha below which a pixel counts as transparent, 0..=255. Free choice.
 const OPAQUE: u8 = 250;
-/// So many frames of an alpha channel are looked at.
+/// Number of frames of an alpha channel that are checked for transparency. Free choice.
 const N_LOOKED_AT: usize = 16;
 
 /// The masks of a footage.
 pub struct Masks {
     video: Video,
-    /// Whether the colors of the footage are mixed with what lies behind the animal.
+    /// Whether the colors of partly covered pixels include the background.
     is_mixed: bool,
 }
 
 impl Masks {
-    /// The masks at `given`, one for each frame of the footage; or else the alpha channel of the footage, whose file is
-    /// at `path`; `None` where there is neither, or that is opaque throughout.
+    /// Opens the masks at `given`, one per frame of the footage; without them, the alpha channel of the
+    /// footage, whose file is at `path`. Returns `None` if there is neither, or if the alpha channel is
+    /// opaque.
     ///
-    /// Fails where they cannot be read.
+    /// Fails if the masks cannot be read.
     pub fn open(
         footage: &Video,
         (path, given): (&Path, Option<&Path>),
@@ -30,7 +31,7 @@ impl Masks {
         hints: &Hints,
     ) -> Result<Option<Masks>, Error> {
         if let Some(given) = given {
-            // Masks have no rate of their own: each is one of a frame.
+            // Masks have no frame rate of their own: each belongs to one frame.
             let hints = Hints {
                 fps: Some(footage.format().fps),
                 ..*hints
@@ -56,12 +57,12 @@ impl Masks {
         Ok(masks.tell_anything()?.then_some(masks))
     }
 
-    /// The footage with its masks. Fails where their sizes differ.
+    /// Returns the footage with its masks. Fails if their picture sizes differ.
     pub fn over<'a>(&'a self, footage: &'a Video) -> Result<Masked<'a>, Error> {
         Ok(Masked::of(footage, &self.video, self.is_mixed)?)
     }
 
-    /// Whether some frame shows more than the animal.
+    /// Returns whether any checked frame has transparent pixels.
     fn tell_anything(&self) -> Result<bool, Error> {
         let mut tells = false;
         let mut look: Box<Visit<'_>> = Box::new(|frame| {

@@ -1,5 +1,5 @@
-//! What is counted of jobs, for /metrics (ECOSYSTEM.md, seen from outside): how they end and how long each stage
-//! takes, how fast films are decoded. Labels are of closed sets: kinds, stages, outcomes, codes; never ids.
+//! Metrics of jobs for `/metrics`: outcomes, duration of each stage, and speed of decoding. All labels have a
+//! fixed set of values (kinds, stages, outcomes, codes) and never contain ids.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,11 +14,12 @@ use super::listener::Listener;
 use super::worker::Step;
 use crate::store::jobs::Kind;
 
-/// From a tiny film to a long one, seconds.
+/// Upper limits of the histogram buckets for stages, seconds. They cover short and long videos.
 const JOB_S: [f64; 11] = [
     0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 180.0, 600.0, 1800.0, 3600.0,
 ];
-/// From a large film on a busy machine to a small one on an idle one, frames a second.
+/// Upper limits of the histogram buckets for decoding, frames per second. They cover large videos on a busy
+/// machine and small ones on an idle machine.
 const DECODE_FPS: [f64; 9] = [5.0, 15.0, 30.0, 60.0, 120.0, 250.0, 500.0, 1000.0, 2000.0];
 
 #[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
@@ -36,7 +37,7 @@ struct Stage {
 
 type Times = Family<Stage, Histogram, fn() -> Histogram>;
 
-/// The counters of one process; cheap to clone.
+/// The metrics of one process. Clones are cheap and share the counters.
 #[derive(Clone)]
 pub struct Meters {
     ended: Family<Ended, Counter>,
@@ -57,7 +58,7 @@ impl Default for Meters {
 }
 
 impl Meters {
-    /// Names the counters in a registry.
+    /// Adds the metrics to a registry.
     pub fn register(&self, registry: &mut Registry) {
         registry.register(
             "flockreel_job_attempts",
@@ -81,7 +82,7 @@ impl Meters {
         );
     }
 
-    /// Counts an attempt that ended.
+    /// Counts a completed attempt.
     pub(super) fn count(&self, kind: Kind, step: &Step, listener: &Listener) {
         let (outcome, code) = match step {
             Step::Idle => return,

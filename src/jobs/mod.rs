@@ -1,43 +1,44 @@
-//! Jobs: what the queue holds and who works on it (DESIGN.md, names; RELIABILITY.md, R2 to R5, R8).
+//! Jobs: the kinds of work in the queue, and the workers that run them
+//! (docs/explanation/promises.md, "No job is lost").
 //!
-//! The kinds are a closed enum. A job's `run` is a plain function on a blocking thread: it
-//! loads, computes by ring 2 and leaves files in its draft; the worker stores them. A job may be run
-//! twice, and only one of the runs is kept.
+//! The kinds are a closed enum. The `run` of a job is a plain function on a blocking thread. It loads its
+//! input, computes, and leaves files in its draft; the worker stores them. A job may run twice, and only one
+//! of the results is kept.
 
-// The way of a job.
-pub mod supervisor; // the pool, rescue, drain
+// How jobs are run.
+pub mod supervisor; // start of workers, rescue of jobs, graceful stop
 
-pub mod worker; // claim, run, finish
+pub mod worker; // claim, run and finish one job
 
-pub mod allotted; // the ids under which a request makes things
+pub mod allotted; // ids for idempotent requests
 
-pub mod attempt; // what one run of a job is given
+pub mod attempt; // input and output of one attempt
 
-pub mod listener; // progress out, cancellation in
+pub mod listener; // progress and cancellation
 
-pub mod meters; // what is counted
+pub mod meters; // metrics
 
-mod decoding; // a film that counts its frames
+mod decoding; // metrics of decoding
 
-// What jobs do.
-pub mod admit; // received bytes -> footage
+// The kinds of jobs, and related computations.
+pub mod admit; // received files -> footage
 
-pub mod sample; // nothing -> footage, for the first visit
+pub mod sample; // nothing -> sample footage
 
 pub mod analysis; // footage -> library
 
 pub mod flock; // library -> flock
 
 pub mod fish; // library -> virtual fish
-pub mod overlay; // footage -> the same with its poses drawn over it
+pub mod overlay; // footage -> video with its poses drawn over it
 
-pub mod masks; // footage -> which of it is the animal, where that is given
+pub mod masks; // footage -> given masks or alpha channel
 
-pub mod refusal; // footage that could not be measured -> a picture of why
+pub mod refusal; // refused footage -> picture of the reason
 
-pub mod at_once; // library -> what somebody waits for
+pub mod at_once; // library -> computations during a request
 
-pub mod places; // how much of that at once
+pub mod places; // limits of simultaneous work
 
 pub mod clock;
 pub mod error;
@@ -65,50 +66,51 @@ use crate::store::jobs::{Kind, Lease};
 use crate::store::owners::Account;
 use crate::store::{self, Store};
 
-/// What workers share: smaller than the API's state.
+/// Data shared by workers. Smaller than the state of the API.
 #[derive(Clone)]
 pub struct Context {
-    /// Rows and files.
+    /// The store.
     pub store: Store,
-    /// Wakes one idle worker when a job was queued.
+    /// Wakes an idle worker when a job is queued.
     pub wake: Arc<Notify>,
-    /// Cancelled when the process stops: no more claims, running jobs go back.
+    /// Cancelled when the process stops. Workers then claim no jobs, and running jobs return to the queue.
     pub draining: CancellationToken,
-    /// Threads that one job may use.
+    /// Number of threads that one job may use.
     pub threads: usize,
-    /// How long a claim holds without a heartbeat.
+    /// Duration of a lease without a heartbeat.
     pub lease: Duration,
-    /// How long one attempt at a job may take.
+    /// Time limit of one attempt at a job.
     pub budget: Duration,
-    /// How often what has expired is swept while the service runs.
+    /// Interval of the sweeps of expired data.
     pub sweep_every: Duration,
-    /// How many jobs of everybody may be queued or running at once.
+    /// Maximum number of queued and running jobs of all owners.
     pub max_queued: i64,
-    /// Room on the disk below which jobs are stopped, bytes, so that rows can still be written.
+    /// Free disk space below which jobs are stopped, bytes. It keeps space for the database.
     pub least_room_bytes: u64,
-    /// What is counted of the jobs of this process.
+    /// Metrics of the jobs of this process.
     pub meters: Meters,
-    /// How many films are looked at at once.
+    /// Limit of simultaneous checks of uploads.
     pub places: Places,
-    /// Who may have something computed while they wait.
+    /// Limit of simultaneous computations during requests.
     pub at_once: Places,
 }
 
 impl Context {
-    /// The time that leases are given and ended by: of all who share the queue, not of this machine alone.
+    /// Returns the time for leases, milliseconds since 1970. If machines share the queue, this is the
+    /// database's clock.
     pub async fn now_ms(&self) -> Result<i64, store::Error> {
         let shared = self.store.clock_ms().await?;
         Ok(shared.unwrap_or_else(clock::now_ms))
     }
 
-    /// Whether a job that goes on writing would leave too little room on the disk.
+    /// Returns whether the free disk space is below the limit for jobs.
     fn lacks_room(&self) -> bool {
         let room = self.store.blobs().room_bytes();
         room.is_ok_and(|room_bytes| room_bytes < self.least_room_bytes)
     }
 
-    /// Queues a job, after another one if it needs that one's result; its id, and the id that its result will
-    /// have. Both are chosen in this order, as a request that comes again asks for them.
+    /// Queues a job, after `after_job` if that makes its input. Returns the id of the job and the id that its
+    /// result will have. The ids are chosen in this order, because a repeated request must get the same ones.
     async fn enqueue<Input: Serialize>(
         &self,
         kind: Kind,
@@ -132,7 +134,7 @@ impl Context {
         Ok((job_id, result_id))
     }
 
-    /// The usual lease, over a store.
+    /// Returns a context with default settings.
     pub fn new(store: Store, threads: usize) -> Context {
         Context {
             store,
@@ -151,21 +153,21 @@ impl Context {
     }
 }
 
-/// A job with its input, decoded.
+/// A job with its decoded input.
 #[derive(Clone, Debug)]
 pub enum Job {
-    /// Nothing to footage.
+    /// Makes the sample footage.
     Sample(sample::Input),
-    /// Footage to library.
+    /// Makes a library from footage.
     Analysis(Box<analysis::Input>),
-    /// Library to flock.
+    /// Makes a flock from a library.
     Flock(Box<flock::Input>),
-    /// Library to virtual fish.
+    /// Makes a virtual fish from a library.
     Fish(fish::Input),
 }
 
 impl Job {
-    /// Reads the input of a claimed job.
+    /// Decodes the input of a claimed job.
     pub fn decode(lease: &Lease) -> Result<Job, Error> {
         Ok(match lease.kind {
             Kind::Sample => Job::Sample(serde_json::from_str(&lease.input)?),
@@ -175,7 +177,7 @@ impl Job {
         })
     }
 
-    /// Does the work, on the thread that calls.
+    /// Runs the job on the calling thread.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         match self {
             Job::Sample(input) => input.run(attempt),
@@ -186,7 +188,7 @@ impl Job {
     }
 }
 
-/// The stages of a kind of job.
+/// Returns the stages of a kind of job.
 pub fn stages(kind: Kind) -> Stages {
     match kind {
         Kind::Sample => sample::STAGES,

@@ -1,4 +1,4 @@
-//! overlay.mp4: the footage once more, with its poses drawn over it (O's figure 10).
+//! `overlay.mp4`: the footage with its poses drawn over it (Okabe et al., figure 10).
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use crate::media::VideoWriter;
 use crate::progress::Progress;
 use crate::raster::Frame;
 
-/// Films the footage with its poses drawn over it. `path` must end in the video's own ending.
+/// Writes the footage with its poses drawn over it to `path`. The extension of `path` selects the container.
 pub fn film(
     source: &dyn FrameSource,
     poses: &Poses,

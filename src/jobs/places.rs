@@ -1,5 +1,5 @@
-//! How much is done at once for those who wait for it (RELIABILITY.md, H5): who finds no place soon is told to come
-//! again, before anything is begun.
+//! Limits of simultaneous work on behalf of waiting requests (docs/explanation/promises.md, "Overload"). If
+//! no permit becomes free in time, the request is refused before its work starts.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,10 +9,10 @@ use tokio::time::timeout;
 
 use super::Error;
 
-/// The longest wait for a place.
+/// Maximum wait for a permit. Free choice.
 const LONGEST_WAIT: Duration = Duration::from_secs(20);
 
-/// Some places.
+/// A limited number of permits. Clones share them.
 #[derive(Clone, Debug)]
 pub struct Places {
     free: Arc<Semaphore>,
@@ -20,7 +20,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// So many, for which others wait so long.
+    /// Returns a limit of `n` permits. `longest_wait` is the maximum wait for one.
     pub(super) fn new(n: usize, longest_wait: Duration) -> Places {
         Places {
             free: Arc::new(Semaphore::new(n)),
@@ -28,18 +28,18 @@ impl Places {
         }
     }
 
-    /// One for each core.
+    /// Returns a limit of one permit per processor core.
     pub fn of_cores() -> Places {
         let n_cores = std::thread::available_parallelism().map_or(1, usize::from);
         Places::new(n_cores, LONGEST_WAIT)
     }
 
-    /// One alone.
+    /// Returns a limit of one permit.
     pub fn one() -> Places {
         Places::new(1, LONGEST_WAIT)
     }
 
-    /// A place until it is dropped; [`Error::Busy`] where none becomes free soon.
+    /// Waits for a permit, which is returned when dropped. Fails with [`Error::Busy`] after the maximum wait.
     pub(super) async fn take(&self) -> Result<OwnedSemaphorePermit, Error> {
         let place = timeout(self.longest_wait, self.free.clone().acquire_owned());
         place.await.ok().and_then(Result::ok).ok_or(Error::Busy)

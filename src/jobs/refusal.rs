@@ -1,4 +1,5 @@
-//! refused.jpg: the frames of a film that show why it became no library.
+//! `refused.jpg`: frames of the footage that show why it was refused
+//! (docs/explanation/algorithms.md, "Refused footage").
 
 use super::Error;
 use crate::analysis;
@@ -6,10 +7,10 @@ use crate::footage::{FrameSource, SourceError};
 use crate::formats::evidence;
 use crate::raster::Frame;
 
-/// The name of the picture in a folder and in an address.
+/// File name of the picture, also in URLs.
 pub const NAME: &str = "refused.jpg";
 
-/// The error of an analysis, with its picture where the film shows the reason.
+/// Returns the error of an analysis, with a picture if the footage shows the reason.
 pub fn illustrated(source: &dyn FrameSource, cause: analysis::Error) -> Error {
     match picture(source, &cause) {
         Some(picture) => Error::Refused { cause, picture },
@@ -17,8 +18,8 @@ pub fn illustrated(source: &dyn FrameSource, cause: analysis::Error) -> Error {
     }
 }
 
-/// The frames that show why the film was refused, as JPEG; `None` where no frame does, or the film
-/// cannot be read any more.
+/// Returns the frames that show why the footage was refused, as JPEG. `None` if no frame shows it, or if the
+/// footage can no longer be read.
 pub fn picture(source: &dyn FrameSource, cause: &analysis::Error) -> Option<Vec<u8>> {
     let shown = cause.evidence(source.format().fps)?;
     let frames = frames(source, &shown.frames);
@@ -27,7 +28,8 @@ pub fn picture(source: &dyn FrameSource, cause: &analysis::Error) -> Option<Vec<
     Some(evidence::draw(frames, &shown.boxes_px))
 }
 
-/// Reads the wanted frames, which rise; fewer where the film ends before.
+/// Returns the wanted frames. Their indices must be in ascending order. Fewer are returned if the footage
+/// ends earlier.
 fn frames(source: &dyn FrameSource, wanted: &[usize]) -> Result<Vec<Frame>, SourceError> {
     let mut stream = source.open()?;
     let (mut frame, mut frames) = (Frame::default(), Vec::new());

@@ -1,5 +1,5 @@
-//! The sample job: films the virtual fish as footage, so that the first visit to an empty service has a
-//! flock to show. [`fill`] queues it together with the analysis and the flock that follow it.
+//! The sample job: films the virtual fish as footage, so that an empty service has a flock to show at the
+//! first visit. [`fill`] queues it, followed by its analysis and its flock.
 
 use std::path::Path;
 
@@ -18,13 +18,13 @@ use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::{Account, Reach};
 
-/// The stages, with their shares.
+/// Stages with their share of the running time.
 pub const STAGES: Stages = &[("filming", 1.0)];
 
-/// What the sample film needs.
+/// Input of the sample.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Input {
-    /// Frames to film, at least 1.
+    /// Number of frames, at least 1.
     pub n_frames: usize,
 }
 
@@ -35,8 +35,9 @@ impl Default for Input {
     }
 }
 
-/// Queues the sample, its analysis and its flock in an empty store. Does nothing where the store has
-/// footage, or jobs under way: a restart finds the jobs of the first start in the queue.
+/// Queues the sample, its analysis and its flock if the store is empty. Does nothing if the store has
+/// footage, or jobs that are queued or running: after a restart the jobs of the first start are still in the
+/// queue.
 pub async fn fill(context: &Context) -> Result<(), store::Error> {
     let store = &context.store;
     let has_footage = !store.list_footage(1, None, &Reach::All).await?.is_empty();
@@ -59,7 +60,7 @@ pub async fn fill(context: &Context) -> Result<(), store::Error> {
     Ok(())
 }
 
-/// Queues a sample film. Returns the job's id and the id that the footage will have.
+/// Queues a sample. Returns the id of the job and the id that the footage will have.
 pub async fn enqueue(
     context: &Context,
     input: &Input,
@@ -71,14 +72,14 @@ pub async fn enqueue(
 }
 
 impl Input {
-    /// Films the virtual fish and leaves the file as a footage's video.
+    /// Films the virtual fish and leaves the video in the folder of the attempt.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let film = SampleFilm::new(SampleParams {
             n_frames: self.n_frames,
             ..SampleParams::default()
         })?;
         let path = attempt.folder().join(VIDEO);
-        // The writer chooses the container by the file's extension.
+        // The extension of the path selects the container.
         let written = path.with_extension("mp4");
         write(&film, &written, attempt.listener)?;
         std::fs::rename(&written, &path)?;

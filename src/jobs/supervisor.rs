@@ -1,5 +1,6 @@
-//! The supervisor: a pool of workers, the rescue of jobs whose workers fell silent, the sweeps while the service
-//! runs (R5), and the drain at the end (RELIABILITY.md, R2 and R4).
+//! The supervisor of a process: starts the workers, rescues jobs whose workers have stopped, sweeps expired
+//! data, and stops the workers at the end (docs/explanation/promises.md, "No job is lost", "Graceful stop"
+//! and "No orphans").
 
 use std::convert::Infallible;
 use std::time::{Duration, SystemTime};
@@ -12,19 +13,20 @@ use super::{Context, clock};
 use crate::ids::JobId;
 use crate::store::{self, Store, jobs::JobState};
 
-/// Idle workers look for jobs this often even if nobody wakes them.
+/// Interval at which idle workers look for jobs, even without a notification. Free choice.
 const POLL: Duration = Duration::from_secs(1);
-/// The longest wait for running jobs to let go.
+/// Maximum wait for running jobs when the process stops. Free choice.
 const DRAIN: Duration = Duration::from_secs(15);
 
-/// The running pool.
+/// The running workers of a process.
 pub struct Supervisor {
     context: Context,
     tasks: JoinSet<()>,
 }
 
 impl Supervisor {
-    /// Starts `n_workers` workers and the rescue.
+    /// Starts `n_workers` workers, the rescue, the notifications, and the sweeps if this process serves the
+    /// data folder.
     pub fn start(context: Context, n_workers: usize) -> Supervisor {
         let mut tasks = JoinSet::new();
         for _ in 0..n_workers {
@@ -38,8 +40,8 @@ impl Supervisor {
         Supervisor { context, tasks }
     }
 
-    /// Stops claiming, sends running jobs back to the queue, and returns when all have let go or
-    /// time is up; whatever still runs then is rescued at the next start.
+    /// Stops claiming, returns running jobs to the queue, and waits until all workers have stopped, at most
+    /// 15 s. A job that still runs then is rescued at the next start.
     pub async fn drain(mut self) {
         self.context.draining.cancel();
         let all = async { while self.tasks.join_next().await.is_some() {} };
@@ -60,7 +62,7 @@ async fn work(context: Context) {
                     () = context.draining.cancelled() => {}
                 }
             }
-            // A job that ended may be what others waited for.
+            // Other jobs may depend on the job that ended.
             Ok(_) => context.wake.notify_one(),
             Err(error) => {
                 tracing::error!(%error, "a worker could not reach its queue");
@@ -88,7 +90,7 @@ async fn rescue_silent(context: &Context) -> Result<Vec<(JobId, JobState)>, stor
     context.store.rescue(context.now_ms().await?).await
 }
 
-/// Wakes a worker when another process has queued a job.
+/// Wakes a worker when any process has queued a job.
 async fn listen(context: Context) {
     while !context.draining.is_cancelled() {
         let heard = async {
@@ -108,7 +110,7 @@ async fn listen(context: Context) {
     }
 }
 
-/// Sweeps again and again what a start would, for a service that runs for months.
+/// Sweeps expired data at regular intervals, for services that run for months.
 async fn sweep(context: Context) {
     loop {
         tokio::select! {
@@ -121,7 +123,8 @@ async fn sweep(context: Context) {
     }
 }
 
-/// Removes expired uploads, answers kept for their day, what the dead were making, and folders that no row names.
+/// Removes expired uploads and idempotency keys, drafts of processes that have ended, and folders that no row
+/// names.
 async fn sweep_expired(store: &Store) -> Result<(), store::Error> {
     store.sweep_uploads(clock::now_ms()).await?;
     store.forget_old_answers(clock::now_ms()).await?;
@@ -129,8 +132,8 @@ async fn sweep_expired(store: &Store) -> Result<(), store::Error> {
     Ok(())
 }
 
-/// Mends what a crash left, before the first worker starts: leases of the dead, drafts, strays. Where
-/// other processes share the rows only what has run out is of the dead.
+/// Repairs the state after a crash, before the first worker starts: leases, idempotency keys, drafts and
+/// folders. If other processes share the database, only expired leases are rescued.
 pub async fn recover(context: &Context) -> Result<(), store::Error> {
     let now_ms = context.now_ms().await?;
     if context.store.is_alone() {

@@ -1,8 +1,8 @@
-//! A worker: claims one job, runs it, ends it (STYLE.md, habit 8). [`Worker::step`] does that once
-//! and says what happened; the loop around it is the supervisor's.
+//! A worker: claims a job, runs it and ends it. [`Worker::step`] does this once and returns the outcome; the
+//! loop is in the supervisor.
 //!
-//! The computation runs on a blocking thread with a pool of its own; beside it, this task beats
-//! every third of the lease, and at most twice a second when there is progress to note.
+//! The computation runs on a blocking thread with its own thread pool. Meanwhile the worker sends a heartbeat
+//! every third of the lease, and up to twice per second if there is new progress.
 
 use std::pin::pin;
 use std::sync::Arc;
@@ -26,44 +26,47 @@ use crate::store::jobs::finish::Outcome;
 use crate::store::jobs::heartbeat::Beat;
 use crate::store::jobs::{Change, Lease};
 
+/// Interval at which the worker checks a running job. Free choice.
 const TICK: Duration = Duration::from_millis(500);
+/// Maximum number of attempts if errors may be transient. Free choice.
 const MAX_ATTEMPTS: i64 = 3;
-/// The longest wait for work to let go once the process stops; then it is abandoned.
+/// Maximum wait for the computation to stop after it was cancelled. Afterwards it is abandoned. Free choice.
 const LET_GO: Duration = Duration::from_secs(10);
-/// The wait before the second attempt; each further one waits four times as long.
+/// Wait before the second attempt, milliseconds. Every further wait is four times as long. Free choice.
 const BACKOFF_MS: i64 = 2_000;
 
-/// How much nicer a job is than the service: under load it gets a tenth of what a request gets.
+/// Increase of the nice value of a job's threads. At 10, a job gets about a tenth of the processor time of a
+/// request under load.
 const PATIENCE: i32 = 10;
 
-/// What one step did.
+/// Outcome of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// There was nothing to do.
+    /// No job was ready.
     Idle,
-    /// A job is done, its result linked.
+    /// The job is done and its result is linked.
     Done(JobId),
-    /// A job failed for good.
+    /// The job failed permanently.
     Failed(JobId, Code),
-    /// A job failed and will be tried again.
+    /// The job failed and will be tried again.
     Retried(JobId),
-    /// A job was cancelled while it ran.
+    /// The job was cancelled while it ran.
     Cancelled(JobId),
-    /// A job went back to the queue because the process stops.
+    /// The job returned to the queue because the process stops.
     Released(JobId),
-    /// A job was no longer ours when it ended: nothing of this run was kept.
+    /// The lease was lost. Nothing of this attempt was kept.
     Lost(JobId),
 }
 
-/// Works on one job at a time.
+/// A worker. It runs one job at a time.
 pub struct Worker {
     context: Context,
-    /// Random per process and worker: a restarted worker is never taken for its predecessor.
+    /// Id of the worker. Random, so that a restarted worker has another id.
     id: Uuid,
 }
 
 impl Worker {
-    /// A worker with an identity of its own.
+    /// Returns a worker with a new id.
     pub fn new(context: Context) -> Worker {
         Worker {
             context,
@@ -77,7 +80,7 @@ impl Worker {
             .await
     }
 
-    /// The same with another way to do the work, for tests of the queue.
+    /// Does the same as [`Worker::step`], but with `run` as the computation. For tests of the queue.
     pub async fn step_by<Run>(&self, run: Run) -> Result<Step, store::Error>
     where
         Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
@@ -112,7 +115,8 @@ impl Worker {
         Ok(step)
     }
 
-    /// Keeps the lease, notes progress, and passes on the wish to stop, until the work ends.
+    /// Renews the lease, stores progress and passes on cancellation until the computation ends. Cancels it at
+    /// the time limit, if disk space is short, or if the process stops.
     async fn beat_until_done(
         &self,
         lease: &Lease,
@@ -136,7 +140,7 @@ impl Worker {
                 listener.cancel();
                 let let_go = LET_GO.min(self.context.lease);
                 if told_to_stop.get_or_insert_with(Instant::now).elapsed() > let_go {
-                    // A thread cannot be ended from outside: it runs on, and its result is thrown away.
+                    // A thread cannot be stopped from outside. It continues, and its result is discarded.
                     return self.unless_stopped(start, lacks_room, Err(Error::Cancelled));
                 }
             }
@@ -148,7 +152,8 @@ impl Worker {
         }
     }
 
-    /// Work that was told to stop because its time was up, or the room, failed for that reason, whatever it says.
+    /// Replaces the error of a computation that was stopped for its time limit or for lack of disk space. The
+    /// error then states that reason.
     fn unless_stopped(
         &self,
         start: Instant,
@@ -172,7 +177,7 @@ impl Worker {
         match self.renew(lease, at).await {
             Ok(Beat::Held) => {}
             Ok(Beat::CancelRequested | Beat::Lost) => listener.cancel(),
-            // The lease may run out; the fence keeps the books right whatever happens then.
+            // If the lease expires, the fence still prevents a second result.
             Err(error) => tracing::warn!(job.id = %lease.job_id, %error, "a heartbeat failed"),
         }
     }
@@ -231,8 +236,8 @@ impl Worker {
     }
 }
 
-/// Begins the work on a blocking thread; what is returned waits for it and puts what it made into place. Who drops
-/// that has given the work up: its thread runs on, and what it makes goes with its draft.
+/// Starts the computation on a blocking thread. The returned future waits for it and stores its files. If the
+/// future is dropped, the thread continues, and its files are removed with its draft.
 fn begin<Run>(
     context: &Context,
     lease: Lease,
@@ -277,8 +282,8 @@ where
     }
 }
 
-/// Lets those who answer requests go first: a job takes minutes and has time, a request has not. Threads and
-/// processes that the calling thread starts from now on are as patient.
+/// Lowers the priority of the calling thread, and of all threads and processes that it starts later, so that
+/// requests are answered first. Failure is ignored: the job then runs at normal priority.
 fn step_back() {
     let usual = getpriority_process(None).unwrap_or(0);
     if let Err(error) = setpriority_process(None, usual + PATIENCE) {
@@ -286,7 +291,7 @@ fn step_back() {
     }
 }
 
-/// Links the result; one that came too late is thrown away.
+/// Links the result. Removes the files if the lease was lost.
 async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Change, store::Error> {
     match store.finish(lease, outcome, now_ms()).await {
         Ok(Change::Lost) => {
@@ -298,13 +303,14 @@ async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Chang
     }
 }
 
-/// Whether the work ended because somebody wanted it to, and not because it failed.
+/// Returns whether the computation ended because it was cancelled, and not because of an error.
 fn was_stopped(error: &Error, listener: &Listener) -> bool {
     crate::progress::Progress::cancelled(listener)
         && !matches!(error, Error::OverTime | Error::NoRoom)
 }
 
-/// What a person is told: the reason, where it is one of theirs; what failed inside stays in the log.
+/// Returns the message for the user. For internal errors this is only the meaning of the code; the details go
+/// to the log.
 fn said(error: &Error) -> String {
     match error.code() {
         Code::Internal | Code::DecoderCrashed => {

@@ -1,5 +1,5 @@
-//! The invariants of the store, verified (RELIABILITY.md, store rules, I1 to I6). Run after every
-//! test that breaks something on purpose, and by `flockreel check`.
+//! Verification of the store's invariants I1 to I6 (docs/explanation/promises.md). `flockreel check` runs it,
+//! and so does every test that injects a fault.
 
 use std::fs;
 use std::time::{Duration, SystemTime};
@@ -9,17 +9,17 @@ use sqlx::types::Uuid;
 use super::upkeep::sweep::GRACE;
 use super::{BlobFile, Error, Store, sql};
 
-/// One thing that is wrong, in words that name the row or file.
+/// One violation. The sentence names the row or file.
 pub type Fault = String;
 
 impl Store {
-    /// Every fault found where nothing was broken; none is what is promised. Reads and hashes every file.
+    /// Returns all violations of an idle store; an intact store has none. Reads and hashes every file.
     pub async fn check(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
         self.check_strays_from(Duration::ZERO, now_ms).await
     }
 
-    /// The same where something may have been broken off, or is under way: a folder whose row is not there
-    /// (yet) is no fault for an hour.
+    /// Returns all violations of a store that is in use or was interrupted by a crash. A folder without a row
+    /// counts only after an hour, because its row may still follow.
     pub async fn check_after_crash(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
         self.check_strays_from(GRACE, now_ms).await
     }
@@ -46,10 +46,10 @@ impl Store {
         Ok(faults)
     }
 
-    /// I3: the database itself is whole, and its rows refer to rows that are there.
+    /// Checks I3: the database is intact, and every reference points to an existing row.
     async fn broken_rows(&self) -> Result<Vec<Fault>, Error> {
         if !self.reader.is_file() {
-            // A server sees to that itself.
+            // A database server verifies itself.
             return Ok(Vec::new());
         }
         let sql = "select * from pragma_integrity_check";
@@ -63,8 +63,8 @@ impl Store {
         Ok(broken.chain(lost).collect())
     }
 
-    /// I1: of an upload under way all bytes are there that its sender was told are safe. Where other
-    /// machines have the rows too, theirs cannot be looked at.
+    /// Checks I1 for unfinished uploads: the file holds all bytes that were confirmed to the sender. Skipped
+    /// for a shared database, whose upload files may be on other machines.
     async fn short_uploads(&self) -> Result<Vec<Fault>, Error> {
         if !self.reader.is_file() {
             return Ok(Vec::new());
@@ -80,7 +80,7 @@ impl Store {
             .collect())
     }
 
-    /// I1: each row's file exists, with its size and hash.
+    /// Checks I1: each row's file exists and has the recorded size and hash.
     async fn missing_or_altered_blobs(&self) -> Result<Vec<Fault>, Error> {
         let sql = "select folder, name, size_bytes, sha256 from blobs order by folder, name";
         let rows: Vec<(String, String, i64, Vec<u8>)> =
@@ -102,8 +102,8 @@ impl Store {
     }
 }
 
-/// Queries that return the job of each row that breaks a rule; $1 is the time.
-/// That a job has one legal state (I3) is held by the table's own constraints.
+/// Queries that return the job of each row that violates a rule. $1 is the time, milliseconds since 1970.
+/// Constraints of the table ensure that every job is in a legal state (I3).
 const RULES_OF_JOBS: &[(&str, &str)] = &[
     (
         "I4: done without exactly one result of its fence, or a result without done",
@@ -119,7 +119,7 @@ const RULES_OF_JOBS: &[(&str, &str)] = &[
     ),
 ];
 
-/// I6: the folders whose owners' sizes differ from their files'.
+/// Query for I6: folders whose recorded size differs from the sum of their files' sizes.
 const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from footage union all \
          select folder, size_bytes from libraries union all \

@@ -1,14 +1,18 @@
-//! Deleting what people made, with all that came of it. The rows go in one transaction, the files after
-//! it (a crash between leaves folders without rows, which are swept). A job's row goes with its result
-//! (RELIABILITY.md, I4); where it was running its worker finds no row at the next heartbeat, lets go, and
-//! can link nothing because no fence stands. Deleting works on a full disk, in the room of the reserve.
+//! Deletion of user data with everything derived from it. One transaction deletes the rows, and the files are
+//! removed after it. A crash in between leaves folders without rows, which the sweep removes.
+//!
+//! The row of a job is deleted with its result. If the job is running, its worker finds no row at the next
+//! heartbeat and stops. It cannot store a result, because its fence matches no row.
+//!
+//! Deleting also works on a full disk, within the reserve (docs/explanation/promises.md, "Full disk").
 
 use sqlx::types::Uuid;
 
 use super::{Error, Store, Transaction, sql};
 
 impl Store {
-    /// Deletes a footage, its libraries and all that was made of them; false where it is not there.
+    /// Deletes a footage, its libraries and everything made from them. Returns false if the footage does not
+    /// exist.
     pub async fn delete_footage(&self, id: Uuid) -> Result<bool, Error> {
         self.reserve.lend(|| self.delete_footage_now(id)).await
     }
@@ -44,7 +48,7 @@ impl Store {
         Ok(true)
     }
 
-    /// Deletes a library and all that was made of it; false where it is not there.
+    /// Deletes a library and everything made from it. Returns false if the library does not exist.
     pub async fn delete_library(&self, id: Uuid) -> Result<bool, Error> {
         self.reserve.lend(|| self.delete_library_now(id)).await
     }
@@ -58,7 +62,7 @@ impl Store {
         Ok(was_there)
     }
 
-    /// Deletes a flock or a virtual fish; false where it is not there.
+    /// Deletes a flock or a virtual fish. Returns false if it does not exist.
     pub async fn delete_film(&self, id: Uuid) -> Result<bool, Error> {
         self.reserve.lend(|| self.delete_film_now(id)).await
     }
@@ -88,7 +92,7 @@ impl Store {
         Ok(was_there)
     }
 
-    /// Ends the transaction, and removes the files that nobody names any more.
+    /// Deletes the rows of the files, commits, and removes the folders.
     async fn forget(
         &self,
         mut transaction: Transaction,
@@ -106,13 +110,13 @@ impl Store {
     }
 }
 
-/// Deletes the rows of a library, there or still to be made, and of what was made of it, jobs included;
-/// returns the folders that they named.
+/// Deletes the rows of a library and of everything made from it, including jobs that have not finished.
+/// Returns the folders that these rows named.
 async fn delete_library_rows(
     transaction: &mut Transaction,
     library: Uuid,
 ) -> Result<Vec<String>, sqlx::Error> {
-    // The jobs first, as whoever finishes them does, so that neither waits for the other.
+    // Locks the jobs first, in the same order as finishing a job does. This prevents deadlocks.
     let jobs = "select 1 from jobs where result_id = $1 \
                or kind in ('flock', 'fish') and json_extract(input, '$.library_id') = $2 for update";
     let lock = sql::query(jobs).bind(library).bind(library.to_string());

@@ -1,4 +1,4 @@
-//! Why the store could not do what was asked (RELIABILITY.md, R7: a full disk is a clean no).
+//! Errors of the store. A full disk has its own stable code (docs/explanation/promises.md, "Full disk").
 
 use std::io::ErrorKind;
 use std::path::PathBuf;
@@ -8,77 +8,77 @@ use sqlx::sqlite::SqliteError;
 
 use crate::code::Code;
 
-/// SQLITE_FULL, the low byte of its extended codes.
+/// SQLite's result code SQLITE_FULL: the low byte of its extended codes.
 const SQLITE_FULL: u32 = 13;
-/// SQLITE_IOERR_SHMSIZE: the index of the write-ahead log cannot grow.
+/// SQLite's extended result code SQLITE_IOERR_SHMSIZE: the index of the write-ahead log cannot grow.
 const SQLITE_IOERR_SHMSIZE: u32 = 4874;
 
-/// The reasons, one variant each.
+/// Reasons why an operation of the store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The database said no.
+    /// The database returned an error.
     #[error("the database failed: {0}")]
     Sql(#[from] sqlx::Error),
-    /// The database could not be brought to this version's form.
+    /// The database could not be migrated to this version's schema.
     #[error("the database could not be migrated: {0}")]
     Migrate(#[from] sqlx::migrate::MigrateError),
     /// A file could not be read or written.
     #[error("a file of the store failed: {0}")]
     Io(#[from] std::io::Error),
-    /// The bucket said no, or was not reached.
+    /// The bucket returned an error or was not reached.
     #[error("the bucket failed: {0}")]
     Bucket(#[from] object_store::Error),
-    /// A file in place is not what was put there.
+    /// The content of a stored file differs from its recorded size or hash.
     #[error("a file of the store has been altered: {0}")]
     Altered(String),
-    /// What is done with a file of rows was asked of a server.
+    /// The operation needs a SQLite file, but the database is on a server.
     #[error("the rows are on a server: copy them with its own tools")]
     RowsElsewhere,
-    /// Another process serves the same folder.
+    /// Another process serves the same data folder.
     #[error("the data folder is in use by another flockreel: {}", .0.display())]
     InUse(PathBuf),
-    /// The files bear the mark of another database.
+    /// The files are marked as belonging to another database.
     #[error(
         "these files are another database's: name the database and the store that belong together, or an empty \
          place for the files"
     )]
     OtherFiles,
-    /// More bytes than an upload may have.
+    /// The upload exceeds its maximum size.
     #[error("the upload is larger than {limit_bytes} bytes")]
     TooLarge {
-        /// The limit.
+        /// The maximum, bytes.
         limit_bytes: u64,
     },
-    /// The film that a job made is stored already, under another id.
+    /// The video that a sample job made is already stored under another id.
     #[error("the same film was uploaded while this one was made")]
     FilmIsKnown,
-    /// A request that comes again under its ids asks for something else.
+    /// A repeated request has the ids of an earlier one but different content.
     #[error("the request was another one when it came first: {0}")]
     IdInUse(sqlx::types::Uuid),
-    /// The owner has as many jobs queued and running as it may.
+    /// The owner has reached the maximum number of queued and running jobs.
     #[error("no more than {quota} jobs may be queued or running at once: wait for one to end")]
     QuotaExceeded {
-        /// The limit.
+        /// The maximum per owner.
         quota: i64,
     },
-    /// Everybody together has as many jobs queued and running as there is room for.
+    /// The queue has reached the maximum number of queued and running jobs of all owners.
     #[error("the queue is full, {room} jobs are under way: ask again when some have ended")]
     QueueFull {
-        /// The limit.
+        /// The maximum of the queue.
         room: i64,
     },
-    /// A row holds what this version does not know.
+    /// A row contains a value that this version does not know.
     #[error("a row of {table} cannot be read: {value}")]
     UnknownValue {
-        /// The table.
+        /// Name of the table.
         table: &'static str,
-        /// The value.
+        /// The unknown value.
         value: String,
     },
 }
 
 impl Error {
-    /// The stable code.
+    /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
@@ -111,7 +111,7 @@ fn is_full(error: &std::io::Error) -> bool {
     )
 }
 
-/// Whether the database found no room on its disk; PostgreSQL says `disk_full`.
+/// Returns whether the database's disk is full. PostgreSQL reports this as `disk_full` (53100).
 fn has_no_room(error: &dyn DatabaseError) -> bool {
     let code = error.code().unwrap_or_default();
     match error.try_downcast_ref::<SqliteError>() {

@@ -1,4 +1,4 @@
-//! The table of fish: what each finished fish job left.
+//! The table of virtual fish: one row per finished fish job.
 
 use sqlx::types::Uuid;
 
@@ -7,7 +7,7 @@ use super::owners::Reach;
 use super::{Error, Store};
 
 impl Store {
-    /// One fish, if it is finished, there and within reach.
+    /// Returns the virtual fish if it exists and is visible to the caller.
     pub async fn fish(&self, id: Uuid, reach: &Reach) -> Result<Option<Film>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
@@ -17,7 +17,7 @@ impl Store {
         self.one_of(sql, id, reach).await
     }
 
-    /// The newest fish, at most `limit`, older than `before`.
+    /// Returns the newest virtual fish with ids less than `before`, at most `limit`.
     pub async fn list_fish(
         &self,
         limit: i64,
@@ -34,7 +34,7 @@ impl Store {
     }
 }
 
-/// What a finished job adds; the parameters are those of every result (`jobs/finish`).
+/// Insert statement for a finished job. The parameters are the same for every kind of result (`jobs/finish`).
 pub(super) const INSERT: &str = "insert into fish (id, job_id, fence, library_id, folder, params, summary, \
     size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
     (select owner from jobs where id = $2))";

@@ -1,35 +1,36 @@
-//! The table of flocks: what each finished flock job left. A virtual fish leaves the same, in a table of its own.
+//! The table of flocks: one row per finished flock job. Virtual fish have the same columns in a table of
+//! their own.
 
 use sqlx::types::Uuid;
 
 use super::owners::Reach;
 use super::{Error, Store};
 
-/// One flock or virtual fish as stored; its files lie in `folder`.
+/// One stored flock or virtual fish. Its files are in `folder`.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct Film {
-    /// Its id.
+    /// Id of the flock or fish.
     pub id: Uuid,
     /// The job that made it.
     pub job_id: Uuid,
-    /// The library it was made of.
+    /// The library that it was made from.
     pub library_id: Uuid,
-    /// Its folder in the blob store.
+    /// Folder in the blob store.
     pub folder: String,
-    /// The parameters it was made with, JSON.
+    /// Parameters of the job, JSON.
     pub params: String,
-    /// What is worth knowing at a glance, JSON.
+    /// Summary for overviews, JSON.
     pub summary: String,
-    /// Whether it came of the sample that the program made itself.
+    /// Whether it derives from the sample made by the program.
     pub sample: bool,
-    /// Size of all its files, bytes.
+    /// Total size of the files, bytes.
     pub size_bytes: i64,
-    /// When it was finished, milliseconds since 1970.
+    /// Time at which the job finished, milliseconds since 1970.
     pub created_ms: i64,
 }
 
 impl Store {
-    /// One flock, if it is finished, there and within reach.
+    /// Returns the flock if it exists and is visible to the caller.
     pub async fn flock(&self, id: Uuid, reach: &Reach) -> Result<Option<Film>, Error> {
         let sql = "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
                    r.size_bytes, r.created_ms \
@@ -39,7 +40,7 @@ impl Store {
         self.one_of(sql, id, reach).await
     }
 
-    /// The newest flocks, at most `limit`, older than `before`.
+    /// Returns the newest flocks with ids less than `before`, at most `limit`.
     pub async fn list_flocks(
         &self,
         limit: i64,
@@ -56,7 +57,7 @@ impl Store {
     }
 }
 
-/// What a finished job adds; the parameters are those of every result (`jobs/finish`).
+/// Insert statement for a finished job. The parameters are the same for every kind of result (`jobs/finish`).
 pub(super) const INSERT: &str = "insert into flocks (id, job_id, fence, library_id, folder, params, summary, \
     size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
     (select owner from jobs where id = $2))";

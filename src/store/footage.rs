@@ -1,4 +1,4 @@
-//! The table of footage: one row per uploaded video and given background.
+//! The table of footage: one row per video, with the background and masks given for it.
 
 use std::io;
 
@@ -8,73 +8,74 @@ use super::jobs::Lease;
 use super::owners::{Owner, Reach};
 use super::{BlobFile, Draft, Error, Store, Transaction, blobs, sql};
 
-/// The name of the video's file in its folder.
+/// File name of the video in its folder.
 pub const VIDEO: &str = "video";
-/// The name of the given background's file in its folder.
+/// File name of the given background in its folder.
 pub const BACKGROUND: &str = "background";
 
-/// The name of the given masks' file in its folder.
+/// File name of the given masks in their folder.
 pub const MASKS: &str = "masks";
 
-/// One footage as stored.
+/// One stored footage.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct Footage {
-    /// Its id.
+    /// Id of the footage.
     pub id: Uuid,
-    /// Whose it is.
+    /// Owner of the footage.
     pub owner: Owner,
-    /// Its folder in the blob store.
+    /// Folder in the blob store.
     pub folder: String,
-    /// SHA-256 of the video's bytes.
+    /// SHA-256 of the video file.
     pub sha256: Vec<u8>,
-    /// SHA-256 of the given background; empty when none was given.
+    /// SHA-256 of the given background; empty if none was given.
     pub background_sha256: Vec<u8>,
-    /// SHA-256 of the given masks; empty when none were given.
+    /// SHA-256 of the given masks; empty if none were given.
     pub masks_sha256: Vec<u8>,
-    /// What the user called it: a label, never a path.
+    /// Label given by the user; never used as a path.
     pub name: String,
-    /// Size of the video, background and masks, bytes.
+    /// Size of video, background and masks, bytes.
     pub size_bytes: i64,
-    /// Columns, square pixels.
+    /// Width in square pixels.
     pub width: i64,
-    /// Rows, square pixels.
+    /// Height in square pixels.
     pub height: i64,
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
-    /// How many frames there seem to be.
+    /// Estimated number of frames.
     pub n_frames_hint: i64,
-    /// Made by the program itself at its first start.
+    /// Whether this is the sample that the program made at its first start.
     pub sample: bool,
-    /// When it was stored, milliseconds since 1970.
+    /// Time of storage, milliseconds since 1970.
     pub created_ms: i64,
 }
 
-/// A film that a job made, as it is known beside its file.
+/// Properties of a video that a sample job made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filmed {
-    /// What it is called.
+    /// Label of the footage.
     pub name: &'static str,
-    /// Columns, square pixels.
+    /// Width in square pixels.
     pub width: u32,
-    /// Rows, square pixels.
+    /// Height in square pixels.
     pub height: u32,
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
-    /// How many frames there are.
+    /// Number of frames.
     pub n_frames: usize,
 }
 
-/// Whether the bytes were new.
+/// Result of adding footage.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Added {
-    /// They were, and are now stored.
+    /// The files were new and are stored.
     New(Footage),
-    /// The same bytes had been stored before; the new copy is gone.
+    /// The owner has already stored the same files; the new copy is discarded.
     Known(Footage),
 }
 
 impl Store {
-    /// Moves the received files into place and adds the row. `footage.folder` is made here.
+    /// Moves the received files into place and adds the row. Sets `footage.folder`. Returns the existing
+    /// footage if the owner has already stored the same files.
     pub async fn add_footage(
         &self,
         mut footage: Footage,
@@ -95,12 +96,13 @@ impl Store {
         }
     }
 
-    /// What became of a footage whose row could not be added, or whose row was, and only the answer lost.
+    /// Decides the outcome after a failed insert. The row may exist nevertheless if only the database's reply
+    /// was lost.
     async fn settle(&self, footage: Footage, error: Error) -> Result<Added, Error> {
         if self.is_linked_after(&footage.folder, &error).await? {
             return Ok(Added::New(footage));
         }
-        // Two uploads of the same bytes at once: the other one came first.
+        // Another upload of the same files may have been stored first.
         match self.footage_of_bytes(&footage).await? {
             Some(known) => {
                 self.blobs.discard(&footage.folder).await?;
@@ -110,13 +112,13 @@ impl Store {
         }
     }
 
-    /// One footage, if it is there and within reach.
+    /// Returns the footage if it exists and is visible to the caller.
     pub async fn footage(&self, id: Uuid, reach: &Reach) -> Result<Option<Footage>, Error> {
         let sql = "select * from footage where id = $1 and ($2 is null or owner = $2)";
         self.one_of(sql, id, reach).await
     }
 
-    /// The newest footage, at most `limit`, older than `before`.
+    /// Returns the newest footage with ids less than `before`, at most `limit`.
     pub async fn list_footage(
         &self,
         limit: i64,
@@ -171,8 +173,8 @@ impl Store {
     }
 }
 
-/// Adds the row of the sample that a finished job filmed; `files` hold its video. Fails with
-/// [`Error::FilmIsKnown`] where the owner has uploaded the same bytes meanwhile.
+/// Adds the row of the sample that a finished job made; `files` contains its video. Fails with
+/// [`Error::FilmIsKnown`] if the owner has uploaded the same file in the meantime.
 pub(super) async fn insert_filmed(
     transaction: &mut Transaction,
     lease: &Lease,
@@ -233,17 +235,17 @@ mod tests {
         }
     }
 
-    /// The error of a commit whose answer was lost.
+    /// The error of a commit whose reply was lost.
     fn lost() -> Error {
         Error::Sql(sqlx::Error::Io(std::io::ErrorKind::ConnectionReset.into()))
     }
 
-    /// How many folders there are in place.
+    /// Returns the number of stored folders.
     async fn n_folders(store: &Store) -> usize {
         store.blobs.folders().await.unwrap().len()
     }
 
-    /// A folder in place, as an upload leaves it, whose row is still to come.
+    /// Stores the folder of an upload without adding its row.
     async fn put_in_place(store: &Store, footage: &Footage) -> Vec<BlobFile> {
         let draft = store.blobs.draft(&footage.id.to_string()).unwrap();
         std::fs::write(draft.path().join(VIDEO), b"film").unwrap();

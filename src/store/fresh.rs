@@ -1,5 +1,5 @@
-//! An empty store for a test, on what the tests run on: a folder of its own, or a database and a prefix of its
-//! own, on the server and in the bucket that `FLOCKREEL_TEST_POSTGRES` and `FLOCKREEL_TEST_BUCKET` name
+//! Empty stores for tests. By default a test uses its own temporary folder. If `FLOCKREEL_TEST_POSTGRES` or
+//! `FLOCKREEL_TEST_BUCKET` names a server or a bucket, the test uses its own database or prefix there
 //! (scripts/with-servers.sh).
 
 use std::path::Path;
@@ -9,12 +9,12 @@ use sqlx::types::Uuid;
 use super::Store;
 use crate::config::{Database, Storage};
 
-/// Opens it.
+/// Opens an empty store for a test.
 pub(super) async fn open(data: &Path) -> Store {
     Store::open(storage(data)).await.unwrap()
 }
 
-/// Where it is.
+/// Returns the location of an empty store for a test.
 pub(super) fn storage(data: &Path) -> Storage {
     let name = format!("test-{}", Uuid::now_v7());
     let of = |server: &str| std::env::var(server).ok();

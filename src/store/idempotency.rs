@@ -1,64 +1,68 @@
-//! The table of idempotency keys (RELIABILITY.md, store and queue rules): same key and body, same
-//! answer. A key is running while its first request is; done once the answer is noted; interrupted
-//! where that request ended without an answer to keep (a crash, a sender who hung up, a 5xx), and then
-//! the next one runs under the same ids, so that nothing is made twice.
+//! The table of idempotency keys: a repeated request with the same key and body gets the same answer
+//! (docs/explanation/promises.md, "Durable answers").
+//!
+//! A key is `running` while its first request runs, and `done` once the answer is stored. It is `interrupted`
+//! if the request ended without an answer worth keeping: a crash, a broken connection or a 5xx status. The
+//! next request with an interrupted key runs with the same ids, so that nothing is created twice.
 
 use sqlx::types::Uuid;
 
 use super::{Error, Store, Transaction, sql};
 
-/// How long an answer is kept, milliseconds.
+/// Time for which an answer is kept, milliseconds. Free choice.
 pub const KEPT_MS: i64 = 24 * 3600 * 1000;
 
-/// Who has held a key for longer has died with it, milliseconds: another process, or a request of this one that could
-/// not give it back. An upload over a slow line may take so long.
+/// Time after which a running key counts as abandoned, milliseconds. Its request died with its process or
+/// failed to release it. Long enough for an upload over a slow connection.
 const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
-/// Where other processes may have died with keys of theirs: who has not renewed one for as long has,
-/// milliseconds.
+/// Time without renewal after which a key counts as abandoned if other processes share the database,
+/// milliseconds. Free choice.
 pub const LEASE_MS: i64 = 15_000;
 
-/// Where a key means what it means.
+/// What identifies a key: the same text from another caller or for another route is another key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scope {
-    /// Whose what it makes will be.
+    /// Owner of everything that the request creates.
     pub caller: String,
-    /// What is asked for.
+    /// Route of the request.
     pub route: String,
-    /// The key, as it was sent.
+    /// The key as sent by the client.
     pub key: String,
 }
 
-/// An answer as it is kept.
+/// A stored answer.
 #[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
 pub struct Answer {
-    /// SHA-256 of the body that it answers.
+    /// SHA-256 of the request body.
     pub body_sha256: Vec<u8>,
     /// HTTP status, below 500.
     #[sqlx(try_from = "i64")]
     pub status: u16,
-    /// Headers, JSON: pairs of name and value.
+    /// Headers as JSON: pairs of name and value.
     pub headers: String,
-    /// The body.
+    /// Body of the answer.
     pub answer: Vec<u8>,
 }
 
-/// What a key met.
+/// Result of [`Store::begin_key`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Begun {
-    /// The request is to be run, and what it makes has ids of this family.
+    /// The request must run. It creates things with ids derived from this one.
     Run(Uuid),
-    /// Another one with this key is under way.
+    /// Another request with this key is running.
     Running,
-    /// An interrupted one with this key had another body.
+    /// An interrupted request with this key had another body.
     OtherBody,
-    /// It has been answered.
+    /// The request was answered before.
     Done(Answer),
 }
 
 impl Store {
-    /// Takes the key for a request, which must renew it every third of [`LEASE_MS`] where other processes share
-    /// the rows. `body_sha256` where it is known before the request runs. Answers older than a day are
-    /// forgotten first.
+    /// Takes the key for a request. If other processes share the database, the caller must renew the key
+    /// every third of [`LEASE_MS`].
+    ///
+    /// `body_sha256` is `None` if the body is not known before the request runs. Keys that are older than
+    /// [`KEPT_MS`] are deleted first.
     pub async fn begin_key(
         &self,
         scope: &Scope,
@@ -66,7 +70,7 @@ impl Store {
         now_ms: i64,
     ) -> Result<Begun, Error> {
         let mut transaction = self.writer.begin().await?;
-        // Two at once: one begins, and the other one learns of it.
+        // Of two simultaneous requests one begins, and the other sees its key.
         let name = format!("key {} {} {}", scope.caller, scope.route, scope.key);
         transaction.lock(&name).await?;
         sql::query("delete from idempotency where created_ms <= $1")
@@ -116,7 +120,7 @@ impl Store {
         Ok(Begun::Run(ids))
     }
 
-    /// Forgets answers that nobody may ask for again, also where no other key ever comes.
+    /// Deletes keys that are older than [`KEPT_MS`], also if no new keys arrive.
     pub async fn forget_old_answers(&self, now_ms: i64) -> Result<(), Error> {
         let forget = || async {
             let sql = "delete from idempotency where created_ms <= $1";
@@ -127,7 +131,7 @@ impl Store {
         self.reserve.lend(forget).await
     }
 
-    /// Whether a request that was last heard of then is not under way any more.
+    /// Returns whether a running request counts as abandoned. `heard_ms` is the time of its last renewal.
     fn is_over(&self, heard_ms: i64, now_ms: i64) -> bool {
         let longest_ms = match self.is_alone() {
             true => LONGEST_REQUEST_MS,
@@ -136,7 +140,7 @@ impl Store {
         heard_ms < now_ms - longest_ms
     }
 
-    /// The request that holds the key is still under way.
+    /// Renews the key of a request that is still running.
     pub async fn renew_key(&self, scope: &Scope, now_ms: i64) -> Result<(), Error> {
         sql::query(
             "update idempotency set created_ms = $4 \
@@ -151,7 +155,7 @@ impl Store {
         Ok(())
     }
 
-    /// Notes the answer to the request that holds the key.
+    /// Stores the answer of the request that holds the key.
     pub async fn finish_key(&self, scope: &Scope, answer: &Answer) -> Result<(), Error> {
         let finish = || async {
             sql::query(
@@ -172,7 +176,7 @@ impl Store {
         self.reserve.lend(finish).await
     }
 
-    /// Gives the key back: its request ended without an answer to keep.
+    /// Releases the key of a request that ended without an answer to keep.
     pub async fn interrupt_key(&self, scope: &Scope) -> Result<(), Error> {
         let interrupt = || async {
             sql::query(
@@ -189,8 +193,8 @@ impl Store {
         self.reserve.lend(interrupt).await
     }
 
-    /// Gives every key back, at the start of the process: whoever held one is gone, because the store is
-    /// this process's alone.
+    /// Releases every running key at the start of the process. The requests have ended, because no other
+    /// process uses the store.
     pub async fn interrupt_all_keys(&self) -> Result<(), Error> {
         let sql = "update idempotency set state = 'interrupted' where state = 'running'";
         let interrupt = || async {
@@ -201,8 +205,8 @@ impl Store {
     }
 }
 
-/// The kept answer, read where it was found: a second connection might never become free, where all of them wait
-/// for one.
+/// Returns the stored answer, read within the transaction. A second connection might never become free if
+/// every request waits for one.
 async fn answer(transaction: &mut Transaction, scope: &Scope) -> Result<Answer, sqlx::Error> {
     let row = sql::query(
         "select body_sha256, status, headers, answer from idempotency \

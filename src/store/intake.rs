@@ -1,8 +1,9 @@
-//! Takes a stream of foreign bytes to disk: counted, hashed, synced, never held in memory
-//! (RELIABILITY.md, store rules: upload). One door for raw bodies and multipart fields.
+//! Writes an incoming stream of bytes to a file. The stream is counted, hashed and synced without being held
+//! in memory (docs/explanation/promises.md, "No upload is lost"). Raw bodies and multipart fields both use
+//! it.
 //!
-//! While some pieces are hashed and written the next ones may come: neither is copied on the way. And while they come
-//! the disk works already at what is written, so that little is left to sync at the end.
+//! Pieces are hashed and written while the next ones arrive, and are not copied. Data is also flushed to the
+//! disk during the transfer, so that the final sync is short.
 
 use std::fs::File;
 use std::io::{self, Write};
@@ -14,33 +15,33 @@ use tokio::task::{JoinHandle, spawn_blocking};
 
 use super::{BlobFile, Draft, Error};
 
-/// Bytes gathered before a write: each write is a hop to the blocking pool.
+/// Bytes collected before a write. Every write is a task on the blocking pool. Free choice.
 const GATHERED_BYTES: usize = 1 << 20;
-/// Bytes written before the disk is told to begin with them.
+/// Bytes written before a flush to the disk starts. Free choice.
 const FLUSHED_BYTES: u64 = 32 << 20;
 
-/// One file being received into a draft.
+/// One file that is being received into a draft.
 pub struct Intake {
     name: &'static str,
     size_bytes: u64,
     limit_bytes: u64,
     pieces: Vec<Bytes>,
     n_gathered: usize,
-    /// What comes back when the pieces before these are on their way to the disk; nothing once that failed.
+    /// Returns the writer once the earlier pieces are written. `None` after a failure.
     writer: Option<JoinHandle<io::Result<Writer>>>,
 }
 
 struct Writer {
     file: Arc<File>,
     hasher: Sha256,
-    /// Written since the disk was last told to begin.
+    /// Bytes written since the last flush started.
     n_unflushed: u64,
-    /// What comes back when the disk is done with what it was told to begin with.
+    /// The flush in progress, if any.
     flush: Option<JoinHandle<io::Result<()>>>,
 }
 
 impl Intake {
-    /// Starts the file `name` in the draft; at most `limit_bytes` will be taken.
+    /// Creates the file `name` in the draft. The file accepts at most `limit_bytes`.
     pub async fn create(
         draft: &Draft,
         name: &'static str,
@@ -63,8 +64,8 @@ impl Intake {
         })
     }
 
-    /// Takes the next bytes; fails with [`Error::TooLarge`] before it stores one too many. What failed of bytes before
-    /// is told here, or at the end.
+    /// Appends bytes. Fails with [`Error::TooLarge`] before the file exceeds its limit. An error of an
+    /// earlier write is returned here or by [`Intake::finish`].
     pub async fn take(&mut self, bytes: Bytes) -> Result<(), Error> {
         self.size_bytes += bytes.len() as u64;
         if self.size_bytes > self.limit_bytes {
@@ -80,7 +81,7 @@ impl Intake {
         }
     }
 
-    /// Begins to write what was gathered, once what came before is written.
+    /// Waits for the previous write, then starts to write the collected pieces.
     async fn write(&mut self) -> Result<(), Error> {
         let mut writer = self.idle_writer().await?;
         writer.flush_in_time().await?;
@@ -95,15 +96,16 @@ impl Intake {
         Ok(())
     }
 
-    /// Closes the file, which its draft then takes along: what is still being written keeps its room until then.
+    /// Waits for the write in progress and closes the file. Afterwards the space is freed when the draft is
+    /// dropped.
     pub async fn give_up(mut self) {
-        // What failed of it does not matter any more.
+        // Errors are ignored, because the file is discarded.
         if let Ok(mut writer) = self.idle_writer().await {
             writer.flushed().await.ok();
         }
     }
 
-    /// Syncs the file and says what it is.
+    /// Writes the remaining bytes, syncs the file, and returns its size and hash.
     pub async fn finish(mut self) -> Result<BlobFile, Error> {
         self.write().await?;
         let mut writer = self.idle_writer().await?;
@@ -133,7 +135,7 @@ impl Writer {
         (&*self.file).write_all(piece)
     }
 
-    /// Tells the disk to begin when there is enough for it to do and it is done with what came before.
+    /// Starts a flush if enough bytes are unflushed and no flush is in progress.
     async fn flush_in_time(&mut self) -> Result<(), Error> {
         let is_busy = (self.flush.as_ref()).is_some_and(|flush| !flush.is_finished());
         if self.n_unflushed >= FLUSHED_BYTES && !is_busy {
@@ -145,7 +147,7 @@ impl Writer {
         Ok(())
     }
 
-    /// What the disk was told to begin with is there; fails where it could not take it, for a later sync would not say.
+    /// Waits for the flush in progress. Returns its error, because a later sync would not report it.
     async fn flushed(&mut self) -> Result<(), Error> {
         match self.flush.take() {
             Some(flush) => Ok(flush.await.map_err(io::Error::other)??),

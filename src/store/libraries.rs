@@ -1,37 +1,37 @@
-//! The table of libraries: what each finished analysis left.
+//! The table of libraries: one row per finished analysis.
 
 use sqlx::types::Uuid;
 
 use super::owners::Reach;
 use super::{Error, Store};
 
-/// One library as stored; its files lie in `folder`.
+/// One stored library. Its files are in `folder`.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct Library {
-    /// Its id.
+    /// Id of the library.
     pub id: Uuid,
     /// The job that made it.
     pub job_id: Uuid,
-    /// The footage it was measured in.
+    /// The footage that was analyzed.
     pub footage_id: Uuid,
-    /// Its folder in the blob store.
+    /// Folder in the blob store.
     pub folder: String,
-    /// What the footage is called.
+    /// Label of the footage.
     pub name: String,
-    /// The parameters it was made with, JSON.
+    /// Parameters of the analysis, JSON.
     pub params: String,
-    /// What is worth knowing at a glance, JSON.
+    /// Summary for overviews, JSON.
     pub summary: String,
-    /// Whether it came of the sample that the program made itself.
+    /// Whether the footage is the sample made by the program.
     pub sample: bool,
-    /// Size of all its files, bytes.
+    /// Total size of the files, bytes.
     pub size_bytes: i64,
-    /// When it was finished, milliseconds since 1970.
+    /// Time at which the analysis finished, milliseconds since 1970.
     pub created_ms: i64,
 }
 
 impl Store {
-    /// One library, if it is finished, there and within reach.
+    /// Returns the library if it exists and is visible to the caller.
     pub async fn library(&self, id: Uuid, reach: &Reach) -> Result<Option<Library>, Error> {
         let sql = "select l.id, l.job_id, footage_id, l.folder, params, summary, f.name, sample, \
                    l.size_bytes, l.created_ms \
@@ -40,7 +40,7 @@ impl Store {
         self.one_of(sql, id, reach).await
     }
 
-    /// The newest libraries, at most `limit`, older than `before`.
+    /// Returns the newest libraries with ids less than `before`, at most `limit`.
     pub async fn list_libraries(
         &self,
         limit: i64,
@@ -56,7 +56,8 @@ impl Store {
     }
 }
 
-/// What a finished analysis adds; the parameters are those of every result (`jobs/finish`).
+/// Insert statement for a finished analysis. The parameters are the same for every kind of result
+/// (`jobs/finish`).
 pub(super) const INSERT: &str = "insert into libraries (id, job_id, fence, footage_id, folder, params, \
     summary, size_bytes, created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
     (select owner from jobs where id = $2))";

@@ -1,8 +1,9 @@
-//! What outlives the process: rows in a database, files in a folder (RELIABILITY.md, store and queue
-//! rules). SQL exists in this folder only, a file per table, one text for both engines (`sql`).
+//! Storage that survives the process: rows in a database and files in a folder or bucket
+//! (docs/explanation/promises.md, "No upload is lost"). Only this folder contains SQL, with one file per
+//! table. The SQL text is the same for both database engines (`sql`).
 //!
-//! No transaction awaits anything but SQL. Times come in as arguments, milliseconds since 1970 (UTC);
-//! where several machines share the database they are to be its own ([`Store::clock_ms`]).
+//! No transaction awaits anything but SQL. Times are arguments, in milliseconds since 1970 (UTC). If several
+//! machines share the database, the times come from the database's clock ([`Store::clock_ms`]).
 
 pub mod blobs;
 pub mod check;
@@ -38,7 +39,7 @@ use sql::{Pool, Reserve, Transaction};
 #[cfg(test)]
 mod fresh;
 
-/// The open store: cheap to clone, one per process and folder.
+/// An open store. Clones are cheap and share the connections. A process opens one store per folder.
 #[derive(Clone)]
 pub struct Store {
     writer: Pool,
@@ -46,28 +47,33 @@ pub struct Store {
     reserve: Reserve,
     blobs: Blobs,
     holders: uploads::Holders,
-    /// Held while the store is open: whoever holds them knows that no other process serves the same folder.
+    /// Locks held while the store is open. They guarantee that no other process serves the same folder. Empty
+    /// if this process opened the store beside another one.
     locks: Arc<Vec<File>>,
     is_alone: bool,
 }
 
 impl Store {
-    /// Opens the store, made if absent, and brings the database to this version's form. Fails with
-    /// [`Error::InUse`] when another process serves the same data folder or file of rows, with
-    /// [`Error::OtherFiles`] when the files are another database's.
+    /// Opens the store for a server. Creates it if absent, and migrates the database to this version's
+    /// schema.
+    ///
+    /// Fails with [`Error::InUse`] if another process serves the same data folder or database file, and with
+    /// [`Error::OtherFiles`] if the files belong to another database.
     pub async fn open(storage: impl Into<Storage>) -> Result<Store, Error> {
         let storage = storage.into();
         std::fs::create_dir_all(&storage.data)?;
         let mut locks = vec![lock(&storage.data.join("lock"))?];
-        // Another process may name the same file while its data folder is another.
+        // Two processes may use the same database file with different data folders.
         if let Database::Sqlite(file) = storage.database() {
             locks.push(lock(&file.with_extension("lock"))?);
         }
         Store::connect(&storage, locks).await
     }
 
-    /// The same, but beside whatever process has it open: for workers, and for rows that do not belong to
-    /// that process, as those of tokens. The form of a file of rows is that process's then.
+    /// Opens the store even if another process has it open. Workers use this, and commands that change rows
+    /// which that process does not own, such as tokens.
+    ///
+    /// If another process serves the store, a SQLite database is not migrated here.
     pub async fn open_beside(storage: impl Into<Storage>) -> Result<Store, Error> {
         let storage = storage.into();
         if let Database::Postgres(_) = storage.database() {
@@ -111,27 +117,29 @@ impl Store {
         Ok(store)
     }
 
-    /// Whether every lease that stands was given by a process that is gone: no other can have the rows.
+    /// Returns whether no other process runs jobs of this database: it is a SQLite file that this process has
+    /// locked. Any lease in it then comes from this process or from one that has ended.
     pub fn is_alone(&self) -> bool {
         self.is_alone
     }
 
-    /// Whether the data folder is this process's: then so are the uploads that grow in it.
+    /// Returns whether this process has locked the data folder, and so owns the unfinished uploads in it.
     pub fn serves(&self) -> bool {
         !self.locks.is_empty()
     }
 
-    /// The time by the database's clock, where processes with clocks of their own share the database.
+    /// Returns the time of the database's clock, milliseconds since 1970. `None` for SQLite, which only one
+    /// machine uses.
     pub async fn clock_ms(&self) -> Result<Option<i64>, Error> {
         Ok(self.reader.clock_ms().await?)
     }
 
-    /// The files.
+    /// Returns the store of files.
     pub fn blobs(&self) -> &Blobs {
         &self.blobs
     }
 
-    /// Whether the database can be written now: for readiness.
+    /// Returns whether the database accepts a write transaction within 2 s; for the readiness check.
     pub async fn is_writable(&self) -> bool {
         let probe = async { self.writer.begin().await?.rollback().await };
         matches!(
@@ -140,15 +148,15 @@ impl Store {
         )
     }
 
-    /// Closes the connections in order, so that the write-ahead log is folded in.
+    /// Closes all connections. SQLite then writes its write-ahead log into the database file.
     pub async fn close(&self) {
         self.reader.close().await;
         self.writer.close().await;
         self.blobs.work().close();
     }
 
-    /// Begins a transaction that adds rows: fails where the disk has no room but the reserve. A transaction that
-    /// removes or ends things begins at the writer, within [`Reserve::lend`].
+    /// Begins a transaction that adds rows. Fails if the disk has no space left besides the reserve. A
+    /// transaction that only removes or ends things uses `writer.begin` within [`Reserve::lend`] instead.
     async fn begin(&self) -> Result<Transaction, sqlx::Error> {
         self.reserve.require().await?;
         self.writer.begin().await
@@ -167,7 +175,8 @@ fn lock(path: &Path) -> Result<File, Error> {
     }
 }
 
-/// A child of a process that was killed holds its locks too until it is another program: for a moment.
+/// Tries to lock the file for up to 0.3 s. A killed server's child process inherits the server's locks and
+/// keeps them until it executes another program.
 fn try_for_a_moment(file: &File) -> Result<(), TryLockError> {
     for _ in 0..10 {
         match file.try_lock() {

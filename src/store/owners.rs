@@ -1,33 +1,34 @@
-//! Whose things are whose (RELIABILITY.md, S6): every row that people make has one owner, and every
-//! question names whose rows it is about, so that a query without the wall does not compile.
+//! Ownership of rows (docs/explanation/promises.md, "Owners are isolated"). Every row that a user creates has
+//! one owner. Every query takes the set of visible owners as an argument, so that a query without this filter
+//! does not compile.
 
 use sqlx::types::Uuid;
 
 use super::{Error, Store, sql};
 
-/// Who has a thing: the owner that a token names, or the local one.
+/// Owner of a row: the owner named by a token, or the local owner.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, sqlx::Type)]
 #[sqlx(transparent)]
 pub struct Owner(pub String);
 
 impl Owner {
-    /// Whoever asks on the machine itself without a token, and the program itself.
+    /// Returns the owner of requests without a token, and of rows that the program itself creates.
     pub fn local() -> Owner {
         Owner("local".to_owned())
     }
 }
 
 impl Store {
-    /// Whose a flock is, for whoever holds a link to it.
+    /// Returns the owner of a flock. For holders of a signed link, who have no token.
     pub async fn owner_of_flock(&self, id: Uuid) -> Result<Option<Owner>, Error> {
         let owner = sql::query_scalar("select owner from flocks where id = $1").bind(id);
         Ok(owner.fetch_optional(&self.reader).await?)
     }
 }
 
-/// Questions within reach: one row by its id, and the newest of a table.
+/// Queries restricted to visible rows.
 impl Store {
-    /// The row that `sql` asks for: `$1` is the id, `$2` the owner, null for everybody's.
+    /// Returns the row that `sql` selects: `$1` is the id, `$2` the owner (null = all owners).
     pub(super) async fn one_of<T: sql::Row>(
         &self,
         sql: &'static str,
@@ -38,8 +39,8 @@ impl Store {
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
-    /// The rows that `sql` asks for: `$1` is the id that they are older than, null for the newest; `$2` how
-    /// many at most, `$3` the owner, null for everybody's.
+    /// Returns the rows that `sql` selects: only ids less than `$1` (null = no limit), at most `$2` rows, of
+    /// the owner `$3` (null = all owners).
     pub(super) async fn newest_of<T: sql::Row>(
         &self,
         sql: &'static str,
@@ -52,17 +53,17 @@ impl Store {
     }
 }
 
-/// Whose rows a question is about.
+/// The owners whose rows are visible to a query.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reach {
-    /// Everybody's: administrators, and the workers.
+    /// All owners: for administrators and workers.
     All,
-    /// One owner's; the others' are not there.
+    /// One owner. Rows of others appear not to exist.
     Of(Owner),
 }
 
 impl Reach {
-    /// As a parameter of `$n is null or owner = $n`.
+    /// Returns the parameter for `$n is null or owner = $n`.
     pub(super) fn owner(&self) -> Option<&str> {
         match self {
             Reach::All => None,
@@ -71,17 +72,17 @@ impl Reach {
     }
 }
 
-/// To whom a new job is charged (RELIABILITY.md, R9).
+/// Account that a new job counts against (docs/explanation/promises.md, "Fair queue").
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Account {
-    /// Whose the job and its result will be.
+    /// Owner of the job and of its result.
     pub owner: Owner,
-    /// How many jobs of the owner may be queued or running at once; any number where it is `None`.
+    /// Maximum number of queued and running jobs of the owner; `None` = unlimited.
     pub quota: Option<i64>,
 }
 
 impl Account {
-    /// The local owner's, without a bound.
+    /// Returns the account of the local owner, without a limit.
     pub fn local() -> Account {
         Account {
             owner: Owner::local(),

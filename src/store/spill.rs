@@ -1,5 +1,6 @@
-//! Bytes put aside in memory up to a budget, beyond it in a file that has no name (RELIABILITY.md:
-//! memory is bounded however long the footage, and nothing is left behind whatever happens).
+//! Temporary storage that bounds memory: the first bytes stay in memory, and the rest goes to an unnamed
+//! file. The system removes such a file when the process ends, whatever the reason
+//! (docs/explanation/promises.md, "No orphans").
 
 use std::fs::File;
 use std::io;
@@ -10,22 +11,22 @@ use std::sync::{OnceLock, PoisonError, RwLock};
 
 use crate::scratch::{Full, Scratch};
 
-/// Bytes held in memory.
+/// Maximum number of bytes held in memory. Free choice.
 const BUDGET: usize = 48 << 20;
 
-/// The first bytes in memory, the others in a file of `folder`, made when it is needed.
+/// A temporary storage. Data beyond the budget goes to a file in `folder`, created on first use.
 #[derive(Debug)]
 pub struct Spill {
     folder: PathBuf,
     held: RwLock<Vec<u8>>,
     budget: usize,
     file: OnceLock<File>,
-    /// Bytes in the file, those that are still being written included.
+    /// Bytes assigned to the file, including those still being written.
     spilled: AtomicU64,
 }
 
 impl Spill {
-    /// For a folder on a disk with room; it must exist when the budget is reached.
+    /// Returns an empty storage with a file in `folder`. The folder must exist once the budget is used up.
     pub fn into(folder: &Path) -> Spill {
         Spill::with_budget(folder, BUDGET)
     }
@@ -40,7 +41,7 @@ impl Spill {
         }
     }
 
-    /// Where the bytes lie in memory, if there is room for them.
+    /// Stores the bytes in memory and returns their offset; `None` if the budget is used up.
     fn hold(&self, bytes: &[u8]) -> Option<u64> {
         let mut held = self.held.write().unwrap_or_else(PoisonError::into_inner);
         if held.len() + bytes.len() > self.budget {
@@ -56,7 +57,7 @@ impl Spill {
             return Ok(file);
         }
         let file = tempfile::tempfile_in(&self.folder)?;
-        // Of two threads that come here at once one is second, and its file goes.
+        // If two threads create a file at the same time, the second file is dropped.
         Ok(self.file.get_or_init(|| file))
     }
 }

@@ -1,10 +1,10 @@
-//! Which cryptography the connections to buckets use. `ring` alone: the default of what speaks to buckets is a large
-//! C library that takes minutes to build. (A database's own connections name theirs by themselves: sqlx's feature.)
+//! The cryptography library for TLS connections to buckets: `ring`. The default of the bucket client is a
+//! large C library that takes minutes to build. Database connections select theirs by a feature of sqlx.
 
 use std::sync::Once;
 
-/// Chooses `ring` for the TLS connections of this process; to be called before the first client is made. Calling it
-/// again changes nothing, and a choice that the embedding program made before stays.
+/// Selects `ring` for the TLS connections of this process. Must be called before the first client is created.
+/// Further calls have no effect, and a choice made earlier by an embedding program is kept.
 pub fn choose_cryptography() {
     static CHOSEN: Once = Once::new();
     CHOSEN.call_once(|| {

@@ -1,6 +1,8 @@
-//! The table of resumable uploads, and their files (RELIABILITY.md, R1 and H3): what a sender is told to
-//! have sent has been synced, whatever happens to the process. One sender at a time: a newcomer asks the
-//! one before to let go, because he is most often the same one after a cut that only he has noticed.
+//! The table of resumable uploads, and their files. A byte is confirmed to the sender only after it is synced
+//! to disk (docs/explanation/promises.md, "No upload is lost" and "Bad networks").
+//!
+//! One request at a time may change an upload. A new request asks the previous one to stop: usually both come
+//! from the same sender, whose connection broke without the server noticing.
 
 use std::collections::HashMap;
 use std::fs;
@@ -19,29 +21,29 @@ use super::footage::VIDEO;
 use super::owners::{Owner, Reach};
 use super::{BlobFile, Draft, Error, Store, sql};
 
-/// How long an upload waits for its next bytes, milliseconds.
+/// Lifetime of an unfinished upload after its last bytes, milliseconds. Free choice.
 pub const LIFE_MS: i64 = 24 * 3600 * 1000;
 
-/// One upload as stored.
+/// One stored upload.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct Upload {
-    /// Its id.
+    /// Id of the upload.
     pub id: Uuid,
-    /// Whose it is, and whose footage it becomes.
+    /// Owner of the upload and of the footage that it becomes.
     pub owner: Owner,
-    /// What the sender calls it: a label.
+    /// Label given by the sender.
     pub name: String,
-    /// How many bytes it will have.
+    /// Size of the complete upload, bytes.
     pub size_bytes: i64,
-    /// How many of them are safe.
+    /// Bytes that are synced to disk and confirmed.
     pub offset_bytes: i64,
-    /// The footage that it became.
+    /// The footage made of the upload; `None` until it is complete.
     pub footage_id: Option<Uuid>,
-    /// When it is given up, milliseconds since 1970.
+    /// Time at which an unfinished upload is deleted, milliseconds since 1970.
     pub expires_ms: i64,
 }
 
-/// Who holds which upload.
+/// The requests that hold or wait for an upload, by upload.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Holders(Arc<Mutex<HashMap<Uuid, Holder>>>);
 
@@ -51,22 +53,22 @@ struct Holder {
     mutex: Arc<tokio::sync::Mutex<()>>,
 }
 
-/// The right to change an upload, until dropped.
+/// Exclusive right to change an upload. Dropping it releases the upload.
 #[derive(Debug)]
 pub struct Hold {
-    /// Cancelled when a newcomer wants the upload: let go.
+    /// Cancelled when another request wants the upload. The holder must then stop.
     pub wanted: CancellationToken,
     _guard: OwnedMutexGuard<()>,
 }
 
-/// The file of an upload while bytes are added to it.
+/// The file of an upload, open for appending.
 #[derive(Debug)]
 pub struct Growing {
     file: File,
 }
 
 impl Store {
-    /// Adds an upload without bytes.
+    /// Adds an upload that has no bytes yet.
     pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
         self.reserve.require().await?;
         File::create_new(self.upload_path(upload.id)).await?;
@@ -85,7 +87,7 @@ impl Store {
         Ok(())
     }
 
-    /// One upload within reach that has not expired.
+    /// Returns an upload that has not expired and is visible to the caller.
     pub async fn upload(
         &self,
         id: Uuid,
@@ -99,7 +101,7 @@ impl Store {
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
-    /// Asks whoever holds the upload to let go, and holds it.
+    /// Asks the current holder to stop, waits for it, and returns the exclusive right.
     pub async fn hold_upload(&self, id: Uuid) -> Hold {
         let (wanted, mutex) = {
             let mut holders = self
@@ -107,7 +109,7 @@ impl Store {
                 .0
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner);
-            // Those that nobody holds or waits for are forgotten.
+            // Removes entries that no request holds or waits for.
             holders.retain(|of, holder| *of == id || Arc::strong_count(&holder.mutex) > 1);
             let holder = holders.entry(id).or_default();
             holder.wanted.cancel();
@@ -118,7 +120,7 @@ impl Store {
         Hold { wanted, _guard }
     }
 
-    /// Opens the file of an upload where its safe bytes end; those beyond are cut off.
+    /// Opens the file of an upload for appending after its confirmed bytes. Unconfirmed bytes are cut off.
     pub async fn grow_upload(&self, upload: &Upload) -> Result<Growing, Error> {
         let path = self.upload_path(upload.id);
         let mut file = OpenOptions::new().write(true).open(path).await?;
@@ -127,7 +129,7 @@ impl Store {
         Ok(Growing { file })
     }
 
-    /// Notes how many bytes are safe, after they have been synced.
+    /// Records the number of synced bytes and the new expiry time.
     pub async fn note_upload(&self, upload: &Upload) -> Result<(), Error> {
         let sql = "update uploads set offset_bytes = $2, expires_ms = $3 where id = $1";
         let update = sql::query(sql).bind(upload.id).bind(upload.offset_bytes);
@@ -135,7 +137,8 @@ impl Store {
         Ok(())
     }
 
-    /// A draft with the whole upload as its video, hashed. The upload keeps its file meanwhile.
+    /// Returns a draft that contains the complete upload as its video, with its hash. The upload keeps its
+    /// own file.
     pub async fn draft_of_upload(&self, upload: &Upload) -> Result<(Draft, BlobFile), Error> {
         let (blobs, path) = (self.blobs.clone(), self.upload_path(upload.id));
         let made = tokio::task::spawn_blocking(move || {
@@ -156,7 +159,7 @@ impl Store {
         made.await.map_err(std::io::Error::other)?
     }
 
-    /// Notes the footage that the upload became; its own file goes.
+    /// Records the footage made of the upload, and removes the upload's file.
     pub async fn end_upload(&self, upload: &Upload, footage: Uuid) -> Result<(), Error> {
         let update = sql::query("update uploads set footage_id = $2 where id = $1");
         let update = update.bind(upload.id).bind(footage);
@@ -164,7 +167,7 @@ impl Store {
         self.remove_upload_file(upload.id)
     }
 
-    /// Gives an upload up, with its bytes.
+    /// Deletes an upload and its file.
     pub async fn delete_upload(&self, id: Uuid) -> Result<(), Error> {
         let delete = || async {
             let delete = sql::query("delete from uploads where id = $1").bind(id);
@@ -174,8 +177,7 @@ impl Store {
         self.remove_upload_file(id)
     }
 
-    /// Removes expired uploads, and files of uploads that are not there (any more). Must not run beside
-    /// [`Store::create_upload`], which makes the file before the row: at the start, or for expired rows alone.
+    /// Deletes expired uploads and their files. Returns their number.
     pub async fn sweep_uploads(&self, now_ms: i64) -> Result<usize, Error> {
         let sql = "delete from uploads where expires_ms <= $1 returning id";
         let delete = || async {
@@ -189,7 +191,8 @@ impl Store {
         Ok(expired.len())
     }
 
-    /// Removes files that no unfinished upload names: at the start of the process.
+    /// Removes files that belong to no unfinished upload. Call it only while no requests are served:
+    /// [`Store::create_upload`] creates the file before the row.
     pub async fn sweep_upload_files(&self) -> Result<(), Error> {
         let sql = "select id from uploads where footage_id is null";
         let known: Vec<Uuid> = sql::query_scalar(sql).fetch_all(&self.reader).await?;
@@ -215,7 +218,7 @@ impl Store {
     }
 }
 
-/// The same file under another name; a copy where that is on another disk.
+/// Links the file under another name. Copies it if the name is on another file system.
 fn link(file: &Path, name: &Path) -> std::io::Result<()> {
     match fs::hard_link(file, name) {
         Err(error) if error.kind() == ErrorKind::CrossesDevices => {
@@ -227,12 +230,12 @@ fn link(file: &Path, name: &Path) -> std::io::Result<()> {
 }
 
 impl Growing {
-    /// Adds bytes.
+    /// Appends bytes.
     pub async fn add(&mut self, bytes: &[u8]) -> Result<(), Error> {
         Ok(self.file.write_all(bytes).await?)
     }
 
-    /// Makes all bytes added so far outlive a power cut.
+    /// Syncs all appended bytes to disk.
     pub async fn sync(&mut self) -> Result<(), Error> {
         self.file.flush().await?;
         Ok(self.file.sync_all().await?)

@@ -1,7 +1,7 @@
-// The calls that the page makes. Every answer that is not a success becomes a Problem.
+// The requests of the page. Every error response becomes a Problem.
 // @ts-check
 
-/** What went wrong, in the words of the service (RFC 9457). */
+/** An error as a problem document of the service (RFC 9457). */
 export class Problem extends Error {
   /** @param {{title?: string, detail?: string, code?: string, advice?: string, picture?: string | null, status?: number}} body */
   constructor(body) {

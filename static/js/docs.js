@@ -1,4 +1,4 @@
-// The description of the API as a page to read and to try calls from. Nothing is asked of anybody else.
+// The API description as a page, from which requests can be tried. It loads nothing from other servers.
 // @ts-check
 /* global SwaggerUIBundle */
 SwaggerUIBundle({

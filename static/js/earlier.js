@@ -1,4 +1,4 @@
-// The lists of what was made before.
+// The lists of earlier libraries and flocks.
 // @ts-check
 import { byId, element } from "./element.js";
 import { count, day } from "./words.js";
@@ -6,7 +6,7 @@ import { count, day } from "./words.js";
 /**
  * @param {any[]} libraries @param {any[]} flocks
  * @param {{library: string | null, flock: string | null}} current
- * @param {{onLibrary: (id: string) => void, onFlock: (id: string) => void}} doors
+ * @param {{onLibrary: (id: string) => void, onFlock: (id: string) => void}} callbacks
  */
 export function showEarlier(libraries, flocks, current, { onLibrary, onFlock }) {
   const nameOf = (id) => libraries.find((library) => library.id === id)?.name || "Film";

@@ -1,4 +1,4 @@
-// Builds elements without strings of markup: what comes from a file name stays text.
+// Builds elements without HTML strings, so that text from file names is never parsed as markup.
 // @ts-check
 
 /**
@@ -19,7 +19,7 @@ export function element(tag, props = {}, ...children) {
 /** @param {string} id @returns {any} */
 export const byId = (id) => document.getElementById(id);
 
-/** Shows a problem in words, next to where it happened. @param {Element} place @param {any} problem */
+/** Shows a problem in an element next to its cause. @param {Element} place @param {any} problem */
 export function showProblem(place, problem) {
   const box = element("div", { className: "problem", role: "alert" }, element("strong", {}, problem.title ?? problem.message));
   if (problem.detail && problem.detail !== problem.title) box.append(problem.detail);

@@ -1,4 +1,4 @@
-// From a chosen or dropped film to its library: upload, then measurement.
+// The form for a film: uploads a chosen or dropped file and starts its analysis.
 // @ts-check
 import { createAnalysis } from "./api.js";
 import { byId, showProblem } from "./element.js";
@@ -13,7 +13,7 @@ export function filmForm(onLibrary) {
   const drop = byId("drop");
 
   input.addEventListener("change", () => { if (input.files[0]) measure(input.files[0]); });
-  // A film dropped beside the place must not replace the page.
+  // A film dropped outside the drop area must not replace the page.
   for (const name of ["dragover", "drop"]) addEventListener(name, (event) => event.preventDefault());
   for (const name of ["dragenter", "dragover"]) drop.addEventListener(name, (event) => { event.preventDefault(); drop.classList.add("over"); });
   for (const name of ["dragleave", "drop"]) drop.addEventListener(name, () => drop.classList.remove("over"));
@@ -51,7 +51,7 @@ function send(file, place) {
   return sending.footage;
 }
 
-/** Only what was chosen: the rest has its defaults. */
+/** Returns the parameters that the person set. The service has defaults for the others. */
 export function paramsOf(form) {
   return Object.fromEntries([...new FormData(form)].filter(([, value]) => value !== "" && typeof value === "string"));
 }

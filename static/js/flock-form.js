@@ -1,4 +1,4 @@
-// From wishes to a flock: how many, how long, which seed.
+// The form for a flock: number of individuals, number of frames, seed and preset.
 // @ts-check
 import { createFlock } from "./api.js";
 import { byId, showProblem } from "./element.js";
@@ -32,7 +32,7 @@ export function flockForm(onFlock) {
     }
   });
 
-  /** Which library the next flock is made of. */
+  /** Sets the library of the next flock. */
   return ({ id, fps, name }) => {
     library = { id, fps };
     byId("make-of").textContent = name ? `Of “${name}”` : "Of the film below";

@@ -1,5 +1,5 @@
-// Listens to the stream of all jobs, and follows single jobs to their ends by it and by asking, which is done more
-// often while the stream is down.
+// Follows jobs until they end. States come from the event stream and from polling, which is more frequent
+// while the stream is down.
 // @ts-check
 import { getJob } from "./api.js";
 import { openEvents } from "./job-events.js";
@@ -7,7 +7,7 @@ import { openEvents } from "./job-events.js";
 const FINAL = ["done", "failed", "cancelled"];
 const ASK_MS = { live: 5000, down: 700 };
 
-/** Jobs that are followed, and the callbacks for their states. @type {Set<{id: string, see: (job: any) => void}>} */
+/** Followed jobs, with the callbacks for their states. @type {Set<{id: string, see: (job: any) => void}>} */
 const followers = new Set();
 /** Ids of all jobs that this tab has followed. @type {Set<string>} */
 const known = new Set();
@@ -15,8 +15,9 @@ let live = false;
 let onNews = (_job) => {};
 
 /**
- * Opens the stream for as long as the page is open.
- * @param {(job: any) => void} tell called with every state of a job that this tab has not followed, and with the id of a deleted one
+ * Opens the event stream for as long as the page is open.
+ * @param {(job: any) => void} tell receives the states of jobs that this tab has not followed; only the id if
+ *   the job was deleted
  */
 export function listen(tell) {
   onNews = tell;
@@ -37,14 +38,14 @@ function hear({ job, live: isLive }) {
 
 /**
  * @param {string} id
- * @param {(job: any) => void} onChange called with every state seen, the last one included
+ * @param {(job: any) => void} onChange receives every observed state, including the final one
  * @returns {Promise<any>} the job in its final state
  */
 export async function followJob(id, onChange) {
   let ended = null;
   let wake = () => {};
   const see = (job) => {
-    if (ended || !job.state) return wake(); // one that was deleted: asking says so
+    if (ended || !job.state) return wake(); // deleted: polling returns the error
     onChange(job);
     if (FINAL.includes(job.state)) { ended = job; wake(); }
   };
@@ -57,7 +58,7 @@ export async function followJob(id, onChange) {
         see(await getJob(id));
         failures = 0;
       } catch (problem) {
-        // A restart of the service takes seconds and loses no job; a job that is unknown stays so.
+        // A restart of the service takes seconds and loses no job. An unknown job stays unknown.
         failures += 1;
         if (problem.status || failures > 30) throw problem;
       }

@@ -1,12 +1,12 @@
-// The heading of every frame as lines that end where the circle is cut open and begin again opposite.
+// The heading of every frame as lines, broken where it crosses from 180 to -180 degrees.
 // @ts-check
 import { degrees } from "./words.js";
 
 const SURE = 0.8;
 
-/** @typedef {{x: number, y: number, sure: boolean} | null} Point x frames, y degrees; null lifts the pen */
+/** @typedef {{x: number, y: number, sure: boolean} | null} Point x frames, y degrees; null breaks the line */
 
-/** @param {any} poses @param {number} most points drawn; the rest is stepped over @returns {Point[]} */
+/** @param {any} poses @param {number} most limit of frames drawn, at even steps @returns {Point[]} */
 export function headingPoints(poses, most) {
   const step = Math.max(1, Math.ceil(poses.frames.length / most));
   const points = /** @type {Point[]} */ ([]);
@@ -26,7 +26,7 @@ export function headingPoints(poses, most) {
   return points;
 }
 
-/** Where the line leaves the plot and where it comes back. */
+/** Returns the points at which the line leaves the plot and enters it again. */
 function overTheCut(from, to) {
   const side = from.y > 0 ? 180 : -180;
   const turn = to.y + 2 * side - from.y;
@@ -34,7 +34,7 @@ function overTheCut(from, to) {
   return [{ x, y: side, sure: to.sure }, null, { x, y: -side, sure: to.sure }];
 }
 
-/** The lines as an SVG path; those that are sure, or those that are not. */
+/** Returns an SVG path of either the sure or the unsure segments. */
 export function pathOf(points, sure) {
   let path = "";
   let drawing = false;

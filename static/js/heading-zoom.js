@@ -1,5 +1,5 @@
-// The zooming plot of the heading, drawn by uPlot where `make vendor` has made it: drag to look closer,
-// double-click to see all. Without the library, a mouse, or room, the plain drawing stays.
+// The zooming plot of the heading, drawn by uPlot. Dragging zooms in, double-clicking zooms out. The static
+// drawing stays if uPlot was not built (`make vendor`), without a mouse, or on a narrow screen.
 // @ts-check
 import { byId, element } from "./element.js";
 import { headingPoints } from "./heading-series.js";
@@ -8,8 +8,8 @@ import { seconds } from "./words.js";
 const SIDES = [[-180, "← left"], [-90, "↑ up"], [0, "→ right"], [90, "↓ down"], [180, "← left"]];
 
 /**
- * @param {any} poses @param {(frame: number) => void} onFrame the frame under the pointer
- * @returns {Promise<((frame: number) => void) | null>} moves the cursor; null without the library
+ * @param {any} poses @param {(frame: number) => void} onFrame receives the frame under the pointer
+ * @returns {Promise<((frame: number) => void) | null>} moves the cursor to a frame; null without the plot
  */
 export async function zoomingPlot(poses, onFrame) {
   if (!matchMedia("(pointer: fine) and (min-width: 40rem)").matches) return null;
@@ -28,7 +28,7 @@ export async function zoomingPlot(poses, onFrame) {
 
 const sizeOf = (place) => ({ width: place.clientWidth, height: place.clientHeight });
 
-/** The points as columns; null lifts the pen, and `cuts_s` are the times where the circle is cut open. */
+/** Returns the points as columns. null breaks a line; `cuts_s` are the times of crossings at 180 degrees. */
 function columns(poses) {
   const data = { frames: [], time_s: [], sure: [], unsure: [], cuts_s: [] };
   const points = headingPoints(poses, poses.frames.length);
@@ -49,7 +49,7 @@ function options(place, { cuts_s }) {
   const style = getComputedStyle(byId("heading"));
   const soft = () => style.color;
   const axis = { stroke: soft, grid: { stroke: () => style.outlineColor, width: 1 }, ticks: { show: false }, font: "13px system-ui, sans-serif" };
-  // The library joins what lies in one column of pixels; the cuts are cleared of it.
+  // uPlot connects points in the same pixel column. Explicit gaps keep the crossings open.
   const gaps = (plot, series, first, last, nulls) => [...nulls, ...cuts_s.map((cut_s) => {
     const at = plot.valToPos(cut_s, "x", true);
     return [at - 2, at + 3];
@@ -69,7 +69,7 @@ function options(place, { cuts_s }) {
   };
 }
 
-/** Waits for a style sheet, once. */
+/** Loads a style sheet once and waits for it. */
 function styled(href) {
   if (document.querySelector(`link[href="${href}"]`)) return undefined;
   return new Promise((resolve) => document.head.append(element("link", { rel: "stylesheet", href, onload: resolve, onerror: resolve })));

@@ -1,4 +1,4 @@
-// The plot of the heading: our own drawing at once, and the zooming one where its library is there.
+// The plot of the heading: a static drawing first, replaced by the zooming plot if that is available.
 // @ts-check
 import { byId, element } from "./element.js";
 import { headingPoints, pathOf } from "./heading-series.js";

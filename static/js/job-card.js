@@ -1,11 +1,14 @@
-// One job on the page: what it does, how far it is, a way to stop it; when it failed, why.
+// The card of a job: stage, progress and a cancel button; after a failure, the reason.
 // @ts-check
 import { cancelJob, Problem } from "./api.js";
 import { element, showProblem } from "./element.js";
 import { followJob } from "./follow-job.js";
 import { stageOf } from "./words.js";
 
-/** A card with a bar. @param {Element} place @param {() => void} onCancel */
+/**
+ * Shows a card with a progress bar and returns the function that updates it.
+ * @param {Element} place @param {() => void} onCancel
+ */
 export function progressCard(place, onCancel) {
   const stage = element("strong", { role: "status" });
   const share = element("span");
@@ -25,10 +28,10 @@ export function progressCard(place, onCancel) {
 
 /**
  * Shows a job until it ends. @param {Element} place @param {string} id
- * @returns {Promise<boolean>} true when it is done
+ * @returns {Promise<boolean>} true if it is done, false if it failed or was cancelled
  */
 export async function showJob(place, id) {
-  // A card of its own: when another has taken the place meanwhile, this one ends unseen.
+  // The card has its own element: if another job takes the place, this card is detached.
   const own = element("div");
   place.replaceChildren(own);
   const update = progressCard(own, () => cancelJob(id).catch((problem) => showProblem(own, problem)));

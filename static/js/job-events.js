@@ -1,10 +1,10 @@
-// The one stream of a browser's jobs: here in the page, or in a worker that all its tabs share.
+// The event stream of all jobs. It runs in the page, or in a worker shared by all tabs of a browser.
 // @ts-check
 
 /**
- * Opens the stream and opens it again when it breaks.
- * @param {(message: {job?: any, live: boolean}) => void} tell what was heard; `live` is false while nothing can be
- * @returns {() => void} closes it
+ * Opens the stream, and opens it again when it breaks.
+ * @param {(message: {job?: any, live: boolean}) => void} tell receives events; not `live` while disconnected
+ * @returns {() => void} closes the stream
  */
 export function openEvents(tell) {
   const events = new EventSource("/v1/events");
@@ -16,7 +16,7 @@ export function openEvents(tell) {
   }
   events.addEventListener("error", () => {
     tell({ live: false });
-    // A browser comes back by itself unless the answer was a refusal.
+    // EventSource reconnects by itself, except after an error response.
     if (events.readyState === EventSource.CLOSED) again = setTimeout(() => { close = openEvents(tell); }, 5000);
   });
   return () => close();

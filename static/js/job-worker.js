@@ -1,8 +1,8 @@
-// Shared by all tabs: a browser allows six connections to a host, and an event stream occupies one.
+// A worker shared by all tabs. Browsers allow six connections per host, and each event stream takes one.
 // @ts-check
 import { openEvents } from "./job-events.js";
 
-/** The tabs that listen. @type {Set<MessagePort>} */
+/** Ports of the listening tabs. @type {Set<MessagePort>} */
 const tabs = new Set();
 let close = null;
 let live = false;

@@ -1,4 +1,4 @@
-// What was measured in one film: numbers, heading, distances, background.
+// The view of a library: numbers, heading, distances, pictures.
 // @ts-check
 import { getPoses } from "./api.js";
 import { byId, element, showProblem } from "./element.js";
@@ -36,7 +36,7 @@ export async function showLibrary(library) {
   }
 }
 
-/** Term and value; what is not known is left out. */
+/** Returns terms and values. Unknown values are omitted. */
 function numbersOf(library) {
   const view = { side: "side", top: "above" }[library.view];
   const length_s = library.n_frames / library.fps;

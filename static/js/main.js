@@ -1,4 +1,4 @@
-// The page as a whole: what is shown now, and what happens when something was made.
+// The page: what is shown, and how it changes when jobs end.
 // @ts-check
 import { getFlock, getFootage, getLibrary, listFlocks, listJobs, listLibraries } from "./api.js";
 import { showEarlier } from "./earlier.js";
@@ -15,9 +15,9 @@ import { quoted } from "./words.js";
 signIn();
 const current = { library: null, flock: null };
 const made = { libraries: [], flocks: [] };
-/** Results shown since the page was opened. They are shown again only when they are chosen. */
+/** Ids of results shown since the page was opened. They are shown again only when they are chosen. */
 const shown = new Set();
-/** Whether the person made or chose something here. From then on, results of other tabs and programs wait in the lists. */
+/** True once the person has made or chosen something. Other results then appear only in the lists. */
 let isOwn = false;
 const own = (show) => async (/** @type {string} */ id) => { isOwn = true; await show(id); };
 const makeFlocksOf = flockForm(own(async (id) => { await refresh(); await watch(id); byId("stage").focus(); }));
@@ -33,7 +33,7 @@ async function refresh() {
 const isReady = (thing) => (thing.state ?? "done") === "done";
 const redrawLists = () => showEarlier(made.libraries, made.flocks, current, { onLibrary: own(chooseLibrary), onFlock: own(watch) });
 
-/** Shows a library and its newest flock; without a flock, the stage says what is next. */
+/** Shows a library and its newest flock. Without a flock, the stage shows the text `next`. */
 async function chooseLibrary(id, next = "Press “Make the flock”, and its flock will play here.") {
   const flock = made.flocks.find((one) => one.library_id === id);
   if (flock) return chooseFlock(flock.id);
@@ -55,7 +55,7 @@ async function chooseFilm(id) {
 async function chooseFlock(id) {
   const mine = isOwn;
   const flock = await getFlock(id);
-  if (mine !== isOwn) return; // the person chose meanwhile
+  if (mine !== isOwn) return; // the person has chosen another result meanwhile
   current.flock = id;
   shown.add(id);
   showFlock(flock, made.libraries.find((library) => library.id === flock.library_id)?.name ?? "");
@@ -71,7 +71,7 @@ async function watch(id) {
 const isUnderWay = (job) => ["queued", "running"].includes(job.state);
 const hasResult = (job) => isUnderWay(job) || (job.state === "done" && job.kind !== "sample");
 
-/** @param {any} job the newest one that has a result or is under way */
+/** @param {any} job the newest job that has a result, is queued or is running */
 async function showNewest(job) {
   if (isOwn) return;
   if (job && isUnderWay(job)) {
@@ -85,7 +85,7 @@ async function showNewest(job) {
   }
 }
 
-/** Fills an empty page while a job is under way: with the film of a flock if it is measured, else with a sentence. */
+/** Fills an empty page during a job: with the library of a flock if it is ready, else with a sentence. */
 async function announce({ kind, subject }) {
   if (made.libraries.some((library) => library.id === subject?.id)) return chooseLibrary(subject.id, "A flock of it is being made and will play here.");
   if (kind !== "analysis") return showEmptyStage("A flock is being made. It will play here.");
@@ -93,7 +93,7 @@ async function announce({ kind, subject }) {
   showEmptyStage(`${quoted(name)} is being measured. The result will be shown here.`);
 }
 
-/** Returns where a job is shown that no form of this tab began: out of sight while that form shows its own. */
+/** Returns the element for a job that no form of this tab started; detached while a form uses its own. */
 function placeOf({ kind }) {
   const [id, isTaken] = kind === "flock" && !byId("make").hidden ? ["flock-job", byId("make-button").disabled] : ["film-job", byId("film-form").hidden];
   return isTaken ? element("div") : byId(id);
@@ -103,7 +103,10 @@ let isListening = false;
 let isFollowing = false;
 let hasNews = false;
 
-/** Follows the jobs of every tab and program until none is under way; shows the newest result before and after each. */
+/**
+ * Follows the jobs of all tabs and programs until none is left. Shows the newest result before and after
+ * each of them.
+ */
 async function followJobs() {
   hasNews = true;
   if (isFollowing) return;
@@ -112,7 +115,7 @@ async function followJobs() {
     while (hasNews) {
       hasNews = false;
       await refresh();
-      // Not earlier: without a session the stream would be refused.
+      // Open the stream only after the first successful requests: without a session it would be refused.
       if (!isListening) listen((job) => { if (job.kind !== "fish") followJobs(); });
       isListening = true;
       const jobs = (await listJobs()).filter((job) => job.kind !== "fish");
@@ -124,7 +127,7 @@ async function followJobs() {
       }
     }
   } catch (problem) {
-    if (current.library) return; // what is shown stays; the stream reports the next job
+    if (current.library) return; // keep the page; the stream reports the next job
     showEmptyStage("");
     showProblem(byId("stage-note"), problem);
   } finally {

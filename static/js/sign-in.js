@@ -1,9 +1,9 @@
-// Asks for a token when the service answers that it needs one; the cookie it gives is out of our sight.
+// Asks for a token when the service requires one. The session is a cookie that scripts cannot read.
 // @ts-check
 import { beginSession, endSession } from "./api.js";
 import { byId, showProblem } from "./element.js";
 
-/** Remembers that there is a session to end: the page cannot see the cookie. */
+/** Key of local storage that records a session, because the page cannot see the cookie. */
 const SIGNED_IN = "flockreel-signed-in";
 
 export function signIn() {

@@ -1,4 +1,4 @@
-// The stage: one flock, playing in a loop, with its downloads.
+// The stage: the video of one flock, played in a loop, with its downloads.
 // @ts-check
 import { byId, element } from "./element.js";
 import { count } from "./words.js";
@@ -29,7 +29,7 @@ export function showFlock(flock, filmName) {
   byId("stage-caption").hidden = false;
 }
 
-/** @param {string} text what is there instead of a flock */
+/** @param {string} text shown in place of a flock */
 export function showEmptyStage(text) {
   const video = byId("stage-video");
   video.hidden = true;

@@ -1,4 +1,4 @@
-// Sends a film as it is, reporting how much of it has left; fetch cannot report that.
+// Uploads a film and reports the progress. It uses XMLHttpRequest, because fetch reports no upload progress.
 // @ts-check
 import { problemFrom, unreachable } from "./api.js";
 

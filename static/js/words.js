@@ -1,4 +1,4 @@
-// Numbers and stages in the words of the page. Angles are in degrees here and nowhere else.
+// Numbers, directions and job stages as text. Angles are converted to degrees only here.
 // @ts-check
 
 const number = new Intl.NumberFormat("en", { maximumFractionDigits: 1 });
@@ -14,7 +14,7 @@ export const day = (time) => (time ? date.format(new Date(time)) : "");
 
 const DIRECTIONS = ["right", "down right", "down", "down left", "left", "up left", "up", "up right"];
 
-/** A heading in words, as "34° down right". */
+/** Returns a heading as text, such as "34° (down right)". */
 export function direction(heading_rad) {
   const heading_deg = Math.round(degrees(heading_rad));
   const eighth = ((Math.round(heading_deg / 45) % 8) + 8) % 8;
@@ -34,7 +34,7 @@ const STAGES = {
   rendering: "Painting the flock",
 };
 
-/** What a job does now. */
+/** Returns the current stage of a job as text. */
 export function stageOf(job) {
   if (job.state === "queued") return "Waiting its turn";
   const stage = job.stage ?? "";

@@ -1,7 +1,8 @@
-"""schemathesis over the OpenAPI document of a really started service that holds one thing of every kind.
+"""Runs schemathesis on the OpenAPI document of a running service that holds one object of every kind.
 
-A third of the calls names what is there, a third what chance brings; a walk asks every operation for what it can give, and
-it is a fault when one of them never succeeded. Streams that never end are left out: tests/it/api/events.rs reads them.
+One run generates random requests, a second run uses the ids of stored objects. A third calls every operation
+with valid input (walk.py), and operations that never succeed are faults. Endless event streams are excluded;
+tests/it/api/events.rs tests them.
 """
 
 import os
@@ -10,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-import hooks  # noqa: F401 (it tells schemathesis, in this process too)
+import hooks  # noqa: F401 (importing registers the hooks in this process too)
 from walk import Walk, tell
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -38,7 +39,7 @@ def main(program):
 
 
 def furnish(program, address, folder):
-    """One of each kind, by the API; their ids."""
+    """Creates one object of each kind through the API and returns their ids."""
     film = folder / "film.mp4"
     size = ["--size", "160x120"]
     subprocess.run([program, "sample", "-o", film, "--frames", "120", *size], check=True, stderr=subprocess.DEVNULL)
@@ -54,7 +55,7 @@ def furnish(program, address, folder):
 
 
 def known(ids):
-    """What of the document's parameters is given, by path; nothing is deleted of what others need."""
+    """Returns settings that use existing ids as path parameters of GET operations."""
     lines = []
     for noun, thing in ids.items():
         lines.append(f'[[operations]]\ninclude-path-regex = "^/v1/{noun}/"\ninclude-method = "GET"')
@@ -64,7 +65,7 @@ def known(ids):
 
 
 def run(address, folder, what, settings):
-    """Whether it found a fault: 0 or 1."""
+    """Runs schemathesis. Returns its exit code, 0 without faults."""
     config = folder / "schemathesis.toml"
     config.write_text(settings)
     command = [Path(sys.prefix) / "bin/schemathesis", "--config-file", config, "run", f"{address}/openapi.json"]
@@ -76,7 +77,7 @@ def run(address, folder, what, settings):
 
 
 def walk_through(program, address, folder):
-    """How many operations never succeeded."""
+    """Calls every operation with valid input. Returns the number of operations that never succeeded."""
     print("contract tests: a walk", flush=True)
     film, data = folder / "another.mp4", folder / "data"
     command = [program, "sample", "-o", film, "--frames", "120", "--size", "160x120", "--seed", "2"]

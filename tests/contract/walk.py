@@ -1,7 +1,7 @@
-"""One walk through the whole API as a client makes it, each answer held against the document by schemathesis.
+"""One pass through the whole API, as a client uses it. schemathesis validates each response.
 
-Chance seldom finds what there is: here every operation is asked for something that is there, from the upload of a film to the
-deletion of all that came of it. What no operation of the document answered with success is told at the end.
+Random requests rarely name existing objects. Here every operation is called for an existing object, from the
+upload of a film to the deletion of everything made from it.
 """
 
 import json
@@ -9,7 +9,7 @@ from collections import defaultdict
 
 import schemathesis
 
-# It never ends: tests/it/api/events.rs reads it.
+# An endless stream; tests/it/api/events.rs tests it.
 ENDLESS = {"GET /v1/events"}
 TUS = {"Tus-Resumable": "1.0.0"}
 STREAM, PIECE = "application/octet-stream", "application/offset+octet-stream"
@@ -19,17 +19,17 @@ CHECKS = ["not_a_server_error", "status_code_conformance", "content_type_conform
 
 
 class Walk:
-    """Calls of operations by name, and the statuses that each has answered with."""
+    """Calls operations by name and validates their responses."""
 
     def __init__(self, address, films, token):
         self.address, self.token = address, token
-        # One that can be measured, and one whose scene moves.
+        # A film that can be analyzed, and one whose background moves.
         self.film, self.moving = (film.read_bytes() for film in films)
         self.document = schemathesis.openapi.from_url(f"{address}/openapi.json")
         self.checks = list(schemathesis.checks.CHECKS.get_by_names(CHECKS))
 
     def call(self, operation, path=None, body=None, media_type=None, **more):
-        """The answer, which must be a success that the document describes."""
+        """Returns the response, which must be a success that the document describes."""
         method, template = operation.split(" ")
         if body is not None:
             more |= {"body": body, "media_type": media_type or JSON}
@@ -52,7 +52,7 @@ class Walk:
             self.call(f"GET {path}")
 
     def make(self):
-        """One of each kind, each by every form that its operation takes."""
+        """Creates objects of each kind, by every content type that its operation accepts. Returns ids."""
         footage = self.call("POST /v1/footage", body=self.film, media_type=STREAM).json()["id"]
         same = self.call("POST /v1/footage", body={"video": self.film}, media_type=FORM)
         assert same.status_code == 200 and same.json()["id"] == footage
@@ -74,7 +74,7 @@ class Walk:
                 "job": flock["job_id"]}
 
     def refuse(self):
-        """A film that cannot be measured, and the picture of why."""
+        """Analyzes a film that must be refused, and gets the picture of the refusal."""
         job = self.call("POST /v1/analyses", body=self.moving, media_type=STREAM).json()["job_id"]
         refused = self.wait_for(job, "failed")
         assert refused["error"]["picture"], refused
@@ -126,7 +126,7 @@ class Walk:
 
 
 def tell(seen, document):
-    """The statuses of every operation; those that never succeeded."""
+    """Prints the recorded statuses of every operation. Returns the operations that never succeeded."""
     statuses = defaultdict(set)
     for line in seen.read_text().splitlines():
         operation, status = line.rsplit(" ", 1)

@@ -1,10 +1,10 @@
-"""Takes the guards of guards.toml out, one after the other, and asks that the test of each fails then.
+"""Disables the guards of guards.toml one by one and checks that the test of each fails.
 
-One program is built of a copy of the sources, in which every guard has a switch; FLOCKREEL_GUARD_OFF says which one is
-taken out. Each test must pass with all guards in place. Writes the table of docs/GUARDS.md anew where --write is given.
+One program is built from a copy of the sources in which every guard has a switch. FLOCKREEL_GUARD_OFF names
+the disabled guard. Each test must pass with all guards enabled. --write updates the table of docs/GUARDS.md.
 
-  tests/guards/run.py [--write] [NAME...]       the guards whose name begins so, or all
-  scripts/with-servers.sh tests/guards/run.py   those that need several machines
+  tests/guards/run.py [--write] [NAME...]       guards whose name starts with NAME, or all
+  scripts/with-servers.sh tests/guards/run.py   guards whose tests need several machines
 """
 
 import argparse
@@ -54,7 +54,7 @@ def main():
         began = time.monotonic()
         said = run(programs, test, guard["name"])
         faults += said is None or green[test] is not None
-        # A test that fails with all guards too says nothing of this one.
+        # A test that also fails with all guards enabled proves nothing about this guard.
         seen[guard["name"]] = said if green[test] is None else None
         verdict = "GREEN WITHOUT" if said is None else "red"
         print(f"{verdict:14}{guard['promise']:12}{guard['name']:24}{time.monotonic() - began:6.1f} s  {said or ''}", flush=True)
@@ -64,7 +64,7 @@ def main():
 
 
 def lay_out(guards):
-    """The sources with a switch beside every guard; files that stay the same keep their time."""
+    """Writes the sources with their switches. Unchanged files keep their modification time."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     texts = {}
     for name in filter(None, listed.split("\0")):
@@ -92,7 +92,7 @@ def lay_out(guards):
 
 
 def build():
-    """The test programs by their kind. Dependencies that are built already are shared by links."""
+    """Builds the test programs and returns their paths by kind. Reuses built dependencies by hard links."""
     built, target = ROOT / "target/debug", PLACE / "target"
     if built.is_dir() and not target.is_dir():
         (target / "debug").mkdir(parents=True)
@@ -116,7 +116,7 @@ def build():
 
 
 def run(programs, test, off):
-    """Why a test fails; None where it passes."""
+    """Returns why a test fails, or None if it passes."""
     kind, path = test.split(" ")
     if kind == "contract":
         command = [ROOT / "target/contract-venv/bin/python", "-B", ROOT / path, PLACE / "target/debug/flockreel"]
@@ -136,10 +136,10 @@ def run(programs, test, off):
 
 
 def reason(said):
-    """The words of the panic, in one line."""
+    """Returns the message of the panic in one line."""
     lines = said.splitlines()
     for line in lines:
-        # schemathesis: the first fault that it found.
+        # The first fault that schemathesis reports.
         if line.startswith("- "):
             return line[2:].strip()
     at_home = [at for at, line in enumerate(lines) if "panicked at tests/" in line]
@@ -152,7 +152,7 @@ def reason(said):
 
 
 def write(guards, seen):
-    """Rows that were not seen this time stay as they were."""
+    """Updates the rows of the guards that were tested; keeps the other rows."""
     text = DOCUMENT.read_text()
     before, rest = text.split(BEGIN)
     old, after = rest.split(END)

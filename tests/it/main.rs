@@ -1,5 +1,5 @@
-//! One test program, so one link. A folder per door, `film` for accuracy against known truth, and
-//! `tidy` for the rules of the house.
+//! All integration tests, linked as one program to save link time. Each folder tests one interface, except
+//! `film` (accuracy against known truth) and `tidy` (conventions of the source code).
 
 #![expect(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-"""A really started service, a film made by the program, and Debian's chromium."""
+"""Fixtures: running services, films made by flockreel, and Debian's chromium."""
 
 import os
 import re
@@ -19,19 +19,19 @@ CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
 
 @pytest.fixture(scope="session")
 def film(tmp_path_factory):
-    """A short film of the virtual fish."""
+    """Path of a short film of the virtual fish."""
     return make_film(tmp_path_factory.mktemp("film") / "goldfish <b>one.mp4", seed=1)
 
 
 def make_film(path, seed):
-    """Makes a film of 150 frames, another one for each seed, and returns its path."""
+    """Makes a film of 150 frames, which depends on the seed, and returns its path."""
     subprocess.run([PROGRAM, "sample", "-o", path, "--frames", "150", "--seed", str(seed)], check=True)
     return path
 
 
 @pytest.fixture(scope="session")
 def filled_service(tmp_path_factory, film):
-    """The address of a service that holds one film and one flock of 6, made by its API."""
+    """Address of a service with one film and one flock of 6, made through the API."""
     with started(PROGRAM, tmp_path_factory.mktemp("filled") / "data") as address:
         name = urllib.parse.quote(film.name)
         footage = post(f"{address}/v1/footage?name={name}", film.read_bytes(), "video/mp4")
@@ -43,14 +43,14 @@ def filled_service(tmp_path_factory, film):
 
 @pytest.fixture
 def empty_service(tmp_path):
-    """The address of a service that holds nothing yet."""
+    """Address of a service without data."""
     with started(PROGRAM, tmp_path / "data") as address:
         yield address
 
 
 @pytest.fixture
 def starting_service(tmp_path):
-    """The address of a service that has just begun to film its sample."""
+    """Address of a service that is filming its sample."""
     with started(PROGRAM, tmp_path / "data", sample=True) as address:
         yield address
 
@@ -66,7 +66,7 @@ def browser():
 
 @pytest.fixture
 def page(browser):
-    """A page that fails its test when a script fails or when anything is fetched from elsewhere."""
+    """A browser page. Its test fails on script errors and on requests to other servers."""
     context = browser.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
     faults = []
@@ -79,7 +79,7 @@ def page(browser):
 
 
 def is_fault(message):
-    # The browser logs every answer that is not a success; the page's own faults are others.
+    # The browser also logs error responses, which are not faults of the page.
     return message.type == "error" and "Failed to load resource" not in message.text
 
 
@@ -89,7 +89,7 @@ def is_elsewhere(url):
 
 @pytest.fixture
 def closed_service(tmp_path):
-    """The address of a service that demands tokens, and one that it takes."""
+    """Address of a service that requires tokens, and a valid token."""
     data = tmp_path / "data"
     command = [PROGRAM, "token", "create", "--name", "page", "--data", data]
     token = subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()

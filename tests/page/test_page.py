@@ -1,4 +1,4 @@
-"""What the page promises to a person: a film in, what was measured, a flock that plays."""
+"""The page from a user's view: upload a film, read the measurements, play and download the flock."""
 
 import json
 import re
@@ -24,7 +24,7 @@ def make_a_flock(page, individuals, frames):
 
 
 def until(page, script, timeout_s=30):
-    """Waits for a truth; the page's policy forbids the browser's own way of waiting for scripts."""
+    """Polls the script until it is true. The page's policy forbids playwright's wait_for_function."""
     end = time.monotonic() + timeout_s
     while not page.evaluate(script):
         assert time.monotonic() < end, f"never came true: {script}"
@@ -165,7 +165,7 @@ def test_all_tabs_follow_their_jobs_by_one_stream(browser, filled_service):
     for number, tab in enumerate(tabs):
         expect(tab.locator("#stage-title")).to_have_text(f"A flock of {3 + number}", timeout=LONG_MS)
         expect(tab.locator("#earlier-flocks li").filter(has_text=re.compile(r"\b40 frames"))).to_have_count(2, timeout=LONG_MS)
-    # Neither tab is shown what the other one made.
+    # No tab shows the flock of the other.
     assert [tab.locator("#stage-title").text_content() for tab in tabs] == ["A flock of 3", "A flock of 4"]
     context.close()
     metrics = fetch(filled_service + "/metrics").decode()

@@ -1,4 +1,4 @@
-"""A resumable upload by the client that pages use (tus-js-client, in node): cut inside a piece, the server killed."""
+"""A resumable upload by tus-js-client in node: the connection is cut inside a piece, the server is killed."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ from service import free_address, start
 
 HERE = Path(__file__).parent
 MODULES = HERE.parents[1] / "target/web"
-# `make vendor` takes node from a wheel where the machine has none.
+# `make vendor` installs node from a wheel if the machine has none.
 WITH_NODE = {**os.environ, "PATH": f"{os.environ['PATH']}:{MODULES.parent / 'node-venv/bin'}"}
 
 
@@ -46,7 +46,7 @@ def test_an_upload_by_tus_js_client_goes_on_where_it_was_cut(tmp_path, film):
 
 
 class CutWire:
-    """A way to the service that is cut once, when so many bytes have gone there; then something happens."""
+    """A proxy to the service that is cut once, after a number of bytes. Then it calls `then`."""
 
     def __init__(self, address, cut_after_bytes, then):
         self.to = ("127.0.0.1", int(address.rsplit(":", 1)[1]))
@@ -76,7 +76,7 @@ class CutWire:
             if self.cuts == 0 and len(piece) >= room:
                 far.sendall(piece[:room])
                 self.carried_bytes, self.cuts = self.cut_after_bytes, 1
-                # The service is to have read what came before it dies of something else.
+                # Let the service read the received bytes before it is killed.
                 far.shutdown(socket.SHUT_WR)
                 back.join(timeout=30)
                 self.then()

@@ -1,4 +1,4 @@
-"""Resumable uploads by a client of others (tuspy): a server that is killed in the middle loses nothing."""
+"""Resumable uploads by the client tuspy. Killing the server during an upload loses no received piece."""
 
 import hashlib
 import json

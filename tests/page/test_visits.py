@@ -1,4 +1,4 @@
-"""What a visit finds while something is made: the first one, a reload, a second tab."""
+"""The page during jobs: on the first visit, after a reload, and in a second tab."""
 
 import re
 
@@ -12,7 +12,7 @@ UPLOADING = re.compile("Sending the film|Checking the film")
 
 
 def begin_to_measure(page, address, film):
-    """Uploads a film and returns while it is being measured."""
+    """Uploads a film and returns while its analysis runs."""
     page.goto(address)
     expect(page.locator("#stage-title")).to_have_text(re.compile("A flock of"))
     page.locator("#film-file").set_input_files(film)

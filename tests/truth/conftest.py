@@ -1,4 +1,4 @@
-"""A film of the virtual fish, its library, and a flock of it with its ground truth: made once by the program itself."""
+"""Fixtures: a film of the virtual fish, its library, and a flock with ground truth, made by flockreel."""
 import json
 import os
 import pathlib
@@ -12,7 +12,7 @@ COUNT = 12
 
 @pytest.fixture(scope="session")
 def truth(tmp_path_factory):
-    """The folder that `flockreel flock --ground-truth` wrote, beside flock.json and flock.mp4."""
+    """Folder written by `flockreel flock --ground-truth`, next to flock.json and flock.mp4."""
     program = pathlib.Path(os.environ["FLOCKREEL_PROGRAM"]).resolve()
     folder = tmp_path_factory.mktemp("truth")
 

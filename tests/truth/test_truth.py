@@ -1,7 +1,7 @@
-"""The ground truth of a flock, read by the field's own tools: pycocotools and TrackEval.
+"""Reads the ground truth of a flock with pycocotools and TrackEval.
 
-Each file is evaluated against itself, which must score 100 %, and against the same truth with one thing wrong, which
-must not: so the tools are seen to read what is meant.
+Each file is evaluated against itself and must score 100 %. It is also evaluated against a copy with one error
+and must score less, which shows that the tools use the changed data.
 """
 import contextlib
 import copy
@@ -51,7 +51,7 @@ def test_amodal_masks_hold_the_visible_ones_and_overlap_where_masks_do_not(coco)
         annotations = coco.loadAnns(coco.getAnnIds(image))
         for annotation in annotations:
             visible, whole = coco.annToMask(annotation), masks.decode(annotation["amodal_segmentation"])
-            # A pixel of the label has visible >= 0.5, and alpha is no less than visible.
+            # Labeled pixels have visible >= 0.5, and alpha is at least `visible`.
             assert not (visible & ~whole.astype(bool)).any()
             assert annotation["amodal_area"] >= whole.sum()
         overlaps += (sum(masks.decode(a["amodal_segmentation"]).astype(int) for a in annotations) > 1).sum()
@@ -84,7 +84,7 @@ def test_coco_against_itself_scores_one_and_with_a_mask_shifted_less(coco, kind)
 
 
 def challenge(truth, folder, spoil=lambda rows: rows):
-    """TrackEval's HOTA, CLEAR and Identity of the truth's own lines, spoiled or not, against the truth."""
+    """Returns HOTA, MOTA and IDF1 of TrackEval, for the truth changed by `spoil` against the truth."""
     sequence = folder / "gt" / "flock"
     shutil.copytree(truth / "gt", sequence / "gt")
     shutil.copy(truth / "seqinfo.ini", sequence)

@@ -1,6 +1,9 @@
-//! Tokens at the door: every request beyond the page and the probes has a caller, or is refused before
-//! its handler (RELIABILITY.md, S6). On loopback a request without a token is the local owner's, unless
-//! tokens are demanded. What a handler may see and to whom it charges comes from its [`Caller`] alone.
+//! Authentication: every request has a [`Caller`], or is refused before its handler runs
+//! (docs/explanation/promises.md, "Owners are isolated"). Only the page, its documentation, the probes and
+//! signing in are open to all.
+//!
+//! On loopback a request without a token belongs to the local owner, unless tokens are required. The caller
+//! is the only source of the data that a handler may read and of the account that it charges.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Instant;
@@ -20,32 +23,32 @@ use crate::store::owners::{Account, Owner, Reach};
 use crate::store::tokens::secret::Presented;
 use crate::store::tokens::{Scope, Token};
 
-/// Who asks: taken by every handler that reads or writes what somebody owns.
+/// The authenticated sender of a request. Every handler that reads or writes data of an owner takes it.
 #[derive(Clone, Debug)]
 pub(in crate::api) struct Caller {
-    /// Whose things are there for this request.
+    /// Owners whose data this request can access.
     pub reach: Reach,
-    /// Whose what it makes will be.
+    /// Owner and quota of everything that this request creates.
     pub account: Account,
     scope: Scope,
     proof: Proof,
 }
 
-/// With what a caller showed who asks: it is asked for again while an answer goes on.
+/// Credential of a caller. Long responses check it again while they run.
 #[derive(Clone)]
 enum Proof {
-    /// Nothing: on the machine itself.
+    /// None: a local request.
     Nothing,
     /// A signed link.
     Link,
     /// A token.
     Token(Presented),
-    /// A browser's cookie.
+    /// The session cookie of a browser.
     Cookie(String),
 }
 
 impl std::fmt::Debug for Proof {
-    /// Its kind alone: secrets do not get into logs.
+    /// Writes only the kind of credential, because secrets must not get into logs.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Proof::Nothing => "nothing",
@@ -57,7 +60,7 @@ impl std::fmt::Debug for Proof {
 }
 
 impl Caller {
-    /// Whoever asks on the machine itself.
+    /// Returns the caller of a local request without a token.
     fn local() -> Caller {
         Caller {
             reach: Reach::Of(Owner::local()),
@@ -67,8 +70,8 @@ impl Caller {
         }
     }
 
-    /// Whoever holds a signed link, which `link` lets no further than its path: what is there belongs to
-    /// that owner, and nothing else is in reach.
+    /// Returns the caller of a signed link to data of `owner`. The caller can only read. `link` has checked
+    /// that the signature covers the path of the request.
     pub(super) fn of_link(owner: Owner) -> Caller {
         Caller {
             reach: Reach::Of(owner),
@@ -90,14 +93,14 @@ impl Caller {
         }
     }
 
-    /// Whether the caller may see how the service does: whoever is on the machine itself without a token,
-    /// and administrators.
+    /// Returns whether the caller may read the metrics of the service: a local request without a token, or an
+    /// administrator.
     pub(in crate::api) fn runs_the_service(&self) -> bool {
         matches!(self.proof, Proof::Nothing) || self.scope == Scope::Admin
     }
 
-    /// Whether the caller would be let in again: the token has neither ended nor been revoked, nobody
-    /// signed out.
+    /// Returns whether the credential is still valid: the token has not expired or been revoked, and the
+    /// session has not ended. Returns false if the store cannot tell.
     pub(in crate::api) async fn is_still_good(&self, state: &AppState) -> bool {
         let store = &state.context.store;
         let token = match &self.proof {
@@ -121,11 +124,12 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
     }
 }
 
-/// The address at the other end of the connection: a proxy's, where there is one.
+/// Address of the other end of the connection. Behind a proxy, it is the address of the proxy.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::api) struct Peer(pub IpAddr);
 
-/// Finds the caller of every request that is not open to all. Refusals are counted for each address.
+/// Middleware: finds the caller of every request, except on open routes. Requests refused with 401 are
+/// counted per address; an address with too many of them gets `rate_limited`.
 pub(in crate::api) async fn authenticate(
     State(state): State<AppState>,
     request: Request,
@@ -158,8 +162,8 @@ async fn let_in(state: &AppState, request: Request, next: Next) -> Response {
     }
 }
 
-/// What holds nobody's data: the page, its description, the probes, and the way to sign in. Everything
-/// that is not named here needs a caller.
+/// Returns whether a path needs no caller: the page, the documentation, the probes, and signing in. They hold
+/// no data of owners. All paths not listed here need a caller.
 fn is_open(path: &str) -> bool {
     let exact = [
         "/",
@@ -192,7 +196,7 @@ async fn caller(state: &AppState, parts: &Parts) -> Result<Caller, Problem> {
     Ok(caller)
 }
 
-/// Whoever has a signed link or a cookie.
+/// Returns the caller of a signed link or a session cookie, if there is one.
 async fn of_browser(state: &AppState, parts: &Parts) -> Result<Option<Caller>, Problem> {
     match caller_of_link(state, &parts.method, &parts.uri).await? {
         None => of_session(state, &parts.method, &parts.headers).await,
@@ -200,7 +204,7 @@ async fn of_browser(state: &AppState, parts: &Parts) -> Result<Option<Caller>, P
     }
 }
 
-/// The good token of this text, or 401.
+/// Returns the valid token that `text` represents. Fails with `unauthenticated`.
 pub(super) async fn token(state: &AppState, text: &str) -> Result<Token, Problem> {
     presented(state, text).await.map(|(token, _)| token)
 }
@@ -212,8 +216,9 @@ async fn presented(state: &AppState, text: &str) -> Result<(Token, Presented), P
     Ok((token.ok_or_else(refused)?, given))
 }
 
-/// The caller that a browser's cookie stands for. A write must say that it comes from our own page: a
-/// browser adds the cookie whoever asks, and says so; what does not say so is no browser's doing.
+/// Returns the caller of a session cookie, if there is one. A browser also adds the cookie to requests of
+/// other sites, but then names the site. A write therefore fails with `cross_site` unless it names its
+/// origin, which `guard` has checked.
 async fn of_session(
     state: &AppState,
     method: &Method,
@@ -234,7 +239,7 @@ async fn of_session(
     Ok(Some(Caller::of(&token, Proof::Cookie(cookie.to_owned()))))
 }
 
-/// The text after `Bearer`; another scheme is a proxy's affair.
+/// Returns the text after `Bearer`. Other schemes are ignored, because they may be meant for a proxy.
 fn bearer(headers: &HeaderMap) -> Option<&str> {
     let value = headers.get(header::AUTHORIZATION)?.to_str().ok()?;
     let (scheme, text) = value.split_once(' ')?;

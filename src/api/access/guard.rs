@@ -1,5 +1,5 @@
-//! What holds on every route: who may ask from a browser, and the headers of every answer
-//! (RELIABILITY.md, S5, S7 and H2).
+//! Checks of every request, and security headers of every response
+//! (docs/explanation/promises.md, "No cross-site writes", "Size limits" and "Nothing served runs as a page").
 
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, Uri, header};
@@ -9,8 +9,8 @@ use axum::response::{IntoResponse, Response};
 use crate::api::Problem;
 use crate::code::Code;
 
-/// Nothing from elsewhere, nothing inline, in nobody's frame. Videos of our own may be shown from
-/// memory (`blob:`).
+/// Content security policy: only resources of this service, nothing inline, and no embedding in frames.
+/// `blob:` lets the page show videos that it holds in memory.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; \
     img-src 'self' blob: data:; media-src 'self' blob:; connect-src 'self'; font-src 'self'; \
     manifest-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'";
@@ -39,23 +39,24 @@ const HEADERS: [(HeaderName, HeaderValue); 6] = [
     ),
 ];
 
-/// The longest address that is read, bytes: ours are a tenth of that.
+/// Longest path and query of a request, bytes. The addresses of this service have about a tenth of it.
 const MAX_ADDRESS_BYTES: usize = 8 << 10;
 
-/// The largest sum of all header fields, bytes. The server's own bound is on what it reads at once.
+/// Largest total size of all header fields, bytes. The server itself only limits its read buffer. Free
+/// choice.
 const MAX_FIELDS_BYTES: usize = 32 << 10;
 
-/// The names under which the service may be asked for.
+/// Host names that requests may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::api) enum Names {
-    /// This machine's own: whoever reaches it needs no token, so another site's name that was made to
-    /// point here must not.
+    /// Only loopback names. Local requests need no token, so a foreign host name that resolves to this
+    /// machine (DNS rebinding) must be refused.
     Loopback,
-    /// Any: a page under another name has neither token nor cookie.
+    /// Any name. A page under a foreign name has neither token nor cookie.
     Any,
 }
 
-/// Refuses what another site makes a browser ask for, and sets the headers.
+/// Middleware: refuses cross-site and oversized requests, and sets the security headers of the response.
 pub(in crate::api) async fn guard(
     State(names): State<Names>,
     request: Request,
@@ -76,7 +77,8 @@ pub(in crate::api) async fn guard(
     response
 }
 
-/// The name must be one of ours. A write must come from our own page or from no page at all.
+/// Checks sizes, encoding, host name and origin of a request. A write must come from this service's own page,
+/// or from a client that is no web page.
 fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
     let address = uri.path_and_query().map_or("", |address| address.as_str());
     if address.len() > MAX_ADDRESS_BYTES {
@@ -89,7 +91,7 @@ fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Resul
     if n_bytes > MAX_FIELDS_BYTES {
         return Err(Code::HeadTooLarge.into());
     }
-    // What is packed small may unfold large, and nothing that is sent here is worth packing.
+    // A small compressed body can expand to a huge one, and no body of this API gains from compression.
     if headers.contains_key(header::CONTENT_ENCODING) {
         let sentence = "a body is sent as it is, without Content-Encoding";
         return Err(Problem::new(Code::UnsupportedMediaType, sentence));

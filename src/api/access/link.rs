@@ -1,6 +1,8 @@
-//! Short signed links: whoever holds one may fetch that one file until it ends, without a token, so that
-//! a film can be shown to somebody else or opened by another program (RELIABILITY.md, S6). The signature
-//! covers the path and the end; the key is this data folder's own.
+//! Signed links: until a link expires, everyone who has it can read one file without a token
+//! (docs/explanation/promises.md, "Owners are isolated"). A link shows a film to another person, or opens it
+//! in another program.
+//!
+//! The signature is an HMAC-SHA-256 of expiry and path. Its key is stored in the database.
 
 use axum::http::{Method, Uri};
 use uuid::Uuid;
@@ -11,13 +13,14 @@ use crate::jobs::clock::now_ms;
 use crate::store::blobs::hex;
 use crate::store::tokens::secret::{hmac_sha256, is_same};
 
-/// The path with its signature, good until `expires_s` (seconds since 1970).
+/// Returns the path with expiry and signature. The link is valid until `expires_s` (seconds since 1970).
 pub fn signed(key: &[u8], path: &str, expires_s: i64) -> String {
     let signature = signature(key, path, expires_s);
     format!("{path}?expires={expires_s}&signature={signature}")
 }
 
-/// The caller that a good link stands for: it reads, and its path is the only one it is good for.
+/// Returns the caller of a valid signed link, which can only read the path of the link. Returns `None` for a
+/// request without a link, or with an invalid or expired one.
 pub(super) async fn caller_of_link(
     state: &AppState,
     method: &Method,
@@ -41,7 +44,7 @@ pub(super) async fn caller_of_link(
     Ok(owner.map(Caller::of_link))
 }
 
-/// The flock whose file the path is.
+/// Returns the flock that a path belongs to.
 fn flock_of(path: &str) -> Option<Uuid> {
     let (id, _) = path.strip_prefix("/v1/flocks/")?.split_once('/')?;
     id.parse().ok()

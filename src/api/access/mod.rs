@@ -1,6 +1,8 @@
-//! Who may ask, before any handler is reached (RELIABILITY.md, S5 to S7): from where a browser asks
-//! (`guard`), whose token came with the request (`auth`), browsers that signed in (`session`), links to one
-//! file (`link`), how often (`rate`).
+//! Access control before any handler runs
+//! (docs/explanation/promises.md, "Owners are isolated" and "No cross-site writes").
+//!
+//! The parts are origin checks (`guard`), tokens (`auth`), sessions of browsers (`session`), signed links to
+//! one file (`link`), and rate limits (`rate`).
 
 mod auth;
 mod guard;

@@ -1,7 +1,10 @@
-//! How often one owner may ask (RELIABILITY.md, H5): a bucket for each, filled at a steady rate, emptied by
-//! one for every request, so that one program in a loop does not slow everybody's page. By owner, never by
-//! address: many sit behind one address, and a header that names another is anybody's to write. Only those who
-//! are nobody, because they are refused with 401, are counted by the address that they really come from.
+//! Rate limits (docs/explanation/promises.md, "Overload"): a token bucket for each owner. It refills at a
+//! steady rate, and every request takes one unit. One program in a loop therefore does not slow down other
+//! owners.
+//!
+//! Requests are counted per owner and not per address, because many users may share an address, and a header
+//! that names another address can be forged. Requests refused with 401 have no owner. They are counted by the
+//! address of the connection.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -11,18 +14,18 @@ use std::time::Instant;
 
 use crate::store::owners::{Account, Owner};
 
-/// A burst may be as large as this many seconds' requests.
+/// Size of a bucket, seconds of its rate. Free choice.
 const BURST_S: f64 = 4.0;
-/// Buckets kept; the full ones are forgotten beyond.
+/// Number of buckets from which full ones are removed. A removed bucket counts as full. Free choice.
 const MAX_BUCKETS: usize = 10_000;
 
-/// How many requests an address may make in vain at once, and a second.
+/// Refused requests that an address may make at once, and per second. Free choice.
 const REFUSALS: (f64, f64) = (30.0, 1.0);
 
-/// The buckets of all owners, and of those who are nobody.
+/// Buckets of all owners, and of all addresses with refused requests.
 #[derive(Debug)]
 pub(in crate::api) struct Rates {
-    /// Requests a second, 0 for any number.
+    /// Requests per second of each owner; 0 = no limit.
     per_s: f64,
     of_owners: Buckets<Owner>,
     of_strangers: Buckets<IpAddr>,
@@ -38,7 +41,7 @@ struct Bucket {
 }
 
 impl Rates {
-    /// Full buckets, filled with `per_s` requests a second.
+    /// Returns full buckets. Those of owners refill at `per_s` requests per second; 0 = no limit.
     pub(in crate::api) fn new(per_s: u32) -> Rates {
         Rates {
             per_s: f64::from(per_s),
@@ -47,8 +50,8 @@ impl Rates {
         }
     }
 
-    /// Takes one request out of the bucket of the account's owner; false where it is empty. Whoever has
-    /// no quota, on the machine itself, has no rate either.
+    /// Takes one request from the bucket of the account's owner. Returns false if the bucket is empty.
+    /// Accounts without a quota, which are local requests, have no limit.
     pub(super) fn take(&self, account: &Account, now: Instant) -> bool {
         if self.per_s == 0.0 || account.quota.is_none() {
             return true;
@@ -57,10 +60,10 @@ impl Rates {
         self.of_owners.take(&account.owner, (full, self.per_s), now)
     }
 
-    /// Takes one refusal out of the bucket of an address; false where it is empty. A good token is good
-    /// from there all the same.
+    /// Takes one refusal from the bucket of an address. Returns false if the bucket is empty. Requests with a
+    /// valid token from this address are not affected.
     pub(super) fn take_refusal(&self, peer: IpAddr, now: Instant) -> bool {
-        // Whoever has one address of IPv6 has all of its network.
+        // A client with one IPv6 address usually has its whole /64 network, so the network shares a bucket.
         let network = match peer {
             IpAddr::V4(_) => peer,
             IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into(),

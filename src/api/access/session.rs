@@ -1,5 +1,6 @@
-//! Signing in from a browser: a token becomes a cookie that scripts cannot read and other sites cannot
-//! send (RELIABILITY.md, S7). The row behind it ends with the token, or when somebody signs out.
+//! Browser sessions: a token is exchanged for a cookie that scripts cannot read and other sites cannot send
+//! (docs/explanation/promises.md, "No cross-site writes"). A session ends after a week, with its token, or
+//! when the user signs out.
 
 use axum::body::Body;
 use axum::extract::State;
@@ -15,31 +16,35 @@ use crate::api::problem::{Problem, ProblemBody};
 use crate::api::timestamp::rfc3339;
 use crate::jobs::clock::now_ms;
 
-/// A browser asks for the token again after a week.
+/// Longest session, ms: one week. Free choice.
 const SESSION_MS: i64 = 7 * 24 * 3600 * 1000;
-/// The cookie's name over plain HTTP, and over HTTPS, where a browser takes it from this host alone.
+/// Name of the cookie over HTTP, and over HTTPS. Browsers accept a `__Host-` cookie only over HTTPS and only
+/// for the exact host.
 const NAMES: [&str; 2] = ["flockreel_session", "__Host-flockreel_session"];
 
-/// What signs in.
+/// Token to sign in with.
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(in crate::api) struct SessionRequest {
-    /// A token, `frl_...`.
+    /// Token of the form `frl_<id>_<secret>`.
     token: String,
 }
 
-/// Who signed in.
+/// The new session.
 #[derive(Debug, Serialize, ToSchema)]
 pub(in crate::api) struct SessionView {
-    /// What the token is called.
+    /// Name of the token.
     name: String,
-    /// `read`, `write` or `admin`.
+    /// Scope of the token: `read`, `write` or `admin`.
     scope: &'static str,
-    /// When the browser will be asked again.
+    /// Time at which the session ends, RFC 3339 in UTC: in a week, or when the token expires.
     expires_at: String,
 }
 
-/// Sign in: a token for a cookie.
+/// Sign in from a browser.
+///
+/// Exchanges a token for a session cookie. An invalid token fails with `unauthenticated`. A proxy that
+/// provides HTTPS must send `X-Forwarded-Proto: https`, so that the cookie is marked `Secure`.
 #[utoipa::path(post, path = "/v1/session", request_body = SessionRequest, security(()), responses(
     (status = 201, body = SessionView, headers(("set-cookie" = String))),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -79,6 +84,8 @@ pub(in crate::api) async fn begin_session(
 }
 
 /// Sign out.
+///
+/// Ends the session and deletes its cookie. Succeeds without a session too.
 #[utoipa::path(delete, path = "/v1/session", security(()), responses(
     (status = 204, description = "signed out", headers(("set-cookie" = String))),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -98,7 +105,7 @@ pub(in crate::api) async fn end_session(
     Ok((StatusCode::NO_CONTENT, cookies).into_response())
 }
 
-/// The value of our cookie, if the browser sent one.
+/// Returns the value of the session cookie, if the request has one.
 pub(super) fn cookie(headers: &HeaderMap) -> Option<&str> {
     let values = headers.get_all(header::COOKIE).into_iter();
     let pairs = values

@@ -1,5 +1,7 @@
-//! A file of the store as an answer: Range, ETag, HEAD, 304, 416 (RELIABILITY.md, H4, S4, S5). Files
-//! never change under their address, so they may be kept for ever; the tag is the content's hash.
+//! Downloads of stored files, with Range, ETag, HEAD, 304 and 416
+//! (docs/explanation/promises.md, "Exact ranges" and "Names are labels").
+//!
+//! Stored files never change, so clients may cache them forever. The ETag is the SHA-256 of the content.
 
 mod range;
 
@@ -14,30 +16,30 @@ use crate::code::Code;
 use crate::store::Store;
 use crate::store::blobs::hex;
 
-/// A file to be sent.
+/// A stored file to send.
 #[derive(Clone, Debug)]
 pub(super) struct Download<'a> {
-    /// Its folder in the store.
+    /// Folder in the store.
     pub folder: &'a str,
-    /// Its name there.
+    /// File name in the folder.
     pub name: &'a str,
-    /// Its media type.
+    /// Media type.
     pub media_type: &'static str,
-    /// Content-Disposition.
+    /// Value of Content-Disposition.
     pub disposition: String,
 }
 
-/// Files of a noun that may be asked for: name and media type.
+/// Files that can be downloaded: name and media type.
 pub(super) type Files = &'static [(&'static str, &'static str)];
 
-/// The entry of a file's name, or 404.
+/// Returns the entry of a file name. Fails with `not_found`.
 pub(super) fn find(files: Files, name: &str) -> Result<(&'static str, &'static str), Problem> {
     let found = files.iter().find(|(known, _)| *known == name);
     found.copied().ok_or_else(Problem::not_found)
 }
 
 impl Download<'_> {
-    /// The answer to a GET or HEAD with these conditions.
+    /// Returns the response to a GET or HEAD request. Fails with `not_found` if the file does not exist.
     pub(super) async fn answer(
         self,
         store: &Store,
@@ -88,7 +90,8 @@ impl Download<'_> {
     }
 }
 
-/// `attachment` or `inline`, with a name that any label survives in (RFC 6266, RFC 8187).
+/// Returns the value of Content-Disposition: `kind` is `attachment` or `inline`, and `label` is the file
+/// name, which may contain any characters (RFC 6266, RFC 8187).
 pub(super) fn disposition(kind: &str, label: &str) -> String {
     let plain: String = label
         .chars()
@@ -120,6 +123,7 @@ fn unsatisfiable(size_bytes: u64) -> Response<Body> {
     answer
 }
 
+/// Returns a built response. Fails with `internal` and logs the cause if a header is invalid.
 pub(super) fn built(
     answer: Result<Response<Body>, axum::http::Error>,
 ) -> Result<Response<Body>, Problem> {

@@ -1,32 +1,36 @@
-//! Which bytes of a file are asked for (RFC 9110, 14; RELIABILITY.md, H4). Pure: headers in, a
-//! decision out. Several ranges at once are answered with the whole file, as the RFC allows.
+//! Range and conditional requests: which bytes of a file to send (RFC 9110, sections 13 and 14;
+//! docs/explanation/promises.md, "Exact ranges").
+//!
+//! The decision depends only on the headers. A request for several ranges gets the whole file, as the RFC
+//! permits.
 
 use axum::http::{HeaderMap, Method, header};
 
-/// What to send.
+/// The part of a file to send.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Wanted {
-    /// All of it.
+    /// The whole file.
     Whole,
-    /// `first..=last`, within the file.
+    /// Bytes `first..=last`, all within the file.
     Part {
-        /// The first byte.
+        /// First byte.
         first: u64,
-        /// The last byte.
+        /// Last byte.
         last: u64,
     },
-    /// Nothing: the client has it already.
+    /// Nothing: the client already has this version.
     NotModified,
-    /// Nothing: the file is shorter than that.
+    /// Nothing: the range starts past the end of the file, or is empty.
     Unsatisfiable,
 }
 
-/// What a request wants of a file of `size_bytes` with the strong entity tag `etag` (with quotes).
+/// Returns which part of a file a request asks for. `etag` is the strong entity tag of the file, with quotes,
+/// and `size_bytes` its size.
 pub(super) fn wanted(method: &Method, headers: &HeaderMap, etag: &str, size_bytes: u64) -> Wanted {
     if header_of(headers, header::IF_NONE_MATCH).is_some_and(|tags| matches(tags, etag)) {
         return Wanted::NotModified;
     }
-    // Ranges are defined for GET alone; a stale If-Range asks for the whole new file.
+    // Ranges apply only to GET. With an outdated If-Range the client gets the whole new file.
     let if_range = header_of(headers, header::IF_RANGE);
     match header_of(headers, header::RANGE) {
         Some(range) if method == Method::GET && if_range.is_none_or(|tag| tag == etag) => {
@@ -40,14 +44,14 @@ fn header_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
     headers.get(name)?.to_str().ok()
 }
 
-/// Weak comparison, as If-None-Match wants it.
+/// Returns whether a list of tags contains `etag`, by the weak comparison that If-None-Match uses.
 fn matches(tags: &str, etag: &str) -> bool {
     tags.split(',')
         .map(str::trim)
         .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == etag)
 }
 
-/// What cannot be read is ignored, as the RFC says.
+/// Parses a Range header. A malformed one is ignored, as the RFC permits.
 fn parse(range: &str, size_bytes: u64) -> Wanted {
     let Some((first, last)) = range
         .trim()
@@ -59,7 +63,7 @@ fn parse(range: &str, size_bytes: u64) -> Wanted {
     };
     let number = |text: &str| -> Option<u64> {
         let digits = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-        // Beyond 64 bits is beyond any file.
+        // A number of more than 64 bits lies past the end of any file.
         digits.then(|| text.parse().unwrap_or(u64::MAX))
     };
     let (first, last) = match (number(first), number(last)) {

@@ -1,9 +1,10 @@
-//! Jobs as server-sent events (ECOSYSTEM.md, SSE): one stream for all of a caller's, which the page opens, and one
-//! for a single job, for scripts. Every event is the whole state, so that missing or repeating one is harmless, and
-//! polling always does as well.
+//! Jobs as server-sent events: one stream for all jobs of a caller, which the page uses, and one stream for a
+//! single job, for scripts. Each event holds the whole state of a job, so a lost or repeated event does no
+//! harm. Polling works as well.
 //!
-//! The id of an event of `/v1/events` is the time of the look that found it. Whoever comes back with it is told
-//! what ended meanwhile too, some of it twice: the clocks of those who end jobs may differ a little.
+//! The id of an event of `/v1/events` is the time of the query that found it. A client that reconnects with
+//! this id also gets the jobs that ended in the meantime. It may get some twice, because queries overlap: the
+//! clocks of the processes that end jobs may differ a little.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::convert::Infallible;
@@ -29,42 +30,48 @@ use crate::jobs::clock::now_ms;
 use crate::store;
 use crate::store::jobs::read::JobRow;
 
-/// How often a stream looks at its jobs: as often as workers note progress.
+/// Interval between two queries of a stream: as often as workers store progress.
 const LOOK: Duration = Duration::from_millis(500);
-/// How far back each look reaches, for what was written late.
+/// Overlap of successive queries, ms, for changes that were written late. Free choice.
 const OVERLAP_MS: i64 = 10_000;
-/// How long a stream may have been cut to be told what happened meanwhile.
+/// Longest interruption of a stream after which missed changes are still sent, ms. Free choice.
 const LOOK_BACK_MS: i64 = 3_600_000;
-/// How long a client should wait before it comes back.
+/// Time after which a client should reconnect. Free choice.
 const RETRY: Duration = Duration::from_secs(1);
 
-/// What an event `gone` says: the job was deleted with its result.
+/// Data of an event `gone`: the job was deleted with its result.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
     reason = "it only describes the event in the OpenAPI document"
 )]
 pub(in crate::api) struct JobGone {
+    /// Id of the deleted job.
     id: Uuid,
 }
 
-/// One event of a stream, by the fields that it has there.
+/// One server-sent event.
 #[derive(ToSchema)]
 #[expect(
     dead_code,
     reason = "it only describes the streams in the OpenAPI document"
 )]
 pub(in crate::api) struct JobEvent {
-    /// `job`, or `gone`.
+    /// `job` or `gone`.
     event: String,
-    /// JSON: of `job` what /v1/jobs/{id} answers, of `gone` the job's id.
+    /// JSON. For `job` the same as GET /v1/jobs/{id}, for `gone` an object with the `id` of the job.
     data: String,
-    /// What to send as Last-Event-ID; of the stream of one job none.
+    /// Value to send as Last-Event-ID when reconnecting. Absent in the stream of a single job.
     id: Option<String>,
 }
 
-/// Every change of the caller's jobs, as events named `job`, or `gone` for one that was deleted: first those
-/// queued and running, and, after a Last-Event-ID, those that ended since. Ends when the token does.
+/// Follow all jobs as server-sent events.
+///
+/// The stream starts with all queued and running jobs. Then it sends an event `job` for every change, and
+/// `gone` for a deleted job. With `Last-Event-ID` it also sends the jobs that ended since then, at most an
+/// hour ago.
+///
+/// The stream ends when the token or session is no longer valid, and when the service stops.
 #[utoipa::path(get, path = "/v1/events",
     params(("Last-Event-ID" = Option<String>, Header, description = "the id of the last event seen")),
     responses(
@@ -93,7 +100,10 @@ pub(in crate::api) async fn get_events(
     }))
 }
 
-/// The job's states as server-sent events named `job`, until the last one.
+/// Follow one job as server-sent events.
+///
+/// The stream sends an event `job` with the current state and after every change. It ends after the final
+/// state, when the token or session is no longer valid, and when the service stops.
 #[utoipa::path(get, path = "/v1/jobs/{id}/events", params(("id" = Uuid, Path)), responses(
     (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -121,11 +131,11 @@ where
     S: Stream<Item = Result<Event, Infallible>> + Send + 'static,
 {
     let events = Sse::new(events).keep_alive(KeepAlive::default());
-    // A proxy that gathers answers would hold events back.
+    // This header tells a proxy not to buffer the events.
     ([("x-accel-buffering", "no")], events).into_response()
 }
 
-/// Waits for another state; none after a final one, or when the service stops.
+/// Returns the next state that differs from `last`, or `None` after a final state or if the stream must end.
 async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Option<JobView> {
     while !is_final(last) && wait(state, caller).await {
         let job = find(state, caller, last.id).await.ok()?;
@@ -136,7 +146,7 @@ async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Optio
     None
 }
 
-/// Waits until it is time to look again; false where the stream ends instead.
+/// Waits until the next query is due. Returns false if the stream must end instead.
 async fn wait(state: &AppState, caller: &Caller) -> bool {
     let draining = &state.context.draining;
     tokio::select! {
@@ -145,20 +155,22 @@ async fn wait(state: &AppState, caller: &Caller) -> bool {
     }
 }
 
-/// What one stream of all jobs knows.
+/// State of a stream of all jobs.
 struct Feed {
     state: AppState,
     caller: Caller,
-    /// What was told last of every job that may still change, or ended a moment ago.
+    /// Last known state of every job that may still change or was found by the last query.
     seen: BTreeMap<JobId, JobView>,
+    /// Events to send.
     ready: VecDeque<Event>,
-    /// The Last-Event-ID.
+    /// Time given as Last-Event-ID, ms since 1970.
     last_ms: Option<i64>,
+    /// Time of the last query, ms since 1970.
     looked_ms: Option<i64>,
 }
 
 impl Feed {
-    /// The next event; none when the stream ends.
+    /// Returns the next event, or `None` when the stream ends.
     async fn next(&mut self) -> Option<Event> {
         loop {
             if let Some(event) = self.ready.pop_front() {
@@ -168,17 +180,18 @@ impl Feed {
                 return None;
             }
             if let Err(error) = self.look().await {
-                // The client comes back with the last id that it has seen.
+                // The client reconnects with the last id that it received.
                 tracing::warn!(%error, "a stream of events could not look at its jobs");
                 return None;
             }
         }
     }
 
+    /// Queries the jobs and collects an event for every change.
     async fn look(&mut self) -> Result<(), store::Error> {
         let now_ms = now_ms();
         let rows = self.rows(now_ms).await?;
-        // Whoever comes for the first time hears nothing of what has ended already.
+        // A new client gets no events of jobs that have ended already.
         let is_first = self.looked_ms.is_none() && self.last_ms.is_none();
         let mut seen = BTreeMap::new();
         for job in rows.into_iter().map(JobView::of) {
@@ -190,7 +203,7 @@ impl Feed {
             }
             seen.insert(job.id, job);
         }
-        // What is left is no longer among them: deleted, or ended long enough ago.
+        // The query did not find the remaining jobs: they were deleted, or ended some time ago.
         for (id, last) in std::mem::take(&mut self.seen) {
             if !is_final(&last) {
                 let event = Event::default().event("gone").json_data(json!({"id": id}));
@@ -202,8 +215,8 @@ impl Feed {
         Ok(())
     }
 
-    /// The jobs that may have changed since the last look; those that were under way then, whatever
-    /// became of them.
+    /// Returns the jobs that may have changed since the last query. It includes all that were unfinished
+    /// then, unless they were deleted.
     async fn rows(&self, now_ms: i64) -> Result<Vec<JobRow>, store::Error> {
         let (store, reach) = (&self.state.context.store, &self.caller.reach);
         let since_ms = self.looked_ms.or(self.last_ms).unwrap_or(now_ms) - OVERLAP_MS;
@@ -222,7 +235,7 @@ impl Feed {
     }
 }
 
-/// The time that a client says it was here last, which may be any number.
+/// Limits the time in a Last-Event-ID, which may be any number, to the last hour.
 fn within_look_back(id_ms: i64, now_ms: i64) -> i64 {
     id_ms.clamp(now_ms - LOOK_BACK_MS, now_ms)
 }

@@ -1,6 +1,6 @@
-//! Jobs: their state, the wish to cancel them; and what other nouns say of jobs.
+//! Jobs: their state and cancellation, and the responses about jobs that other routes share.
 
-pub(super) mod events; // the same, as they happen
+pub(super) mod events; // server-sent events
 
 pub(super) mod wait; // Prefer: wait=N
 
@@ -33,61 +33,70 @@ use crate::store::jobs::{JobState, Kind};
 pub(super) struct JobView {
     #[schema(value_type = Uuid)]
     id: JobId,
-    /// `sample` (the film of the first start), `analysis`, `flock` or `fish`.
+    /// `sample` (films the sample of an empty data folder), `analysis`, `flock` or `fish`.
     kind: &'static str,
     /// `queued`, `running`, `done`, `failed` or `cancelled`.
     state: &'static str,
-    /// The stage under way, while running.
+    /// Current stage, such as `tracking`. After a failure or cancellation, the last stage. null before the
+    /// first stage and when the job is done.
     stage: Option<String>,
-    /// How much of the whole is done, 0..=1.
+    /// Progress of the whole job, 0..=1.
     progress: f64,
-    /// How often it has been tried.
+    /// Number of attempts so far, including the current one.
     attempt: i64,
+    /// Whether the job was asked to stop while running.
     cancel_requested: bool,
-    /// Why it failed.
+    /// Reason of the failure; null unless the job failed.
     error: Option<JobFailure>,
+    /// Time at which the job was queued, RFC 3339 in UTC.
     created_at: String,
+    /// Time at which the first attempt began; null before.
     started_at: Option<String>,
+    /// Time at which the job was done, failed or was cancelled; null before.
     finished_at: Option<String>,
-    /// The footage or library that the job works on; null for a `sample`, which needs neither.
+    /// Footage or library that the job works on; null for a `sample` job.
     subject: Option<JobSubject>,
+    /// Addresses of the job and its result.
     links: JobLinks,
 }
 
-/// A footage or a library that a job works on. It may be absent while its own job is under way.
+/// Footage or library that a job works on. It does not exist before its own job is done.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub(super) struct JobSubject {
     /// `footage` or `library`.
     kind: &'static str,
+    /// Id of the footage or library.
     id: Uuid,
 }
 
-/// Why a job failed.
+/// Reason why a job failed.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub(super) struct JobFailure {
-    /// The stable code.
+    /// Stable error code.
     code: &'static str,
-    /// What the code means.
+    /// Meaning of the code.
     title: &'static str,
-    /// What happened this time.
+    /// Description of this failure.
     detail: String,
-    /// What to do about it.
+    /// Advice on what to do.
     advice: &'static str,
-    /// The address of a picture of the frames that show the reason, where they do.
+    /// Address of a picture of the frames that show the reason; null if there is none.
     picture: Option<String>,
 }
 
-/// Where to look next.
+/// Addresses of a job and its result.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub(super) struct JobLinks {
+    /// Address of the job.
     #[serde(rename = "self")]
     this: String,
+    /// Address of its server-sent events.
     events: String,
-    /// What it makes; there once it is done.
+    /// Address of its result, which exists once the job is done.
     result: String,
 }
 
-/// Every job, newest first.
+/// List all jobs, newest first.
 #[utoipa::path(get, path = "/v1/jobs", params(Paging), responses(
     (status = 200, body = Page<JobView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -104,7 +113,9 @@ pub(super) async fn list_jobs(
     Page::of(rows, paging, |row| row.id.0, |row| Ok(JobView::of(row)))
 }
 
-/// One job; with `Prefer: wait=N` once it has ended, or after N seconds.
+/// Get one job.
+///
+/// With `Prefer: wait=N` the response is sent when the job has ended, or after N seconds, at most 60.
 #[utoipa::path(get, path = "/v1/jobs/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = JobView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -126,7 +137,10 @@ pub(super) async fn get_job(
     Ok(answer)
 }
 
-/// The frames that show why a film was refused: with boxes around what moved, or before and after a change.
+/// Get the picture that shows why a video was refused.
+///
+/// It is a JPEG of a frame with boxes around moving objects, or of the frames before and after a change.
+/// Fails with `not_found` if the job has no picture.
 #[utoipa::path(get, path = "/v1/jobs/{id}/refused.jpg", params(("id" = Uuid, Path)), responses(
     (status = 200, content_type = "image/jpeg"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -149,7 +163,10 @@ pub(super) async fn get_refused_jpeg(
     Ok((headers, jpeg))
 }
 
-/// Cancel a job: at once where it is queued (200), soon where it runs (202).
+/// Cancel a job.
+///
+/// A queued job is cancelled at once (200), with the jobs that wait for it. A running job is asked to stop
+/// (202) and ends soon after. A job that has ended fails with `already_finished`.
 #[utoipa::path(delete, path = "/v1/jobs/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = JobView),
     (status = 202, body = JobView),
@@ -180,7 +197,7 @@ async fn find(state: &AppState, caller: &Caller, id: JobId) -> Result<JobView, P
     job.map(JobView::of).ok_or_else(Problem::not_found)
 }
 
-/// 202: the job is where Location says, its result will be where Link says.
+/// Returns 202 with the address of the job in `Location` and that of its future result in `Link`.
 pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Response<Body> {
     let headers = [
         (header::LOCATION, format!("/v1/jobs/{job}")),
@@ -190,7 +207,8 @@ pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Respon
     (StatusCode::ACCEPTED, headers, axum::Json(body)).into_response()
 }
 
-/// Why a result is not there: its job has not finished, or there never was one.
+/// Returns the problem for an absent result: `not_ready` with the state of its job, or `not_found` if no job
+/// makes it.
 pub(super) async fn absent_result(
     state: &AppState,
     caller: &Caller,
@@ -204,7 +222,8 @@ pub(super) async fn absent_result(
     Ok(Problem::new(Code::NotReady, sentence))
 }
 
-/// The job to wait for before a library can be used: none when it is there already.
+/// Returns the analysis that must finish before a library can be used, or `None` if the library exists. Fails
+/// with `invalid_params` if there is no such library and no unfinished analysis makes it.
 pub(super) async fn job_to_follow(
     state: &AppState,
     caller: &Caller,
@@ -223,7 +242,7 @@ pub(super) async fn job_to_follow(
     }
 }
 
-/// Where a job's result is, or will be.
+/// Returns the address of a job's result, which may not exist yet.
 pub(super) fn result_of(row: &JobRow) -> String {
     let noun = match row.kind {
         Kind::Sample => "footage",
@@ -234,7 +253,7 @@ pub(super) fn result_of(row: &JobRow) -> String {
     format!("/v1/{noun}/{}", row.result_id)
 }
 
-/// What a job works on.
+/// Returns the footage or library that a job works on.
 fn subject_of(row: &JobRow) -> Option<JobSubject> {
     let kind = match row.kind {
         Kind::Sample => return None,

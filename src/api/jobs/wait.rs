@@ -1,5 +1,7 @@
-//! `Prefer: wait=N` (RFC 7240): an answer that waits up to N seconds, at most 60, for its job to end.
-//! Polling must always do as well; a service that stops waits for nobody (RELIABILITY.md, R4).
+//! `Prefer: wait=N` (RFC 7240): the response waits up to N seconds, at most 60, until its job ends.
+//!
+//! Waiting is a convenience: polling gives the same results. When the service stops, all waits end at once
+//! (docs/explanation/promises.md, "Graceful stop").
 
 use std::time::Duration;
 
@@ -16,16 +18,17 @@ use crate::store::jobs::read::JobRow;
 use crate::store::owners::Reach;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
+/// Longest wait, seconds. Free choice.
 const MAX_WAIT_S: u64 = 60;
-/// How often the job is looked at.
+/// Interval between two queries of the job. Free choice.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// How long the sender is ready to wait, seconds.
+/// Time that the client is willing to wait, seconds, at most [`MAX_WAIT_S`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Wait(u64);
 
 impl Wait {
-    /// What the headers ask for; what cannot be read is no preference.
+    /// Returns the wait that the headers ask for. A malformed preference is ignored.
     pub(super) fn of(headers: &HeaderMap) -> Option<Wait> {
         let lines = headers.get_all(PREFER);
         let lines = lines.iter().filter_map(|line| line.to_str().ok());
@@ -39,14 +42,15 @@ impl Wait {
             })
     }
 
-    /// Says in the answer that the preference was heard.
+    /// Adds `Preference-Applied` to the headers of the response.
     pub(super) fn applied(self, headers: &mut HeaderMap) {
         if let Ok(value) = HeaderValue::from_str(&format!("wait={}", self.0)) {
             headers.insert(HeaderName::from_static("preference-applied"), value);
         }
     }
 
-    /// The job once it has ended, or as it is when the time is up; none where there is no such job.
+    /// Waits until the job has ended or the time is up, and returns its state. Returns `None` if there is no
+    /// such job.
     pub(super) async fn for_end(
         self,
         state: &AppState,
@@ -67,7 +71,8 @@ impl Wait {
     }
 }
 
-/// An accepted job whose sender waits: 201 and the result's address where it is done in time.
+/// Middleware: waits for the job that a POST with `Prefer: wait=N` has queued. If the job is done in time,
+/// the response is 201 with the address of the result in `Location`.
 pub(in crate::api) async fn wait_for_result(
     State(state): State<AppState>,
     request: Request,

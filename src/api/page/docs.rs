@@ -1,6 +1,8 @@
-//! The API described for people: `/docs` draws the OpenAPI document (Swagger UI, its files inside the
-//! program), `/docs/errors` explains every code, where the `type` of every problem points (RFC 9457; ECOSYSTEM.md,
-//! API). Both hold to the policy of all pages: nothing from elsewhere, nothing inline (RELIABILITY.md, S5).
+//! Documentation of the API: `/docs` shows the OpenAPI document in Swagger UI, and `/docs/errors` explains
+//! every error code. The `type` of every problem points to the second page (RFC 9457).
+//!
+//! The files of Swagger UI are embedded in the program. The pages load nothing from other sites and have no
+//! inline scripts or styles (docs/explanation/promises.md, "Nothing served runs as a page").
 
 use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
@@ -20,20 +22,20 @@ use crate::api::{AppState, Problem};
 use crate::code::Code;
 use crate::store::blobs::hex;
 
-/// What of Swagger UI the page loads; the rest of it is not served.
+/// Files of Swagger UI that the page loads. Its other files are not served.
 const FILES: [&str; 2] = ["swagger-ui.css", "swagger-ui-bundle.js"];
 
 static ERRORS: LazyLock<String> = LazyLock::new(errors);
 static LOADED: LazyLock<Vec<Loaded>> = LazyLock::new(|| FILES.iter().filter_map(load).collect());
 
-/// A file of Swagger UI.
+/// An embedded file of Swagger UI.
 struct Loaded {
     name: &'static str,
     bytes: Cow<'static, [u8]>,
     etag: String,
 }
 
-/// `/docs`, `/docs/errors`, and what they load.
+/// Returns the routes `/docs` and `/docs/errors` and those of the files that they load.
 pub(in crate::api) fn routes() -> Router<AppState> {
     Router::new()
         .route("/docs", get(|| async { Html(description()) }))
@@ -91,7 +93,7 @@ fn entry(code: Code) -> String {
     )
 }
 
-/// Text as HTML; what stands between backticks is program text.
+/// Returns text as HTML. Parts between backticks become `<code>` elements.
 fn marked(text: &str) -> String {
     let text = text.replace('&', "&amp;").replace('<', "&lt;");
     let parts = text.split('`').enumerate();

@@ -1,9 +1,9 @@
-//! The page: files of `static/`, and of the vendored libraries, inside the program (read from disk in
-//! a debug build), each with the hash of its content as its tag.
+//! The web page: the files of `static/` and the vendored libraries, embedded in the program. A debug build
+//! reads them from disk. The ETag of a file is the hash of its content.
 
-pub(super) mod docs; // what can be read of the API
+pub(super) mod docs; // /docs, /docs/errors
 
-pub(super) mod openapi; // its description, for programs
+pub(super) mod openapi; // /openapi.json
 
 use axum::Router;
 use axum::body::Body;
@@ -20,13 +20,13 @@ use crate::store::blobs::hex;
 #[folder = "static/"]
 struct Static;
 
-/// The page's libraries, as `make vendor` left them; the page does without them.
+/// Third-party libraries of the page, written by `make vendor`. The page also works without them.
 #[derive(RustEmbed)]
 #[folder = "target/vendor/"]
 #[allow_missing = true]
 struct Vendor;
 
-/// `/` and everything under `/static/` and `/vendor/`.
+/// Returns the routes `/`, `/static/` and `/vendor/`.
 pub(super) fn routes() -> Router<AppState> {
     Router::new()
         .route(
@@ -52,7 +52,7 @@ fn answer<Files: RustEmbed>(path: &str, headers: &HeaderMap) -> Result<Response<
     }))
 }
 
-/// The answer with its tag, or 304 where the browser has it already.
+/// Returns a response with its ETag, or 304 if the client already has this version.
 pub(super) fn tagged(
     headers: &HeaderMap,
     etag: &str,

@@ -1,4 +1,4 @@
-//! The description of the API, generated from the code (OpenAPI 3.1).
+//! The OpenAPI 3.1 document, generated from the handlers and their types.
 
 use axum::Router;
 use axum::http::header;
@@ -11,7 +11,7 @@ use utoipa::openapi::{OpenApi, RefOr, Required};
 
 use crate::api::{AppState, idempotency};
 
-/// The frame of the document; the routes add themselves.
+/// Title and security schemes of the document. The routes add their own entries.
 #[derive(utoipa::OpenApi)]
 #[openapi(
     info(
@@ -23,7 +23,7 @@ use crate::api::{AppState, idempotency};
 )]
 pub(in crate::api) struct Document;
 
-/// The headers that whole groups of calls take.
+/// Adds the request headers that middleware handles: `Idempotency-Key` and `Prefer`.
 pub(in crate::api) fn add_headers(document: &mut OpenApi) {
     for (path, item) in &mut document.paths.paths {
         if let Some(post) = item
@@ -48,8 +48,9 @@ pub(in crate::api) fn add_headers(document: &mut OpenApi) {
     }
 }
 
-/// Requests that hold parameters beside a field of their own, as one object each: two closed schemas that both
-/// must hold would admit nothing.
+/// Replaces the schemas of requests that flatten parameters by one object each. The generated `allOf`
+/// combines closed schemas, each of which refuses the fields of the others, so that no request would be
+/// valid.
 pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
     let Some(components) = &mut document.components else {
         return;
@@ -98,7 +99,8 @@ fn add_header(operation: &mut Operation, name: &str, meaning: &str) {
         .push(RefOr::T(header));
 }
 
-/// How a caller shows who asks. On loopback, unless the service demands tokens, nobody has to.
+/// Authentication: a token or a session cookie. On loopback neither is needed, unless the service requires
+/// tokens.
 struct Schemes;
 
 impl Modify for Schemes {
@@ -115,7 +117,7 @@ impl Modify for Schemes {
     }
 }
 
-/// /openapi.json.
+/// Returns the route `/openapi.json`.
 pub(in crate::api) fn route(document: &utoipa::openapi::OpenApi) -> Router<AppState> {
     let text = document.to_json().unwrap_or_default();
     let answer = move || async move { ([(header::CONTENT_TYPE, "application/json")], text) };

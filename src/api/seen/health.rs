@@ -1,4 +1,4 @@
-//! Whether the process lives, and whether it can work.
+//! Liveness (`/healthz`) and readiness (`/readyz`) of the service.
 
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -8,53 +8,57 @@ use utoipa::ToSchema;
 use crate::api::AppState;
 use crate::media::Walls;
 
-/// What the service needs, and whether it has it.
+/// Readiness of the service and of everything that it needs.
 #[derive(Debug, Serialize, ToSchema)]
 pub(in crate::api) struct Readiness {
-    /// Whether all below is well.
+    /// Whether the service can take work: it is not stopping, and everything below except `sandbox` is
+    /// available.
     ready: bool,
-    /// Whether the database can be written.
+    /// Whether the database can be written to.
     database: bool,
-    /// Whether files can be written on this machine, and a bucket, where they are kept in one, answers within two seconds.
+    /// Whether files can be written on this machine. If files are kept in a bucket, the bucket must also
+    /// answer within 2 seconds.
     blob_store: bool,
-    /// The version of the media tool; null when it is missing.
+    /// Version of ffmpeg; null if it is missing.
     media_tool: Option<String>,
-    /// The layers of the sandbox around the media tool. One that is missing does not make the service unready:
-    /// whoever demands them all starts it with `--sandbox strict`.
+    /// Layers of the sandbox around ffmpeg. A missing layer does not affect `ready`. With `--sandbox strict`
+    /// the service does not start without all layers.
     sandbox: Vec<LayerView>,
-    /// Room for uploads.
+    /// Free space for uploads.
     disk: DiskView,
 }
 
 /// One layer of the sandbox.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct LayerView {
-    /// Its name: `leash`, `privileges`, `limits`, `files`, `network`, `signals` or `calls`.
+    /// Name: `leash`, `privileges`, `limits`, `files`, `network`, `signals` or `calls`.
     name: &'static str,
-    /// Whether it stands.
+    /// Whether it is in use.
     on: bool,
-    /// Why not, where it does not.
+    /// Reason why it is not in use; null if it is.
     lack: Option<String>,
 }
 
-/// Room on the disk.
+/// Free space on the disk.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct DiskView {
-    /// Bytes that can still be written; null where that cannot be found out.
+    /// Free space, bytes; null if unknown.
     room_bytes: Option<u64>,
-    /// Bytes that uploads leave free.
+    /// Space that uploads leave free, bytes.
     reserve_bytes: u64,
-    /// Whether there is more room than that.
+    /// Whether more than this reserve is free.
     ok: bool,
 }
 
-/// The process lives.
+/// Check that the process is alive.
 #[utoipa::path(get, path = "/healthz", security(()), responses((status = 200, body = str)))]
 pub(in crate::api) async fn healthz() -> &'static str {
     "ok\n"
 }
 
-/// The service can take work.
+/// Check that the service can take work.
+///
+/// The status is 200 if it can, else 503. The body says what is missing.
 #[utoipa::path(get, path = "/readyz", security(()), responses(
     (status = 200, body = Readiness),
     (status = 503, body = Readiness),

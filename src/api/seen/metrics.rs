@@ -1,6 +1,8 @@
-//! `/metrics`, in the text form that Prometheus reads (ECOSYSTEM.md, seen from outside): what this process counted,
-//! and what the store holds when it is asked. It tells of everybody's work, so beyond this machine it wants an
-//! administrator's token, or a listener of its own (`--metrics-bind`) that a firewall can keep.
+//! `/metrics` in the text format of Prometheus: the counters of this process, and the current contents of the
+//! store.
+//!
+//! The metrics cover the work of all owners. Requests from other machines therefore need a token of scope
+//! `admin`. A separate listener (`--metrics-bind`) needs no token, and a firewall can protect it.
 
 use std::fmt;
 use std::sync::Arc;
@@ -46,7 +48,7 @@ struct Stored {
     noun: &'static str,
 }
 
-/// Everything that is told; cheap to clone.
+/// All metrics of the service. Clones share the same values.
 #[derive(Clone)]
 pub(in crate::api) struct Metrics {
     registry: Arc<Registry>,
@@ -56,7 +58,7 @@ pub(in crate::api) struct Metrics {
 }
 
 impl Metrics {
-    /// Over what is counted elsewhere in the process.
+    /// Returns metrics that include the counters of jobs and requests.
     pub(in crate::api) fn new(meters: &Meters, requests: &Requests) -> Metrics {
         let mut registry = counted(meters);
         let (jobs, stored) = (Family::default(), Family::default());
@@ -84,6 +86,7 @@ impl Metrics {
         }
     }
 
+    /// Updates the metrics that describe the store.
     fn note(&self, census: &Census, now_ms: i64) {
         for (kind, state) in Kind::ALL
             .into_iter()
@@ -106,8 +109,10 @@ impl Metrics {
     }
 }
 
-/// What the service does and holds, for Prometheus (OpenMetrics text). Without a token on the machine itself;
-/// elsewhere with one of the scope `admin`, or by the listener of `--metrics-bind`.
+/// Get the metrics of the service for Prometheus.
+///
+/// The format is OpenMetrics text. Local requests need no token, unless the service requires tokens. Other
+/// requests need one of scope `admin`. The listener of `--metrics-bind` needs none.
 #[utoipa::path(get, path = "/metrics", responses(
     (status = 200, content_type = "application/openmetrics-text", body = str),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -122,7 +127,7 @@ pub(in crate::api) async fn get_metrics(
     }
 }
 
-/// The metrics alone, for a listener of their own: whoever reaches it may read them.
+/// Returns a router that serves only the metrics, without a token, for a separate listener.
 pub fn metrics_router(state: AppState) -> Router {
     let answer = async |State(state): State<AppState>| text(&state).await;
     Router::new()
@@ -132,8 +137,8 @@ pub fn metrics_router(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(Names::Any, guard))
 }
 
-/// The metrics of a process that works and serves nobody: what it did itself. What is queued and stored is the
-/// service's to tell, once for all of them.
+/// Returns a router for the metrics of a process that only runs jobs. They cover this process; the queue and
+/// the store are reported once, by the service.
 pub fn worker_metrics_router(meters: &Meters) -> Router {
     let registry = Arc::new(counted(meters));
     let answer = async |State(registry): State<Arc<Registry>>| written(&registry);
@@ -144,7 +149,7 @@ pub fn worker_metrics_router(meters: &Meters) -> Router {
         .layer(middleware::from_fn_with_state(Names::Any, guard))
 }
 
-/// Log lines that were dropped, read when the metrics are.
+/// Collector for the number of dropped log lines, which is read at every request.
 #[derive(Debug)]
 struct LostLines;
 
@@ -159,7 +164,7 @@ impl Collector for LostLines {
     }
 }
 
-/// What every process tells: its version, its lost log lines, and its jobs.
+/// Returns a registry with the metrics of every process: version, dropped log lines, and jobs.
 fn counted(meters: &Meters) -> Registry {
     let mut registry = Registry::default();
     let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);

@@ -1,5 +1,5 @@
-//! The service seen from outside (ECOSYSTEM.md, seen from outside): whether it lives and can work (`health`),
-//! what it does and holds (`metrics`), and every request's id, log line and count (`observe`).
+//! Monitoring: liveness and readiness (`health`), metrics for Prometheus (`metrics`), and the id, log line
+//! and counters of every request (`observe`).
 
 pub(super) mod health;
 pub(super) mod metrics;

@@ -1,6 +1,7 @@
-//! What is seen of every request from outside (ECOSYSTEM.md, seen from outside): an id that its log lines and its
-//! answer bear, one line when it was answered, and its count and time by route and status. The query of an
-//! address is never logged: the signature of a link stands there.
+//! Monitoring of requests. Every request gets an id for its log lines and its response, one log line when it
+//! is answered, and counters by route and status.
+//!
+//! The query of an address is never logged, because it may hold the signature of a link.
 
 use std::time::{Duration, Instant};
 
@@ -18,9 +19,9 @@ use tracing::Instrument;
 use uuid::Uuid;
 
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
-/// A sender's own id is kept where it is this short and plain.
+/// Longest request id that is accepted from a client, bytes. Free choice.
 const MAX_ID_BYTES: usize = 64;
-/// From a probe to a film that was waited for, seconds until the head of the answer.
+/// Histogram buckets of the time until the response begins, seconds: from a probe to a long `Prefer: wait`.
 const ANSWER_S: [f64; 12] = [
     0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 300.0,
 ];
@@ -36,7 +37,7 @@ const METHODS: [Method; 7] = [
 
 #[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
 struct Answered {
-    /// The template, so that no id becomes a label.
+    /// Template of the route, so that ids do not become labels.
     route: String,
     method: &'static str,
     status: u16,
@@ -47,7 +48,7 @@ struct Route {
     route: String,
 }
 
-/// The counters of requests; cheap to clone.
+/// Counters of requests. Clones share the same counters.
 #[derive(Clone)]
 pub(in crate::api) struct Requests {
     answered: Family<Answered, Counter>,
@@ -66,7 +67,7 @@ impl Default for Requests {
 }
 
 impl Requests {
-    /// Names the counters in a registry.
+    /// Registers the counters.
     pub(in crate::api) fn register(&self, registry: &mut Registry) {
         registry.register(
             "flockreel_http_requests",
@@ -99,7 +100,7 @@ impl Requests {
     }
 }
 
-/// Counted for as long as it is there: a sender who hangs up drops it.
+/// A running request. It is counted until it is dropped, which also happens when the client disconnects.
 struct UnderWay(Gauge);
 
 impl Drop for UnderWay {
@@ -108,7 +109,7 @@ impl Drop for UnderWay {
     }
 }
 
-/// Gives the request its id, and sees it through.
+/// Middleware: gives the request an id, then counts and logs the response.
 pub(in crate::api) async fn observe(
     State(requests): State<Requests>,
     request: Request,
@@ -134,7 +135,8 @@ pub(in crate::api) async fn observe(
     answer
 }
 
-/// One line; those that come by themselves every few seconds, and the page's files, only on demand.
+/// Logs one line. Probes, which come every few seconds, and the files of the page are logged only at the
+/// debug level.
 fn log(route: &str, status: u16, took: Duration) {
     let duration_ms = took.as_secs_f64() * 1000.0;
     let is_frequent = ["/healthz", "/readyz", "/metrics"].contains(&route)
@@ -147,7 +149,7 @@ fn log(route: &str, status: u16, took: Duration) {
     }
 }
 
-/// The sender's own id, if it can stand in a log, or a fresh one.
+/// Returns the id that the client sent, if it is safe to log, else a new one.
 fn id_of(headers: &HeaderMap) -> String {
     let given = headers.get(REQUEST_ID).and_then(|id| id.to_str().ok());
     let is_plain = |id: &&str| {

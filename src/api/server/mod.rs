@@ -1,6 +1,8 @@
-//! The accept loop, our own because header time-outs need a timer (RELIABILITY.md, facts and H1),
-//! and the graceful end (R4). When all connections are taken a few more are let in, to be told so, and to ask
-//! whether the service lives.
+//! The accept loop and the graceful stop (docs/explanation/promises.md, "Slow clients" and "Graceful stop").
+//!
+//! `axum::serve` installs no timer, so the header timeout of hyper would have no effect. This loop installs
+//! one. If all connections are in use, a few more are accepted for one response each: `busy`, or that of
+//! /healthz.
 
 mod patience;
 
@@ -30,29 +32,31 @@ use super::Problem;
 use super::access::Peer;
 use crate::code::Code;
 
+/// Largest number of connections that are served normally. Free choice.
 const MAX_CONNECTIONS: usize = 2048;
-/// Those that are let in besides, for one answer each.
+/// Largest number of further connections, which get one response each. Free choice.
 const MAX_CROWD: usize = 64;
-/// The longest wait for a request's head, and for the next request on an idle connection.
+/// Longest wait for the head of a request, and for the next request on an idle connection. Free choice.
 const HEAD: Duration = Duration::from_secs(30);
-/// The longest head.
+/// Size of the read buffer for the head of a request, bytes. Free choice.
 const MAX_HEAD_BYTES: usize = 64 << 10;
-/// The longest wait for requests under way once the service stops.
+/// Longest wait for running requests when the service stops. Free choice.
 const DRAIN: Duration = Duration::from_secs(10);
 
-/// The longest wait for answers to those who came after that.
+/// Longest wait for the responses to connections that arrived during the stop. Free choice.
 const FAREWELL: Duration = Duration::from_secs(1);
 
-/// How a server ends.
+/// The two steps of a stop.
 #[derive(Clone, Debug, Default)]
 pub struct Stop {
-    /// Cancelled when the service begins to stop: requests under way may end, for ten seconds.
+    /// Cancelled when the service begins to stop. Running requests then have 10 seconds to finish.
     pub begun: CancellationToken,
-    /// Cancelled when the rest of the service has stopped: newcomers are told so until then, not turned away.
+    /// Cancelled when the rest of the service has stopped. Until then new connections are still answered, so
+    /// clients learn that the service is stopping.
     pub over: CancellationToken,
 }
 
-/// Answers until it is told to stop, and then as long as [`Stop`] says.
+/// Serves connections until the stop begins, and then as described at [`Stop`].
 pub async fn serve(listener: TcpListener, router: Router, stop: Stop) {
     let (under_way, newcomers) = (TaskTracker::new(), TaskTracker::new());
     let door = Door::new(listener, router, [MAX_CONNECTIONS, MAX_CROWD]);
@@ -79,11 +83,11 @@ pub async fn serve(listener: TcpListener, router: Router, stop: Stop) {
     timeout(FAREWELL, newcomers.wait()).await.ok();
 }
 
-/// Where connections come in.
+/// The listener and its limits.
 struct Door {
     listener: TcpListener,
     router: Router,
-    /// Answers those for whom there is no room.
+    /// Router for connections beyond the limit.
     in_crowd: Router,
     room: Arc<Semaphore>,
     crowd: Arc<Semaphore>,
@@ -100,7 +104,7 @@ impl Door {
         }
     }
 
-    /// Answers each in a task of its own, for ever.
+    /// Accepts connections forever and serves each in its own task.
     async fn let_in(
         &self,
         builder: &Builder<TokioExecutor>,
@@ -121,7 +125,7 @@ impl Door {
                     });
                 }
                 Err(error) => {
-                    // No descriptors left, most likely: others must close first.
+                    // Most likely no file descriptor is left until other connections close.
                     tracing::warn!(%error, "a connection could not be accepted");
                     sleep(Duration::from_millis(100)).await;
                 }
@@ -129,7 +133,7 @@ impl Door {
         }
     }
 
-    /// The next connection, with its place, and whether that is one in the crowd.
+    /// Returns the next connection, its permit, and whether it is beyond the limit.
     async fn accept(&self) -> io::Result<(TcpStream, OwnedSemaphorePermit, bool)> {
         let usual = || self.room.clone().try_acquire_owned().ok();
         let (mut permit, mut is_crowd) = match usual() {
@@ -141,7 +145,7 @@ impl Door {
         };
         let (stream, _) = self.listener.accept().await?;
         stream.set_nodelay(true)?;
-        // Somebody may have left meanwhile.
+        // Another connection may have closed during the wait.
         if let Some(place) = usual().filter(|_| is_crowd) {
             (permit, is_crowd) = (place, false);
         }
@@ -149,7 +153,7 @@ impl Door {
     }
 }
 
-/// Whether the service lives can be asked all the same.
+/// Middleware of connections beyond the limit: refuses requests with `busy`, except /healthz.
 async fn answer_in_crowd(request: Request, next: Next) -> Response {
     match request.uri().path() {
         "/healthz" => next.run(request).await,
@@ -157,6 +161,7 @@ async fn answer_in_crowd(request: Request, next: Next) -> Response {
     }
 }
 
+/// Serves one connection to its end. Once `stop` is cancelled, only the current request is finished.
 async fn answer(
     builder: &Builder<TokioExecutor>,
     stream: TcpStream,
@@ -185,15 +190,15 @@ async fn answer(
     }
 }
 
-/// One request each: their connections are not kept.
+/// Returns a builder without keep-alive: one request per connection.
 fn once() -> Builder<TokioExecutor> {
     let mut once = builder();
     once.http1().keep_alive(false);
     once
 }
 
-/// HTTP/1 alone: telling the versions apart waits for first bytes without a time-out, and browsers
-/// speak HTTP/2 over TLS only, which is a proxy's work.
+/// Returns a builder with the limits of this module. It supports only HTTP/1: detecting HTTP/2 would wait for
+/// the first bytes without a timeout. Browsers use HTTP/2 only over TLS, which a proxy provides.
 fn builder() -> Builder<TokioExecutor> {
     let mut builder = Builder::new(TokioExecutor::new()).http1_only();
     builder
@@ -211,7 +216,7 @@ mod tests {
 
     use super::*;
 
-    /// Sends a request on a connection of its own; the connection, and the first line of the answer.
+    /// Sends a request on a new connection. Returns the connection and the first line of the response.
     async fn ask(address: std::net::SocketAddr, path: &str) -> (TcpStream, String) {
         let mut connection = TcpStream::connect(address).await.unwrap();
         let request = format!("GET {path} HTTP/1.1\r\nhost: x\r\n\r\n");

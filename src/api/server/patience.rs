@@ -1,6 +1,8 @@
-//! How long we wait for those who are slow (RELIABILITY.md, H1): a reader must take something now and then, and a
-//! body must come at some rate on the whole, for whoever keeps a connection open keeps one of few. Time in
-//! which they wait for us does not count against them.
+//! Limits for slow clients (docs/explanation/promises.md, "Slow clients").
+//!
+//! Every client occupies one of a limited number of connections. It must therefore read a part of the
+//! response from time to time, and send a body at a minimum average rate. Time during which the client waits
+//! for the server does not count.
 
 use std::io;
 use std::pin::Pin;
@@ -11,14 +13,14 @@ use hyper::body::{Body, Buf, Frame, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep};
 
-/// The longest wait until a reader takes more of an answer.
+/// Longest time during which a client may read nothing of a response. Free choice.
 const READER: Duration = Duration::from_secs(60);
-/// What every body may wait for all in all, besides what its length allows.
+/// Total waiting time that every body may cause, in addition to what its length allows. Free choice.
 const GRACE: Duration = Duration::from_secs(30);
-/// The least rate of a body beyond that, bytes a second: slower than any line that films are sent over.
+/// Minimum average rate of a body, bytes per second. Any line that is used to send videos is faster.
 const LEAST_RATE: f64 = 1024.0;
 
-/// A connection whose writes end with an error once nobody takes them.
+/// A connection whose writes fail if the client reads nothing for too long.
 pub(super) struct Patient<S> {
     stream: S,
     longest: Duration,
@@ -34,6 +36,7 @@ impl<S> Patient<S> {
         }
     }
 
+    /// Passes on the result of a write. Fails with `TimedOut` if the write has been pending for too long.
     fn watch(
         &mut self,
         context: &mut Context<'_>,
@@ -92,12 +95,12 @@ impl<S: AsyncRead + Unpin> AsyncRead for Patient<S> {
     }
 }
 
-/// The body came too slowly.
+/// The client sent the body too slowly.
 #[derive(Debug, thiserror::Error)]
 #[error("the body came too slowly")]
 pub(in crate::api) struct TooSlow;
 
-/// Whether an error of a body comes of its slowness.
+/// Returns whether the error of a body was caused by [`TooSlow`].
 pub(in crate::api) fn is_too_slow(error: &dyn std::error::Error) -> bool {
     let mut cause = error.source();
     while let Some(error) = cause {
@@ -109,13 +112,13 @@ pub(in crate::api) fn is_too_slow(error: &dyn std::error::Error) -> bool {
     false
 }
 
-/// A body that ends with [`TooSlow`] when we have waited for it too long for what came of it.
+/// A body that fails with [`TooSlow`] if the total waiting time is too long for the number of bytes received.
 pub(super) struct Paced<B> {
     body: B,
     grace: Duration,
-    /// How long we have waited for pieces that came.
+    /// Total time spent waiting for the chunks received so far.
     waited: Duration,
-    /// Since when we wait for the next, and when that is too long.
+    /// Start of the current wait, and the timer that limits it.
     waiting: Option<(Instant, Pin<Box<Sleep>>)>,
     n_bytes: f64,
 }
@@ -201,7 +204,7 @@ mod tests {
         assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
     }
 
-    /// A body of pieces of so many bytes, each after a tenth of [`SOON`], for ten times as long.
+    /// Returns a body of 100 chunks of `n_bytes` bytes, one every tenth of [`SOON`].
     fn dripping(n_bytes: usize) -> Paced<AnyBody> {
         let pieces = unfold(0, move |k| async move {
             tokio::time::sleep(SOON / 10).await;

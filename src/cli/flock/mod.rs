@@ -1,7 +1,9 @@
-//! `flockreel flock`: library to flock (DESIGN.md, Command line), as a film in any format and, when asked
-//! for, its plan as flock.json and its ground truth. A plan made before can be filmed again.
+//! `flockreel flock`: plans and films a flock from a library (docs/reference/command-line.md).
+//!
+//! It writes the film and, if requested, the plan (flock.json), a chart of the plan, and the ground truth. An
+//! existing plan can be filmed again.
 
-mod outputs; // the flags about the film
+mod outputs; // flags about the film
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -23,30 +25,30 @@ use crate::media::{self, Tool};
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The folder that `analyze` made.
+    /// Folder of the library, written by `analyze`.
     library: PathBuf,
     #[command(flatten)]
     outputs: Outputs,
-    /// Individuals, 1 to 10000. By default as many as there is room for, at most 20.
+    /// Number of individuals, 1 to 10000. Default: as many as the tank has room for, 2 to 20.
     #[arg(long)]
     count: Option<u32>,
-    /// Wanted mean distance to the nearest other in the picture, body lengths, 0.2 to 10.
+    /// Target of the mean distance to the nearest neighbor in the image, body lengths, 0.2 to 10.
     #[arg(long, value_name = "BL")]
     spacing: Option<f64>,
-    /// Frames, 1 to 1000000; times the individuals at most 4000000.
+    /// Length in frames, 1 to 1000000. Individuals times frames is at most 4000000. Default: 400.
     #[arg(long)]
     frames: Option<u32>,
-    /// Everything random follows from it.
+    /// Random seed. The same library, parameters and seed give the same flock. Default: 1.
     #[arg(long)]
     seed: Option<u64>,
-    /// The last frame plays into the first: a film that repeats without a seam. Ten seconds or more, for all swim back
-    /// to where somebody began.
+    /// Make a loop: the last frame leads into the first, so that the film repeats without a seam. A loop has
+    /// 30 to 5000 frames. Use at least 10 seconds, so that the individuals have time to swim back.
     #[arg(long = "loop")]
     is_loop: bool,
-    /// Where to start from: school, swarm, mill, scatter, zonal or papers.
+    /// Preset to start from: school, swarm, mill, scatter, zonal or papers. Other flags override its values.
     #[arg(long)]
     preset: Option<String>,
-    /// Rules to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.
+    /// Steering rules of the boids to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.
     #[arg(long, value_name = "JSON")]
     rules: Option<String>,
     #[command(flatten)]
@@ -54,7 +56,7 @@ pub struct Args {
     /// Write the plan, flock.json, here.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Draw what the boids ask for against what is shown here, as SVG.
+    /// Write a chart that compares the headings of boids and individuals to this SVG file.
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
     /// Film this plan, a flock.json of the same library, instead of making one.
@@ -123,7 +125,8 @@ fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
     }))
 }
 
-/// A flock that was planned before, to be filmed as `params` say.
+/// Reads an existing plan, to be filmed with the `render` parameters of `params`. Fails if it belongs to
+/// another library.
 fn planned(path: &Path, library: &Library, params: Params) -> Result<Flock, Error> {
     let named = |why: &str| Error::Usage(format!("{why}: {}", path.display()));
     let bytes =
@@ -138,7 +141,7 @@ fn planned(path: &Path, library: &Library, params: Params) -> Result<Flock, Erro
 }
 
 impl Args {
-    /// The preset with what was given besides.
+    /// Returns the preset with the parameters set by flags.
     fn params(&self) -> Result<Params, Error> {
         let mut overrides = Map::new();
         if let Some(text) = &self.rules {

@@ -1,5 +1,5 @@
-//! What `flockreel flock` makes of a flock: the flags about its film, and what they mean for the files to
-//! make (DESIGN.md, Command line; ALGORITHMS.md 8).
+//! Flags of `flockreel flock` about its film, and the files that they request
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use std::path::{Path, PathBuf};
 
@@ -15,43 +15,47 @@ use crate::raster::RgbImage;
 /// Flags about the film.
 #[derive(Debug, clap::Args)]
 pub(super) struct Outputs {
-    /// The film to make: .mp4, .webm, .mov (ProRes); .gif or .webp, at most 480 columns, 15 frames a second and ten
-    /// seconds of it; one picture as .png or .jpg; a folder or
-    /// .zip of pictures with --format png.
+    /// File to write. Films: .mp4, .webm, .mov (ProRes). Previews, at most 480 pixels wide, 15 frames per
+    /// second and 10 seconds long: .gif, .webp. Middle frame: .png, .jpg. All frames as pictures: .zip, or a
+    /// folder with --format png.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
-    /// What to make, when the name does not tell.
+    /// Format of the output. Default: by the extension of its name.
     #[arg(long, value_name = "mp4|webm|mov|png|gif|webp|poster")]
     format: Option<String>,
-    /// Width and height of the film; the same field of view as the footage.
+    /// Width and height of the film, pixels. The film always shows the whole picture of the footage. Default:
+    /// the size of the footage.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
-    /// What lies behind: plate, transparent, #rrggbb, a picture or a video.
+    /// Background: plate (default, the background of the footage), transparent, a color as #rrggbb, or the
+    /// file of a picture or video.
     #[arg(long, value_name = "WHAT")]
     background: Option<String>,
-    /// How jumps are bridged: fade or morph.
+    /// Drawing method at a jump: fade (default) or morph.
     #[arg(long, value_name = "fade|morph")]
     cut: Option<String>,
-    /// How much of what is a body length farther is lost in haze, 0 to 1.
+    /// Share of an animal's color that haze replaces per body length of depth, 0 to 1. Default: 0, no haze.
     #[arg(long, value_name = "SHARE")]
     haze: Option<f64>,
-    /// How dark the shadows on the floor are, 0 to 1.
+    /// Darkness of the shadows on the floor, 0 to 1. 0 disables them. Default: as measured in top view, none
+    /// in side view.
     #[arg(long, value_name = "SHARE")]
     shadow: Option<f64>,
-    /// Also film where every boid is and heads, over the flock.
+    /// Also write a video that marks the position and heading of every boid.
     #[arg(long, value_name = "MP4")]
     overlay: Option<PathBuf>,
-    /// Also write the frame in the middle, as .png or .jpg.
+    /// Also write the middle frame, as .png or .jpg.
     #[arg(long, value_name = "PICTURE")]
     poster: Option<PathBuf>,
-    /// Write what is where in every frame into this folder: masks, coco.json, MOTChallenge, tracks.csv.
+    /// Also write the ground truth of every frame to this folder: masks, coco.json, MOTChallenge files,
+    /// tracks.csv.
     #[arg(long, value_name = "DIR")]
     pub(super) ground_truth: Option<PathBuf>,
 }
 
-/// What lies behind, opened.
+/// Background of the film, with its file opened.
 pub(super) enum Behind {
-    /// What the parameters say.
+    /// As the `render` parameters say.
     AsAsked,
     /// A picture.
     Picture(RgbImage),
@@ -60,7 +64,7 @@ pub(super) enum Behind {
 }
 
 impl Outputs {
-    /// The `render` parameters that the flags set.
+    /// Returns the `render` parameters that the flags set.
     pub(super) fn overrides(&self) -> Map<String, Value> {
         let named = self.named_background().map(Value::from);
         let given = [
@@ -76,7 +80,7 @@ impl Outputs {
             .collect()
     }
 
-    /// The files to make. Fails when one cannot show what lies behind.
+    /// Returns the files to write. Fails if one cannot store a transparent background that is requested.
     pub(super) fn targets(&self, render: &Render) -> Result<Vec<Target>, Error> {
         let format = match &self.format {
             Some(name) => serde_json::from_value(Value::from(name.as_str()))
@@ -105,7 +109,7 @@ impl Outputs {
         }
     }
 
-    /// Opens the picture or video that lies behind, where one is named.
+    /// Opens the picture or video that is named as background, if any.
     pub(super) fn behind(&self) -> Result<Behind, Error> {
         let named = self.named_background();
         let Some(path) = self.background.as_deref().filter(|_| named.is_none()) else {
@@ -127,7 +131,7 @@ impl Outputs {
         }
     }
 
-    /// The background, where it is no file.
+    /// Returns the background, unless it is a file.
     fn named_background(&self) -> Option<String> {
         let text = self.background.as_ref()?;
         Background::try_from(text.clone()).ok().map(String::from)
@@ -135,7 +139,7 @@ impl Outputs {
 }
 
 impl Behind {
-    /// As a film takes it.
+    /// Returns the background in the type that `Film` takes.
     pub(super) fn backdrop(&self) -> Backdrop<'_> {
         match self {
             Behind::AsAsked => Backdrop::AsAsked,
@@ -147,13 +151,13 @@ impl Behind {
 
 fn keeps_alpha(target: &Target) -> bool {
     match target.output {
-        Output::Overlay => true, // it has a backdrop of its own
+        Output::Overlay => true, // it has its own background
         Output::Film(Format::Poster) => !["jpg", "jpeg"].contains(&ending(&target.path).as_str()),
         Output::Film(format) => format.has_alpha(),
     }
 }
 
-/// The format that a file's name asks for.
+/// Returns the format for the extension of a file name. Fails if it is unknown.
 fn format_of(path: &Path) -> Result<Format, Error> {
     match ending(path).as_str() {
         "mp4" | "m4v" => Ok(Format::Mp4),

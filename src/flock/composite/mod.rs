@@ -9,17 +9,17 @@
 //! converted again, so the cost grows with the area drawn. The ground truth is computed from the same
 //! layers.
 
-mod backdrop; // what lies behind
-mod bleed; // color beyond the edges of alpha
-mod draw_ahead; // the frames of a film, in order
-mod front; // what stands before all
-mod layer; // one individual in one frame
-mod morph; // two sprites bent to each other at a jump
+mod backdrop; // the background of the film
+mod bleed; // color of transparent pixels
+mod draw_ahead; // drawing on all threads, ahead of the consumer
+mod front; // occluders in front of the animals
+mod layer; // drawing of one individual
+mod morph; // warping of two sprites at a jump
 pub mod params;
-mod shadow; // below all
-mod stock; // sprites ready to be drawn
-pub mod truth; // what of whom can be seen
-mod view; // from pixels of the footage to those of the film
+mod shadow; // shadows on the floor
+mod stock; // cache of premultiplied sprites
+pub mod truth; // ground truth of a frame
+mod view; // footage pixels to film pixels
 
 use std::sync::{Mutex, PoisonError};
 

@@ -96,11 +96,11 @@ impl Weights {
         }
     }
 
-    /// Returns the cost of a jump, in turns.
+    /// Returns the cost of a jump, in turns, below 2^16.
     pub fn of_jump(&self, jump: &Jump) -> u32 {
         let share = jump.cost as f64 / self.epsilon.max(1) as f64;
         let transition = (self.jump_turns * share).round().min(65535.0) as u32;
-        transition + self.of_return(jump)
+        (transition + self.of_return(jump)).min(65535)
     }
 
     /// Returns the part of a jump's cost for showing frames again, in turns, below 2^16. It is 0 for jumps

@@ -1,23 +1,25 @@
-//! Another film behind a flock: its frames at the flock's own times, over and over (ALGORITHMS.md 8).
+//! A video as the background of a flock, repeated if it is shorter than the flock
+//! (docs/explanation/algorithms.md, "Compositing"). Its frames are chosen by time, so the two frame rates may
+//! differ.
 
 use crate::flock::Shot;
 use crate::footage::{FrameSource, FrameStream};
 use crate::jobs::Error;
 use crate::raster::Frame;
 
-/// A film that is read along with the flock.
+/// A background video that is read along with the flock.
 pub(super) struct Behind<'a> {
     source: &'a dyn FrameSource,
     stream: Box<dyn FrameStream + 'a>,
-    /// Frames of it to a frame of the flock.
+    /// Frames of the video per frame of the flock.
     step: f64,
-    /// Frames read since the beginning, those of earlier rounds too.
+    /// Number of frames read so far, repetitions included.
     n_read: usize,
     frame: Frame,
 }
 
 impl<'a> Behind<'a> {
-    /// Opens the film, for a flock of so many frames a second.
+    /// Opens the video for a flock with `fps` frames per second.
     pub(super) fn of(source: &'a dyn FrameSource, fps: f64) -> Result<Behind<'a>, Error> {
         Ok(Behind {
             source,
@@ -28,7 +30,7 @@ impl<'a> Behind<'a> {
         })
     }
 
-    /// Gives a shot the frame that lies behind it. Shots come in order.
+    /// Sets the background of a shot. `frame_idx` must not decrease from call to call.
     pub(super) fn at(&mut self, frame_idx: usize, shot: &mut Shot) -> Result<(), Error> {
         let wanted = (frame_idx as f64 * self.step) as usize;
         while self.n_read <= wanted {

@@ -1,6 +1,9 @@
-//! A planned flock to files: its film in every format asked for, what its boids meant drawn over it, and
-//! the ground truth from the same layers (ALGORITHMS.md 8). The command line and the service make them
-//! here, in at most two passes: planes for encoders without transparency, RGBA for the rest.
+//! Writes a planned flock to files: its video in all requested formats, an overlay with the simulated boids,
+//! and the ground truth from the same layers (docs/explanation/algorithms.md, "Compositing"). Both the
+//! commands and the service use it.
+//!
+//! The frames are drawn in at most two passes: as planes for encoders without transparency, and as RGBA for
+//! the others.
 
 use std::path::{Path, PathBuf};
 
@@ -16,51 +19,51 @@ use crate::library::Library;
 use crate::progress::Progress;
 use crate::raster::RgbImage;
 
-/// A flock that can be filmed.
+/// A flock with everything needed to draw it.
 #[derive(Clone, Copy)]
 pub struct Film<'a> {
-    /// Whose frames are shown.
+    /// The library that provides the sprites.
     pub library: &'a Library,
-    /// What they do.
+    /// The planned flock.
     pub flock: &'a Flock,
-    /// What lies behind, instead of what the flock's parameters say.
+    /// The background, which may replace that of the flock's parameters.
     pub backdrop: Backdrop<'a>,
-    /// Told how far the film is; may cancel it.
+    /// Receives progress, and may cancel the work.
     pub progress: &'a dyn Progress,
 }
 
-/// What lies behind a film.
+/// Background of a video of a flock.
 #[derive(Clone, Copy)]
 pub enum Backdrop<'a> {
-    /// What the flock's parameters say.
+    /// The background selected by the flock's parameters.
     AsAsked,
     /// A picture.
     Picture(&'a RgbImage),
-    /// Another film, over and over.
+    /// A video, repeated as needed.
     Film(&'a dyn FrameSource),
 }
 
-/// A file to make.
+/// A file to write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
-    /// What it shows.
+    /// Content of the file.
     pub output: Output,
-    /// Where it goes. Pictures go to a folder, or to an archive where this ends in `.zip`; a poster is
-    /// a JPEG where it ends in `.jpg`.
+    /// Path of the file. PNG frames go to a folder, or to an archive if the path ends in `.zip`. A poster is
+    /// a JPEG if the path ends in `.jpg` or `.jpeg`, otherwise a PNG.
     pub path: PathBuf,
 }
 
-/// What a file shows.
+/// Content of an output file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
-    /// The flock.
+    /// The flock, in this format.
     Film(Format),
-    /// The flock, and where every boid is and heads, as MP4.
+    /// The flock with position and heading of every boid drawn over it, as MP4.
     Overlay,
 }
 
 impl Output {
-    /// Whether it is encoded from planes, without transparency.
+    /// Returns whether the file is encoded from planes, without transparency.
     fn is_planar(self) -> bool {
         match self {
             Output::Film(format) => !format.has_alpha(),
@@ -70,7 +73,7 @@ impl Output {
 }
 
 impl Film<'_> {
-    /// Makes the files, and where a folder for it is given tells the ground truth.
+    /// Writes the files, and the ground truth if its folder is given.
     pub fn make(&self, targets: &[Target], truth: Option<&Path>) -> Result<(), Error> {
         let (posters, moving): (Vec<&Target>, Vec<&Target>) = targets
             .iter()
@@ -78,7 +81,8 @@ impl Film<'_> {
         let (planar, straight): (Vec<&Target>, Vec<&Target>) = moving
             .into_iter()
             .partition(|target| target.output.is_planar());
-        // Truth is that of the film it lies beside: what stands before the animals is in an opaque one alone.
+        // Foreground objects are drawn only in opaque videos, so the ground truth of the two passes differs.
+        // It is computed with the opaque pass, if there is one.
         let has_planar = !planar.is_empty() || (straight.is_empty() && truth.is_some());
         let of_straight = truth.filter(|_| !has_planar);
         let n_passes = usize::from(has_planar) + usize::from(!straight.is_empty());
@@ -114,7 +118,7 @@ impl Film<'_> {
             n_frames: compositor.n_frames(),
             fps: self.flock.fps,
         };
-        // Begun with the first frame: by then some are drawn, if the encoder lets wait for it.
+        // Encoders start with the first frame. More frames are drawn while they start.
         let mut sinks = Vec::new();
         let begin = |target: &&Target| Sink::begin(target, shape, self.flock, self.is_clear());
         let mut truth = (truth.map(|folder| TruthFolder::create(folder, shape))).transpose()?;
@@ -154,7 +158,7 @@ impl Film<'_> {
         Ok(truth.map_or(Ok(()), TruthFolder::finish)?)
     }
 
-    /// The frame in the middle.
+    /// Writes the middle frame as a picture.
     fn poster(&self, target: &Target) -> Result<(), Error> {
         let compositor = self.before(Compositor::new(self.library, self.flock).straight());
         let (mut shot, middle) = (Shot::default(), compositor.n_frames() / 2);
@@ -184,7 +188,7 @@ impl Film<'_> {
         }
     }
 
-    /// Whether nothing lies behind, where a format can show that.
+    /// Returns whether the background is transparent, in formats that support it.
     fn is_clear(&self) -> bool {
         matches!(self.backdrop, Backdrop::AsAsked)
             && self.flock.params.render.background == Background::Transparent

@@ -1,10 +1,11 @@
-//! The flock job: library to flock (ALGORITHMS.md 6 to 8), left as `flock.json`, `plan.svg`,
-//! `video.mp4`, and what its `render` parameters ask for besides.
+//! The flock job: makes a flock from a library (docs/explanation/algorithms.md, "Planning", "Boids" and
+//! "Compositing"). It writes `flock.json`, `plan.svg`, `video.mp4`, and the further files that the `render`
+//! parameters request.
 
-mod behind; // another film behind a flock
-pub mod film; // frames to files
-mod sink; // where frames go
-pub mod truth; // the ground truth as a folder and as one file
+mod behind; // video background
+pub mod film; // flock -> files
+mod sink; // encoders and pictures
+pub mod truth; // ground truth
 
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -28,7 +29,7 @@ use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Made;
 use crate::store::owners::Account;
 
-/// The stages, with their measured shares.
+/// Stages with their share of the running time; measured.
 pub const STAGES: Stages = &[
     ("loading", 0.05),
     ("simulating", 0.05),
@@ -36,35 +37,36 @@ pub const STAGES: Stages = &[
     ("rendering", 0.6),
 ];
 
-/// What a flock needs.
+/// Input of a flock.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Input {
-    /// The library to make it of.
+    /// The library that the flock is made from.
     pub library_id: LibraryId,
-    /// How.
+    /// Parameters of the flock.
     pub params: Params,
 }
 
-/// What is worth knowing of a flock at a glance.
+/// Summary of a flock.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[schema(as = FlockSummary)]
 pub struct Summary {
-    /// Frames a second.
+    /// Frame rate, frames per second.
     pub fps: f64,
     /// Width and height of the picture, pixels.
     pub image_size_px: [u32; 2],
-    /// Individuals.
+    /// Number of individuals.
     pub count: u32,
-    /// Frames of the video.
+    /// Number of frames of the video.
     pub frames: u32,
-    /// The seed of everything random.
+    /// Random seed.
     pub seed: u64,
-    /// Advice on the flock; empty if there is none.
+    /// Weaknesses of the flock; empty if there are none.
     #[serde(default)]
     pub advice: Vec<Advice>,
 }
 
-/// Queues a flock, after the job that makes its library if that is not done yet.
+/// Queues a flock. If `after_job` is given, it starts after that job, which makes its library. Returns the id
+/// of the job and the id that the flock will have.
 pub async fn enqueue(
     context: &Context,
     input: &Input,
@@ -77,7 +79,7 @@ pub async fn enqueue(
 }
 
 impl Input {
-    /// Simulates, plans, renders.
+    /// Simulates, plans and renders the flock into the folder of the attempt, and returns the result's row.
     pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let (_, files) = attempt.library(self.library_id)?;
         attempt.listener.report("loading", 0.0);
@@ -127,7 +129,7 @@ fn render(attempt: &Attempt, library: &Library, flock: &Flock) -> Result<(), Err
     Ok(std::fs::remove_dir_all(&truth)?)
 }
 
-/// video.mp4, and what is asked for besides, each once.
+/// Returns the files to write: `video.mp4` and the requested formats, each once.
 fn targets(folder: &Path, render: &Render) -> Vec<Target> {
     let formats: BTreeSet<Format> = render
         .formats
@@ -151,7 +153,7 @@ fn targets(folder: &Path, render: &Render) -> Vec<Target> {
     targets
 }
 
-/// The name of a format's file among those of a flock.
+/// Returns the file name of a format in the folder of a flock.
 pub fn file_name(format: Format) -> &'static str {
     match format {
         Format::Mp4 => "video.mp4",

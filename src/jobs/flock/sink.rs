@@ -1,5 +1,5 @@
-//! Where the frames of a film go: an encoder, a folder of pictures, or an archive of them; and one frame
-//! as one picture (ALGORITHMS.md 8).
+//! Output of the frames of a flock: an encoder, a folder of pictures, or an archive of pictures. Also writes
+//! single frames as posters (docs/explanation/algorithms.md, "Compositing").
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -17,15 +17,15 @@ use crate::jobs::Error;
 use crate::media::{Coding, VideoFormat, VideoWriter};
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
-/// A preview ends after so many seconds.
+/// Maximum length of a preview (GIF and WebP), seconds. Free choice.
 const PREVIEW_S: f64 = 10.0;
 
-/// Takes the frames of a film, in order.
+/// Output that receives the frames of a video in order.
 pub(super) struct Sink {
     size_px: [u32; 2],
-    /// Whether what is written has transparency.
+    /// Whether the output has transparency.
     alpha: bool,
-    /// Frames from here on are not wanted.
+    /// Number of frames to write; later ones are ignored.
     n_wanted: usize,
     kind: Kind,
 }
@@ -38,7 +38,7 @@ enum Kind {
 }
 
 impl Sink {
-    /// Begins a file. `alpha` tells whether nothing lies behind the film.
+    /// Starts the output of a file. `alpha` is whether the video has a transparent background.
     pub(super) fn begin(
         target: &Target,
         film: FilmShape,
@@ -74,7 +74,7 @@ impl Sink {
         })
     }
 
-    /// Takes the next frame.
+    /// Writes the next frame.
     pub(super) fn take(
         &mut self,
         flock: &Flock,
@@ -109,7 +109,7 @@ impl Sink {
         Ok(())
     }
 
-    /// Ends the file.
+    /// Completes the file.
     pub(super) fn finish(self) -> Result<(), Error> {
         match self.kind {
             Kind::Video(writer) | Kind::Overlay(writer, ..) => Ok(writer.finish()?),
@@ -119,7 +119,7 @@ impl Sink {
     }
 }
 
-/// Removes from a folder what a longer film left there: its frames from `first` on.
+/// Removes the frames from index `first` on that a longer earlier video has left in a folder.
 pub(super) fn remove_frames(folder: &Path, first: usize) -> io::Result<()> {
     for frame_idx in first.. {
         match fs::remove_file(folder.join(frame_name(frame_idx))) {
@@ -130,7 +130,7 @@ pub(super) fn remove_frames(folder: &Path, first: usize) -> io::Result<()> {
     Ok(())
 }
 
-/// How many frames of a film a file shows.
+/// Returns the number of frames to write to a file.
 pub(super) fn n_wanted(target: &Target, film: FilmShape) -> usize {
     match target.output {
         Output::Film(Format::Gif | Format::Webp) => {
@@ -140,7 +140,7 @@ pub(super) fn n_wanted(target: &Target, film: FilmShape) -> usize {
     }
 }
 
-/// A folder of pictures, or an archive of them where the path ends so.
+/// Creates a folder of pictures, or an archive if the path ends in `.zip`.
 fn pictures(path: &Path) -> io::Result<Kind> {
     if path.extension().is_some_and(|extension| extension == "zip") {
         let file = BufWriter::new(File::create(path)?);
@@ -157,7 +157,7 @@ fn png([width, height]: [u32; 2], alpha: bool, rgba: &[u8]) -> Vec<u8> {
     }
 }
 
-/// Writes one picture, a JPEG where the path ends so.
+/// Writes one picture: a JPEG if the path ends in `.jpg` or `.jpeg`, otherwise a PNG.
 pub(super) fn poster(path: &Path, size_px: [u32; 2], alpha: bool, rgba: &[u8]) -> io::Result<()> {
     let is_jpeg = path
         .extension()

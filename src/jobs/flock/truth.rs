@@ -1,5 +1,5 @@
-//! A flock's ground truth as a folder, written while the film is drawn, and that folder as one file
-//! (ALGORITHMS.md 8). What the files hold is said in `formats::ground_truth::README`.
+//! The ground truth of a flock, written to a folder while the video is drawn, and the archive of this folder
+//! (docs/reference/formats.md, "Ground truth"). `formats::ground_truth::README` describes the files.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -14,23 +14,23 @@ use crate::formats::ground_truth::coco::Coco;
 use crate::formats::ground_truth::{FilmShape, README, frame_name, mot, tracks};
 use crate::formats::picture;
 
-/// Folders of pictures, one a frame.
+/// Subfolders with one picture per frame.
 const MASKS: &str = "masks";
 const SHADOWS: &str = "shadows";
 
-/// A ground truth in the making.
+/// The folder of a ground truth that is being written.
 pub struct TruthFolder {
     folder: PathBuf,
     film: FilmShape,
     coco: Coco<BufWriter<File>>,
     mot: BufWriter<File>,
     tracks: BufWriter<File>,
-    /// Pictures of shadows written.
+    /// Index after the last shadow picture written.
     n_shadows: usize,
 }
 
 impl TruthFolder {
-    /// Begins in a folder, which is made if need be.
+    /// Starts a ground truth in a folder. Creates the folder if absent.
     pub fn create(folder: &Path, film: FilmShape) -> io::Result<TruthFolder> {
         fs::create_dir_all(folder.join(MASKS))?;
         fs::create_dir_all(folder.join("gt"))?;
@@ -50,7 +50,7 @@ impl TruthFolder {
         })
     }
 
-    /// Adds the next frame.
+    /// Writes the ground truth of the next frame.
     pub fn add(&mut self, flock: &Flock, frame_idx: usize, truth: &FrameTruth) -> io::Result<()> {
         let [width, height] = truth.size_px;
         let mask = picture::write_labels(width, height, &truth.labels);
@@ -67,7 +67,7 @@ impl TruthFolder {
         tracks::write_frame(&mut self.tracks, (flock, &self.film), frame_idx, truth)
     }
 
-    /// Ends every file.
+    /// Completes all files, and removes pictures that a longer earlier video has left.
     pub fn finish(mut self) -> io::Result<()> {
         remove_frames(&self.folder.join(MASKS), self.film.n_frames)?;
         remove_frames(&self.folder.join(SHADOWS), self.n_shadows)?;
@@ -77,8 +77,7 @@ impl TruthFolder {
     }
 }
 
-/// Puts a folder's files, and those of its subfolders, into an archive, stored, in the order of their
-/// names.
+/// Writes all files below a folder into a ZIP archive, uncompressed, in the order of their names.
 pub fn pack(folder: &Path, archive: &Path) -> io::Result<()> {
     let mut zip = zip::ZipWriter::new(BufWriter::new(File::create(archive)?));
     let stored = SimpleFileOptions::default()

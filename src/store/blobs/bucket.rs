@@ -1,6 +1,6 @@
-//! Files in a bucket of an S3-compatible store, whose address and keys are in the usual `AWS_*` variables
-//! (ECOSYSTEM.md 3). What is written in parts has parts of one size, and what cannot be finished is
-//! taken back; a part that a crash leaves costs money until the bucket's own rules remove it.
+//! Files in an S3-compatible bucket. Address and keys are in the usual `AWS_*` variables. Uploads in parts
+//! use parts of equal size and are aborted on failure. A part left by a crash costs money until a rule of the
+//! bucket removes it.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -21,15 +21,16 @@ use tokio::time::timeout;
 use super::Folder;
 use crate::store::{Error, tls};
 
-/// Every part but the last: more than the least that any store takes, and of one size as some want it.
+/// Size of every part except the last, bytes. It exceeds the minimum of every provider, and some require
+/// equal sizes.
 const PART_BYTES: usize = 16 << 20;
-/// Bytes asked for at a time: no request lasts as long as the one who downloads is slow.
+/// Size of one read request, bytes. Short requests do not stay open while a client downloads slowly.
 const PIECE_BYTES: u64 = 4 << 20;
 
-/// The longest wait for a sign of life; a bucket that is busy is asked again by the next probe.
+/// Maximum wait of a readiness probe. If the bucket is slow, the next probe asks again. Free choice.
 const ANSWER: Duration = Duration::from_secs(2);
 
-/// A bucket, and where in it our files begin.
+/// A bucket and the prefix of our files in it.
 #[derive(Clone, Debug)]
 pub(super) struct Bucket {
     store: Arc<dyn ObjectStore>,
@@ -37,11 +38,11 @@ pub(super) struct Bucket {
 }
 
 impl Bucket {
-    /// Fails where the bucket cannot be listed.
+    /// Opens the bucket. Fails if it cannot be listed.
     pub(super) async fn open(name: &str, prefix: &str) -> Result<Bucket, Error> {
         tls::choose_cryptography();
         let builder = AmazonS3Builder::from_env().with_bucket_name(name);
-        // Whoever gives an address without encryption means it.
+        // HTTP is used only if the configured address asks for it.
         let options = ClientOptions::new().with_allow_http(true);
         let store = builder.with_client_options(options).build()?;
         let bucket = Bucket {
@@ -54,7 +55,8 @@ impl Bucket {
         Ok(bucket)
     }
 
-    /// Whether the bucket answers us in time: asked for something that never was, it says that it is not there.
+    /// Returns whether the bucket answers in time. The probe asks for an object that never exists, so "not
+    /// found" is a valid answer.
     pub(super) async fn answers(&self) -> bool {
         let nothing = self.path("footage/readiness");
         let asked = self.store.head(&nothing);
@@ -106,7 +108,7 @@ impl Bucket {
         .boxed()
     }
 
-    /// The mark of these files.
+    /// Returns the mark of these files, if any (`identity`).
     pub(super) async fn mark(&self) -> Result<Option<String>, Error> {
         let found = match self.store.get(&self.path(super::MARK)).await {
             Err(object_store::Error::NotFound { .. }) => return Ok(None),
@@ -115,7 +117,7 @@ impl Bucket {
         Ok(Some(String::from_utf8_lossy(&found).trim().to_owned()))
     }
 
-    /// Marks these files, for good.
+    /// Marks these files permanently (`identity`).
     pub(super) async fn set_mark(&self, mark: &str) -> Result<(), Error> {
         let bytes = Bytes::copy_from_slice(mark.as_bytes());
         self.store
@@ -144,7 +146,7 @@ impl Bucket {
         Ok(folders.into_values().collect())
     }
 
-    /// The folder of an object: of ours, kind and name come before the file's own name.
+    /// Returns the folder of an object, `kind/name`. `None` if the object is not one of our files.
     fn folder_of(&self, object: &ObjectMeta) -> Option<String> {
         let path = object.location.as_ref().strip_prefix(&self.prefix)?;
         let (folder, _name) = path.trim_start_matches('/').rsplit_once('/')?;
@@ -160,7 +162,7 @@ impl Bucket {
 async fn copy(file: &FilePath, writer: &mut BufWriter) -> io::Result<()> {
     let mut reader = BufReader::with_capacity(1 << 20, File::open(file).await?);
     if let Err(error) = tokio::io::copy_buf(&mut reader, writer).await {
-        // What cannot be ended is taken back by `shutdown` itself.
+        // If `shutdown` fails, it aborts the upload itself.
         writer.abort().await?;
         return Err(error);
     }

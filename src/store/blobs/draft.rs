@@ -1,6 +1,6 @@
-//! What a process is making: folders under one of its own, which it locks while it lives. Several processes
-//! may share a disk, and whoever finds such a folder unlocked knows that its process is gone and sweeps it
-//! (RELIABILITY.md, R5).
+//! Drafts: folders in which a process makes files before they are stored. Every process has a folder of its
+//! own and locks it while it lives. Processes that share a disk recognize an unlocked folder as a leftover
+//! and remove it (docs/explanation/promises.md, "No orphans").
 
 use std::fs::{self, File};
 use std::io;
@@ -11,15 +11,15 @@ use sqlx::types::Uuid;
 
 use super::shelf::size_of;
 
-/// Where the processes of a machine make what they make.
+/// The folder in which the processes of a machine keep their drafts.
 #[derive(Debug)]
 pub(in crate::store) struct Workplace {
     tmp: PathBuf,
-    /// This process's folder, made when it is first needed, and the lock on it.
+    /// Folder of this process and its lock; created on first use.
     own: Mutex<Option<(PathBuf, File)>>,
 }
 
-/// A folder in the making; removed with all it holds unless it is moved into place.
+/// A temporary folder. Dropping it removes it with its content, unless it was moved to its final place.
 #[derive(Debug)]
 pub struct Draft {
     path: PathBuf,
@@ -35,7 +35,7 @@ impl Workplace {
         })
     }
 
-    /// The folder that all of them make things in.
+    /// Returns the folder that all processes share.
     pub(super) fn folder(&self) -> &Path {
         &self.tmp
     }
@@ -53,7 +53,7 @@ impl Workplace {
         Ok(Draft { path, kept: false })
     }
 
-    /// Removes what processes left that are gone; returns how many.
+    /// Removes the folders of processes that have ended. Returns their number.
     pub(in crate::store) fn sweep(&self) -> io::Result<usize> {
         let left = self.left()?;
         for (path, _lock) in &left {
@@ -65,14 +65,14 @@ impl Workplace {
         Ok(left.len())
     }
 
-    /// How many processes left something that are gone, and its bytes.
+    /// Returns the number of folders of processes that have ended, and their total size in bytes.
     pub(in crate::store) fn n_left(&self) -> io::Result<(usize, u64)> {
         let left = self.left()?;
         let sizes = left.iter().map(|(path, _lock)| size_of(path));
         Ok((left.len(), sizes.sum::<io::Result<u64>>()?))
     }
 
-    /// What processes left that are gone, locked.
+    /// Returns the folders of processes that have ended, locked by this process.
     fn left(&self) -> io::Result<Vec<(PathBuf, File)>> {
         let mut left = Vec::new();
         for entry in fs::read_dir(&self.tmp)? {
@@ -86,7 +86,7 @@ impl Workplace {
         Ok(left)
     }
 
-    /// Leaves nothing behind, unless something is still being made.
+    /// Removes this process's folder if it is empty.
     pub(in crate::store) fn close(&self) {
         let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((folder, _)) = own.as_ref()
@@ -97,7 +97,8 @@ impl Workplace {
     }
 }
 
-/// Another process may sweep the folder before it is locked: then it is made anew.
+/// Creates and locks a folder for this process. Another process may remove the folder before it is locked;
+/// then another one is created.
 fn make_own(tmp: &Path) -> io::Result<(PathBuf, File)> {
     loop {
         let path = tmp.join(Uuid::now_v7().to_string());
@@ -113,12 +114,12 @@ fn make_own(tmp: &Path) -> io::Result<(PathBuf, File)> {
 }
 
 impl Draft {
-    /// Where to write.
+    /// Returns the path of the draft.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Moves it into place, from where it is not removed.
+    /// Moves the draft to its final place. It is then no longer removed on drop.
     pub(super) fn move_to(mut self, place: &Path) -> io::Result<()> {
         fs::rename(&self.path, place)?;
         self.kept = true;

@@ -1,14 +1,15 @@
-//! Which rows and which files belong together: both bear the same random mark, from their first meeting on. A
-//! database that is not the files' own names none of them, so that a sweep for it would remove them all
-//! (RELIABILITY.md, store rules: no row without its blob, ever).
+//! Marks that show which database and which files belong together. Both store the same random mark, created
+//! at their first use together. Without this check, a sweep with another database would find no rows for the
+//! files and delete them all.
 
 use super::{Place, hex};
 use crate::store::tokens::random_key;
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Fails with [`Error::OtherFiles`] where the files are another database's. Where a mark is missing, on one side
-    /// or on both, it is made if the rows know of the files, or if there are none.
+    /// Verifies that database and files have the same mark. Fails with [`Error::OtherFiles`] if they differ.
+    ///
+    /// A missing mark is added if the database knows at least one of the files, or if there are no files.
     pub(in crate::store) async fn own_files(&self) -> Result<(), Error> {
         let of_rows = self.mark_of_rows().await?;
         let of_files = self.mark_of_files().await?;
@@ -26,7 +27,7 @@ impl Store {
             (None, Some(of_files)) => self.mark_rows(&unhex(of_files)).await?,
             (None, None) => self.mark_rows(&random_key()?).await?,
         };
-        // Of several processes that start at once each has the rows' mark by now.
+        // Processes that start at the same time have all read the same mark of the database here.
         match of_files {
             None => self.mark_files(&hex(&mark)).await,
             Some(of_files) if of_files == hex(&mark) => Ok(()),
@@ -34,7 +35,7 @@ impl Store {
         }
     }
 
-    /// Whether the rows name any of the files, or there are none.
+    /// Returns whether the database knows any of the files, or there are none.
     async fn knows_files(&self) -> Result<bool, Error> {
         let folders = self.blobs.folders().await?;
         for folder in &folders {
@@ -50,7 +51,7 @@ impl Store {
         Ok(sql::query_scalar(sql).fetch_optional(&self.reader).await?)
     }
 
-    /// Gives the rows a mark, unless another process does; the one that they have then.
+    /// Stores a mark in the database unless another process has stored one. Returns the stored mark.
     async fn mark_rows(&self, mark: &[u8]) -> Result<Vec<u8>, Error> {
         sql::query("insert into keys (name, secret) values ('store', $1) on conflict do nothing")
             .bind(mark)
@@ -75,7 +76,8 @@ impl Store {
     }
 }
 
-/// The bytes of a hexadecimal text; what is none is no mark of ours.
+/// Returns the bytes of a hexadecimal text. Invalid digits are skipped, so the result then
+/// differs from the text.
 fn unhex(text: &str) -> Vec<u8> {
     let pairs = text.as_bytes().chunks_exact(2);
     let bytes = pairs.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());
@@ -90,7 +92,7 @@ mod tests {
     use super::*;
     use crate::config::{Files, Storage};
 
-    /// Rows in a folder of their own, files in one that others may name too.
+    /// Returns a storage with its own database and a folder of files that others may use too.
     fn storage(rows: &Path, files: &Path) -> Storage {
         Storage {
             store: Some(Files::Folder(files.to_owned())),

@@ -1,9 +1,10 @@
-//! The files of the store: immutable, in folders that are made elsewhere and put into place as a whole
-//! before any row names them (RELIABILITY.md, store rules: sync the file, rename it, sync the folder, *then*
-//! commit the row). They lie in a folder of this machine or in a bucket; whoever works on them works on files
-//! of this machine.
+//! The stored files. They never change. A folder of files is completed elsewhere and then put in its final
+//! place, before any row names it (docs/explanation/promises.md, "No upload is lost"). Order: sync the files,
+//! rename the folder, sync its parent, then commit the row.
 //!
-//! A folder's name holds the fence of the job that made it, so that two attempts never meet in one folder.
+//! The files are in a local folder or in a bucket. Code that works on files always uses local ones. The
+//! folder of a job's result contains the job's fence in its name, so that two attempts never use the same
+//! folder.
 
 mod bucket;
 mod draft;
@@ -33,24 +34,24 @@ use super::{Error, Store, Transaction, sql};
 use crate::code::Code;
 use crate::config::{Files, Storage};
 
-/// The kinds of folders.
+/// Kinds of folders.
 const KINDS: [&str; 4] = ["footage", "libraries", "flocks", "fish"];
 
-/// The name under which files bear their mark (`identity`).
+/// Name of the file that holds the mark of the files (`identity`).
 const MARK: &str = "store-id";
 
-/// One file of a folder in the store.
+/// One stored file.
 #[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
 pub struct BlobFile {
-    /// The file's name in its folder; ours, never a user's.
+    /// Name in its folder; chosen by the program, never by a user.
     pub name: String,
     /// Size, bytes.
     pub size_bytes: i64,
-    /// SHA-256 of the content: the ETag.
+    /// SHA-256 of the content; used as ETag.
     pub sha256: Vec<u8>,
 }
 
-/// What is in place and what is being made.
+/// The stored files, and the drafts of this process.
 #[derive(Clone, Debug)]
 pub struct Blobs {
     place: Place,
@@ -58,29 +59,29 @@ pub struct Blobs {
     uploads: PathBuf,
 }
 
-/// Where files are once they are in place.
+/// Location of the stored files.
 #[derive(Clone, Debug)]
 enum Place {
     Shelf(Shelf),
     Bucket(Bucket),
 }
 
-/// A folder in place.
+/// A stored folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Folder {
-    /// Its kind and its own name.
+    /// Kind and name, as in `flocks/<name>`.
     pub name: String,
-    /// When the youngest of its files was put there.
+    /// Time at which its newest file was stored.
     pub modified: SystemTime,
-    /// Size of all its files, bytes.
+    /// Total size of its files, bytes.
     pub n_bytes: u64,
 }
 
-/// Files as files of this machine, until dropped.
+/// Local files or local copies of stored files. Copies are removed on drop.
 #[derive(Debug)]
 pub struct Fetched {
     path: PathBuf,
-    /// Where they are a copy.
+    /// The copies, if the files are in a bucket.
     _copy: Option<Draft>,
 }
 
@@ -90,7 +91,7 @@ impl Blobs {
         fs::create_dir_all(&uploads)?;
         let (place, tmp) = match &storage.store {
             None => (storage.data.join("blobs"), storage.data.join("tmp")),
-            // Beside the files, for what is made is renamed into place.
+            // Drafts are renamed into this folder, so they must be on the same file system.
             Some(Files::Folder(folder)) => (folder.clone(), folder.join("tmp")),
             Some(Files::Bucket { name, prefix }) => {
                 let place = Place::Bucket(Bucket::open(name, prefix).await?);
@@ -112,13 +113,13 @@ impl Blobs {
         })
     }
 
-    /// A fresh folder of this machine. The name must not have been used before.
+    /// Creates a draft. The name must not have been used before.
     pub fn draft(&self, name: &str) -> io::Result<Draft> {
         self.work.draft(name)
     }
 
-    /// Syncs and hashes every file of a draft, in the order of their names. Blocks; subfolders are
-    /// an error.
+    /// Syncs and hashes all files of a draft. Returns them in the order of their names. Blocks the thread.
+    /// Fails if the draft has subfolders.
     pub fn seal(&self, draft: &Draft) -> io::Result<Vec<BlobFile>> {
         let mut names: Vec<_> = fs::read_dir(draft.path())?
             .map(|entry| Ok(entry?.file_name()))
@@ -130,7 +131,7 @@ impl Blobs {
             .collect()
     }
 
-    /// Puts a draft, whose files are synced, into place as `folder`, for good.
+    /// Stores a draft as `folder`. Its files must be synced.
     pub async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
         match &self.place {
             Place::Shelf(shelf) => shelf.adopt(draft, folder).await,
@@ -138,7 +139,7 @@ impl Blobs {
         }
     }
 
-    /// Removes a folder that no row names (any more). Absence is no error.
+    /// Removes a folder that no row names. Succeeds also if it does not exist.
     pub async fn discard(&self, folder: &str) -> Result<(), Error> {
         match &self.place {
             Place::Shelf(shelf) => shelf.discard(folder).await,
@@ -146,7 +147,7 @@ impl Blobs {
         }
     }
 
-    /// The bytes of a file in place from `first` on, `n_bytes` of them, in pieces.
+    /// Returns `n_bytes` of a stored file from offset `first`, in pieces.
     pub async fn read(
         &self,
         folder: &str,
@@ -160,12 +161,12 @@ impl Blobs {
         }
     }
 
-    /// Size and SHA-256 of a file in place, read to its end.
+    /// Reads a stored file and returns its size and SHA-256.
     pub async fn hash(&self, file: &BlobFile, folder: &str) -> Result<(i64, Vec<u8>), Error> {
         self.copy(file, folder, &mut tokio::io::sink()).await
     }
 
-    /// Writes a file in place to somewhere else; size and SHA-256 of what was written.
+    /// Writes a stored file to `to`. Returns size and SHA-256 of the written bytes.
     pub async fn copy(
         &self,
         file: &BlobFile,
@@ -177,7 +178,7 @@ impl Blobs {
         Ok(write_and_hash(bytes, to).await?)
     }
 
-    /// Every folder in place, in no special order.
+    /// Returns all stored folders, in no particular order.
     pub async fn folders(&self) -> Result<Vec<Folder>, Error> {
         match &self.place {
             Place::Shelf(shelf) => Ok(shelf.folders()?),
@@ -185,24 +186,24 @@ impl Blobs {
         }
     }
 
-    /// Where things are made.
+    /// Returns the folder of the drafts of all processes.
     pub(super) fn tmp(&self) -> &Path {
         self.work.folder()
     }
 
-    /// Where unfinished uploads of this machine grow.
+    /// Returns the folder of this machine's unfinished uploads.
     pub(super) fn uploads(&self) -> &Path {
         &self.uploads
     }
 
-    /// Where this process makes what it makes, and others make theirs.
+    /// Returns the drafts.
     pub(super) fn work(&self) -> &Workplace {
         &self.work
     }
 }
 
 impl Place {
-    /// Whether it can be asked; a folder of this machine is there, or nothing of ours is.
+    /// Returns whether the location answers. A local folder always does.
     async fn is_there(&self) -> bool {
         match self {
             Place::Shelf(_) => true,
@@ -212,22 +213,22 @@ impl Place {
 }
 
 impl Fetched {
-    /// The folder in which the files are.
+    /// Returns the folder of the files.
     pub fn path(&self) -> &Path {
         &self.path
     }
 }
 
 impl Store {
-    /// One file of a folder, if it is there.
+    /// Returns one file of a folder, if it exists.
     pub async fn blob(&self, folder: &str, name: &str) -> Result<Option<BlobFile>, Error> {
         let sql = "select name, size_bytes, sha256 from blobs where folder = $1 and name = $2";
         let blob = sql::query(sql).bind(folder).bind(name);
         Ok(blob.fetch_optional(&self.reader).await?)
     }
 
-    /// Files of a folder, those of them that are there, as files of this machine: the very ones where they
-    /// lie on it, else copies, whose content is compared with what was put in place.
+    /// Returns local copies of those files of a folder that exist. If the store is local, returns the stored
+    /// files themselves. Fails with [`Error::Altered`] if a copy does not match its recorded size and hash.
     pub async fn fetch(&self, folder: &str, names: &[&str]) -> Result<Fetched, Error> {
         let bucket = match &self.blobs.place {
             Place::Shelf(shelf) => {
@@ -255,16 +256,18 @@ impl Store {
         })
     }
 
-    /// Whether a row names the folder.
+    /// Returns whether a row names the folder.
     pub async fn is_folder_known(&self, folder: &str) -> Result<bool, Error> {
         let sql = "select exists (select 1 from blobs where folder = $1)";
         let known = sql::query_scalar(sql).bind(folder);
         Ok(known.fetch_one(&self.reader).await?)
     }
 
-    /// Whether a folder in place was linked by a transaction that ended with `error`: of a lost connection nobody
-    /// knows, so the rows are asked. Where they name it not, and it was the database itself that refused, the
-    /// folder is thrown away; else it is left to the sweep, for a commit may still be under way.
+    /// Returns whether a transaction that failed with `error` has linked a stored folder nevertheless. The
+    /// reply to a commit can be lost, so this asks the database.
+    ///
+    /// If no row names the folder and the database rejected the transaction, the folder is removed. Otherwise
+    /// the commit may still be in progress, and the folder is left to the sweep.
     pub async fn is_linked_after(&self, folder: &str, error: &Error) -> Result<bool, Error> {
         match self.is_folder_known(folder).await {
             Ok(true) => return Ok(true),
@@ -283,7 +286,7 @@ impl Store {
     }
 }
 
-/// Adds the rows of a folder's files, in the transaction that makes the folder's owner.
+/// Adds the rows of a folder's files. Must run in the transaction that adds the row of the footage or result.
 pub(super) async fn insert(
     transaction: &mut Transaction,
     folder: &str,
@@ -312,7 +315,7 @@ fn seal_file(path: &Path) -> io::Result<BlobFile> {
     })
 }
 
-/// Size and SHA-256 of a file.
+/// Returns size and SHA-256 of a file.
 pub(super) fn hash_file(path: &Path) -> io::Result<(i64, Vec<u8>)> {
     let mut file = File::open(path)?;
     let mut hasher = Sha256::new();
@@ -328,7 +331,7 @@ pub(super) fn hash_file(path: &Path) -> io::Result<(i64, Vec<u8>)> {
     }
 }
 
-/// Writes what comes; its size and SHA-256.
+/// Writes the stream to `to`. Returns its size and SHA-256.
 async fn write_and_hash(
     mut bytes: impl Stream<Item = io::Result<Bytes>> + Unpin,
     to: &mut (impl AsyncWrite + Unpin),
@@ -343,7 +346,7 @@ async fn write_and_hash(
     Ok((size_bytes, hasher.finalize().to_vec()))
 }
 
-/// A hash as people and ETags write it.
+/// Returns the bytes as lower-case hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -1,5 +1,5 @@
-//! Room on this machine's disk (RELIABILITY.md, R7): how much is left, and whether it can be written at
-//! all. A reserve is kept, so that rows can still be written and things deleted.
+//! Free space on this machine's disk (docs/explanation/promises.md, "Full disk"), and whether the disk is
+//! writable. `sql::reserve` keeps the space that the database needs on a full disk.
 
 use std::io;
 use std::path::PathBuf;
@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use super::Blobs;
 
 impl Blobs {
-    /// Bytes that we can still write where uploads and results grow: on the fuller one, where they grow
-    /// on two disks.
+    /// Returns the number of bytes that can be written for uploads and results. If they are on two disks,
+    /// returns the smaller number.
     pub fn room_bytes(&self) -> io::Result<u64> {
         let mut least = u64::MAX;
         for folder in self.growing() {
@@ -18,8 +18,8 @@ impl Blobs {
         Ok(least)
     }
 
-    /// Whether a folder of this machine can be made and removed again, and a bucket, where the files are in
-    /// one, answers in time: for readiness.
+    /// Returns whether a local folder can be created and removed, and whether the bucket answers, if there is
+    /// one; for the readiness check.
     pub async fn is_writable(&self) -> bool {
         let work = self.work.clone();
         let name = uuid::Uuid::now_v7().to_string();
@@ -27,7 +27,7 @@ impl Blobs {
         made.await.unwrap_or(false) && self.place.is_there().await
     }
 
-    /// The folders of this machine that grow.
+    /// Returns the local folders that grow.
     fn growing(&self) -> [PathBuf; 2] {
         [self.uploads().to_owned(), self.tmp().to_owned()]
     }

@@ -1,5 +1,5 @@
-//! Files in a folder of this machine: a draft is renamed into place, and names outlive a power cut once
-//! their folder is synced. Read by large pieces, for each read is a hop to the blocking pool.
+//! Files in a local folder. A draft is renamed to its final place, and its parent folder is synced, so that
+//! the name survives a power loss. Reads use large pieces, because each read is a task on the blocking pool.
 
 use std::fs::{self, File};
 use std::io::{self, SeekFrom};
@@ -16,10 +16,10 @@ use tokio_util::io::ReaderStream;
 use super::{Draft, Folder, KINDS, MARK};
 use crate::store::Error;
 
-/// Bytes read at a time.
+/// Size of one read, bytes. Free choice.
 const PIECE_BYTES: usize = 1 << 20;
 
-/// The folder, and one in it for each kind.
+/// The folder, with one subfolder per kind.
 #[derive(Clone, Debug)]
 pub(super) struct Shelf {
     root: PathBuf,
@@ -73,7 +73,7 @@ impl Shelf {
         Ok(ReaderStream::with_capacity(file.take(n_bytes), PIECE_BYTES).boxed())
     }
 
-    /// The mark of these files.
+    /// Returns the mark of these files, if any (`identity`).
     pub(super) fn mark(&self) -> io::Result<Option<String>> {
         match fs::read_to_string(self.root.join(MARK)) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -81,7 +81,7 @@ impl Shelf {
         }
     }
 
-    /// Marks these files, for good.
+    /// Marks these files permanently (`identity`).
     pub(super) fn set_mark(&self, mark: &str) -> io::Result<()> {
         let unfinished = self.root.join(format!("{MARK}.new"));
         fs::write(&unfinished, mark)?;
@@ -95,7 +95,7 @@ impl Shelf {
         for kind in KINDS {
             for entry in fs::read_dir(self.root.join(kind))? {
                 let entry = entry?;
-                // It may be deleted meanwhile.
+                // The folder may be deleted in the meantime.
                 let Ok(about) = entry.metadata() else {
                     continue;
                 };
@@ -111,7 +111,8 @@ impl Shelf {
     }
 }
 
-/// Makes a folder as young as it is in its place: one that was long in the making is no stray before its row comes.
+/// Sets the modification time of a folder to the present. Otherwise a draft that took long could be swept
+/// before its row is committed.
 fn touch(path: &Path) -> io::Result<()> {
     let now = Timespec {
         tv_sec: 0,
@@ -124,7 +125,7 @@ fn touch(path: &Path) -> io::Result<()> {
     Ok(utimensat(CWD, path, &times, AtFlags::empty())?)
 }
 
-/// Bytes of a file, or of all files below a folder; of what is gone already, none.
+/// Returns the size of a file, or of all files below a folder, bytes. A missing file counts as 0.
 pub(super) fn size_of(path: &Path) -> io::Result<u64> {
     let about = match fs::symlink_metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
@@ -140,7 +141,7 @@ pub(super) fn size_of(path: &Path) -> io::Result<u64> {
     Ok(n_bytes)
 }
 
-/// Makes the names in a folder outlive a power cut.
+/// Syncs the folder, so that the names in it survive a power loss.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     File::open(path)?.sync_all()
 }

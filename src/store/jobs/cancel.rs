@@ -1,4 +1,4 @@
-//! Cancel: somebody no longer wants the job.
+//! Cancel: a user no longer wants the job.
 
 use super::JobState;
 use super::follow::cancel_followers;
@@ -6,21 +6,21 @@ use crate::ids::JobId;
 use crate::store::owners::Reach;
 use crate::store::{Error, Store, sql};
 
-/// What a wish to cancel met.
+/// Result of [`Store::cancel`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cancel {
-    /// The job was queued and is cancelled, with all that followed it.
+    /// The job was queued. It is cancelled, with all jobs that depend on it.
     Cancelled,
-    /// The job is running: its worker will learn of it with the next heartbeat.
+    /// The job is running. Its worker learns of the request at its next heartbeat.
     Requested,
-    /// The job had ended already.
+    /// The job had already ended.
     Final(JobState),
-    /// There is no such job within reach.
+    /// No visible job has this id.
     Absent,
 }
 
 impl Store {
-    /// Cancels a queued job at once, asks the worker of a running one to stop.
+    /// Cancels a queued job immediately, or asks the worker of a running job to stop.
     pub async fn cancel(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
         let cancel = || self.cancel_now(job, reach, now_ms);
         self.reserve.lend(cancel).await

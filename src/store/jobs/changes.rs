@@ -1,6 +1,7 @@
-//! Which jobs may have changed since somebody last looked: what a stream of events asks again and again.
-//! Both questions meet an index (the state, the id, which begins with the time it was made); the history
-//! is read once for each stream that was cut.
+//! Jobs that may have changed since a given time. Event streams run these queries repeatedly.
+//!
+//! Both queries use an index: by state, or by id, which begins with the creation time. A stream reads ended
+//! jobs only once, when it resumes after an interruption.
 
 use sqlx::types::Uuid;
 
@@ -8,13 +9,14 @@ use super::read::{JobRow, Row, columns};
 use crate::store::owners::Reach;
 use crate::store::{Error, Store, sql};
 
-/// The most that a stream which was cut is told of what ended meanwhile.
+/// Maximum number of ended jobs that a resumed stream reports. Free choice.
 const MAX_ENDED: i64 = 1_000;
-/// The most that any stream follows at once: the latest.
+/// Maximum number of jobs that a stream follows; the newest ones. Free choice.
 const MAX_UNDER_WAY: i64 = 10_000;
 
 impl Store {
-    /// The jobs within reach that are queued, running, or were made since, the latest ten thousand, oldest first.
+    /// Returns the visible jobs that are queued, running, or were created since `since_ms`. At most the
+    /// 10,000 newest, oldest first.
     pub async fn jobs_under_way(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
         let sql = concat!(
             "select ",
@@ -31,13 +33,13 @@ impl Store {
         rows.into_iter().rev().map(JobRow::try_from).collect()
     }
 
-    /// Whether anybody has a job that is queued or running.
+    /// Returns whether any owner has a queued or running job.
     pub async fn has_jobs_under_way(&self) -> Result<bool, Error> {
         let sql = "select exists (select 1 from jobs where state in ('queued', 'running'))";
         Ok(sql::query_scalar(sql).fetch_one(&self.reader).await?)
     }
 
-    /// The jobs within reach that ended since, the latest thousand of them.
+    /// Returns the visible jobs that ended since `since_ms`. At most the 1000 that ended last, latest first.
     pub async fn jobs_ended(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
         let sql = concat!(
             "select ",
@@ -55,7 +57,7 @@ impl Store {
     }
 }
 
-/// The least id of version 7 that can be made at that time.
+/// Returns the smallest UUID of version 7 with this creation time (milliseconds since 1970).
 fn first_id_of(ms: i64) -> Uuid {
     Uuid::from_u128(u128::from(ms.max(0).unsigned_abs()) << 80)
 }

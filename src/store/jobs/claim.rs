@@ -1,5 +1,5 @@
-//! Claim: a worker takes the next queued job under a lease with a fresh fence. Owners take turns, so
-//! that nobody waits for all that another has queued (RELIABILITY.md, R9).
+//! Claim: a worker takes the next queued job with a lease and a new fence. Owners take turns, so that one
+//! owner's many jobs do not delay another owner's job (docs/explanation/promises.md, "Fair queue").
 
 use sqlx::types::Uuid;
 
@@ -8,9 +8,11 @@ use crate::ids::JobId;
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// The next job whose turn it is: of the owner with the fewest running jobs; highest priority
-    /// first; of the owner who waited longest since a job of theirs began; the oldest. `None` when
-    /// there is none. A job that follows another waits until that one is done.
+    /// Claims the next job for a worker. Returns `None` if no job is ready. A job that depends on another one
+    /// is ready when that one is done.
+    ///
+    /// Order of the jobs: owners with fewer running jobs first, then higher priority, then owners whose last
+    /// job started longer ago, then older jobs.
     pub async fn claim(
         &self,
         worker: Uuid,

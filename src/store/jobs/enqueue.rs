@@ -1,4 +1,5 @@
-//! Enqueue: a job comes to be, queued, unless its owner has as many as it may (RELIABILITY.md, R9).
+//! Enqueue: adds a job to the queue within the limits of its owner and of the queue
+//! (docs/explanation/promises.md, "Fair queue").
 
 use sqlx::types::Uuid;
 
@@ -8,36 +9,40 @@ use crate::ids::JobId;
 use crate::store::owners::Account;
 use crate::store::{Error, Store, Transaction, sql};
 
-/// What a server tells all who listen.
+/// Name of the notification about new jobs.
 const QUEUED: &str = "flockreel_jobs";
 
 /// A job to be queued.
 #[derive(Clone, Debug)]
 pub struct NewJob {
-    /// Its id.
+    /// Id of the job.
     pub job_id: JobId,
-    /// To whom it is charged.
+    /// Account that the job counts against.
     pub account: Account,
-    /// What it is.
+    /// Kind of the job.
     pub kind: Kind,
-    /// What it needs to run, JSON.
+    /// Input of the job, JSON.
     pub input: String,
-    /// The id that its result will have.
+    /// Id that the result will have.
     pub result_id: Uuid,
-    /// The job whose result it needs, if that is not there yet.
+    /// Job that makes the input; `None` if the input exists.
     pub after_job: Option<JobId>,
-    /// Higher runs first; 0 is usual.
+    /// Jobs of higher priority run first. The usual value is 0.
     pub priority: i64,
-    /// How many jobs of everybody may be queued and running, this one included.
+    /// Maximum number of queued and running jobs of all owners, including this one.
     pub room: i64,
 }
 
 impl Store {
-    /// Adds the job to the queue; [`Error::QuotaExceeded`] where its owner has too many queued and
-    /// running already, [`Error::QueueFull`] where all together have. Counted and added under one lock, so that
-    /// two at once cannot both be the last. A job after one that was cancelled, or has failed, ends at once as it
-    /// would have, had it come before that. A job that is there already under its id, because its request comes again after a crash, is left as it is;
-    /// [`Error::IdInUse`] where that one has another input.
+    /// Adds the job to the queue.
+    ///
+    /// Fails with [`Error::QuotaExceeded`] if the owner has too many queued and running jobs, and with
+    /// [`Error::QueueFull`] if all owners together have. Counting and adding happen under one lock, so that
+    /// simultaneous calls cannot exceed the limits.
+    ///
+    /// A job that depends on a failed or cancelled job ends immediately in the same state. A repeated call
+    /// with the same job id, as after a crash, changes nothing. It fails with [`Error::IdInUse`] if the input
+    /// differs.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
         let mut transaction = self.begin().await?;
         transaction.lock("queue").await?;
@@ -73,24 +78,25 @@ impl Store {
         Ok(())
     }
 
-    /// Hears of jobs that any process queues.
+    /// Subscribes to notifications about new jobs of any process.
     pub async fn listen(&self) -> Result<QueuedJobs, Error> {
         Ok(QueuedJobs(self.reader.listen(QUEUED).await?))
     }
 }
 
-/// Where a process hears that there are jobs, its own and those of others.
+/// Subscription to notifications about new jobs, from this process and others.
 pub struct QueuedJobs(sql::Listener);
 
 impl QueuedJobs {
-    /// Returns once a job was queued since the last call, or may have been. Never where no other process
-    /// queues jobs; an error is a lost connection, and then one listens anew.
+    /// Returns when a job may have been queued since the last call. Never returns on SQLite.
+    ///
+    /// An error means that the connection is lost. The caller must then subscribe again.
     pub async fn next(&mut self) -> Result<(), Error> {
         Ok(self.0.heard().await?)
     }
 }
 
-/// A job that ended before its follower came ends it now: nobody else would.
+/// Ends a new job whose predecessor has already failed or been cancelled. No later event would end it.
 async fn end_with_predecessor(
     transaction: &mut Transaction,
     job: &NewJob,
@@ -99,7 +105,8 @@ async fn end_with_predecessor(
     let Some(before) = job.after_job else {
         return Ok(());
     };
-    // Whoever ends it right now does so before or after all of this.
+    // With the row lock, a concurrent end of the predecessor happens completely before or after this
+    // transaction.
     let sql = "select state from jobs where id = $1 for update";
     let state = sql::query_scalar(sql).bind(before.0);
     let state: Option<String> = state.fetch_optional(&mut *transaction).await?;
@@ -111,7 +118,7 @@ async fn end_with_predecessor(
     Ok(())
 }
 
-/// Why there was no room: where it is both, the owner's own doing.
+/// Returns the limit that refused the job. If both limits are reached, returns that of the owner.
 async fn why_not(transaction: &mut Transaction, job: &NewJob) -> Result<Error, Error> {
     let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
     let count = sql::query_scalar(sql).bind(&job.account.owner);

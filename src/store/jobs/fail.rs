@@ -1,4 +1,4 @@
-//! Fail and stop: the job ends without a result, for a reason or because somebody asked.
+//! Fail and stop: the job ends without a result, because of an error or because a user cancelled it.
 
 use super::follow::{cancel_followers, fail_followers};
 use super::{Change, Lease};
@@ -6,7 +6,8 @@ use crate::code::Code;
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Ends the job as failed, for a reason that another attempt would meet again; `picture` shows it, JPEG.
+    /// Ends the job as failed, for an error that another attempt would repeat. `picture` is a JPEG that shows
+    /// the reason.
     pub async fn fail(
         &self,
         lease: &Lease,
@@ -49,7 +50,7 @@ impl Store {
         Ok(Change::of_rows(n_rows))
     }
 
-    /// Ends a running job as cancelled: its worker has let go of it.
+    /// Ends a running job as cancelled, after its worker has stopped the work.
     pub async fn stop(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
         self.reserve.lend(|| self.stop_now(lease, now_ms)).await
     }

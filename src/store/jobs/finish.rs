@@ -1,5 +1,5 @@
-//! Finish: the job is done, and its one result set is linked in the same transaction
-//! (RELIABILITY.md, R2 and R3).
+//! Finish: the job is done. The same transaction links its single result
+//! (docs/explanation/promises.md, "No job is lost" and "Stalled workers cannot overwrite").
 
 use sqlx::types::Uuid;
 
@@ -7,37 +7,37 @@ use super::{Change, Lease};
 use crate::store::footage::{self, Filmed};
 use crate::store::{BlobFile, Error, Store, Transaction, blobs, fish, flocks, libraries, sql};
 
-/// What a finished job leaves: files already in place, and the row that names them.
+/// Output of a finished job: files that are already stored, and the values of the result's row.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What was made, and of what.
+    /// Kind of the result, and its source.
     pub made: Made,
-    /// The folder in the blob store.
+    /// Folder in the blob store.
     pub folder: String,
-    /// The files in it.
+    /// Files in the folder.
     pub files: Vec<BlobFile>,
-    /// The parameters in full, JSON; not kept of a film.
+    /// All parameters, JSON; not stored for a sample.
     pub params: String,
-    /// What is worth knowing at a glance, JSON; not kept of a film.
+    /// Summary for overviews, JSON; not stored for a sample.
     pub summary: String,
 }
 
-/// What was made, and of what.
+/// Kind of a result, with the id of the footage or library that it was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Made {
-    /// The sample, of nothing.
+    /// The sample footage; made from nothing.
     Sample(Filmed),
-    /// A library of this footage.
+    /// A library made from this footage.
     Library(Uuid),
-    /// A flock of this library.
+    /// A flock made from this library.
     Flock(Uuid),
-    /// A virtual fish of this library.
+    /// A virtual fish made from this library.
     Fish(Uuid),
 }
 
 impl Store {
-    /// Links the result and ends the job, if the fence still stands; [`Change::Lost`] means that the
-    /// caller must throw its output away. A cancel that comes too late loses against finishing.
+    /// Links the result and ends the job if the fence is still valid. [`Change::Lost`] means that the caller
+    /// must discard its output. A pending cancel request is ignored.
     pub async fn finish(
         &self,
         lease: &Lease,
@@ -77,13 +77,13 @@ impl Store {
 }
 
 impl Outcome {
-    /// Size of all files, bytes.
+    /// Returns the total size of the files, bytes.
     pub fn size_bytes(&self) -> i64 {
         self.files.iter().map(|file| file.size_bytes).sum()
     }
 }
 
-/// Adds the row of the result, which is the job's owner's.
+/// Adds the row of the result. Its owner is the owner of the job.
 async fn insert(
     transaction: &mut Transaction,
     lease: &Lease,

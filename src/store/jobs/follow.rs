@@ -1,12 +1,12 @@
-//! What becomes of the jobs that wait for one that will never be done: they end with it, in the
-//! same transaction, so that no job waits for ever.
+//! Jobs that depend on a job that will never be done. They end in the same transaction as that job, so that
+//! no job waits forever.
 
 use sqlx::types::Uuid;
 
 use crate::code::Code;
 use crate::store::{Transaction, sql};
 
-/// Cancels every job that follows a cancelled one, however far.
+/// Cancels all jobs that depend on a cancelled job, directly or indirectly.
 pub(super) async fn cancel_followers(
     transaction: &mut Transaction,
     job: Uuid,
@@ -26,7 +26,7 @@ pub(super) async fn cancel_followers(
     Ok(())
 }
 
-/// Fails every job that follows a failed one, however far.
+/// Fails all jobs that depend on a failed job, directly or indirectly.
 pub(super) async fn fail_followers(
     transaction: &mut Transaction,
     job: Uuid,

@@ -1,21 +1,21 @@
-//! Heartbeat: the worker is alive, its lease goes on, and this is how far it is.
+//! Heartbeat: a running worker renews its lease and reports its progress.
 
 use super::Lease;
 use crate::store::{Error, Store, sql};
 
-/// What a heartbeat learned.
+/// Result of a heartbeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Beat {
-    /// The lease goes on.
+    /// The lease is renewed.
     Held,
-    /// The lease goes on, but somebody wants the job cancelled.
+    /// The lease is renewed, but a user wants the job cancelled.
     CancelRequested,
-    /// The job is no longer this worker's: its output is to be thrown away.
+    /// The lease is lost. The worker must discard its output.
     Lost,
 }
 
 impl Store {
-    /// Renews the lease and notes stage and progress (0..=1).
+    /// Renews the lease until `lease_until_ms` and stores stage and progress (0..=1).
     pub async fn heartbeat(
         &self,
         lease: &Lease,

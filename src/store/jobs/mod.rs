@@ -1,15 +1,15 @@
-//! The table of jobs: a small state machine in words (STYLE.md, habit 8; RELIABILITY.md, queue
-//! rules). Every transition is one function in one file, one short transaction and one event.
+//! The table of jobs: a state machine (docs/explanation/promises.md, "No job is lost"). Every transition is
+//! one function in one file, one short transaction and one log event.
 //!
 //! ```text
 //! enqueue -> queued --claim--> running --finish--> done
 //!              ^  |               |  \---fail----> failed      <- rescue, after two crashes
-//!              |  '----cancel--.  |  '---stop----> cancelled   <- rescue, where cancel was asked for
+//!              |  '----cancel--.  |  '---stop----> cancelled   <- rescue, if cancel was requested
 //!              |               v  |
 //!              |           cancelled
 //!              '-- retry, release, rescue
 //! ```
-//! A job's row is never deleted by the queue: the history is what users ask for.
+//! The queue never deletes rows, because users want to see the history of their jobs.
 
 pub mod cancel;
 pub mod changes;
@@ -31,66 +31,66 @@ use sqlx::types::Uuid;
 use super::Error;
 use crate::ids::JobId;
 
-/// The closed set of kinds of job.
+/// Kinds of jobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Nothing to footage: the sample is filmed.
+    /// Makes the sample footage; needs no input.
     Sample,
-    /// Footage to library.
+    /// Makes a library from footage.
     Analysis,
-    /// Library to flock.
+    /// Makes a flock from a library.
     Flock,
-    /// Library to virtual fish.
+    /// Makes a virtual fish from a library.
     Fish,
 }
 
-/// Where a job stands.
+/// State of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JobState {
-    /// Waits for a worker. In by enqueue, retry, release, rescue; out by claim, cancel.
+    /// Waits for a worker. Entered by enqueue, retry, release, rescue; left by claim, cancel.
     Queued,
-    /// A worker holds its lease. In by claim; out by finish, fail, retry, release, stop, rescue.
+    /// A worker holds its lease. Entered by claim; left by finish, fail, retry, release, stop, rescue.
     Running,
-    /// Its one result set is linked. In by finish; final.
+    /// Its result is linked. Entered by finish; final.
     Done,
-    /// It has a code. In by fail and rescue (quarantine); final.
+    /// It has an error code. Entered by fail and by rescue (quarantine); final.
     Failed,
-    /// Somebody asked for it. In by cancel, stop and rescue; final.
+    /// A user cancelled it. Entered by cancel, stop and rescue; final.
     Cancelled,
 }
 
-/// The right to work on a job until the lease ends, and to finish it if the fence still stands.
+/// The right to work on a job until the lease expires, and to finish it while the fence is valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Lease {
-    /// The job.
+    /// Id of the job.
     pub job_id: JobId,
-    /// What it is.
+    /// Kind of the job.
     pub kind: Kind,
-    /// Its input as it was enqueued, JSON.
+    /// Input of the job, JSON.
     pub input: String,
-    /// The id that its result will have.
+    /// Id that the result will have.
     pub result_id: Uuid,
-    /// How often it has been claimed, released claims apart: 1 at the first time.
+    /// Number of claims so far, without released ones. The first claim has 1.
     pub attempt: i64,
-    /// The number that only the newest claim holds.
+    /// Number of the claim. Only the latest claim of a job can change it.
     pub fence: i64,
 }
 
-/// Whether a transition that needs a standing lease took place.
+/// Whether a transition that requires a valid lease took place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub enum Change {
-    /// It did.
+    /// The transition took place.
     Made,
-    /// The lease had passed to somebody else, or the job had ended: nothing was changed.
+    /// Nothing was changed: another worker holds the lease, or the job has ended.
     Lost,
 }
 
 impl Kind {
-    /// Every kind.
+    /// All kinds.
     pub const ALL: [Kind; 4] = [Kind::Sample, Kind::Analysis, Kind::Flock, Kind::Fish];
 
-    /// The name in the database and the API.
+    /// Returns the name used in the database and in the API.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Sample => "sample",
@@ -107,7 +107,7 @@ impl Kind {
 }
 
 impl JobState {
-    /// Every state.
+    /// All states.
     pub const ALL: [JobState; 5] = [
         JobState::Queued,
         JobState::Running,
@@ -116,7 +116,7 @@ impl JobState {
         JobState::Cancelled,
     ];
 
-    /// The name in the database and the API.
+    /// Returns the name used in the database and in the API.
     pub fn name(self) -> &'static str {
         match self {
             JobState::Queued => "queued",
@@ -127,7 +127,7 @@ impl JobState {
         }
     }
 
-    /// Whether it will never change again.
+    /// Returns whether the state is final.
     pub fn is_final(self) -> bool {
         match self {
             JobState::Queued | JobState::Running => false,

@@ -1,4 +1,4 @@
-//! Reading jobs: one, a page, the one that makes a given result.
+//! Queries for jobs: one job, a page of jobs, or the job of a result.
 
 use sqlx::types::Uuid;
 
@@ -8,36 +8,36 @@ use crate::ids::JobId;
 use crate::store::owners::Reach;
 use crate::store::{Error, Store};
 
-/// One job as people see it.
+/// One job as shown to users.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobRow {
-    /// Its id.
+    /// Id of the job.
     pub id: JobId,
-    /// What it is.
+    /// Kind of the job.
     pub kind: Kind,
-    /// Where it stands.
+    /// State of the job.
     pub state: JobState,
-    /// The id of the result that it makes.
+    /// Id of the result that the job makes.
     pub result_id: Uuid,
-    /// The id of the footage or library that it works on; `None` for a sample, which needs neither.
+    /// Id of the footage or library that is the input; `None` for a sample.
     pub subject_id: Option<Uuid>,
-    /// Whether somebody asked to cancel it.
+    /// Whether a user asked to cancel the job.
     pub cancel_requested: bool,
-    /// How often it has been tried.
+    /// Number of attempts so far.
     pub attempt: i64,
-    /// The stage under way, while running.
+    /// Current stage; for a failed or cancelled job the last one, if known.
     pub stage: Option<String>,
-    /// How much of the whole is done, 0..=1.
+    /// Completed share of the job, 0..=1.
     pub progress: f64,
-    /// Why it failed.
+    /// Error code and message of a failed job.
     pub failure: Option<(Code, String)>,
-    /// Whether there is a picture of that.
+    /// Whether a picture shows the reason of the failure.
     pub has_picture: bool,
-    /// When it was queued, first claimed and ended, milliseconds since 1970.
+    /// Time at which the job was queued, milliseconds since 1970.
     pub created_ms: i64,
-    /// See `created_ms`.
+    /// Time of the first claim, milliseconds since 1970.
     pub started_ms: Option<i64>,
-    /// See `created_ms`.
+    /// Time at which the job ended, milliseconds since 1970.
     pub finished_ms: Option<i64>,
 }
 
@@ -72,7 +72,7 @@ pub(super) struct Row {
 }
 
 impl Store {
-    /// One job, if it is there and within reach.
+    /// Returns the job if it exists and is visible to the caller.
     pub async fn job(&self, id: JobId, reach: &Reach) -> Result<Option<JobRow>, Error> {
         let sql = concat!(
             "select ",
@@ -83,7 +83,7 @@ impl Store {
         row.map(JobRow::try_from).transpose()
     }
 
-    /// The picture of why a job failed, JPEG, if it has one and is within reach.
+    /// Returns the picture that shows why a job failed (JPEG), if it has one and is visible to the caller.
     pub async fn refused_jpeg(&self, id: JobId, reach: &Reach) -> Result<Option<Vec<u8>>, Error> {
         let sql = "select refused_jpeg from jobs \
                    where id = $1 and ($2 is null or owner = $2) and refused_jpeg is not null";
@@ -91,7 +91,7 @@ impl Store {
         Ok(row.map(|(jpeg,)| jpeg))
     }
 
-    /// The job that makes, or made, the result of that id, if it is within reach.
+    /// Returns the job that makes or made this result, if it is visible to the caller.
     pub async fn job_of_result(
         &self,
         result: Uuid,
@@ -106,7 +106,7 @@ impl Store {
         row.map(JobRow::try_from).transpose()
     }
 
-    /// The newest jobs, at most `limit`, older than `before`.
+    /// Returns the newest jobs with ids less than `before`, at most `limit`.
     pub async fn list_jobs(
         &self,
         limit: i64,

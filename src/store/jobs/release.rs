@@ -1,11 +1,11 @@
-//! Release: the worker stops and gives its job back; the attempt does not count
-//! (RELIABILITY.md, R4).
+//! Release: a stopping worker returns its job to the queue. The attempt does not count
+//! (docs/explanation/promises.md, "Graceful stop").
 
 use super::{Change, Lease};
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Puts the job back in the queue as if it had not been claimed, its fence apart.
+    /// Returns the job to the queue as if it had not been claimed, except for its fence.
     pub async fn release(&self, lease: &Lease) -> Result<Change, Error> {
         self.reserve.lend(|| self.release_now(lease)).await
     }

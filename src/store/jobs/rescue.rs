@@ -1,5 +1,6 @@
-//! Rescue: jobs whose workers fell silent get another worker, or an end (RELIABILITY.md, R2, R8).
-//! By the lease, never by the age of the job: a job may run for hours as long as its worker beats.
+//! Rescue: jobs whose worker has stopped sending heartbeats return to the queue or end
+//! (docs/explanation/promises.md, "No job is lost" and "Poison jobs"). The lease decides, never the age of
+//! the job: a job may run for hours while its worker sends heartbeats.
 
 use sqlx::types::Uuid;
 
@@ -9,19 +10,20 @@ use crate::code::Code;
 use crate::ids::JobId;
 use crate::store::{Error, Store, Transaction, sql};
 
-/// A job that kills its worker this often is quarantined.
+/// Number of crashes after which a job is quarantined. Free choice.
 const MAX_CRASHES: i64 = 2;
 
 impl Store {
-    /// Rescues every job whose lease ended before `now_ms`: back to the queue; cancelled, where that
-    /// had been asked for; failed as `crashed_worker` at its second crash. Returns where each went.
+    /// Rescues every job whose lease expired before `now_ms`. The job is cancelled if that was requested,
+    /// fails as `crashed_worker` at its second crash, and otherwise returns to the queue. Returns the new
+    /// states.
     pub async fn rescue(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
         let rescue = || self.rescue_leases_before(now_ms, now_ms);
         self.reserve.lend(rescue).await
     }
 
-    /// The same at the start of the process, whatever the leases say. Sound because the store's lock
-    /// on the data folder is held: whoever gave those leases is gone.
+    /// Rescues all running jobs, at the start of a process. Call it only if [`Store::is_alone`]: the workers
+    /// that hold their leases have then ended.
     pub async fn rescue_all(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
         let rescue = || self.rescue_leases_before(i64::MAX, now_ms);
         self.reserve.lend(rescue).await

@@ -1,10 +1,10 @@
-//! Retry: what failed may pass another time; the attempt counts.
+//! Retry: a job that failed may succeed later. The attempt counts.
 
 use super::{Change, Lease};
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Puts the job back in the queue, not to be claimed before `run_at_ms`.
+    /// Returns the job to the queue. It is not claimed before `run_at_ms`.
     pub async fn retry(&self, lease: &Lease, run_at_ms: i64) -> Result<Change, Error> {
         self.reserve.lend(|| self.retry_now(lease, run_at_ms)).await
     }

@@ -1,5 +1,5 @@
-//! The transitions, one by one, on a real database (RELIABILITY.md, R2, R3, R8). Time is given, so
-//! nothing sleeps.
+//! Tests of the transitions on a real database (docs/explanation/promises.md, "No job is lost", "Stalled
+//! workers cannot overwrite" and "Poison jobs"). Times are arguments, so nothing sleeps.
 
 use tempfile::TempDir;
 
@@ -71,7 +71,7 @@ impl Queue {
             .state
     }
 
-    /// Finishes with a result of no files over a library made for it.
+    /// Finishes a job with a result without files, made from a library that is added for it.
     async fn finish(&self, lease: &Lease) -> Change {
         let library = self.library().await;
         let outcome = Outcome {
@@ -326,7 +326,8 @@ fn of(owner: &str, quota: i64) -> Account {
     }
 }
 
-/// How many jobs begin before the one of the owner who came last, with so many workers.
+/// Returns the number of jobs that start before the job of the owner who queued last, if `n_workers` jobs run
+/// at once.
 async fn n_before_the_other(n_workers: usize) -> usize {
     let queue = Queue::open().await;
     for _ in 0..500 {

@@ -1,8 +1,9 @@
-//! One SQL text for both engines (RELIABILITY.md, store and queue rules): SQLite, in one file of one machine,
-//! and PostgreSQL, which any number of machines share. The rest of the store does not notice which is there.
+//! One SQL text for both database engines: SQLite, a file on one machine, and PostgreSQL, which several
+//! machines can share. The rest of the store does not depend on the engine.
 //!
-//! `$n` parameters, `returning`, `on conflict` and common table expressions mean the same on both. Row locks
-//! are PostgreSQL's alone: SQLite's one writer holds all rows anyway, so its text goes without them.
+//! `$n` parameters, `returning`, `on conflict` and common table expressions mean the same in both. Only
+//! PostgreSQL has row locks. They are removed from the text for SQLite, where the single writer locks the
+//! whole database.
 
 mod pool;
 mod reserve;
@@ -19,7 +20,7 @@ pub(super) use pool::{Listener, Pool, Transaction};
 pub(super) use reserve::Reserve;
 use value::{Value, arguments};
 
-/// The clauses that SQLite does not know, the longest first.
+/// Clauses that SQLite does not know. Longer ones come first, because shorter ones are parts of them.
 const ROW_LOCKS: [&str; 3] = [
     " for update of j skip locked",
     " for update skip locked",
@@ -35,7 +36,7 @@ pub(super) struct Query {
 /// A statement whose rows have one column.
 pub(super) struct ScalarQuery(Query);
 
-/// A statement with its parameters; $1 is bound first.
+/// Returns a statement without parameters. The first bound value becomes `$1`.
 pub(super) fn query(sql: &'static str) -> Query {
     Query {
         sql,
@@ -43,12 +44,12 @@ pub(super) fn query(sql: &'static str) -> Query {
     }
 }
 
-/// The same for rows of one column.
+/// Returns a statement whose rows have one column, without parameters.
 pub(super) fn query_scalar(sql: &'static str) -> ScalarQuery {
     ScalarQuery(query(sql))
 }
 
-/// What can be made of a row of either engine.
+/// Types that can be read from a row of either engine.
 pub(super) trait Row:
     for<'r> FromRow<'r, SqliteRow> + for<'r> FromRow<'r, PgRow> + Send + Unpin
 {
@@ -57,7 +58,7 @@ pub(super) trait Row:
 impl<T> Row for T where T: for<'r> FromRow<'r, SqliteRow> + for<'r> FromRow<'r, PgRow> + Send + Unpin
 {}
 
-/// What can be made of a value of either engine.
+/// Types that can be read from a column of either engine.
 pub(super) trait Column:
     for<'r> Decode<'r, Sqlite>
     + Type<Sqlite>
@@ -78,7 +79,7 @@ impl<T> Column for T where
 {
 }
 
-/// Runs a query where it is to run, as the engine that is there wants it.
+/// Runs a query on a connection or transaction, with the statement and parameters in the form of its engine.
 macro_rules! run {
     ($query:expr, $on:expr, $prepare:path, |$at:ident, $statement:ident| $run:expr) => {{
         let Query { sql, values } = $query;
@@ -106,20 +107,20 @@ macro_rules! run {
 }
 
 impl Query {
-    /// The next parameter.
+    /// Binds the next parameter.
     pub(super) fn bind(mut self, value: impl Into<Value>) -> Query {
         self.values.push(value.into());
         self
     }
 
-    /// Runs it and says how many rows were changed.
+    /// Runs the statement and returns the number of changed rows.
     pub(super) async fn execute<'a>(self, on: impl Into<On<'a>>) -> Result<u64, sqlx::Error> {
         run!(self, on, sqlx::query_with, |at, statement| {
             Ok(statement.execute(at).await?.rows_affected())
         })
     }
 
-    /// The one row.
+    /// Returns the first row. Fails if there is none.
     pub(super) async fn fetch_one<'a, T: Row>(
         self,
         on: impl Into<On<'a>>,
@@ -129,7 +130,7 @@ impl Query {
         })
     }
 
-    /// The first row, if there is one.
+    /// Returns the first row, if there is one.
     pub(super) async fn fetch_optional<'a, T: Row>(
         self,
         on: impl Into<On<'a>>,
@@ -139,7 +140,7 @@ impl Query {
         })
     }
 
-    /// Every row.
+    /// Returns all rows.
     pub(super) async fn fetch_all<'a, T: Row>(
         self,
         on: impl Into<On<'a>>,
@@ -151,12 +152,12 @@ impl Query {
 }
 
 impl ScalarQuery {
-    /// The next parameter.
+    /// Binds the next parameter.
     pub(super) fn bind(self, value: impl Into<Value>) -> ScalarQuery {
         ScalarQuery(self.0.bind(value))
     }
 
-    /// The one row's value.
+    /// Returns the value of the first row. Fails if there is none.
     pub(super) async fn fetch_one<'a, T: Column>(
         self,
         on: impl Into<On<'a>>,
@@ -165,7 +166,7 @@ impl ScalarQuery {
         Ok(value)
     }
 
-    /// The first row's value, if there is one.
+    /// Returns the value of the first row, if there is one.
     pub(super) async fn fetch_optional<'a, T: Column>(
         self,
         on: impl Into<On<'a>>,
@@ -174,7 +175,7 @@ impl ScalarQuery {
         Ok(row.map(|(value,)| value))
     }
 
-    /// Every row's value.
+    /// Returns the values of all rows.
     pub(super) async fn fetch_all<'a, T: Column>(
         self,
         on: impl Into<On<'a>>,
@@ -201,7 +202,7 @@ mod tests {
 
     use super::{Pool, query, without_row_locks};
 
-    /// Every table and column.
+    /// Returns all tables with their columns.
     async fn columns(pool: &Pool, sql: &'static str) -> BTreeSet<(String, String)> {
         let rows: Vec<(String, String)> = query(sql).fetch_all(pool).await.unwrap();
         let ours = |(table, _): &(String, String)| !table.starts_with("_sqlx");

@@ -1,8 +1,8 @@
-//! Connections to whichever engine is there, and how each is opened.
+//! Database connections, and how they are opened for each engine.
 //!
-//! SQLite has one writer connection beside a pool of readers: with one writer nobody upgrades a read
-//! snapshot, so nobody meets `database is locked`. PostgreSQL locks rows, and where a rule is about more than
-//! the rows it changes, a name ([`Transaction::lock`]).
+//! SQLite has one writer connection and a pool of readers. With a single writer no reader upgrades its
+//! snapshot to write, so `database is locked` does not occur. PostgreSQL locks rows. Rules that involve more
+//! than the changed rows use a named lock ([`Transaction::lock`]).
 
 use std::path::Path;
 use std::str::FromStr;
@@ -20,30 +20,33 @@ use crate::store::Error;
 
 static FOR_SQLITE: Migrator = sqlx::migrate!("migrations/sqlite");
 static FOR_POSTGRES: Migrator = sqlx::migrate!("migrations/postgres");
+/// Number of reader connections of one process. Free choice.
 const SQLITE_READERS: u32 = 4;
-/// Connections of one process: many processes share what a server allows, usually 100.
+/// Number of connections of one process. Many processes share the server's limit, which is usually 100.
 const POSTGRES_CONNECTIONS: u32 = 8;
 
+/// Error code of PostgreSQL: the database does not exist.
 const NO_SUCH_DATABASE: &str = "3D000";
+/// Error code of PostgreSQL: the database exists already.
 const DATABASE_IS_THERE: &str = "42P04";
 
-/// Connections of one kind.
+/// The connections to a database.
 #[derive(Clone, Debug)]
 pub(in crate::store) enum Pool {
     Sqlite(SqlitePool),
     Postgres(PgPool),
 }
 
-/// What changes together or not at all; undone when dropped before its end.
+/// A transaction. Dropping it before the commit rolls it back.
 pub(in crate::store) enum Transaction {
     Sqlite(sqlx::Transaction<'static, Sqlite>),
     Postgres(sqlx::Transaction<'static, Postgres>),
 }
 
-/// Hears what other processes notify of; on SQLite there is nobody to hear.
+/// Receiver of notifications from other processes. On SQLite it receives none.
 pub(in crate::store) struct Listener(Option<Box<PgListener>>);
 
-/// Where a statement runs: on any connection, or in a transaction.
+/// Where a statement runs: on any connection of a pool, or in a transaction.
 pub(in crate::store) enum On<'a> {
     SqlitePool(&'a SqlitePool),
     Sqlite(&'a mut SqliteConnection),
@@ -52,14 +55,15 @@ pub(in crate::store) enum On<'a> {
 }
 
 impl Pool {
-    /// The writer and the readers of a file, made if absent, and brought to this version's form
-    /// where `migrates`.
+    /// Opens a database file and returns the writer and the readers. Creates the file if absent, and migrates
+    /// it to this version's schema if `migrates`.
     pub(in crate::store) async fn open_sqlite(
         file: &Path,
         migrates: bool,
     ) -> Result<[Pool; 2], Error> {
         let options = options(file);
-        // A file does not hang up: to ask each time whether a connection still answers would double the way to it.
+        // A local file does not disconnect. A test before every use would double the cost of getting a
+        // connection.
         let pool = SqlitePoolOptions::new().test_before_acquire(false);
         let writer = pool
             .clone()
@@ -77,8 +81,8 @@ impl Pool {
         Ok([Pool::Sqlite(writer), Pool::Sqlite(readers)])
     }
 
-    /// The connections to a server, brought to this version's form; processes that start at once wait
-    /// for one another.
+    /// Connects to a server, creates the database if absent, and migrates it to this version's schema.
+    /// Processes that start at the same time wait for each other.
     pub(in crate::store) async fn open_postgres(url: &str) -> Result<Pool, Error> {
         let options = PgConnectOptions::from_str(url)?.application_name("flockreel");
         let pool = PgPoolOptions::new().max_connections(POSTGRES_CONNECTIONS);
@@ -95,13 +99,13 @@ impl Pool {
         Ok(Pool::Postgres(pool))
     }
 
-    /// Whether the rows are in a file of this machine.
+    /// Returns whether the database is a local file.
     pub(in crate::store) fn is_file(&self) -> bool {
         matches!(self, Pool::Sqlite(_))
     }
 
-    /// Copies the rows, as they are at one time, into a file, and opens it. Of rows on a server
-    /// [`Error::RowsElsewhere`].
+    /// Copies a snapshot of the database to a file and opens the copy. Fails with [`Error::RowsElsewhere`] if
+    /// the database is on a server.
     pub(in crate::store) async fn copy_to(&self, file: &Path) -> Result<Pool, Error> {
         if !self.is_file() {
             return Err(Error::RowsElsewhere);
@@ -114,7 +118,7 @@ impl Pool {
         Ok(Pool::Sqlite(pool.connect_with(options(file)).await?))
     }
 
-    /// A transaction for writing: on SQLite it holds the writer's lock from its first statement.
+    /// Begins a write transaction. On SQLite it locks the database immediately.
     pub(in crate::store) async fn begin(&self) -> Result<Transaction, sqlx::Error> {
         Ok(match self {
             Pool::Sqlite(pool) => Transaction::Sqlite(pool.begin_with("BEGIN IMMEDIATE").await?),
@@ -122,8 +126,8 @@ impl Pool {
         })
     }
 
-    /// The time by the database's clock, milliseconds since 1970, where processes with clocks of their
-    /// own share the database.
+    /// Returns the time of the database's clock, milliseconds since 1970. `None` for SQLite, which only one
+    /// machine uses.
     pub(in crate::store) async fn clock_ms(&self) -> Result<Option<i64>, sqlx::Error> {
         match self {
             Pool::Sqlite(_) => Ok(None),
@@ -134,7 +138,7 @@ impl Pool {
         }
     }
 
-    /// Hears what other processes notify of under a name.
+    /// Subscribes to notifications of this name from all processes.
     pub(in crate::store) async fn listen(&self, name: &str) -> Result<Listener, sqlx::Error> {
         let Pool::Postgres(pool) = self else {
             return Ok(Listener(None));
@@ -144,7 +148,7 @@ impl Pool {
         Ok(Listener(Some(Box::new(listener))))
     }
 
-    /// Closes the connections in order.
+    /// Closes all connections.
     pub(in crate::store) async fn close(&self) {
         match self {
             Pool::Sqlite(pool) => pool.close().await,
@@ -153,12 +157,14 @@ impl Pool {
     }
 }
 
-/// Whether a connection that comes back is in no transaction, by SQLite's count and by sqlx's. They differ after
-/// SQLite has ended a transaction by itself, as it does when the disk is full: sqlx's rollback then fails, and every
-/// later transaction would. Such a connection is closed, and the next one who needs it opens another. Statements
-/// run in order, so a rollback that is under way comes first; a deferred `begin` takes no lock.
+/// Returns whether a released SQLite connection is in no transaction, according to both SQLite and sqlx.
 ///
-/// PostgreSQL's connections need no such test: there a rollback succeeds outside of transactions too.
+/// The two differ after SQLite has rolled back by itself, as it does on a full disk. The rollback of sqlx
+/// then fails, and so would every later transaction. Such a connection is closed, and the next request opens
+/// another one.
+///
+/// Statements run in order, so a pending rollback is complete before this test. The deferred `begin` takes no
+/// lock. PostgreSQL needs no such test, because there a rollback outside of a transaction succeeds.
 async fn is_idle(connection: &mut SqliteConnection) -> bool {
     let begun = connection.execute(sqlx::raw_sql("begin; rollback")).await;
     let is_idle = begun.is_ok() && !connection.is_in_transaction();
@@ -178,7 +184,7 @@ fn options(file: &Path) -> SqliteConnectOptions {
         .busy_timeout(Duration::from_secs(5))
 }
 
-/// Makes the database; another process may have done so meanwhile.
+/// Creates the database. Succeeds also if another process has created it.
 async fn create(url: &str) -> Result<(), sqlx::Error> {
     match Postgres::create_database(url).await {
         Err(sqlx::Error::Database(error)) if error.code().as_deref() == Some(DATABASE_IS_THERE) => {
@@ -189,7 +195,7 @@ async fn create(url: &str) -> Result<(), sqlx::Error> {
 }
 
 impl Listener {
-    /// Returns once something was notified of.
+    /// Waits for the next notification. Never returns on SQLite.
     pub(in crate::store) async fn heard(&mut self) -> Result<(), sqlx::Error> {
         match &mut self.0 {
             Some(listener) => listener.recv().await.map(drop),
@@ -199,8 +205,9 @@ impl Listener {
 }
 
 impl Transaction {
-    /// Until the end nobody else passes the lock of that name: for rules about rows that are not there
-    /// yet, or about how many there are. On SQLite a transaction is alone anyway.
+    /// Takes the named lock until the end of the transaction. It protects rules about rows that do not exist
+    /// yet, or about the number of rows. On SQLite it does nothing, because there is only one write
+    /// transaction at a time.
     pub(in crate::store) async fn lock(&mut self, name: &str) -> Result<(), sqlx::Error> {
         if let Transaction::Postgres(_) = self {
             query("select pg_advisory_xact_lock(hashtextextended($1, 0))")
@@ -211,7 +218,7 @@ impl Transaction {
         Ok(())
     }
 
-    /// Tells those who listen to a name, once the transaction has ended well.
+    /// Notifies all subscribers of this name when the transaction commits. Does nothing on SQLite.
     pub(in crate::store) async fn notify(&mut self, name: &str) -> Result<(), sqlx::Error> {
         if let Transaction::Postgres(_) = self {
             query("select pg_notify($1, '')")
@@ -222,7 +229,7 @@ impl Transaction {
         Ok(())
     }
 
-    /// Ends it; its changes stay.
+    /// Commits the transaction.
     pub(in crate::store) async fn commit(self) -> Result<(), sqlx::Error> {
         match self {
             Transaction::Sqlite(transaction) => transaction.commit().await,
@@ -230,7 +237,7 @@ impl Transaction {
         }
     }
 
-    /// Ends it without a trace.
+    /// Rolls the transaction back.
     pub(in crate::store) async fn rollback(self) -> Result<(), sqlx::Error> {
         match self {
             Transaction::Sqlite(transaction) => transaction.rollback().await,
@@ -272,7 +279,7 @@ mod tests {
         let run = async |sql| query(sql).execute(&writer).await.unwrap();
         run("create table films (bytes blob)").await;
         for _ in 0..3 {
-            // As on a full disk, the database cannot grow. The limit is the connection's own.
+            // This simulates a full disk: the database cannot grow. The limit belongs to the connection.
             run("pragma max_page_count = 1").await;
             let mut transaction = writer.begin().await.unwrap();
             let insert = query("insert into films values (zeroblob(1000000))");
@@ -288,7 +295,7 @@ mod tests {
         assert_eq!(count.fetch_one::<i64>(&writer).await.unwrap(), 3);
     }
 
-    /// A done analysis with its library, a flock that follows it and is done, and one that is queued.
+    /// A finished analysis with its library, a finished flock job that depends on it, and a queued one.
     const ROWS: &str = "
         insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, height, fps,
             n_frames_hint, sample, created_ms) values (x'00000000000000000000000000000001', 'footage/1',

@@ -1,6 +1,6 @@
-//! Room on the disk that is kept for the database (RELIABILITY.md, R7): a file beside it whose bytes are given
-//! to transactions that remove or end things while the disk is full. Transactions that add rows are refused until
-//! the file is whole again, so that they cannot use that room up.
+//! Disk space reserved for the database (docs/explanation/promises.md, "Full disk"): a file beside it. On a
+//! full disk the file is removed, so that transactions that remove or end things have space. Transactions
+//! that add rows are refused until the file is complete again, so that they cannot use up this space.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
@@ -15,20 +15,20 @@ use tokio::task::spawn_blocking;
 use crate::code::Code;
 use crate::store::Error;
 
-/// Size of the file, bytes: twice the size that SQLite's write-ahead log reaches between two checkpoints
-/// (1000 pages of 4 KiB), once for the log and once for the pages that it moves into the database.
+/// Size of the reserve, bytes: twice the size that SQLite's write-ahead log reaches between two checkpoints
+/// (1000 pages of 4 KiB). One half is for the log, the other for the pages that it moves into the database.
 const RESERVE_BYTES: u64 = 8 << 20;
-/// Step in which a reserve that does not fit as a whole is taken, bytes: the block of most file systems.
+/// Allocation step for an incomplete reserve, bytes: the block size of most file systems.
 const BLOCK_BYTES: u64 = 4096;
 
-/// The reserve of one database; clones share it.
+/// The reserve of one database. Clones share it.
 #[derive(Clone, Debug)]
 pub(in crate::store) struct Reserve(Option<Arc<Kept>>);
 
 #[derive(Debug)]
 struct Kept {
     file: PathBuf,
-    /// Locked while the room is lent, and while it is taken back.
+    /// Held while the space is released for use, and while the file is made complete.
     lent: Mutex<()>,
 }
 
@@ -41,13 +41,13 @@ impl Reserve {
         })))
     }
 
-    /// Returns the reserve of a database server: none, because the server's disk is not ours.
+    /// Returns the reserve of a database server: none, because the server's disk belongs to another machine.
     pub(in crate::store) fn none() -> Reserve {
         Reserve(None)
     }
 
-    /// Succeeds if the reserve is in place, which it makes if there is room. Fails with
-    /// [`ErrorKind::StorageFull`] if there is none.
+    /// Succeeds if the reserve is complete, and completes it if there is space. Fails with
+    /// [`ErrorKind::StorageFull`] otherwise.
     pub(in crate::store) async fn require(&self) -> io::Result<()> {
         match &self.0 {
             Some(kept) if !kept.is_whole() => {
@@ -58,8 +58,10 @@ impl Reserve {
         }
     }
 
-    /// Runs `work`. If it fails for want of room, runs it once more in the room of the reserve, which is then
-    /// taken back. `work` must leave nothing behind when it fails. Fails as the last run failed.
+    /// Runs `work`. If it fails because the disk is full, removes the reserve, runs `work` once more and
+    /// restores the reserve.
+    ///
+    /// `work` must leave nothing behind when it fails. Returns the result of the last run.
     pub(in crate::store) async fn lend<T, Run>(&self, work: impl Fn() -> Run) -> Result<T, Error>
     where
         Run: Future<Output = Result<T, Error>>,
@@ -93,7 +95,8 @@ impl Kept {
         }
     }
 
-    /// Makes the file whole. If there is less room than that, fails, and the file takes the room that there is.
+    /// Makes the file complete. If there is too little space, fails, and the file takes the space that there
+    /// is.
     async fn make(&self) -> io::Result<()> {
         if self.is_whole() {
             return Ok(());
@@ -103,7 +106,8 @@ impl Kept {
             let mut file = File::options();
             let file = file.create(true).truncate(false).write(true).open(path)?;
             grow(&file, RESERVE_BYTES).inspect_err(|_| {
-                // The rest still serves for a few deletions. Failure is ignored: the error is reported anyway.
+                // A smaller reserve still serves for a few deletions. Failure is ignored: the first error is
+                // reported anyway.
                 take_rest(&file).ok();
             })
         };
@@ -111,10 +115,10 @@ impl Kept {
     }
 }
 
-/// Gives the file the blocks of its first `n_bytes`, which it may have in part.
+/// Allocates the first `n_bytes` of the file. Part of them may be allocated already.
 fn grow(mut file: &File, n_bytes: u64) -> io::Result<()> {
     match fallocate(file, FallocateFlags::empty(), 0, n_bytes) {
-        // A file system that cannot allocate ahead is written to.
+        // The file system cannot allocate in advance, so zeros are written.
         Err(Errno::OPNOTSUPP) => {
             let mut n_written = file.seek(SeekFrom::End(0))?;
             while n_written < n_bytes {
@@ -126,7 +130,7 @@ fn grow(mut file: &File, n_bytes: u64) -> io::Result<()> {
     }
 }
 
-/// Gives the file what room there is, in whole blocks.
+/// Allocates the remaining space of the disk to the file, in whole blocks, up to the size of the reserve.
 fn take_rest(file: &File) -> io::Result<()> {
     let disk = rustix::fs::fstatvfs(file)?;
     let n_free = disk.f_bavail.saturating_mul(disk.f_frsize);

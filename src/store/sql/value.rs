@@ -1,5 +1,5 @@
-//! The parameters of a statement, of the few kinds that the tables have, for either engine. Each may be
-//! null, and a null has its kind too: PostgreSQL asks for it.
+//! The parameters of a statement, for either engine. Only the column types of our tables exist. A null has a
+//! type too, because PostgreSQL requires it.
 
 use sqlx::types::Uuid;
 use sqlx::{Arguments, Database, Encode, Type};
@@ -17,7 +17,7 @@ pub(in crate::store) enum Value {
     Uuid(Option<Uuid>),
 }
 
-/// The parameters as an engine takes them.
+/// Returns the parameters in the form of an engine.
 pub(super) fn arguments<DB: Database>(values: Vec<Value>) -> Result<DB::Arguments, sqlx::Error>
 where
     Option<i64>: for<'q> Encode<'q, DB> + Type<DB>,

@@ -1,5 +1,6 @@
-//! The table of tokens: who may ask, for how long, and for how much (RELIABILITY.md, S6 and R9). Of
-//! a token only the hash of its secret is kept; it is shown once, when it is made.
+//! The table of tokens: who may use the service, until when, and with how many jobs
+//! (docs/explanation/promises.md, "Owners are isolated" and "Fair queue"). The table contains only the hash
+//! of the secret. The secret itself is shown once, when the token is created.
 
 mod key;
 pub mod secret;
@@ -11,50 +12,50 @@ use secret::{Presented, Secret};
 use super::owners::{Account, Owner, Reach};
 use super::{Error, Store, sql};
 
-/// How much a token may do; each may do what the ones before it may.
+/// Permissions of a token. Each scope includes the scopes before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Scope {
-    /// See what its owner has.
+    /// Read the owner's data.
     Read,
-    /// Make and cancel.
+    /// Create, cancel and delete.
     Write,
-    /// The same with everybody's things.
+    /// Read and change the data of all owners.
     Admin,
 }
 
-/// What a token is to be.
+/// Properties of a token to be created.
 #[derive(Clone, Debug)]
 pub struct NewToken {
-    /// A label for people.
+    /// Label for people.
     pub name: String,
-    /// Whose things it reaches; an owner of its own where it is `None`.
+    /// Owner whose data the token gives access to; `None` creates a new owner.
     pub owner: Option<Owner>,
-    /// What it may do.
+    /// Permissions.
     pub scope: Scope,
-    /// How many jobs of its owner may be queued or running at once.
+    /// Maximum number of queued and running jobs of the owner.
     pub quota: i64,
-    /// When it ends, milliseconds since 1970.
+    /// Time of expiry, milliseconds since 1970; `None` = never.
     pub expires_ms: Option<i64>,
 }
 
-/// One token as stored.
+/// One stored token.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Token {
-    /// Its id: the part that is no secret.
+    /// Id: the public part of the token.
     pub id: String,
-    /// A label for people.
+    /// Label for people.
     pub name: String,
-    /// Whose things it reaches.
+    /// Owner whose data the token gives access to.
     pub owner: Owner,
-    /// What it may do.
+    /// Permissions.
     pub scope: Scope,
-    /// How many jobs of its owner may be queued or running at once.
+    /// Maximum number of queued and running jobs of the owner.
     pub quota: i64,
-    /// When it was made, milliseconds since 1970.
+    /// Time of creation, milliseconds since 1970.
     pub created_ms: i64,
-    /// When it ends, if ever.
+    /// Time of expiry, milliseconds since 1970; `None` = never.
     pub expires_ms: Option<i64>,
-    /// When it was revoked, if it was.
+    /// Time of revocation, milliseconds since 1970; `None` if not revoked.
     pub revoked_ms: Option<i64>,
 }
 
@@ -72,7 +73,7 @@ struct Row {
 }
 
 impl Store {
-    /// Adds a token; the text given back is shown once and can never be had again.
+    /// Adds a token. Returns it with its text, which contains the secret and cannot be recovered later.
     pub async fn add_token(&self, new: &NewToken, now_ms: i64) -> Result<(Token, String), Error> {
         let (id, secret) = (secret::random_id()?, Secret::random()?);
         let token = Token {
@@ -110,7 +111,7 @@ impl Store {
         Ok((token, text))
     }
 
-    /// Every token, the ended ones too, the oldest first.
+    /// Returns all tokens, also expired and revoked ones, oldest first.
     pub async fn list_tokens(&self) -> Result<Vec<Token>, Error> {
         let rows: Vec<Row> = sql::query("select * from tokens order by created_ms, id")
             .fetch_all(&self.reader)
@@ -118,7 +119,8 @@ impl Store {
         rows.into_iter().map(Token::try_from).collect()
     }
 
-    /// Ends a token and its sessions; false where there is none of that id that still held.
+    /// Revokes a token and thereby its sessions. Returns false if no token has this id, or if it was revoked
+    /// before.
     pub async fn revoke_token(&self, id: &str, now_ms: i64) -> Result<bool, Error> {
         let sql = "update tokens set revoked_ms = $2 where id = $1 and revoked_ms is null";
         let revoke = || async {
@@ -130,7 +132,7 @@ impl Store {
         Ok(n_rows > 0)
     }
 
-    /// Whether anybody holds a token that is good at that time.
+    /// Returns whether any token is valid at `now_ms`.
     pub async fn has_tokens(&self, now_ms: i64) -> Result<bool, Error> {
         let sql = "select exists (select 1 from tokens where revoked_ms is null \
                    and (expires_ms is null or expires_ms > $1))";
@@ -138,7 +140,7 @@ impl Store {
         Ok(known.fetch_one(&self.reader).await?)
     }
 
-    /// The token that was presented, if its secret is right and it is good at that time.
+    /// Returns the presented token if its secret is correct and it is valid at `now_ms`.
     pub async fn token(&self, given: &Presented, now_ms: i64) -> Result<Option<Token>, Error> {
         let row: Option<Row> = sql::query("select * from tokens where id = $1")
             .bind(&given.id)
@@ -151,12 +153,12 @@ impl Store {
 }
 
 impl Token {
-    /// Whether it has neither ended nor been revoked.
+    /// Returns whether the token is neither expired nor revoked.
     pub fn is_good(&self, now_ms: i64) -> bool {
         self.revoked_ms.is_none() && self.expires_ms.is_none_or(|end_ms| end_ms > now_ms)
     }
 
-    /// Whose rows it may see.
+    /// Returns the owners whose rows the token may see.
     pub fn reach(&self) -> Reach {
         match self.scope {
             Scope::Admin => Reach::All,
@@ -164,7 +166,7 @@ impl Token {
         }
     }
 
-    /// To whom its jobs are charged.
+    /// Returns the account that the token's jobs count against.
     pub fn account(&self) -> Account {
         Account {
             owner: self.owner.clone(),
@@ -174,10 +176,10 @@ impl Token {
 }
 
 impl Scope {
-    /// Every scope, the smallest first.
+    /// All scopes, in ascending order.
     pub const ALL: [Scope; 3] = [Scope::Read, Scope::Write, Scope::Admin];
 
-    /// The name in the database, the API and on the command line.
+    /// Returns the name used in the database, in the API and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Scope::Read => "read",
@@ -186,7 +188,7 @@ impl Scope {
         }
     }
 
-    /// The scope of a name.
+    /// Returns the scope with this name.
     pub fn from_name(name: &str) -> Option<Scope> {
         Scope::ALL.into_iter().find(|scope| scope.name() == name)
     }

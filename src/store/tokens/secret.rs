@@ -1,5 +1,6 @@
-//! The secrets of tokens, sessions and signed links: 256 random bits as 43 letters and digits, shown once, kept as
-//! SHA-256. They are compared in a time that says nothing of where they differ.
+//! Secrets of tokens, sessions and signed links: 256 random bits, written as 43 letters and digits. A secret
+//! is shown once and stored as SHA-256. Comparisons take constant time, so that their duration does not
+//! reveal the position of a difference.
 
 use std::hint::black_box;
 use std::io;
@@ -7,33 +8,33 @@ use std::io;
 use sha2::{Digest, Sha256};
 
 const DIGITS: &[u8; 62] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz";
-/// What scanners for leaked secrets look for.
+/// Prefix of a token, by which scanners recognize leaked secrets.
 const PREFIX: &str = "frl";
-/// 62^43 > 2^256.
+/// Number of letters of a secret, because 62^43 > 2^256.
 const SECRET_LETTERS: usize = 43;
 const ID_BYTES: usize = 8;
-/// 62^11 > 2^64.
+/// Number of letters of an id, because 62^11 > 2^64.
 const ID_LETTERS: usize = 11;
 
-/// A token as its holder has it: `frl_<id>_<secret>`.
+/// A token as sent by its holder: `frl_<id>_<secret>`.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Presented {
-    /// Which row.
+    /// Id of the token's row.
     pub id: String,
     /// SHA-256 of the secret.
     pub sha256: [u8; 32],
 }
 
-/// Fresh random bits that nobody has seen, and their hash.
+/// A new secret and its hash.
 pub(super) struct Secret {
-    /// To be shown once.
+    /// The secret; shown once and not stored.
     pub text: String,
-    /// To be kept.
+    /// SHA-256 of the secret; stored.
     pub sha256: [u8; 32],
 }
 
 impl Presented {
-    /// Reads a token; `None` where the text is none.
+    /// Parses a token. Returns `None` if the text is not a token.
     pub fn parse(text: &str) -> Option<Presented> {
         let (id, secret) = text
             .strip_prefix(PREFIX)?
@@ -51,7 +52,7 @@ impl Presented {
 }
 
 impl Secret {
-    /// 32 bytes of the system's randomness.
+    /// Creates a secret from 32 bytes of the system's random generator.
     pub(super) fn random() -> io::Result<Secret> {
         let text = base62(&random_key()?, SECRET_LETTERS);
         Ok(Secret {
@@ -61,21 +62,21 @@ impl Secret {
     }
 }
 
-/// A fresh id of a token: no secret.
+/// Creates the public id of a token.
 pub(super) fn random_id() -> io::Result<String> {
     let mut bytes = [0; ID_BYTES];
     fill(&mut bytes)?;
     Ok(base62(&bytes, ID_LETTERS))
 }
 
-/// 32 bytes of the system's randomness.
+/// Returns 32 bytes of the system's random generator.
 pub(in crate::store) fn random_key() -> io::Result<[u8; 32]> {
     let mut bytes = [0; 32];
     fill(&mut bytes)?;
     Ok(bytes)
 }
 
-/// The keyed hash of a message (RFC 2104), for keys of at most 64 bytes.
+/// Returns HMAC-SHA-256 of a message (RFC 2104), for keys of at most 64 bytes.
 pub fn hmac_sha256(key: &[u8], message: &[u8]) -> [u8; 32] {
     let pad = |with: u8| {
         let mut block = [with; 64];
@@ -87,17 +88,17 @@ pub fn hmac_sha256(key: &[u8], message: &[u8]) -> [u8; 32] {
     outer.chain_update(inner.finalize()).finalize().into()
 }
 
-/// The token of an id and a secret, as it is handed out.
+/// Returns the text of a token, made of its id and its secret.
 pub(super) fn written(id: &str, secret: &str) -> String {
     format!("{PREFIX}_{id}_{secret}")
 }
 
-/// What is kept of a secret.
+/// Returns SHA-256 of a secret.
 pub(super) fn hash(secret: &str) -> [u8; 32] {
     Sha256::digest(secret.as_bytes()).into()
 }
 
-/// Whether two secrets or hashes are the same, looked at to the last byte in any case.
+/// Returns whether two secrets or hashes are equal. Always compares all bytes of the shorter one.
 pub fn is_same(a: &[u8], b: &[u8]) -> bool {
     let differing = a
         .iter()
@@ -110,7 +111,7 @@ fn fill(bytes: &mut [u8]) -> io::Result<()> {
     getrandom::fill(bytes).map_err(|error| io::Error::other(error.to_string()))
 }
 
-/// A big-endian number in `n` digits of base 62.
+/// Returns a big-endian number as `n` digits of base 62.
 fn base62(bytes: &[u8], n: usize) -> String {
     let mut number = bytes.to_vec();
     let mut digits = vec![b'0'; n];

@@ -1,12 +1,12 @@
-//! The table of sessions: browsers that were given a cookie for a token (RELIABILITY.md, S7). A session
-//! holds no longer than its token does.
+//! The table of sessions: browsers that exchanged a token for a cookie
+//! (docs/explanation/promises.md, "No cross-site writes"). A session is valid no longer than its token.
 
 use super::secret::{self, Secret};
 use super::{Row, Token};
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Begins a session of a token; the text given back is the cookie's value.
+    /// Begins a session of a token and returns the value of the cookie. Expired sessions are deleted first.
     pub async fn begin_session(
         &self,
         token_id: &str,
@@ -34,8 +34,8 @@ impl Store {
         Ok(secret.text)
     }
 
-    /// The token that a cookie stands for, if both hold at that time. It is looked for by the hash of
-    /// the secret, which nobody can choose, so the time that takes tells nothing.
+    /// Returns the token of a cookie if both are valid at `now_ms`. The lookup uses the hash of the secret.
+    /// An attacker cannot choose hashes, so its duration reveals nothing.
     pub async fn token_of_session(
         &self,
         cookie: &str,
@@ -53,7 +53,7 @@ impl Store {
         Ok(token.filter(|token| token.is_good(now_ms)))
     }
 
-    /// Ends a session; absence is no error.
+    /// Ends a session. Succeeds also if the session does not exist.
     pub async fn end_session(&self, cookie: &str) -> Result<(), Error> {
         let end = || async {
             sql::query("delete from sessions where sha256 = $1")

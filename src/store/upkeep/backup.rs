@@ -1,8 +1,9 @@
-//! A copy of the data folder, or of a file of rows with the files elsewhere, while the service writes to it (RELIABILITY.md, R11): the database by VACUUM
-//! INTO, never as a file, and every file that its rows name, which never change once they are there.
+//! Backup while the service writes (docs/explanation/promises.md, "Restore and upgrade"). The database is
+//! copied with VACUUM INTO, never as a file. Then every file that the copied rows name is copied; stored
+//! files never change.
 //!
-//! What is deleted between the two is in the copy's rows without its file; then the rows are copied again. A
-//! job that runs is queued in the copy, its attempt not counted: its worker is not in the copy.
+//! If a file was deleted between the two steps, the rows are copied again. In the copy, running jobs are
+//! queued and their attempt does not count, because the copy has no workers.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -13,21 +14,25 @@ use sqlx::types::Uuid;
 use crate::store::sql::{self, Pool};
 use crate::store::{BlobFile, Error, Store};
 
-/// How often the rows are copied again because something was deleted meanwhile.
+/// Maximum number of times that the rows are copied. Free choice.
 const MAX_ROUNDS: usize = 20;
 const DATABASE: &str = "flockreel.db";
 
-/// What was copied.
+/// Result of a backup.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Copied {
-    /// Files that rows name, and uploads under way.
+    /// Number of copied files, including unfinished uploads.
     pub n_files: usize,
-    /// Their bytes.
+    /// Total size of the copied files, bytes.
     pub n_bytes: u64,
 }
 
 impl Store {
-    /// Copies everything into `target`, which must not be there: it appears when it is whole.
+    /// Copies the store to the folder `target`, which must not exist. The folder appears only when the copy
+    /// is complete.
+    ///
+    /// Fails if the database is on a server, if a stored file is damaged, or if files are deleted faster than
+    /// they are copied.
     pub async fn back_up(&self, target: &Path) -> Result<Copied, Error> {
         let partial = beside(target);
         fs::create_dir_all(&partial)?;
@@ -55,7 +60,7 @@ impl Store {
         self.writer.copy_to(database).await
     }
 
-    /// Copies what the snapshot's rows name; false where something of it is gone already.
+    /// Copies the files that the rows of the snapshot name. Returns false if one of them no longer exists.
     async fn copy_files(
         &self,
         snapshot: &Pool,
@@ -93,8 +98,11 @@ impl Store {
         Ok(true)
     }
 
-    /// Copies one file and checks on the way that it is what its row says; false where it is gone. It has its name
-    /// only once it is whole, so that a copy that was cut short is not taken for one by the next.
+    /// Copies one file and compares it with the size and hash of its row. Returns false if the file no longer
+    /// exists.
+    ///
+    /// The copy gets its final name only when it is complete, so that the next backup does not keep a partial
+    /// one.
     async fn copy(&self, folder: &str, file: &BlobFile, to: &Path) -> Result<bool, Error> {
         fs::create_dir_all(to)?;
         let unproven = to.join(format!("{}.unproven", file.name));
@@ -118,14 +126,15 @@ impl Store {
     }
 }
 
-/// The folder in which the copy is made.
+/// Returns the folder of the unfinished copy.
 fn beside(target: &Path) -> PathBuf {
     let mut name = target.file_name().unwrap_or_default().to_owned();
     name.push(".partial");
     target.with_file_name(name)
 }
 
-/// Copies the bytes of an upload that are safe; those after them may be changing. None where it is gone.
+/// Copies the synced bytes of an unfinished upload; later bytes may still change. Returns the number of
+/// bytes, or `None` if the file is missing or too short.
 fn copy_start(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64>> {
     let source = match File::open(from) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -138,7 +147,7 @@ fn copy_start(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64
     Ok((n_copied == n_bytes.unsigned_abs()).then_some(n_copied))
 }
 
-/// Running jobs go back to the queue, as when their worker releases them.
+/// Returns running jobs to the queue, as a release does.
 async fn forget_workers(snapshot: &Pool) -> Result<(), Error> {
     sql::query(
         "update jobs set state = 'queued', worker = null, lease_until_ms = null, stage = null, \
@@ -149,7 +158,7 @@ async fn forget_workers(snapshot: &Pool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Syncs the copy's folders and gives it its name.
+/// Syncs all folders of the copy and renames it to `target`.
 fn publish(partial: &Path, target: &Path) -> io::Result<()> {
     sync_folders(partial)?;
     fs::rename(partial, target)?;

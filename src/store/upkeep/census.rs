@@ -1,17 +1,17 @@
-//! How much there is: jobs by kind and state, bytes by what they are (ECOSYSTEM.md, metrics). Of the whole
-//! store, whoever's it is, so it is asked for by those who run the service alone.
+//! Counts of the whole store for monitoring: jobs by kind and state, and bytes by type of data. The numbers
+//! cover all owners, so only operators may see them.
 
 use crate::store::jobs::{JobState, Kind};
 use crate::store::{Error, Store, sql};
 
-/// What there is at one time.
+/// Contents of the store at one time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Census {
-    /// Jobs of a kind in a state; what is not named is none.
+    /// Number of jobs by kind and state. Combinations without jobs are left out.
     pub jobs: Vec<(Kind, JobState, i64)>,
-    /// When the job that is queued longest was queued, milliseconds since 1970.
+    /// Creation time of the oldest queued job, milliseconds since 1970; `None` if no job is queued.
     pub oldest_queued_ms: Option<i64>,
-    /// Bytes of the files of each noun, and of uploads under way.
+    /// Size of the files by type of data, bytes. `uploads` counts unfinished uploads only.
     pub stored_bytes: Vec<(&'static str, i64)>,
 }
 
@@ -39,7 +39,7 @@ const STORED: [(&str, &str); 5] = [
 ];
 
 impl Store {
-    /// Counts everything.
+    /// Counts all jobs and bytes.
     pub async fn census(&self) -> Result<Census, Error> {
         let sql = "select kind, state, count(*) from jobs group by kind, state";
         let rows: Vec<(String, String, i64)> = sql::query(sql).fetch_all(&self.reader).await?;

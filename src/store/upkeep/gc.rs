@@ -1,5 +1,5 @@
-//! What nobody refers to any more (RELIABILITY.md, store rules and R5), counted before it is removed: for
-//! `flockreel gc`. What a running process is making is left alone.
+//! Removal of data that nothing refers to, counted first, for `flockreel gc`
+//! (docs/explanation/promises.md, "No orphans"). Unfinished work of running processes is kept.
 
 use std::fs;
 use std::time::SystemTime;
@@ -7,23 +7,23 @@ use std::time::SystemTime;
 use crate::store::idempotency::KEPT_MS;
 use crate::store::{Error, Store, sql};
 
-/// What there is to remove.
+/// Amount of removable data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Waste {
-    /// Drafts of processes that are gone.
+    /// Number of working folders left by processes that have ended.
     pub n_drafts: usize,
-    /// Folders that no row has named for an hour.
+    /// Number of folders, older than an hour, that no row names.
     pub n_folders: usize,
-    /// Uploads that were given up.
+    /// Number of expired uploads.
     pub n_uploads: usize,
-    /// Sessions and kept answers whose time is over.
+    /// Number of expired sessions and idempotency keys.
     pub n_rows: usize,
-    /// Bytes of all files among it.
+    /// Total size of these files, bytes.
     pub n_bytes: u64,
 }
 
 impl Store {
-    /// Counts it, and changes nothing.
+    /// Counts the removable data. Changes nothing.
     pub async fn waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
         let mut waste = Waste::default();
         (waste.n_drafts, waste.n_bytes) = self.blobs.work().n_left()?;
@@ -35,7 +35,7 @@ impl Store {
         let expired = sql::query_scalar(sql).bind(now_ms);
         for id in expired.fetch_all(&self.reader).await? {
             waste.n_uploads += 1;
-            // Its file may be another machine's.
+            // The file may be on another machine.
             let file = fs::metadata(self.upload_path(id));
             waste.n_bytes += file.map_or(0, |file| file.len());
         }
@@ -58,7 +58,7 @@ impl Store {
         Ok(waste)
     }
 
-    /// Removes it, and says what it was.
+    /// Removes the data and returns the amounts counted before.
     pub async fn collect_waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
         let waste = self.waste(now, now_ms).await?;
         self.sweep(now).await?;

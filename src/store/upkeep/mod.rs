@@ -1,5 +1,5 @@
-//! What those do who run the service: count what there is, remove what nobody refers to, copy everything
-//! (RELIABILITY.md, store rules, R5 and R11).
+//! Maintenance of the store by its operator: counts, removal of leftovers, and backup
+//! (docs/explanation/promises.md, "No orphans" and "Restore and upgrade").
 
 pub mod backup;
 pub mod census;

@@ -1,26 +1,27 @@
-//! Removes what a crash left behind: drafts, and folders that no row names (RELIABILITY.md, store
-//! rules and R5).
+//! Removal of what a crash left behind: unfinished drafts, and folders that no row names
+//! (docs/explanation/promises.md, "No orphans").
 
 use std::time::{Duration, SystemTime};
 
 use crate::store::blobs::Folder;
 use crate::store::{Error, Store};
 
-/// A folder without a row is younger than this while its row is being made.
+/// Minimum age of a folder without a row before it is removed. The row of a younger one may still be
+/// committed. Free choice.
 pub(in crate::store) const GRACE: Duration = Duration::from_secs(3600);
 
-/// What a sweep removed.
+/// Result of a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Swept {
-    /// What processes that are gone were making.
+    /// Number of working folders left by processes that have ended.
     pub n_drafts: usize,
-    /// Folders in place that no row named.
+    /// Number of stored folders without a row.
     pub n_folders: usize,
 }
 
 impl Store {
-    /// Sweeps what processes that are gone were making, and every folder that no row names and that is
-    /// older than an hour.
+    /// Removes unfinished drafts of processes that have ended, and folders older than an hour that no row
+    /// names. Returns their numbers.
     pub async fn sweep(&self, now: SystemTime) -> Result<Swept, Error> {
         let mut swept = Swept {
             n_drafts: self.blobs.work().sweep()?,
@@ -40,7 +41,7 @@ impl Store {
         Ok(swept)
     }
 
-    /// The folders that no row has named for an hour.
+    /// Returns the stored folders without a row that are older than [`GRACE`].
     pub(in crate::store) async fn old_strays(&self, now: SystemTime) -> Result<Vec<Folder>, Error> {
         let mut strays = self.folders_without_row().await?;
         let is_old = |age: Duration| age > GRACE;
@@ -48,7 +49,7 @@ impl Store {
         Ok(strays)
     }
 
-    /// The folders in place that no row names.
+    /// Returns the stored folders that no row names.
     pub(in crate::store) async fn folders_without_row(&self) -> Result<Vec<Folder>, Error> {
         let mut strays = Vec::new();
         for folder in self.blobs.folders().await? {

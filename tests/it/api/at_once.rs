@@ -1,4 +1,4 @@
-//! What is computed while one waits: a flock without its film, and a library's distances as numbers.
+//! Results that are computed during the request: the preview of a flock, and the distances of a library.
 
 use reqwest::StatusCode;
 use serde_json::json;
@@ -7,7 +7,7 @@ use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::SWIM;
 
-/// A service with a library of a swimming fish: the library's path and id.
+/// Starts a service with a library of the swimming fish. Returns the library's path and id.
 async fn with_library() -> (TestApp, String, String) {
     let app = TestApp::working().await;
     let footage_id = app.upload(&SWIM).await;
@@ -83,7 +83,7 @@ async fn distances_come_as_numbers_and_not_again_to_who_has_them() {
     let bytes = answer.bytes().await.unwrap();
     assert_eq!(length, bytes.len().to_string().as_str());
     let stored = app.json(&format!("{library}/library.json")).await;
-    // 300 frames have 301 - f clips.
+    // 300 frames have 301 - f clips, where f is the number of frames of a clip.
     let n = 301 - stored["params"]["clip_frames"].as_u64().unwrap_or(8) as usize;
     let header = String::from_utf8_lossy(&bytes[..128]).into_owned();
     assert!(header.contains(&format!("'shape': ({n}, {n})")), "{header}");

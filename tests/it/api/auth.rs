@@ -1,4 +1,4 @@
-//! Tokens, sessions, scopes, quotas: who gets in, and what the others are told.
+//! Tokens, browser sessions, scopes, quotas and rate limits, and the responses to rejected callers.
 
 use flockreel::store::tokens::Scope;
 use reqwest::{Response, StatusCode};

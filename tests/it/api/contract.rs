@@ -1,4 +1,5 @@
-//! What holds on every route: error form, headers, who may ask from a browser, the document.
+//! Properties of every route: problem documents, security headers, cross-site requests, and the OpenAPI
+//! document.
 
 use reqwest::Method;
 use serde_json::json;
@@ -86,7 +87,7 @@ async fn nothing_served_runs_as_a_page_of_others() {
         asked.push((method, path.replace("{id}", &id)));
     }
     assert!(asked.len() > 20, "the document names few routes");
-    // What deletes comes last, so that there is something to look at before.
+    // Request deletions last, so that the other requests still find their data.
     asked.sort_by_key(|(method, _)| *method == Method::DELETE);
     for (method, path) in asked {
         let answer = app.request(method, &path).send().await.unwrap();
@@ -181,7 +182,7 @@ async fn the_document_has_one_meaning_for_every_name() {
         assert!(schemas[name]["properties"][field].is_object(), "{name}");
     }
     assert!(schemas["Params"].is_null() && schemas["Summary"].is_null());
-    // Closed schemas cannot be joined by allOf: each would refuse the other's fields.
+    // `allOf` cannot combine closed schemas, because each would reject the other's fields.
     for (name, field) in [("FlockRequest", "count"), ("FishRequest", "palette")] {
         let request = &schemas[name];
         assert_eq!(request["additionalProperties"], false, "{name}");
@@ -190,7 +191,7 @@ async fn the_document_has_one_meaning_for_every_name() {
             assert!(request["properties"][field].is_object(), "{name} {field}");
         }
     }
-    // What is asked for may name a preset; what was measured with is in full, and names none.
+    // Requests may name a preset. The stored parameters are complete and name none.
     for (name, field) in [
         ("AnalysisOverrides", "clip_frames"),
         ("FlockOverrides", "count"),

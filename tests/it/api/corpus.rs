@@ -1,5 +1,6 @@
-//! Bad films of every kind in the corpus, every third of them, sent to the service (RELIABILITY.md, S1): a stable code, never an answer of
-//! the 500s, nothing stuck, nothing left; what is taken in spite of its damage ends as a job with a code.
+//! Sends every third file of the corpus of bad films to the service (docs/explanation/promises.md,
+//! "Bad input"). Each is answered in time with an allowed code, never with a 5xx status, and leaves no data.
+//! Damaged films that are accepted end as jobs, which do not crash their worker.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +11,7 @@ use crate::common::TestApp;
 use crate::common::film::Films;
 use crate::media::corpus::{Case, corpus};
 
-/// The longest that any answer may take.
+/// Time limit of one response.
 const LONGEST: Duration = Duration::from_secs(30);
 
 #[tokio::test(flavor = "multi_thread")]
@@ -19,7 +20,7 @@ async fn every_bad_film_is_answered_with_its_code() {
     let cases = corpus(&films);
     let app = TestApp::working().await;
     let (mut faults, mut taken) = (Vec::new(), Vec::new());
-    // Each is read whole elsewhere; here it is the way through the service that counts.
+    // `media::traced` reads the whole corpus; a third is enough to test the service.
     for case in cases.iter().step_by(3) {
         let start = Instant::now();
         let film = std::fs::read(&case.path).unwrap();
@@ -51,7 +52,8 @@ async fn every_bad_film_is_answered_with_its_code() {
     app.assert_sound().await;
 }
 
-/// Damage further inside is found when the film is decoded, so it may be taken first.
+/// Returns true if the response is allowed. A damaged film may be accepted, because its damage is found only
+/// when it is decoded.
 fn is_expected(case: &Case, status: u16, said: &Value) -> bool {
     let code = said["code"].as_str().and_then(Code::from_name);
     match status {

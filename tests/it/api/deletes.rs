@@ -1,4 +1,4 @@
-//! Deleting: what is gone is gone with all that came of it, rows and files, and nothing else is.
+//! Deletion: an object is deleted with its rows, its files and everything made from it, and nothing else.
 
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{Attempt, Error, Product};
@@ -12,7 +12,7 @@ use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::TINY;
 
-/// What the job was to make, without its work.
+/// Returns a result of the job's kind without doing its work.
 fn pretend(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
     std::fs::write(attempt.folder().join("some.json"), b"{}")?;
     let input: Value = serde_json::from_str(&lease.input)?;
@@ -28,7 +28,8 @@ fn pretend(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
     })
 }
 
-/// A footage with a library, a flock and a fish of it, and one more flock that is still queued: their paths.
+/// Creates a footage with a library, a flock, a fish and a queued flock. Returns the paths of these and of
+/// the job of the first flock.
 async fn family(app: &TestApp) -> Vec<String> {
     let footage = app.upload(&TINY).await;
     let analysis = app.accept("/v1/analyses", json!({"footage_id": footage}));
@@ -64,7 +65,7 @@ async fn assert_gone(app: &TestApp, path: &str) {
     assert_eq!(code_of(answer, 404).await, "not_found", "{path}");
 }
 
-/// How many folders of each kind the store holds.
+/// Returns the number of stored folders of footage, libraries, flocks and fish.
 async fn folders(app: &TestApp) -> [usize; 4] {
     let mut counts = [0; 4];
     for (count, kind) in counts
@@ -137,7 +138,7 @@ async fn a_running_job_lets_go_when_its_footage_is_deleted() {
             while !attempt.listener.cancelled() {
                 std::thread::yield_now();
             }
-            // Too late to notice: it finishes all the same.
+            // The job ignores the cancellation and finishes.
             pretend(lease, attempt)
         };
         worker.step_by(work).await

@@ -1,5 +1,5 @@
-//! The pages about the API: every code is explained where its problems point, and the description loads
-//! nothing from elsewhere. How it looks in a browser is tested in `tests/page`.
+//! The documentation pages. Every error code is explained at the URL that its problem documents name. The
+//! API description loads only files of the service. `tests/page` tests both in a browser.
 
 use flockreel::code::Code;
 use serde_json::Value;

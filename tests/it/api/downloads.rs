@@ -1,4 +1,5 @@
-//! Range, conditional requests, HEAD (RELIABILITY.md, H4), over an uploaded film.
+//! Range requests, conditional requests and HEAD, for an uploaded film (docs/explanation/promises.md,
+//! "Exact ranges").
 
 use reqwest::StatusCode;
 

@@ -1,4 +1,4 @@
-//! One stream of events for all of a caller's jobs: what it tells, whom, and when it ends.
+//! The event stream of all jobs of a caller: its events, its recipients, and when it ends.
 
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ impl Stream {
         Stream { answer, text }
     }
 
-    /// The next block of lines; none at the end.
+    /// Returns the next block of lines, or `None` at the end of the stream.
     async fn block(&mut self) -> Option<String> {
         loop {
             if let Some((block, rest)) = self.text.split_once("\n\n") {
@@ -41,7 +41,7 @@ impl Stream {
         }
     }
 
-    /// The next event that is one: its name, its id, its data.
+    /// Returns name, id and data of the next event, or `None` at the end. Skips blocks without data.
     async fn event(&mut self) -> Option<(String, String, Value)> {
         loop {
             let block = self.block().await?;
@@ -56,7 +56,7 @@ impl Stream {
         }
     }
 
-    /// The next event as a job's id and state, or `gone`.
+    /// Returns the job id of the next event, with the job's state or, for a deleted job, `gone`.
     async fn told(&mut self) -> (Value, String) {
         let (name, _, data) = self.event().await.expect("the stream has ended");
         match name.as_str() {
@@ -100,7 +100,7 @@ async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
     assert_eq!(stream.told().await, (second.clone(), "queued".to_owned()));
     cancel(&app, &first).await;
     assert_eq!(stream.told().await, (first.clone(), "cancelled".to_owned()));
-    // Made and ended between two looks.
+    // A job that is created and cancelled between two polls.
     let third = queued(&app, &footage).await;
     cancel(&app, &third).await;
     let mut told = stream.told().await;
@@ -108,7 +108,7 @@ async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
         told = stream.told().await;
     }
     assert_eq!(told, (third.clone(), "cancelled".to_owned()));
-    // Whoever asks for all that ever ended is told of the own alone, too.
+    // A client that asks for the whole history also receives only events of its own jobs.
     let all = app.get("/v1/events").header("last-event-id", "1");
     let mut all = Stream::open(all).await;
     for expected in [&first, &second, &third] {

@@ -1,4 +1,4 @@
-//! Uploads: what is taken, what is refused, and that a refusal leaves nothing behind.
+//! Uploads: accepted films and pictures, refused ones with their codes, and no leftovers of a refusal.
 
 use reqwest::StatusCode;
 use reqwest::multipart::{Form, Part};
@@ -156,7 +156,7 @@ async fn a_packed_body_is_refused() {
     app.assert_sound().await;
 }
 
-/// A form with a film and its masks.
+/// Returns a form with a film and its mask film.
 fn with_masks(video: &[u8], masks: &[u8]) -> Form {
     Form::new()
         .part("video", Part::bytes(video.to_vec()))
@@ -175,7 +175,7 @@ async fn masks_that_come_with_a_film_are_taken_instead_of_its_colors() {
     let again = app.send_form("/v1/footage", with_masks(&SWIM, &SWIM_MASKS));
     let again = json_of(again.await, StatusCode::OK).await;
     assert_eq!(again["id"], footage["id"]);
-    // By its colors nothing would be found that differs by so much.
+    // With this threshold, no animal would be found by color.
     let body = json!({"footage_id": footage["id"], "params": {"threshold": 200}});
     let accepted = app.accept("/v1/analyses", body).await;
     let job = app.ended_job(&accepted["job_id"]).await;

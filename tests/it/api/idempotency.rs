@@ -1,4 +1,4 @@
-//! Idempotency-Key: what is asked for twice is made once (RELIABILITY.md, store and queue rules).
+//! Idempotency-Key: a repeated request has one effect and gets the first response again.
 
 use flockreel::ids::FootageId;
 use flockreel::jobs::clock::now_ms;
@@ -88,7 +88,8 @@ async fn while_the_first_request_runs_the_second_is_told_so() {
     app.assert_sound().await;
 }
 
-/// A request of two hours ago as far as it came: the key taken, the job queued, no answer noted; then a start.
+/// Simulates a crash two hours ago, after the job was queued and before its response was stored. Then
+/// recovers as at a start, and returns the expected response.
 async fn crashed_between(app: &TestApp, footage: &str) -> Value {
     let then_ms = now_ms() - 2 * 3600 * 1000;
     let begun = app.context.store.begin_key(&scope(), None, then_ms).await;

@@ -1,4 +1,4 @@
-//! Jobs as people see them: accepted, listed, cancelled, followed.
+//! Jobs in the API: accepted, listed, cancelled, followed by events, and refused with a picture.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};

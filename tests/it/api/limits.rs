@@ -1,5 +1,5 @@
-//! What is too long, too large, packed or lied about is refused before it costs anything
-//! (RELIABILITY.md, H2), over a connection of our own: no client would send most of it.
+//! Oversized, compressed and dishonest requests are refused early (docs/explanation/promises.md,
+//! "Size limits"). Most are written to a raw TCP connection, because HTTP clients do not send them.
 
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
@@ -10,12 +10,12 @@ use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::TINY;
 
-/// Sends bytes and reads what comes back until the service closes or falls silent.
+/// Sends the parts and returns the response up to the end of its head. Stops after 5 s of silence.
 async fn exchange(app: &TestApp, parts: &[&[u8]]) -> String {
     let authority = app.address("").replace("http://", "");
     let mut connection = TcpStream::connect(&authority).await.unwrap();
     for part in parts {
-        // The service may have hung up on us already; its answer is still there.
+        // The service may close the connection early. Its response can still be read.
         if connection.write_all(part).await.is_err() {
             break;
         }
@@ -74,7 +74,7 @@ async fn a_body_that_does_not_say_how_long_it_is_ends_at_the_limit() {
     let more = "transfer-encoding: chunked\r\n";
     let chunk = [&b"258\r\n"[..], &[7; 600], b"\r\n"].concat();
     let all = [&head("POST", "/v1/footage", more), &chunk[..], &chunk].map(<[u8]>::to_vec);
-    // It has not ended, and never will.
+    // The body never ends.
     let all: Vec<&[u8]> = all.iter().map(Vec::as_slice).collect();
     let answer = exchange(&app, &all).await;
     assert!(answer.starts_with("HTTP/1.1 413"), "{answer}");
@@ -142,7 +142,7 @@ async fn a_form_of_ten_thousand_parts_is_refused_at_the_first_that_is_not_asked_
         let head = format!("--x\r\ncontent-disposition: form-data; name=\"{name}\"\r\n\r\n");
         [head.as_bytes(), value, b"\r\n"].concat()
     };
-    // With what is asked for at its beginning, so that nothing is missing.
+    // Start with the required part, so that only the others are wrong.
     let mut parts = part("video", &TINY);
     for k in 0..10_000 {
         parts.extend(part(&format!("f{k}"), b"v"));

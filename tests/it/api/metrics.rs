@@ -1,4 +1,4 @@
-//! What is seen from outside: the metrics, who may read them, and the id that a request's answer bears.
+//! Monitoring: the metrics, the access to them, and the request id in every response.
 
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::store::tokens::Scope;
@@ -8,7 +8,7 @@ use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::TINY;
 
-/// The value of a line that begins so.
+/// Returns the value of the metric line that begins with `start`.
 fn value(text: &str, start: &str) -> f64 {
     let mut lines = text.lines();
     let value = lines.find_map(|line| line.strip_prefix(start)?.trim().parse().ok());

@@ -1,4 +1,4 @@
-//! The API, through the real router over a real connection; a file per noun.
+//! The API, tested through the real router over TCP. Most files test one noun of the API.
 
 mod at_once;
 mod auth;

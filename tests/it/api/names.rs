@@ -1,5 +1,5 @@
-//! Names are labels (RELIABILITY.md, S4): whatever a sender calls a film, its file has a name of ours, the
-//! download's header can be read, and nothing is opened or run because of it.
+//! Names from clients are only labels (docs/explanation/promises.md, "Names are labels"). Stored files have
+//! names chosen by the service, and the name in a download's header is escaped.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::common::clip::TINY;
 use reqwest::StatusCode;
 use reqwest::multipart::{Form, Part};
 
-/// Names that mean something to a shell, a path, a header, a terminal, a page or to ffmpeg.
+/// Names with a meaning for shells, paths, headers, terminals, web pages or ffmpeg.
 fn names() -> Vec<String> {
     let names = [
         "../../../../etc/passwd",
@@ -42,7 +42,7 @@ fn names() -> Vec<String> {
 async fn whatever_a_film_is_called_its_file_is_called_by_us() {
     let app = TestApp::idle().await;
     for (k, name) in names().into_iter().enumerate() {
-        // Each film is another, so that each is stored.
+        // Make each film different, because equal films are stored once.
         let film = [
             TINY.as_slice(),
             b"\0\0\0\x0cfree",
@@ -62,7 +62,7 @@ async fn whatever_a_film_is_called_its_file_is_called_by_us() {
         };
         let answer = answer.unwrap();
         if answer.status() == StatusCode::BAD_REQUEST {
-            // A form cannot carry these at all.
+            // Multipart forms cannot carry these characters.
             assert!(name.contains(['\0', '\u{1b}']), "{name:?}");
             continue;
         }
@@ -88,12 +88,12 @@ async fn whatever_a_film_is_called_its_file_is_called_by_us() {
     app.assert_sound().await;
 }
 
-/// For an address, byte by byte.
+/// Percent-encodes every byte.
 fn encoded(name: &str) -> String {
     name.bytes().map(|byte| format!("%{byte:02X}")).collect()
 }
 
-/// `attachment; filename="..."`, with no quote inside, and at most an encoded form besides.
+/// Asserts that the header is `attachment; filename="..."`, optionally followed by an encoded name.
 fn assert_is_one_attachment(disposition: &str, name: &str) {
     let rest = disposition.strip_prefix("attachment; filename=\"");
     let rest = rest.unwrap_or_else(|| panic!("{name:?}: {disposition}"));
@@ -109,7 +109,7 @@ fn assert_is_one_attachment(disposition: &str, name: &str) {
     );
 }
 
-/// The name of everything under a folder.
+/// Returns the names of all files and folders below a folder.
 fn stored_names(folder: &Path) -> Vec<String> {
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {

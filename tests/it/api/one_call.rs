@@ -1,4 +1,4 @@
-//! The whole way in one call: a film and what to make of it.
+//! One request with a film and parameters: it uploads the film and queues the jobs.
 
 use reqwest::StatusCode;
 use reqwest::multipart::{Form, Part};

@@ -1,4 +1,5 @@
-//! tus 1.0.0 by raw HTTP: uploads that are cut and go on (RELIABILITY.md, R1, H3).
+//! Resumable uploads by tus 1.0.0, sent as raw HTTP (docs/explanation/promises.md, "No upload is lost" and
+//! "Bad networks").
 
 use std::time::Duration;
 
@@ -21,7 +22,7 @@ fn tus(app: &TestApp, method: &str, path: &str) -> RequestBuilder {
     request.header("tus-resumable", "1.0.0")
 }
 
-/// Begins an upload; returns its path.
+/// Creates an upload and returns its path.
 async fn begin(app: &TestApp, size_bytes: usize) -> String {
     let label = STANDARD.encode("../my fish.mp4");
     let answer = tus(app, "POST", "/v1/uploads")
@@ -54,7 +55,7 @@ async fn offset(app: &TestApp, path: &str) -> usize {
     header(&answer, "upload-offset").parse().unwrap()
 }
 
-/// Sends the head of a PATCH that promises all, and some of its bytes; the connection.
+/// Sends the head of a PATCH for the bytes `at..all`, then only `some` bytes. Returns the open connection.
 async fn send_some(app: &TestApp, path: &str, at: usize, all: usize, some: &[u8]) -> TcpStream {
     let authority = app.address("").replace("http://", "");
     let mut connection = TcpStream::connect(&authority).await.unwrap();
@@ -91,7 +92,7 @@ async fn an_upload_cut_at_every_tenth_goes_on_and_is_whole() {
             }
             tokio::time::sleep(Duration::from_millis(5)).await;
         }
-        // What was on its way when a newcomer asked may be lost; never is more noted than came.
+        // Bytes that arrived while the offset was queried may be lost, but the offset never exceeds them.
         assert!(offset(&app, &path).await <= cut);
     }
     let at = offset(&app, &path).await;

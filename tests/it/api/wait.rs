@@ -1,4 +1,4 @@
-//! `Prefer: wait=N`: an answer that waits for its job, and no longer than was asked.
+//! `Prefer: wait=N`: the response waits for the end of the job, but at most N seconds.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,6 @@
-//! Owners are walls (RELIABILITY.md, S6): every call of the document, with every kind of id, tells a
-//! stranger what a random id tells. A call that is missing from the table fails the test.
+//! Isolation of owners (docs/explanation/promises.md, "Owners are isolated"). For every operation of the
+//! OpenAPI document and an id of every kind, a stranger gets the response to a random id. The test fails if
+//! an operation is missing from its table.
 
 use flockreel::api::signed;
 use flockreel::jobs::Product;
@@ -15,19 +16,19 @@ use crate::common::TestApp;
 use crate::common::app::{json_of, routes};
 use crate::common::clip::TINY;
 
-/// How a call touches what people own.
+/// How an operation accesses owned objects.
 enum Touch {
-    /// By the id in its path, of this kind.
+    /// By an id of this kind in its path.
     Path(&'static str),
-    /// By an id in its body, under this name and of this kind.
+    /// By an id in its body: field name and kind.
     Body(&'static str, &'static str),
-    /// It lists the caller's own.
+    /// It lists the objects of the caller.
     List,
-    /// Not at all.
+    /// It accesses none.
     Nothing,
 }
 
-/// Every call; those that change something come last, so that the owner's own still work before.
+/// All operations. Those that delete come last, so that the others still find the owner's objects.
 fn table() -> Vec<(&'static str, &'static str, Touch)> {
     use Touch::{Body, List, Nothing, Path};
     vec![
@@ -63,8 +64,8 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("DELETE", "/v1/fish/{id}", Path("fish")),
         ("DELETE", "/v1/libraries/{id}", Path("libraries")),
         ("DELETE", "/v1/footage/{id}", Path("footage")),
-        ("GET", "/v1/jobs/{id}/refused.jpg", Nothing), // of jobs that failed alone: tests/it/api/jobs.rs
-        ("GET", "/v1/events", Nothing), // endless, of the caller's own: tests/it/api/events.rs
+        ("GET", "/v1/jobs/{id}/refused.jpg", Nothing), // only for failed jobs: tests/it/api/jobs.rs
+        ("GET", "/v1/events", Nothing), // an endless stream of the caller's jobs: tests/it/api/events.rs
         ("POST", "/v1/footage", Nothing),
         ("POST", "/v1/uploads", Nothing),
         ("OPTIONS", "/v1/uploads", Nothing),
@@ -72,11 +73,11 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("DELETE", "/v1/session", Nothing),
         ("GET", "/healthz", Nothing),
         ("GET", "/readyz", Nothing),
-        ("GET", "/metrics", Nothing), // of everybody, for those who run the service: tests/it/api/metrics.rs
+        ("GET", "/metrics", Nothing), // of all owners, for administrators: tests/it/api/metrics.rs
     ]
 }
 
-/// A file that each kind has.
+/// Returns the name of a file that the substitute results of this kind have.
 fn file_of(kind: &str) -> &'static str {
     match kind {
         "libraries" => "library.json",
@@ -85,7 +86,7 @@ fn file_of(kind: &str) -> &'static str {
     }
 }
 
-/// One thing of every kind, owned by whoever is signed in: its kind and id. The works are stood in for.
+/// Creates one object of every kind for the signed-in owner, with substitute results. Returns kinds and ids.
 async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
     let footage = app.upload(&TINY).await;
     let analysis = app
@@ -147,7 +148,7 @@ fn fish_summary() -> Value {
     json!({"fps": 25.0, "image_size_px": [64, 64], "frames": 10, "visible_frames": 10})
 }
 
-/// What a call with an id answers: the status, and the body with the id taken out.
+/// Calls an operation with an id. Returns the status, and the body with the id replaced by `ID`.
 async fn told(app: &TestApp, call: (&str, &str, &Touch), kind: &str, id: &str) -> (u16, String) {
     let (method, path, touch) = call;
     let path = path.replace("{id}", id).replace("{file}", file_of(kind));
@@ -195,7 +196,7 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
     let admin = app.token(Scope::Admin, 9).await;
     app.sign_in(&owner);
     let mut things = belongings(&app).await;
-    // What is not made yet has an id already.
+    // The library of a queued job has an id before it exists.
     let (_, footage) = things.iter().find(|(kind, _)| *kind == "footage").unwrap();
     let wish = json!({"footage_id": footage});
     let queued = app.accept("/v1/analyses", wish).await;
@@ -220,9 +221,9 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
         for allowed in [&owner, &admin] {
             app.sign_in(allowed);
             let (status, body) = told(&app, call, wanted, own).await;
-            // What the owner deleted is gone for the administrator too.
+            // An object that the owner deleted is gone for the administrator too.
             let is_gone = *method == "DELETE" && allowed == &admin && status == 404;
-            // Of a library that is only stood in for nothing can be simulated.
+            // A substitute library cannot be simulated.
             let is_stood_in = *path == "/v1/flocks/preview" && status == 500;
             assert!(
                 status < 300 || status == 409 || is_gone || is_stood_in,

@@ -1,5 +1,5 @@
-//! `doctor` says what this machine has, and `--sandbox strict` refuses to start where a layer is missing
-//! (RELIABILITY.md, "The gate"): a kernel without Landlock is had by answering its call as such a kernel would.
+//! `doctor` reports what the machine supports, and `--sandbox strict` refuses to start if a sandbox layer is
+//! missing (docs/explanation/promises.md, "Sandbox"). A seccomp filter simulates a kernel without Landlock.
 
 use std::process::{Command, Output};
 
@@ -9,7 +9,7 @@ use super::flockreel;
 use crate::common::film::Films;
 use crate::media::cage::compile_attack;
 
-/// The program on a kernel without Landlock.
+/// Runs the program as on a kernel without Landlock.
 fn without_landlock(films: &Films, args: &[&str]) -> Output {
     let attack = compile_attack(films.folder());
     Command::new(attack)

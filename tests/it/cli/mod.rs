@@ -1,5 +1,5 @@
-//! The command line from outside: exit codes, one clear sentence, nothing left behind (DESIGN.md,
-//! Command line). What it makes of a film is tested in `film`.
+//! The command line as a user sees it: exit codes, error messages, no leftovers
+//! (docs/reference/command-line.md). The results of its commands are tested in `film`.
 
 mod doctor;
 mod stderr;
@@ -21,7 +21,7 @@ fn flockreel(films: &Films, args: &str) -> Output {
         .expect("the program starts")
 }
 
-/// What is in the folder, by name.
+/// Returns the sorted names of the entries of the folder.
 fn names(films: &Films) -> Vec<String> {
     let entries = std::fs::read_dir(films.folder()).expect("it is there");
     let mut names: Vec<String> = entries
@@ -81,7 +81,7 @@ fn every_option_that_an_advice_names_is_one() {
     for option in options {
         let done = flockreel(&films, &format!("analyze nowhere.mp4 -o library {option}"));
         let sentence = String::from_utf8(done.stderr).expect("it is text");
-        // It was understood: what is missing is the film.
+        // The option was parsed, because the error is about the film.
         assert!(
             sentence.contains("cannot be read") && sentence.contains("nowhere.mp4"),
             "{option}: {sentence}"

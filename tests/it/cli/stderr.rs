@@ -1,4 +1,5 @@
-//! A stderr that takes no lines costs the service no answer: its reader has died, stalls, or its disk is full.
+//! The service keeps answering when its stderr is blocked: the reader has died or stalled, or the disk is
+//! full. Lines that cannot be written are dropped and counted.
 
 use std::fs::File;
 use std::io::{PipeReader, Read, pipe};
@@ -10,10 +11,10 @@ use rustix::process::{Pid, Signal, kill_process};
 
 use crate::common::{Place, client};
 
-/// More than any of these tests needs to become ready, or to stop.
+/// Time limit for one start, response or stop. Free choice, longer than any of them takes.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A service whose stderr is given.
+/// A running service with a given stderr.
 struct Service {
     child: Child,
     base: String,
@@ -21,7 +22,7 @@ struct Service {
 }
 
 impl Service {
-    /// Starts it and waits until it answers.
+    /// Starts the service and waits until it responds.
     async fn start(stderr: impl Into<Stdio>, filter: &str) -> Service {
         Service::start_with(Stdio::null(), stderr, filter).await
     }
@@ -60,7 +61,7 @@ impl Service {
         service
     }
 
-    /// Sends requests that are logged, each of which must be answered.
+    /// Sends requests that the service logs, and asserts that each is answered.
     async fn assert_answers(&self, n_requests: usize) {
         let client = client();
         for _ in 0..n_requests {
@@ -79,7 +80,7 @@ impl Service {
         lost.unwrap().parse().unwrap()
     }
 
-    /// Waits until so many lines are counted as lost.
+    /// Waits until at least `n_lines` lines are counted as lost.
     async fn assert_lost_lines(&self, n_lines: u64) {
         let start = Instant::now();
         while self.n_lost_lines().await < n_lines {
@@ -88,7 +89,7 @@ impl Service {
         }
     }
 
-    /// SIGTERM; the exit code.
+    /// Sends SIGTERM, waits for the end and returns the exit code.
     fn terminate(&mut self) -> Option<i32> {
         kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
         let start = Instant::now();
@@ -104,7 +105,7 @@ impl Service {
 
 impl Drop for Service {
     fn drop(&mut self) {
-        // Already gone, where the test ended well.
+        // The process has already ended if the test passed.
         self.child.kill().ok();
         self.child.wait().ok();
     }
@@ -138,7 +139,7 @@ async fn a_dead_reader_of_stderr_costs_no_answer() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_stalled_reader_of_stderr_costs_no_answer() {
     let (reader, stderr) = pipe().unwrap();
-    // Both go to the reader that stalls, as with `2>&1`.
+    // Both streams go to the stalled reader, as with `2>&1`.
     let stdout = stderr.try_clone().unwrap();
     let mut service = Service::start_with(stdout, stderr, "trace").await;
     let start = Instant::now();

@@ -1,4 +1,5 @@
-//! `backup`, `check`, `gc` and the file of settings, on the real program (RELIABILITY.md, R11 and I1 to I6).
+//! `backup`, `check`, `gc` and the settings file, run with the real program (docs/explanation/promises.md,
+//! "Restore and upgrade").
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -28,10 +29,10 @@ async fn json_at(url: String) -> Value {
     answer.json().await.unwrap()
 }
 
-/// Films that were stored and are not deleted again.
+/// Ids of films that were stored and not deleted.
 type Kept = Arc<Mutex<Vec<String>>>;
 
-/// Uploads films, queues their analyses, and deletes every third, until told to stop.
+/// Uploads films and queues their analyses until `stop` is set. Deletes every third film.
 async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>, kept: Kept) {
     let client = client();
     while !stop.load(Ordering::Relaxed) {
@@ -113,7 +114,8 @@ async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
     assert_eq!(ended.status(), 201, "it goes on");
 }
 
-/// So many films are listed, and each is served with the bytes that its hash is of; their ids.
+/// Asserts that `n_films` films are listed and that each is served with the bytes of its hash. Returns their
+/// ids.
 async fn every_film_is_whole(base: &str, n_films: u64) -> Vec<String> {
     let items = json_at(format!("{}/v1/footage?limit=200", base)).await["items"].clone();
     let items = items.as_array().unwrap().clone();
@@ -194,7 +196,7 @@ async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
     }
 }
 
-/// What is broken or missing is not copied.
+/// Asserts that damaged or missing files are not backed up.
 fn assert_no_copy_is_made(films: &Films) {
     let backup = flockreel(&["backup", "copy", "--data", "data"], films.folder());
     assert_eq!(backup.status.code(), Some(1), "{}", said(&backup));
@@ -209,7 +211,7 @@ async fn gc_beside_a_service_leaves_what_it_is_receiving() {
     let (first, second) = film.split_at(film.len() / 2);
     let (first, second) = (first.to_vec(), second.to_vec());
     let folder = films.folder().to_owned();
-    // What comes between the halves is that somebody looks for waste.
+    // Between the two halves of the upload, `gc` runs.
     let rest = async move {
         let gc = move || {
             let is_received =

@@ -1,4 +1,4 @@
-//! The real service, router and all, on a port and a data folder of its own.
+//! Runs the real service with its router, on its own port and data folder.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Place, client};
 
-/// The service under test.
+/// The service under test, with a client for it.
 pub(crate) struct TestApp {
     pub(crate) context: Context,
     pub(crate) client: Client,
@@ -36,19 +36,19 @@ struct Arguments {
 }
 
 impl TestApp {
-    /// A service without workers: jobs stay queued, and tests step them.
+    /// Starts a service without workers: jobs stay queued until a test steps a worker.
     pub(crate) async fn idle() -> TestApp {
         TestApp::start(&[]).await
     }
 
-    /// A service with one worker.
+    /// Starts a service with one worker.
     pub(crate) async fn working() -> TestApp {
         let mut app = TestApp::start(&[]).await;
         app.supervisor = Some(Supervisor::start(app.context.clone(), 1));
         app
     }
 
-    /// A service with further flags.
+    /// Starts a service without workers and with additional command-line flags.
     pub(crate) async fn start(flags: &[&str]) -> TestApp {
         let place = Place::of_tests();
         let flags = flags.iter().map(|flag| (*flag).to_owned());
@@ -76,17 +76,17 @@ impl TestApp {
         }
     }
 
-    /// The folder that the service keeps its things in.
+    /// Returns the data folder of the service.
     pub(crate) fn folder(&self) -> &std::path::Path {
         self.place.data()
     }
 
-    /// The whole address of a path.
+    /// Returns the URL of a path.
     pub(crate) fn address(&self, path: &str) -> String {
         format!("{}{path}", self.base)
     }
 
-    /// Makes a token, for an owner of its own.
+    /// Creates a token with its own owner and returns it. `quota` limits the owner's jobs.
     pub(crate) async fn token(&self, scope: Scope, quota: i64) -> String {
         let new = NewToken {
             name: "test".to_owned(),
@@ -99,7 +99,7 @@ impl TestApp {
         made.unwrap().1
     }
 
-    /// From now on every request carries this token.
+    /// Makes every later request send this token.
     pub(crate) fn sign_in(&mut self, token: &str) {
         let value = format!("Bearer {token}").parse().unwrap();
         let headers = HeaderMap::from_iter([(header::AUTHORIZATION, value)]);
@@ -107,7 +107,7 @@ impl TestApp {
         self.client = client.unwrap();
     }
 
-    /// From now on requests carry nothing of their own.
+    /// Makes every later request go without a token.
     pub(crate) fn sign_out(&mut self) {
         self.client = client();
     }
@@ -132,30 +132,30 @@ impl TestApp {
         self.client.head(format!("{}{path}", self.base))
     }
 
-    /// POSTs a form.
+    /// POSTs a form and returns the response.
     pub(crate) async fn send_form(&self, path: &str, form: Form) -> Response {
         self.post(path).multipart(form).send().await.unwrap()
     }
 
-    /// Uploads a film that must be taken, and returns its id.
+    /// Uploads a film, asserts status 201 and returns the footage id.
     pub(crate) async fn upload(&self, film: &[u8]) -> String {
         let answer = self.post("/v1/footage").body(film.to_vec()).send().await;
         let footage = json_of(answer.unwrap(), StatusCode::CREATED).await;
         footage["id"].as_str().unwrap().to_owned()
     }
 
-    /// POSTs JSON that must be accepted as a job, and returns the answer.
+    /// POSTs JSON, asserts status 202 and returns the response body.
     pub(crate) async fn accept(&self, path: &str, body: Value) -> Value {
         let answer = self.post(path).json(&body).send().await.unwrap();
         json_of(answer, StatusCode::ACCEPTED).await
     }
 
-    /// GETs JSON that must be there.
+    /// GETs JSON and asserts status 200.
     pub(crate) async fn json(&self, path: &str) -> Value {
         json_of(self.get(path).send().await.unwrap(), StatusCode::OK).await
     }
 
-    /// The job in its final state.
+    /// Waits until the job has ended and returns it. Panics after two minutes.
     pub(crate) async fn ended_job(&self, id: &Value) -> Value {
         let path = format!("/v1/jobs/{}", id.as_str().unwrap());
         for _ in 0..1200 {
@@ -168,17 +168,17 @@ impl TestApp {
         panic!("the job did not end in two minutes");
     }
 
-    /// What is being made, or was left half made.
+    /// Returns the number of drafts, those in use and those left by a crash.
     pub(crate) fn n_drafts(&self) -> usize {
         self.place.n_drafts()
     }
 
-    /// Files of unfinished uploads.
+    /// Returns the number of files of unfinished uploads.
     pub(crate) fn n_uploads(&self) -> usize {
         self.place.n_uploads()
     }
 
-    /// Folders of a kind in the store.
+    /// Returns the number of stored folders of one kind, such as `libraries`.
     pub(crate) async fn n_folders(&self, kind: &str) -> usize {
         let folders = self.context.store.blobs().folders().await.unwrap();
         let of_kind = |name: &str| name.split('/').next() == Some(kind);
@@ -188,7 +188,7 @@ impl TestApp {
             .count()
     }
 
-    /// Every invariant of the store holds, nothing is half made; the workers let go.
+    /// Stops workers and server, then asserts that the invariants of the store hold and no drafts are left.
     pub(crate) async fn assert_sound(mut self) {
         if let Some(supervisor) = self.supervisor.take() {
             supervisor.drain().await;
@@ -207,7 +207,7 @@ impl Drop for TestApp {
     }
 }
 
-/// The JSON of an answer that must have this status.
+/// Asserts the status of a response and returns its JSON.
 pub(crate) async fn json_of(answer: Response, status: StatusCode) -> Value {
     let found = answer.status();
     let text = answer.text().await.unwrap();
@@ -215,7 +215,7 @@ pub(crate) async fn json_of(answer: Response, status: StatusCode) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// The code of an answer that must be a problem of this status.
+/// Asserts that a response is a complete problem document with this status, and returns its code.
 pub(crate) async fn code_of(answer: Response, status: u16) -> String {
     let media_type = answer.headers()["content-type"].to_str().unwrap();
     assert_eq!(media_type, "application/problem+json");
@@ -229,7 +229,7 @@ pub(crate) async fn code_of(answer: Response, status: u16) -> String {
     code.to_owned()
 }
 
-/// Every call that the document names.
+/// Returns method and path of every operation in the OpenAPI document.
 pub(crate) fn routes(document: &Value) -> Vec<(Method, String)> {
     let paths = document["paths"].as_object().unwrap();
     let calls = paths.iter().flat_map(|(path, calls)| {

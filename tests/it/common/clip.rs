@@ -1,4 +1,4 @@
-//! Small real video files, made once per test program: the virtual fish, filmed and encoded.
+//! Small video files of the virtual fish. Each is rendered and encoded once per test program.
 
 use std::sync::LazyLock;
 
@@ -8,13 +8,13 @@ use flockreel::footage::{FootageFormat, FrameSource};
 use flockreel::media::VideoWriter;
 use flockreel::raster::{Frame, RgbImage};
 
-/// Ten frames of 64x64: enough to be admitted.
+/// Ten frames of 64 x 64 pixels, enough to be admitted as footage.
 pub(crate) static TINY: LazyLock<Vec<u8>> = LazyLock::new(|| film(10, 64, 64));
 
-/// Ten seconds of 320x240: enough for a library with transitions.
+/// Ten seconds (300 frames) of 320 x 240 pixels, enough for a library with transitions.
 pub(crate) static SWIM: LazyLock<Vec<u8>> = LazyLock::new(|| film(300, 320, 240));
 
-/// A mask for each frame of SWIM: white where the fish is.
+/// The mask film of `SWIM`: each pixel is the alpha of the fish, 0 to 255.
 pub(crate) static SWIM_MASKS: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let params = SampleParams {
         n_frames: 300,
@@ -49,7 +49,7 @@ fn film(n_frames: usize, width: u32, height: u32) -> Vec<u8> {
     encoded(&film.format(), |k, frame| film.render(k, frame))
 }
 
-/// A film of frames that `draw` gives.
+/// Returns the bytes of an MP4 file whose frames are drawn by `draw`.
 fn encoded(format: &FootageFormat, draw: impl Fn(usize, &mut Frame)) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("film.mp4");

@@ -1,4 +1,4 @@
-//! What tests arrange with: a real service on a port of its own, films, a service as a process.
+//! Test fixtures: a running service, films and pictures, and the service as a separate process.
 
 pub(crate) mod app;
 pub(crate) mod clip;
@@ -10,7 +10,7 @@ pub(crate) mod process;
 pub(crate) use app::TestApp;
 pub(crate) use place::Place;
 
-/// A client of the service. `Client::new()` alone would ask for cryptography that nobody has chosen yet.
+/// Returns an HTTP client. Installs the TLS provider first, because `Client::new()` needs one.
 pub(crate) fn client() -> reqwest::Client {
     flockreel::store::tls::choose_cryptography();
     reqwest::Client::new()

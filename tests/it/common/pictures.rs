@@ -1,4 +1,4 @@
-//! Pictures as footage, made on the spot: PNGs, zips of them, stacks of TIFF pages.
+//! Footage made of pictures, generated at run time: PNG files, zips of them, and multi-page TIFF files.
 
 use std::io::{Cursor, Write};
 
@@ -7,31 +7,31 @@ use tiff::encoder::{TiffEncoder, colortype};
 use zip::CompressionMethod;
 use zip::write::SimpleFileOptions;
 
-/// Columns and rows of the pictures.
+/// Width and height of the pictures, pixels.
 pub(crate) const SIZE: [u32; 2] = [64, 48];
 
-/// A ramp of gray that moves on by 10 levels with each picture, modulo 256.
+/// Returns a gray ramp. Each step of `k` adds 10 levels, modulo 256.
 pub(crate) fn gray(k: usize) -> GrayImage {
     GrayImage::from_fn(SIZE[0], SIZE[1], |x, y| {
         Luma([((2 * x + y) as usize + 10 * k) as u8])
     })
 }
 
-/// A picture as the bytes of a file.
+/// Returns the bytes of an encoded picture.
 pub(crate) fn encoded(image: &GrayImage, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).expect("in memory");
     bytes.into_inner()
 }
 
-/// The same of a picture with alpha.
+/// Returns the bytes of an encoded picture with alpha.
 pub(crate) fn encoded_rgba(image: &RgbaImage, format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, format).expect("in memory");
     bytes.into_inner()
 }
 
-/// A zip of files, packed.
+/// Returns the bytes of a compressed zip of files.
 pub(crate) fn zip_of(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
     let packed = SimpleFileOptions::default().compression_method(CompressionMethod::Deflated);
@@ -42,7 +42,7 @@ pub(crate) fn zip_of(files: &[(String, Vec<u8>)]) -> Vec<u8> {
     zip.finish().expect("in memory").into_inner()
 }
 
-/// A zip of `n` numbered PNGs.
+/// Returns the bytes of a zip with `n` numbered PNG files.
 pub(crate) fn zip_of_grays(n: usize) -> Vec<u8> {
     let file = |k: usize| {
         (
@@ -53,12 +53,12 @@ pub(crate) fn zip_of_grays(n: usize) -> Vec<u8> {
     zip_of(&(0..n).map(file).collect::<Vec<_>>())
 }
 
-/// A TIFF of `n` pages of 8 bits.
+/// Returns the bytes of a TIFF with `n` pages of 8 bits.
 pub(crate) fn stack_of_grays(n: usize) -> Vec<u8> {
     stack::<colortype::Gray8>(n, |k| gray(k).into_raw())
 }
 
-/// A TIFF of `n` pages of any samples.
+/// Returns the bytes of a TIFF with `n` pages of any sample type.
 pub(crate) fn stack<C: colortype::ColorType>(
     n: usize,
     page: impl Fn(usize) -> Vec<C::Inner>,

@@ -1,5 +1,5 @@
-//! Where a service under test keeps its things. By itself a test program keeps them in folders; beside the
-//! servers of scripts/with-servers.sh the same tests run on PostgreSQL and a bucket.
+//! The storage of a service under test. It is a temporary folder by default. With the servers of
+//! scripts/with-servers.sh, the same tests use PostgreSQL and a bucket.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use flockreel::config::Storage;
 use tempfile::TempDir;
 use uuid::Uuid;
 
-/// A folder of its own, and perhaps a database and a prefix in a bucket.
+/// A data folder, and optionally a database and a prefix in a bucket.
 pub(crate) struct Place {
     folder: TempDir,
     flags: Vec<String>,
@@ -21,18 +21,18 @@ struct Arguments {
 }
 
 impl Place {
-    /// All in the folder.
+    /// Returns a place that stores everything in its folder.
     pub(crate) fn local() -> Place {
         Place::on(None, None)
     }
 
-    /// On what the tests are to run on.
+    /// Returns a place on the servers that the environment names; without any, everything is in its folder.
     pub(crate) fn of_tests() -> Place {
         let of = |name: &str| std::env::var(name).ok();
         Place::on(of("FLOCKREEL_TEST_POSTGRES"), of("FLOCKREEL_TEST_BUCKET"))
     }
 
-    /// On the servers, which must be there.
+    /// Returns a place on the servers. Panics if the environment does not name both.
     pub(crate) fn shared() -> Place {
         let place = Place::of_tests();
         assert_eq!(place.flags.len(), 4, "run it by scripts/with-servers.sh");
@@ -52,23 +52,23 @@ impl Place {
         }
     }
 
-    /// The flags that say so to a process.
+    /// Returns the command-line flags that select this place.
     pub(crate) fn flags(&self) -> Vec<String> {
         let data = self.folder.path().to_str().unwrap().to_owned();
         [vec!["--data".to_owned(), data], self.flags.clone()].concat()
     }
 
-    /// The data folder.
+    /// Returns the data folder.
     pub(crate) fn data(&self) -> &Path {
         self.folder.path()
     }
 
-    /// The flags that say what is not in the folder.
+    /// Returns the flags for database and bucket only; empty if all is in the folder.
     pub(crate) fn elsewhere_flags(&self) -> Vec<String> {
         self.flags.clone()
     }
 
-    /// The same for a process on another machine: a folder of its own, with the same rows and files.
+    /// Returns the place of a second machine: another data folder, but the same database and bucket.
     pub(crate) fn elsewhere(&self) -> Place {
         Place {
             folder: tempfile::tempdir().unwrap(),
@@ -76,17 +76,17 @@ impl Place {
         }
     }
 
-    /// The same for this process.
+    /// Returns the storage settings, for use within this process.
     pub(crate) fn storage(&self) -> Storage {
         Place::storage_of(self.flags().iter().map(String::as_str))
     }
 
-    /// What such flags say.
+    /// Parses command-line flags into storage settings.
     pub(crate) fn storage_of<'a>(flags: impl Iterator<Item = &'a str>) -> Storage {
         Arguments::parse_from(["test"].into_iter().chain(flags)).storage
     }
 
-    /// What processes are making, or left half made.
+    /// Returns the number of drafts of all processes, those in use and those left by a crash.
     pub(crate) fn n_drafts(&self) -> usize {
         let of_processes = std::fs::read_dir(self.folder.path().join("tmp")).unwrap();
         of_processes
@@ -94,7 +94,7 @@ impl Place {
             .sum()
     }
 
-    /// Files of unfinished uploads.
+    /// Returns the number of files of unfinished uploads.
     pub(crate) fn n_uploads(&self) -> usize {
         entries(&self.folder.path().join("uploads"))
     }

@@ -1,4 +1,4 @@
-//! The service as a process of its own, for tests that kill it.
+//! The service and its workers as separate processes, for tests that kill them.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -17,19 +17,19 @@ use super::app::json_of;
 use super::clip::TINY;
 use super::{Place, client};
 
-/// A running `flockreel worker`, and what it has said.
+/// A running `flockreel worker`, and the lines of its stderr.
 pub(crate) struct WorkerProcess {
     pub(crate) child: Child,
     said: Arc<Mutex<Vec<String>>>,
 }
 
 impl WorkerProcess {
-    /// Starts it over its things, with one worker.
+    /// Starts the process with one worker.
     pub(crate) fn start(place: &Place) -> WorkerProcess {
         WorkerProcess::start_with(place, &[])
     }
 
-    /// The same with further flags.
+    /// Starts the process with one worker and additional flags.
     pub(crate) fn start_with(place: &Place, flags: &[&str]) -> WorkerProcess {
         let mut child = Command::new(env!("CARGO_BIN_EXE_flockreel"))
             .args(["worker", "--workers", "1"])
@@ -47,7 +47,7 @@ impl WorkerProcess {
         WorkerProcess { child, said }
     }
 
-    /// Whether it has said something with these words.
+    /// Returns true if a line of stderr contains these words.
     pub(crate) fn has_said(&self, words: &str) -> bool {
         self.said
             .lock()
@@ -56,17 +56,17 @@ impl WorkerProcess {
             .any(|line| line.contains(words))
     }
 
-    /// All that it has said.
+    /// Returns stderr so far.
     pub(crate) fn said(&self) -> String {
         self.said.lock().unwrap().join("\n")
     }
 
-    /// Sends a signal.
+    /// Sends a signal to the process.
     pub(crate) fn signal(&self, signal: Signal) {
         kill_process(Pid::from_child(&self.child), signal).unwrap();
     }
 
-    /// SIGTERM; returns the exit code.
+    /// Sends SIGTERM, waits for the end and returns the exit code.
     pub(crate) fn terminate(mut self) -> Option<i32> {
         self.signal(Signal::TERM);
         self.child.wait().unwrap().code()
@@ -75,13 +75,13 @@ impl WorkerProcess {
 
 impl Drop for WorkerProcess {
     fn drop(&mut self) {
-        // Already gone, where the test ended well.
+        // The process has already ended if the test passed.
         self.child.kill().ok();
         self.child.wait().ok();
     }
 }
 
-/// A running `flockreel serve` without a sample, and what asks it.
+/// A running `flockreel serve --no-sample`, with a client for it.
 pub(crate) struct Server {
     child: Child,
     log: JoinHandle<String>,
@@ -90,31 +90,31 @@ pub(crate) struct Server {
 }
 
 impl Server {
-    /// Starts it over a data folder and waits for its address.
+    /// Starts the service on a data folder and waits for its address.
     pub(crate) fn start(data: &Path) -> Server {
         Server::start_with(data, &[])
     }
 
-    /// The same over a place of any kind.
+    /// Starts the service on a place.
     pub(crate) fn start_at(place: &Place) -> Server {
         let flags = place.elsewhere_flags();
         let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
         Server::start_with(place.data(), &flags)
     }
 
-    /// The same with further flags.
+    /// Starts the service with additional flags.
     pub(crate) fn start_with(data: &Path, flags: &[&str]) -> Server {
         Server::start_in(data, flags, &[])
     }
 
-    /// The same with variables of its environment.
+    /// Starts the service with additional flags and environment variables.
     pub(crate) fn start_in(data: &Path, flags: &[&str], variables: &[(&str, &str)]) -> Server {
         let mut service = Command::new(env!("CARGO_BIN_EXE_flockreel"));
         service.envs(variables.iter().copied());
         Server::started(service, data, flags)
     }
 
-    /// Starts it by another program that stands before it, such as one that writes down its calls.
+    /// Starts the service under another program, such as strace. `before` is its command line.
     pub(crate) fn start_under(before: &[&str], data: &Path) -> Server {
         let mut service = Command::new(before[0]);
         service
@@ -140,7 +140,7 @@ impl Server {
             Some(address.trim_end_matches('/').to_owned())
         });
         let base = base.unwrap_or_else(|| panic!("no address was given:\n{log}"));
-        // What it says later must not block it.
+        // Keep reading, so that a full pipe does not block the service.
         let log = std::thread::spawn(move || {
             let lines = lines.map_while(Result::ok);
             lines.fold(log, |log, line| format!("{log}{line}\n"))
@@ -168,27 +168,27 @@ impl Server {
         request.send().await.unwrap()
     }
 
-    /// Sends a film.
+    /// Uploads a film and returns the response.
     pub(crate) async fn upload(&self, film: Vec<u8>) -> Response {
         let request = self.client.post(format!("{}/v1/footage", self.base));
         request.body(film).send().await.unwrap()
     }
 
-    /// POSTs JSON that must be accepted as a job, and returns the answer.
+    /// POSTs JSON, asserts status 202 and returns the response body.
     pub(crate) async fn accept(&self, path: &str, wish: Value) -> Value {
         let request = self.client.post(format!("{}{path}", self.base));
         let answer = request.json(&wish).send().await.unwrap();
         json_of(answer, StatusCode::ACCEPTED).await
     }
 
-    /// Sends a film that must be taken, and has it measured.
+    /// Uploads a film, asserts status 201, and queues its analysis.
     pub(crate) async fn analyze(&self, film: Vec<u8>) -> Value {
         let footage = json_of(self.upload(film).await, StatusCode::CREATED).await;
         let wish = json!({"footage_id": footage["id"]});
         self.accept("/v1/analyses", wish).await
     }
 
-    /// The job once it is as wanted, which it must be within four minutes.
+    /// Polls the job until `is_so` holds and returns it. Panics after four minutes.
     pub(crate) async fn job_when(&self, id: &Value, is_so: impl Fn(&Value) -> bool) -> Value {
         let path = format!("/v1/jobs/{}", id.as_str().unwrap());
         let start = Instant::now();
@@ -202,29 +202,29 @@ impl Server {
         }
     }
 
-    /// The job in its final state.
+    /// Waits until the job has ended and returns it.
     pub(crate) async fn ended(&self, id: &Value) -> Value {
         self.job_when(id, |job| !job["finished_at"].is_null()).await
     }
 
-    /// SIGKILL.
+    /// Sends SIGKILL and waits for the end.
     pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }
 
-    /// SIGTERM, and no waiting.
+    /// Sends SIGTERM without waiting for the end.
     pub(crate) fn tell_to_stop(&self) {
         kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
     }
 
-    /// SIGTERM; returns the exit code.
+    /// Sends SIGTERM, waits for the end and returns the exit code.
     pub(crate) fn terminate(mut self) -> Option<i32> {
         self.tell_to_stop();
         self.child.wait().unwrap().code()
     }
 
-    /// SIGTERM; returns what it said.
+    /// Sends SIGTERM, waits for the end and returns the stderr since the start message.
     pub(crate) fn terminate_and_read(mut self) -> String {
         self.tell_to_stop();
         self.child.wait().unwrap();
@@ -232,7 +232,7 @@ impl Server {
         log.join().unwrap()
     }
 
-    /// Waits for its end; returns the exit code.
+    /// Waits for the end and returns the exit code.
     pub(crate) fn wait(mut self) -> Option<i32> {
         self.child.wait().unwrap().code()
     }
@@ -240,25 +240,25 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // Already gone, where the test ended well.
+        // The process has already ended if the test passed.
         self.child.kill().ok();
         self.child.wait().ok();
     }
 }
 
-/// A film of its own: the tiny picture, and a box after its last one that no player reads.
+/// Returns `TINY` with a `free` box that contains `number`. Players ignore the box, but the hash differs.
 pub(crate) fn numbered_film(number: usize) -> Vec<u8> {
     let text = format!("film {number:08}");
     let n_bytes = u32::try_from(text.len() + 8).unwrap().to_be_bytes();
     [&TINY[..], &n_bytes, b"free", text.as_bytes()].concat()
 }
 
-/// SHA-256, hexadecimal.
+/// Returns the SHA-256 in hexadecimal.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// The command lines of all processes that name the folder.
+/// Returns the command lines of all processes that mention the folder.
 pub(crate) fn processes_of(folder: &Path) -> Vec<String> {
     let folder = folder.to_str().unwrap();
     let entries = std::fs::read_dir("/proc").unwrap().flatten();

@@ -1,6 +1,6 @@
-//! How near the analysis comes to the truth of a generated film, and a flock made of it
-//! (ALGORITHMS.md 9). The film is the virtual fish's; its pixels and its truth share no code with
-//! the analysis.
+//! Compares an analysis and a flock with the known truth of a film of the virtual fish
+//! (docs/explanation/algorithms.md, "Quality measures"). The film's pixels and truth share no code with the
+//! analysis.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use flockreel::scratch::{InMemory, Scratch};
 
 use super::sample::{filmed, median};
 
-/// (measured, true) poses of the frames in which the animal was found.
+/// Returns pairs of measured and true poses, for the frames in which the animal was detected.
 fn pairs() -> Vec<(Pose, Pose)> {
     let (film, library, _) = filmed();
     let truth = film.truth().frames;

@@ -1,11 +1,11 @@
-//! What goes wrong when people film: each is measured all the same, or refused for its own reason.
+//! Common faults of films: the analysis copes with them, or refuses the film for the right reason.
 
 use flockreel::analysis::{Error, Params};
 use flockreel::library::MoverKind;
 
 use super::staged::{FPS, HEIGHT, N_FRAMES, Staged, WIDTH, put};
 
-/// An animal from the side, as most films of this fish are; the view is guessed in tests of its own.
+/// Analyzes the film with default parameters, checks the poses against the truth and returns the library.
 fn measured(name: &str, film: &Staged) -> flockreel::library::Library {
     let library = film.analyzed(&Params::default());
     let library = library.unwrap_or_else(|error| panic!("{name}: {error}"));
@@ -55,7 +55,7 @@ fn a_cable_is_not_the_animal() {
         for row in 0..y as u32 {
             let middle = 160.0 + (x - 160.0) * f64::from(row) / y;
             for column in middle as u32 - 1..middle as u32 + 1 {
-                // It is fixed to the far side of the fish.
+                // The cable is attached to the far side of the fish, so the fish covers it.
                 let (shown, empty) = (picture.pixel(column, row), scene.pixel(column, row));
                 let is_fish = (0..3).any(|c| shown[c].abs_diff(empty[c]) > 24);
                 if !is_fish {
@@ -80,7 +80,7 @@ fn a_hand_that_was_there_first_is_not_the_animal_but_told() {
         }
     });
     let library = film.analyzed(&Params::default()).expect("a library");
-    // Where the hand hides the fish or touches it, nobody can tell.
+    // While the hand covers or touches the fish, the fish cannot be located.
     let poses = &library.poses.frames;
     let far = (0..N_FRAMES).filter(|&k| {
         let truth = film.centroid_px(k).expect("it is shown");
@@ -92,7 +92,7 @@ fn a_hand_that_was_there_first_is_not_the_animal_but_told() {
     let others = &library.poses.other_movers;
     let hand = others.iter().find(|m| m.kind == MoverKind::FromBorder);
     let hand = hand.unwrap_or_else(|| panic!("nobody told of the hand: {others:?}"));
-    // Until it moves it may be taken for scenery.
+    // Until the hand moves, it may be part of the background.
     assert!(hand.from_s < 1.0 && hand.to_s < 2.0, "{hand:?}");
 }
 
@@ -112,7 +112,7 @@ fn the_mirror_image_in_the_surface_is_not_a_second_animal() {
         let (found, truth) = (library.poses.frames[k].centroid_px?, film.centroid_px(k)?);
         Some((found[0] - truth[0]).hypot(found[1] - truth[1]))
     };
-    // Only while the fish is below the surface its truth is that of the film.
+    // The truth of the film holds only while the fish is below the surface.
     let below = (0..N_FRAMES).filter(|&k| {
         let y = film.centroid_px(k).map_or(0.0, |c| c[1]);
         y > f64::from(surface) + 25.0
@@ -126,7 +126,7 @@ fn the_mirror_image_in_the_surface_is_not_a_second_animal() {
     assert!(n > N_FRAMES / 2 && n_far <= n / 50, "{n_far} of {n}");
 }
 
-/// The first frame at which a refusal says that the trouble begins.
+/// Returns the code of a refusal and the time in the film that it names, seconds.
 fn refused(name: &str, film: &Staged) -> (&'static str, f64) {
     match film.analyzed(&Params::default()) {
         Err(Error::BackgroundNotStatic { at_s, .. }) => ("background_not_static", at_s),

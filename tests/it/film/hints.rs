@@ -1,4 +1,4 @@
-//! What a person may say of a film: which part is measured, which thing is the animal, and what is none.
+//! Hints of the user: the part of the film to analyze, a point on the animal, and boxes to ignore.
 
 use flockreel::analysis::params::{AnimalAtParam, IgnoreParam};
 use flockreel::analysis::{Error, Params};
@@ -7,10 +7,11 @@ use flockreel::raster::Frame;
 
 use super::staged::{HEIGHT, N_FRAMES, Staged, WIDTH, put};
 
-/// How much lower the second fish swims, pixels.
+/// Vertical offset of the second fish, pixels.
 const LOWER_PX: u32 = 70;
 
-/// The fish, and one that swims below as if it were the first one in a picture turned about its middle.
+/// Returns a film of the fish with a second one below: the first, rotated by 180 degrees about the
+/// picture's center and shifted down.
 fn two_fish() -> Staged {
     let film = Staged::plain();
     let scene = film.scene().clone();

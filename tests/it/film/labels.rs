@@ -1,5 +1,6 @@
-//! Real recordings, which are not part of the repository, against labels made by eye (`bench/labels`). FLOCKREEL_FOOTAGE names
-//! their folder. What is measured of them whole is in docs/ACCURACY.md (`make accuracy`).
+//! Compares analyses of real recordings with manual labels (`bench/labels`). FLOCKREEL_FOOTAGE names the
+//! folder of recordings, which are not in the repository. Whole clips are evaluated by `make accuracy`
+//! (docs/measurements.md).
 
 use std::path::Path;
 use std::sync::Arc;
@@ -15,17 +16,17 @@ use serde_json::Value;
 
 use crate::common::film::footage;
 
-/// How much of a clip is measured here, seconds.
+/// Length of the analyzed part of a clip, seconds. Free choice.
 const SECONDS: f64 = 10.0;
 
-/// The labels of a clip.
+/// Returns the labels of a clip.
 fn labels(name: &str) -> Value {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("bench/labels/{name}.json"));
     let text = std::fs::read(path).expect("labels");
     serde_json::from_slice(&text).expect("JSON")
 }
 
-/// The first seconds measured; `None` where there is no footage.
+/// Analyzes the first `SECONDS` of a clip. Returns `None` without FLOCKREEL_FOOTAGE.
 fn measured(labels: &Value) -> Option<Result<Library, Error>> {
     let clip = footage()?.join(labels["clip"].as_str().expect("a name"));
     let video = Video::open(&clip, &Limits::default()).expect("a film");
@@ -50,7 +51,8 @@ fn distance([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
     (ax - bx).hypot(ay - by)
 }
 
-/// Checks the centroids: found where the labeller saw the animal, within a quarter of its length.
+/// Asserts that the animal is detected in 95 % of the labeled frames in which it is visible. Each centroid
+/// must be within a quarter of the animal's length of its label, and the view must match.
 fn check(name: &str) {
     let labels = labels(name);
     let Some(library) = measured(&labels) else {

@@ -1,4 +1,4 @@
-//! Masks that are given with a film: they say what is the animal, whatever the scene does.
+//! Masks that come with a film: they define the animal, even before a background that moves.
 
 use std::sync::Arc;
 
@@ -14,13 +14,13 @@ use flockreel::scratch::{InMemory, Scratch};
 
 use super::staged::{HEIGHT, N_FRAMES, Staged, WIDTH, put};
 
-/// The fish of the plain film, to be drawn before anything.
+/// Returns the renderer of the fish of the plain film, to draw it over other backgrounds.
 fn fish() -> Film {
     let plain = Staged::plain();
     Film::new(plain.motion().clone(), plain.scene().clone())
 }
 
-/// The fish before waves that run, which no plate describes.
+/// Returns a film of the fish before moving waves, which no static background describes.
 fn before_running_waves(fish: &Film) -> Staged {
     Staged::plain().with_drawing(|k, picture, _| {
         for y in 0..HEIGHT {
@@ -37,7 +37,7 @@ fn before_running_waves(fish: &Film) -> Staged {
     })
 }
 
-/// A mask of each frame, soft at the rim; all black where `is_empty`.
+/// Returns a mask film: the alpha of the fish with its soft edge, or black if `is_empty`.
 fn masks(fish: &Film, is_empty: bool) -> Staged {
     Staged::plain().with_drawing(|k, picture: &mut RgbImage, _| {
         let drawing = fish.draw(k);
@@ -77,7 +77,7 @@ fn before_a_scene_that_moves_masks_tell_the_animal() {
     assert!(worst < 1.0, "{worst} px off");
 }
 
-/// How far the colors of half transparent pixels are from those of the fish alone, levels, on average.
+/// Returns the mean color error of half-transparent pixels against the fish alone, levels of 255.
 fn color_error(fish: &Film, library: &Library) -> f64 {
     let (mut off, mut n) = (0.0, 0.0);
     let mut rgba = Vec::new();

@@ -1,4 +1,5 @@
-//! Accuracy against known truth, on generated films (ALGORITHMS.md 9).
+//! Accuracy of the analysis against known truth, on generated films and on labeled recordings
+//! (docs/explanation/algorithms.md, "Quality measures").
 
 mod accuracy;
 mod cases;

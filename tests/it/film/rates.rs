@@ -1,4 +1,4 @@
-//! Any frame rate from 0.01 to 1000 gives a library and a flock: a time lapse as well as a high-speed camera.
+//! Frame rates from 0.02 to 1000 frames/s, from time lapse to high-speed film, give a library and a flock.
 
 use std::process::Command;
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::common::film::Films;
 
-/// The virtual fish in 64 frames, as a film of 30 a second.
+/// Writes film.mp4: the virtual fish, 64 frames.
 fn filmed(films: &Films) {
     let params = SampleParams {
         n_frames: 64,

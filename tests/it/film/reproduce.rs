@@ -1,6 +1,6 @@
-//! A matte put back over the plate reproduces its frame (ALGORITHMS.md 2.7): mean absolute error in
-//! the animal's box below 1.5 of 255, in a film without noise. Its pixels are those of the frame, so that
-//! nothing is interpolated.
+//! A matte composited over the background reproduces its frame (docs/explanation/algorithms.md, "Mattes").
+//! In a film without noise, the mean absolute error in the animal's box is below 1.5 of 255 levels. The
+//! matte's pixels are those of the frame, so nothing is interpolated.
 
 use flockreel::footage::FrameSource;
 use flockreel::library::{Library, Pose};
@@ -25,7 +25,7 @@ fn a_matte_over_the_plate_reproduces_its_frame() {
     assert!(n_frames > 150, "{n_frames}");
 }
 
-/// Mean absolute difference over the box and the channels.
+/// Returns the mean absolute difference over the animal's box and the channels, levels of 255.
 fn error_in_box(library: &Library, idx: usize, pose: &Pose, seen: &RgbImage) -> f64 {
     let (rect, centroid) = (pose.box_px.unwrap(), pose.centroid_px.unwrap());
     let (matte, mut rgba) = (library.sprites.matte(idx).unwrap(), Vec::new());

@@ -1,5 +1,5 @@
-//! The whole way of the virtual fish: the sample is filmed, analysed with its camera, and the virtual
-//! fish driven by what was measured swims where the filmed one swam (ALGORITHMS.md 4 and 9).
+//! The virtual fish from end to end (docs/explanation/algorithms.md, "Virtual fish"). The sample film is
+//! analyzed with its true camera. The poses drive a virtual fish, which must follow the filmed one.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -20,13 +20,13 @@ use flockreel::scratch::{InMemory, Scratch};
 
 const N_FRAMES: usize = 180;
 
-/// The sample and what the analysis made of it, once for all tests.
+/// Returns the sample film, its library and the analysis parameters. They are made once for all tests.
 pub(super) fn filmed() -> &'static (SampleFilm, Library, analysis::Params) {
     static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
     FILMED.get_or_init(|| filmed_with(SampleParams::default().noise))
 }
 
-/// The same without noise: what is there can be told from what is added.
+/// Like [`filmed`], without noise, so that only the errors of the method remain.
 pub(super) fn filmed_without_noise() -> &'static (SampleFilm, Library, analysis::Params) {
     static FILMED: OnceLock<(SampleFilm, Library, analysis::Params)> = OnceLock::new();
     FILMED.get_or_init(|| filmed_with(0.0))

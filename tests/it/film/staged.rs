@@ -1,5 +1,5 @@
-//! Films of the virtual fish to which something happens, with their truth: the frames are changed in memory, so that a test
-//! of a whole analysis takes a second.
+//! Films of the virtual fish with staged events, and their truth. The frames are edited in memory, so a test
+//! of a whole analysis takes about a second.
 
 use std::sync::Arc;
 
@@ -14,29 +14,29 @@ use flockreel::progress::Silent;
 use flockreel::raster::{Frame, RgbImage};
 use flockreel::scratch::{InMemory, Scratch};
 
-/// Frames of the film that is changed.
+/// Number of frames of the unedited film.
 pub(super) const N_FRAMES: usize = 150;
 pub(super) const FPS: f64 = 30.0;
 pub(super) const WIDTH: u32 = 320;
 pub(super) const HEIGHT: u32 = 240;
 
-/// A film whose frames were changed.
+/// A film with edited frames.
 pub(super) struct Staged {
     film: SampleFilm,
     frames: Vec<Frame>,
-    /// The frame of the film that each shows; `None` where the fish is not seen.
+    /// For each frame, the index of the frame of the unedited film; `None` if it does not show the fish.
     shown: Vec<Option<usize>>,
-    /// How far the picture is shifted in each, pixels.
+    /// For each frame, the shift of the picture to the right and down, pixels.
     shift_px: Vec<[f64; 2]>,
 }
 
 impl Staged {
-    /// The film as it is.
+    /// Returns the unedited film.
     pub(super) fn plain() -> Staged {
         Staged::in_order((0..N_FRAMES).collect())
     }
 
-    /// The frames of the film in another order, or again and again.
+    /// Returns a film of the unedited frames in this order; frames may be omitted or repeated.
     pub(super) fn in_order(order: Vec<usize>) -> Staged {
         let film = SampleFilm::new(SampleParams {
             n_frames: N_FRAMES,
@@ -58,7 +58,7 @@ impl Staged {
         }
     }
 
-    /// Multiplies the light of every frame: number of the frame, row.
+    /// Multiplies the brightness of every frame by `light`, a function of frame and row.
     pub(super) fn with_light(mut self, light: impl Fn(usize, usize) -> f64) -> Staged {
         for (k, frame) in self.frames.iter_mut().enumerate() {
             let mut picture = frame.to_rgb();
@@ -71,7 +71,7 @@ impl Staged {
         self
     }
 
-    /// Draws into every frame: number of the frame, picture, and the true centroid of the fish.
+    /// Edits every frame with `draw`, a function of frame, picture and true centroid of the fish.
     pub(super) fn with_drawing(mut self, draw: impl Fn(usize, &mut RgbImage, [f64; 2])) -> Staged {
         for k in 0..self.frames.len() {
             let centroid_px = self.centroid_px(k).unwrap_or([f64::NAN; 2]);
@@ -82,7 +82,7 @@ impl Staged {
         self
     }
 
-    /// Shifts the picture of each frame by whole pixels, right and down; the border is repeated.
+    /// Shifts each frame right and down by whole pixels. Border pixels are repeated.
     pub(super) fn shifted(mut self, by: impl Fn(usize) -> [i64; 2]) -> Staged {
         for (k, frame) in self.frames.iter_mut().enumerate() {
             let [right, down] = by(k);
@@ -101,7 +101,7 @@ impl Staged {
         self
     }
 
-    /// Puts frames of one color before the film.
+    /// Inserts frames of one color before the film.
     pub(super) fn after(mut self, n_frames: usize, rgb: [u8; 3]) -> Staged {
         let mut frame = self.frames[0].clone();
         let mut picture = frame.to_rgb();
@@ -117,29 +117,31 @@ impl Staged {
         self
     }
 
-    /// The scene without the fish.
+    /// Returns the background without the fish.
     pub(super) fn scene(&self) -> &RgbImage {
         self.film.background()
     }
 
-    /// How the fish swims in the film as it is.
+    /// Returns the motion of the fish in the unedited film.
     pub(super) fn motion(&self) -> &Motion {
         self.film.motion()
     }
 
-    /// Where the fish is in a frame.
+    /// Returns the true centroid of the fish, pixels; `None` if the frame does not show it.
     pub(super) fn centroid_px(&self, k: usize) -> Option<[f64; 2]> {
         let centroid = self.film.true_pose(self.shown[k]?).centroid_px?;
         Some([0, 1].map(|c| centroid[c] + self.shift_px[k][c]))
     }
 
-    /// The whole analysis.
+    /// Runs the whole analysis.
     pub(super) fn analyzed(&self, params: &Params) -> Result<Library, Error> {
         let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
         analyze(self, None, params, Level::detect(), &scratch, &Silent)
     }
 
-    /// Checks that the fish is measured in nearly every frame, and nothing else: within two pixels, with the head at its end.
+    /// Checks the poses against the truth. The fish is missed in at most 5 % of the frames. The 95th
+    /// percentile of the centroid error is below 2 px. The heading is off by more than 90 degrees in at most
+    /// 5 % of the frames. Headings more than 60 degrees out of the image plane are not checked.
     pub(super) fn check(&self, name: &str, library: &Library) {
         let poses = &library.poses.frames;
         assert_eq!(poses.len(), self.frames.len(), "{name}");
@@ -173,7 +175,7 @@ impl Staged {
     }
 }
 
-/// Sets a pixel.
+/// Sets one pixel.
 pub(super) fn put(picture: &mut RgbImage, [x, y]: [u32; 2], rgb: [u8; 3]) {
     let at = 3 * (y * picture.width + x) as usize;
     picture.pixels[at..at + 3].copy_from_slice(&rgb);

@@ -1,6 +1,6 @@
-//! What is answered with 201 outlives a power cut (RELIABILITY.md, R1 and the store's rules). A kill does not
-//! show that, for the kernel keeps what a killed process wrote: the calls of a really started service are read
-//! instead, under strace, and must come in the order in which nothing can be lost.
+//! An answered upload survives a power cut (docs/explanation/promises.md, "No upload is lost"). Killing the
+//! service cannot show this, because the kernel keeps what a killed process wrote. Instead the service runs
+//! under strace, and the test checks the order of its write, sync, rename and response calls.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,14 +12,14 @@ use crate::common::client;
 use crate::common::clip::TINY;
 use crate::common::process::Server;
 
-/// A service whose calls are written down.
+/// A service under strace.
 struct Traced {
     folder: TempDir,
     server: Server,
 }
 
 impl Traced {
-    /// None where nothing can be traced.
+    /// Starts the service. Returns `None` if strace is missing or not permitted.
     fn start() -> Option<Traced> {
         let traces = Command::new("strace").args(["-qq", "true"]).output();
         if !traces.is_ok_and(|done| done.status.success()) {
@@ -39,7 +39,8 @@ impl Traced {
         format!("{}{path}", self.server.base)
     }
 
-    /// The calls up to the answer that begins so, from the first that has to do with `start`.
+    /// Returns the system calls from the first that contains `start` to the first that contains `answer`,
+    /// both included. Waits for them up to 20 s.
     fn calls(&self, start: &str, answer: &str) -> Vec<String> {
         let begun = Instant::now();
         loop {
@@ -55,10 +56,10 @@ impl Traced {
     }
 }
 
-/// A call that must come: its name, and what stands in it.
+/// A required system call: the start of its name, and a text that it contains.
 type Wanted<'a> = (&'a str, &'a str);
 
-/// Each of the calls comes, after the one before it.
+/// Asserts that the required calls occur in this order; others may occur between them.
 fn assert_in_order(calls: &[String], wanted: &[Wanted]) {
     let mut rest = calls.iter();
     for (name, text) in wanted {
@@ -98,7 +99,7 @@ async fn what_is_answered_with_201_is_on_the_disk() {
     assert!(Path::new(&place).join("video").is_file());
 }
 
-/// The folder that a call renames, from `/data` on.
+/// Returns the source folder of a rename call, as a path that starts at `/data`.
 fn draft_of(rename: &str) -> String {
     let from = rename.split('"').nth(1).unwrap();
     from[from.find("/data/tmp/").unwrap()..].to_owned()

@@ -1,5 +1,6 @@
-//! A full disk is a clean no (RELIABILITY.md, R7): uploads are refused with 507 and leave nothing, a job fails
-//! with `storage_full`, what is there can be read and deleted, and all works again once there is room.
+//! Behavior on a full disk (docs/explanation/promises.md, "Full disk"). Uploads are refused with 507 and
+//! leave no files, and jobs fail with `storage_full`. Stored files can be read and deleted, and everything
+//! works again as soon as there is space.
 
 use std::fs::File;
 use std::io::Write;
@@ -15,14 +16,14 @@ use crate::common::clip::{SWIM, TINY};
 use crate::common::process::{Server, numbered_film};
 use crate::common::{Place, client};
 
-/// Within this time of room being there everything works.
+/// Time within which the service works again after space was freed.
 const RECOVERY: Duration = Duration::from_secs(2);
 
-/// A small disk of memory over a folder, until dropped.
+/// A small tmpfs mounted over a folder, unmounted on drop.
 struct SmallDisk(PathBuf);
 
 impl SmallDisk {
-    /// None where mounting is not allowed.
+    /// Mounts the disk; `size` is a tmpfs size such as `64m`. Returns `None` if mounting is not permitted.
     fn over(folder: &Path, size: &str) -> Option<SmallDisk> {
         let options = format!("size={size}");
         let mounted = Command::new("mount")
@@ -33,13 +34,13 @@ impl SmallDisk {
         mounted.then(|| SmallDisk(folder.to_owned()))
     }
 
-    /// Fills it but for so many bytes.
+    /// Fills the disk except for `n_left` bytes.
     fn fill_but(&self, n_left: u64) {
         let filler = vec![7; self.n_free_bytes().saturating_sub(n_left) as usize];
         std::fs::write(self.0.join("filler"), filler).unwrap();
     }
 
-    /// Fills it to the last byte.
+    /// Fills the disk completely.
     fn fill(&self) {
         let mut filler = File::options();
         let mut filler = filler
@@ -63,7 +64,7 @@ impl SmallDisk {
 
 impl Drop for SmallDisk {
     fn drop(&mut self) {
-        // Lazily, for something of it may still be open.
+        // Unmount lazily, because files on the disk may still be open.
         Command::new("umount").arg("-l").arg(&self.0).output().ok();
     }
 }
@@ -80,7 +81,7 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     let swim: Value = server.upload(SWIM.clone()).await.json().await.unwrap();
     let tiny: Value = server.upload(TINY.clone()).await.json().await.unwrap();
 
-    // A body that does not say how long it is, and would fit but for the reserve.
+    // A body without a declared length. Only the reserve keeps it from fitting.
     disk.fill_but(44 << 20);
     let pieces = (0..41).map(|_| Ok::<_, std::io::Error>(vec![7_u8; 1 << 20]));
     let endless = reqwest::Body::wrap_stream(futures_util::stream::iter(pieces));
@@ -90,7 +91,7 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     disk.free();
     assert!(disk.n_free_bytes() > 43 << 20, "it leaves nothing");
 
-    // Down to the reserve: nothing new comes in, all else works.
+    // Fill up to the reserve: uploads are refused, and everything else works.
     disk.fill_but(8 << 20);
     let other = [TINY.as_slice(), b"\0\0\0\x08free"].concat();
     let refused = server.upload(other.clone()).await;
@@ -99,7 +100,7 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     let ready = json_of(server.get("/readyz").await, StatusCode::SERVICE_UNAVAILABLE).await;
     assert_eq!(ready["disk"]["ok"], false, "{ready}");
 
-    // Below it, as somebody else may fill the disk: a job fails cleanly.
+    // Fill below the reserve, as another program may do: a job fails.
     disk.free();
     disk.fill_but(1 << 20);
     let wish = json!({"footage_id": swim["id"]});
@@ -111,7 +112,7 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     assert!(film.bytes().await.unwrap() == SWIM.as_slice());
     assert_eq!(server.delete(&path_of(&tiny)).await.status(), 204);
 
-    // With room again everything works, without a restart.
+    // Free the space: everything works without a restart.
     disk.free();
     assert_eq!(server.upload(other).await.status(), 201);
     let accepted = server.accept("/v1/analyses", wish).await;
@@ -122,7 +123,8 @@ async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
     drop(disk);
 }
 
-/// A service on a disk of its own that is not kept from filling it.
+/// Starts a service without a disk reserve on its own small disk. Returns `None` if mounting is not
+/// permitted.
 fn careless() -> Option<(Place, SmallDisk, Server)> {
     let place = Place::local();
     let Some(disk) = SmallDisk::over(place.data(), "64m") else {
@@ -138,7 +140,7 @@ async fn id_of(uploaded: Response) -> String {
     footage["id"].as_str().unwrap().to_owned()
 }
 
-/// Asks for an upload, a resumable upload and a job, each of which must be refused for want of room.
+/// Asserts that an upload, a resumable upload and a job are each refused with `storage_full`.
 async fn assert_refused(server: &Server, number: usize, footage: &str) {
     let refused = server.upload(numbered_film(number)).await;
     assert!(refused.headers().contains_key("retry-after"));
@@ -167,7 +169,7 @@ async fn a_disk_at_zero_bytes_lets_things_be_deleted_and_needs_no_restart() {
         disk.fill();
         assert_refused(&server, 10 * round + 5, &swim).await;
         for film in films {
-            // What the last deletion freed is taken by others.
+            // Fill the space that the last deletion freed.
             disk.fill();
             let gone = server.delete(&format!("/v1/footage/{film}")).await;
             assert_eq!(gone.status(), 204);
@@ -237,7 +239,7 @@ async fn every_request_is_answered_while_the_disk_fills_and_empties_under_load()
     assert_sound(place.data());
 }
 
-/// Uploads films, reads each and deletes it, for seven seconds. Returns how many were taken and how many refused.
+/// Uploads, reads and deletes films for seven seconds. Returns the numbers of accepted and refused uploads.
 async fn send_all(base: String, sender: usize) -> (usize, usize) {
     let (client, start) = (client(), Instant::now());
     let ask = async |method: Method, path: &str, film: Vec<u8>| {
@@ -263,7 +265,7 @@ async fn send_all(base: String, sender: usize) -> (usize, usize) {
     (n_taken, n_refused)
 }
 
-/// Has `flockreel check` verify the data folder.
+/// Asserts that `flockreel check` accepts the data folder.
 fn assert_sound(data: &Path) {
     let check = Command::new(env!("CARGO_BIN_EXE_flockreel"))
         .args(["check", "--data"])

@@ -1,4 +1,5 @@
-//! A server that is killed in the middle of a job, or told to stop (RELIABILITY.md, R2, R4, R5).
+//! A server that is killed or stopped during a job (docs/explanation/promises.md, "No job is lost",
+//! "Graceful stop" and "No orphans").
 
 use std::time::{Duration, Instant};
 
@@ -20,9 +21,9 @@ use crate::common::clip::SWIM;
 use crate::common::process::{Server, numbered_film, processes_of};
 use crate::common::{Place, client};
 
-/// Starts the analysis of a film; returns the job's id.
+/// Uploads the film, queues its analysis and returns the job id.
 async fn start_job(server: &Server) -> Value {
-    // The second time the film is known already.
+    // From the second call on, the film is already stored.
     let footage: Value = server.upload(SWIM.clone()).await.json().await.unwrap();
     let wish = json!({"footage_id": footage["id"]});
     server.accept("/v1/analyses", wish).await["job_id"].clone()
@@ -32,8 +33,9 @@ fn is_running(job: &Value) -> bool {
     job["state"] == "running"
 }
 
-/// How long a job may wait for another server: where others may have the rows too, until its lease has ended;
-/// where none can, nobody is waited for.
+/// Returns the longest time for which a job of a killed server may stay unclaimed. With PostgreSQL the job
+/// stays leased until its lease of 15 s ends, because other servers may share the queue. With SQLite the
+/// next server claims it at once. Both have a tolerance of 2 s.
 fn longest_orphan() -> Duration {
     match std::env::var_os("FLOCKREEL_TEST_POSTGRES") {
         Some(_) => Duration::from_secs(15 + 2),
@@ -41,7 +43,7 @@ fn longest_orphan() -> Duration {
     }
 }
 
-/// A job as its row has it, while no service runs.
+/// Reads the row of a job while no service runs.
 async fn row_of(place: &Place, job: &Value) -> JobRow {
     let store = Store::open(place.storage()).await.unwrap();
     let id = job.as_str().unwrap().parse().unwrap();
@@ -53,7 +55,7 @@ async fn assert_sound(place: &Place) {
     assert_eq!(store.check(now_ms()).await.unwrap(), Vec::<String>::new());
 }
 
-/// What one server had to leave in the making, the next one sweeps away.
+/// Asserts that the store is sound and that the drafts of the killed server are gone.
 async fn assert_swept(place: &Place) {
     assert_sound(place).await;
     assert_eq!(place.n_drafts(), 0);
@@ -111,7 +113,7 @@ async fn a_server_told_to_stop_gives_its_job_back_unused() {
     assert_swept(&place).await;
 }
 
-/// The tags, which are hashes, of what a done analysis left.
+/// Returns the entity tags (hashes of the content) of the files of a finished analysis.
 async fn result_of(server: &Server, job: &Value) -> Vec<String> {
     let library = job["links"]["result"].as_str().unwrap();
     let mut tags = Vec::new();
@@ -149,7 +151,7 @@ async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed()
         let ended = server.ended(job).await;
         match ended["state"].as_str().unwrap() {
             "done" => done.push(ended),
-            // Whoever is met by two kills is not tried again.
+            // A job that was interrupted by two kills is not retried.
             _ => assert_eq!(ended["error"]["code"], "crashed_worker", "{ended}"),
         }
     }
@@ -172,7 +174,7 @@ async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed()
     );
 }
 
-/// A film that is sent in two halves, the second when told to.
+/// Uploads a film in two halves. The second half is sent when the returned sender is used.
 fn slow_upload(server: &Server) -> (oneshot::Sender<()>, JoinHandle<StatusCode>) {
     let (go_on, told) = oneshot::channel::<()>();
     let film = numbered_film(1);

@@ -1,4 +1,4 @@
-//! The way of the data through HTTP: film in, measurements, flock out.
+//! All stages through HTTP: film to library, library to flock and virtual fish, and every result file.
 
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -68,7 +68,7 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     app.assert_sound().await;
 }
 
-/// Everything that a flock was asked for can be had, as what it is.
+/// Asserts that each requested file of a flock is served with its media type and file signature.
 async fn assert_files(app: &TestApp, flock: &str) {
     for (file, media_type, at, magic) in [
         ("video.webm", "video/webm", 0, &b"\x1a\x45\xdf\xa3"[..]),

@@ -1,4 +1,4 @@
-//! The life of jobs: stepped by hand, run by a real pool, under a killed server, and raced for.
+//! The life cycle of jobs: stepped by hand, run by worker pools, interrupted by kills, claimed concurrently.
 
 mod durable;
 mod full_disk;

@@ -1,5 +1,5 @@
-//! Films that break the program that decodes them are contained (RELIABILITY.md, R8): each of their jobs
-//! fails with its code within its limit, and the jobs after them finish as if nothing had been.
+//! Films that crash or stall their decoder affect no other job (docs/explanation/promises.md,
+//! "Poison jobs"). Each of their jobs fails with its code within its limit, and the jobs after them finish.
 
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -10,17 +10,18 @@ use crate::common::Place;
 use crate::common::clip::SWIM;
 use crate::common::process::Server;
 
-/// What the last bytes of a film do to its decoder, and the code that comes of it.
+/// Last bytes of a film, with the error code that they lead to. [`poisoned_ffmpeg`] acts on them.
 const POISONS: [(&str, &str); 4] = [
     ("ABORT", "decoder_crashed"),
     ("KILLED", "memory_limit"),
-    // It floods its complaints, and then its frames.
+    // Floods stderr, then writes endless frames.
     ("FLOOD", "too_many_frames"),
-    // It floods its complaints, and then says nothing for ever: until the longest wait for a frame.
+    // Floods stderr, then stays silent until the time limit for a frame.
     ("SILENT", "time_limit"),
 ];
 
-/// A shell script in ffmpeg's place that obeys the film's last bytes, and decodes other films.
+/// Writes a shell script that replaces ffmpeg. It acts on the last bytes of a poisoned film and runs the
+/// real ffmpeg for any other.
 fn poisoned_ffmpeg(folder: &Path) -> PathBuf {
     let path = std::env::var_os("PATH").expect("a PATH");
     let mut places = std::env::split_paths(&path).map(|place| place.join("ffmpeg"));
@@ -49,7 +50,7 @@ fn poisoned_ffmpeg(folder: &Path) -> PathBuf {
 async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
     let place = Place::local();
     let wrapper = poisoned_ffmpeg(place.data());
-    // The script starts other programs, which the sandbox would not let it.
+    // The script starts other programs, which the sandbox would forbid.
     let flags = [
         "--sandbox",
         "off",

@@ -1,5 +1,6 @@
-//! Many processes that claim from one queue at once (RELIABILITY.md, R10). The processes are this test
-//! program, started anew; `FLOCKREEL_RACE_JOBS` says how many jobs they race for.
+//! Many processes claim jobs from one queue concurrently (docs/explanation/promises.md,
+//! "Race-free claims"). They are further instances of this test program. FLOCKREEL_RACE_JOBS sets the number
+//! of jobs, 400 by default.
 
 use std::process::{Command, Stdio};
 
@@ -35,7 +36,7 @@ fn job(kind: Kind) -> NewJob {
     }
 }
 
-/// Something that was made of nothing.
+/// Returns a result without files.
 fn outcome(made: Made, result: Uuid) -> Outcome {
     Outcome {
         made,
@@ -46,7 +47,7 @@ fn outcome(made: Made, result: Uuid) -> Outcome {
     }
 }
 
-/// A library, so that there is something to make fish of.
+/// Stores a library without files, as input of the fish jobs.
 async fn library(store: &Store) -> Uuid {
     let draft = store.blobs().draft("film").unwrap();
     std::fs::write(draft.path().join(VIDEO), b"film").unwrap();

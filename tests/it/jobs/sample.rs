@@ -1,4 +1,4 @@
-//! The sample: three jobs of the first start, seen and ended like all others.
+//! The sample of a new data folder: three ordinary jobs that film, analyze and make a flock.
 
 use flockreel::ids::{FootageId, JobId};
 use flockreel::jobs::worker::{Step, Worker};
@@ -11,14 +11,14 @@ use serde_json::{Value, json};
 use crate::common::TestApp;
 use crate::common::app::code_of;
 
-/// Queues a sample of few frames; its job and its footage.
+/// Queues a sample of 20 frames. Returns the ids of its job and its footage.
 async fn queued(app: &TestApp) -> (JobId, FootageId) {
     let (input, account) = (sample::Input { n_frames: 20 }, Account::local());
     let queued = sample::enqueue(&app.context, &input, &account).await;
     queued.unwrap()
 }
 
-/// Kind, state and subject of every job, oldest first.
+/// Returns kind, state and subject of every job, oldest first.
 async fn jobs(app: &TestApp) -> Vec<(String, String, Value)> {
     let page = app.json("/v1/jobs").await;
     let mut jobs: Vec<_> = (page["items"].as_array().unwrap().iter())
@@ -35,7 +35,7 @@ async fn jobs(app: &TestApp) -> Vec<(String, String, Value)> {
 async fn an_empty_store_is_filled_by_three_jobs_that_everybody_can_see() {
     let app = TestApp::idle().await;
     sample::fill(&app.context).await.unwrap();
-    sample::fill(&app.context).await.unwrap(); // a restart while they are queued adds none
+    sample::fill(&app.context).await.unwrap(); // a second start while they are queued adds none
     let seen = jobs(&app).await;
     let kinds: Vec<&str> = seen.iter().map(|(kind, ..)| kind.as_str()).collect();
     assert_eq!(kinds, ["sample", "analysis", "flock"]);

@@ -1,5 +1,4 @@
-//! The worker, one step at a time, with other work in the place of the real one: no sleeping, no
-//! video.
+//! Steps a worker by hand, with substitutes for the work of the jobs: no video is decoded.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +18,7 @@ use serde_json::json;
 use crate::common::TestApp;
 use crate::common::clip::TINY;
 
-/// An app with one queued analysis; its job and its footage.
+/// Returns an app with one queued analysis, and the ids of the job and its footage.
 async fn with_job() -> (TestApp, JobId, uuid::Uuid) {
     let app = TestApp::idle().await;
     let footage_id = app.upload(&TINY).await;
@@ -65,7 +64,8 @@ async fn a_worker_that_was_given_up_throws_its_output_away() {
     let (fresh, store) = (Worker::new(app.context.clone()), app.context.store.clone());
     let (tell, told) = ended;
     let runtime = tokio::runtime::Handle::current();
-    // While the first worker works, the job is given to a second, which works until the first ended.
+    // During the first worker's attempt, the job is rescued and a second worker claims it. The second
+    // worker finishes after the first has ended.
     let step = stale.step_by(move |_, attempt| {
         runtime.block_on(store.rescue_all(0))?;
         let (claimed, is_claimed) = std::sync::mpsc::channel();
@@ -145,7 +145,7 @@ async fn a_panic_fails_its_own_job_alone() {
     app.assert_sound().await;
 }
 
-/// A worker whose jobs have next to no time, and notice soon.
+/// Returns a worker with a job budget of 300 ms and a lease of 900 ms.
 fn hurried(app: &TestApp) -> Worker {
     let mut context = app.context.clone();
     context.budget = Duration::from_millis(300);
@@ -191,7 +191,7 @@ async fn a_job_that_spins_and_does_not_listen_fails_all_the_same() {
     ends.store(true, Ordering::Relaxed);
     let worker = Worker::new(app.context.clone());
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
-    // What it makes after all is kept by nobody.
+    // The job ends late. Its output is discarded.
     tokio::time::sleep(Duration::from_millis(500)).await;
     assert_eq!(app.n_folders("libraries").await, 0);
     app.assert_sound().await;

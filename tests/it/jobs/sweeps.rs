@@ -1,4 +1,5 @@
-//! What a service that runs for months removes without a restart (RELIABILITY.md, R5; store and queue rules).
+//! Removal of expired data and of folders without a row, while the service runs
+//! (docs/explanation/promises.md, "No orphans").
 
 use std::fs::File;
 use std::time::{Duration, Instant, SystemTime};
@@ -24,7 +25,7 @@ async fn a_running_service_removes_what_has_expired_and_nothing_else() {
     for (scope, then_ms) in [(&old, now_ms() - KEPT_MS), (&young, now_ms() - 1000)] {
         answer_key(&app, scope, then_ms).await;
     }
-    // In a bucket nothing can be made to look old.
+    // Folders in a bucket cannot be backdated, so strays are tested in local storage only.
     let has_shelf = app.folder().join("blobs").exists();
     let strays = has_shelf.then(|| [2 * HOUR, Duration::ZERO].map(|age| stray(&app, age)));
     let [old_stray, young_stray] = strays.unwrap_or_default();
@@ -39,7 +40,7 @@ async fn a_running_service_removes_what_has_expired_and_nothing_else() {
     }
     supervisor.drain().await;
     assert_eq!(app.n_uploads(), 1);
-    // Asked as of then, when both were still to be had: one has been forgotten since.
+    // Look the keys up as of a time at which neither has expired: only the young one is still stored.
     let store = &app.context.store;
     let then_ms = now_ms() - KEPT_MS;
     let met = store.begin_key(&old, None, then_ms).await.unwrap();
@@ -86,7 +87,7 @@ async fn answer_key(app: &TestApp, scope: &Scope, then_ms: i64) {
     store.finish_key(scope, &answer).await.unwrap();
 }
 
-/// A folder that no row names, among the files of this machine.
+/// Creates a folder without a row in local storage, last modified `age` ago.
 fn stray(app: &TestApp, age: Duration) -> std::path::PathBuf {
     let folder = app.folder().join("blobs/footage");
     let folder = folder.join(format!("{}.0", Uuid::now_v7()));

@@ -1,5 +1,5 @@
-//! The advice of each refusal works: each command and option that `code.rs` names for a file is run on a file that is
-//! refused with that code, and the film it makes is read to its end.
+//! The advice of each error code works. Each command and option that `code.rs` suggests is run on a film with
+//! this error, and all frames of the repaired film are read.
 
 use std::path::{Path, PathBuf};
 
@@ -10,21 +10,21 @@ use flockreel::media::{Hints, Limits, Video};
 use super::{read_all, read_whole};
 use crate::common::film::Films;
 
-/// The commands that an advice names.
+/// Returns the ffmpeg commands in the advice of a code.
 fn commands(code: Code) -> Vec<&'static str> {
     let quoted = code.advice().split('`').skip(1).step_by(2);
     quoted.filter(|text| text.starts_with("ffmpeg ")).collect()
 }
 
-/// The rates that an advice names, as options.
+/// Returns the values of `--fps` in the advice of a code.
 fn rates(code: Code) -> Vec<f64> {
     let quoted = code.advice().split('`').skip(1).step_by(2);
     let rates = quoted.filter_map(|text| text.strip_prefix("--fps "));
     rates.map(|fps| fps.parse().expect("a number")).collect()
 }
 
-/// Films that are refused, one for each code whose advice names a command, more where kinds differ: size, frames, and
-/// how ffmpeg makes them.
+/// Films that are refused: code, picture size, number of frames, ffmpeg arguments. Each code whose advice
+/// contains a command has at least one film here or in [`refused`].
 #[rustfmt::skip]
 const REFUSED: [(Code, &str, usize, &str); 12] = [
     (Code::ContainerNotAllowed, "64x48", 40, "-c:v libvpx -f ivf film.ivf"),
@@ -41,7 +41,7 @@ const REFUSED: [(Code, &str, usize, &str); 12] = [
     (Code::DecoderCrashed, "64x48", 40, "-c:v mpeg4 any.avi"),
 ];
 
-/// The refused films, with their codes.
+/// Creates the refused films and returns them with their codes.
 fn refused(films: &Films) -> Vec<(Code, PathBuf)> {
     let make = |&(code, size, n, args): &(Code, &str, usize, &str)| {
         (code, films.test_picture(size, n, args))
@@ -74,7 +74,7 @@ fn each_command_of_an_advice_makes_a_film_that_is_taken() {
     let mut tried = Vec::new();
     for (code, film) in refused(&films) {
         let refusal = read_whole(&film, &Limits::default()).err();
-        // A decoder that crashes does so by chance: its advice is tried on a film that can be read.
+        // A decoder crash cannot be provoked, so its advice is tried on a good film.
         let is_right = refusal == Some(code) || code == Code::DecoderCrashed;
         assert!(is_right, "{film:?}: {refusal:?}");
         let name = film
@@ -105,7 +105,7 @@ fn each_command_of_an_advice_makes_a_film_that_is_taken() {
         }
         tried.push(code);
     }
-    // Too many frames take too long to make: its command is run on a film within the limit.
+    // A film of more frames than the default limit takes too long to make, so the limit is lowered.
     let film = films.test_picture("64x48", 60, "-c:v ffv1 endless.mkv");
     let limits = Limits {
         max_frames: 50,
@@ -132,7 +132,7 @@ fn each_command_of_an_advice_makes_a_film_that_is_taken() {
     }
 }
 
-/// A mask for each picture of a film whose pictures have no constant rate.
+/// Asserts that the suggested rates make masks match a film of variable frame rate.
 fn the_rates_for_masks_make_them_match(films: &Films) {
     let slowing = "-vf setpts=N*N*0.01/TB -fps_mode vfr -c:v mpeg4 slowing.mkv";
     let film = films.test_picture("64x48", 40, slowing);

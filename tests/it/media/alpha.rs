@@ -1,4 +1,4 @@
-//! Footage with an alpha channel: it is read as gray, whatever file it lies in.
+//! Footage with an alpha channel: the alpha is the mask, in every container that supports it.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::common::pictures::{encoded_rgba, zip_of};
 
 const N_FRAMES: usize = 20;
 
-/// How much of a pixel is a soft disk that goes to the right.
+/// Returns the alpha of a disk with a soft edge that moves right by one pixel per frame, 0 to 255.
 fn alpha(k: usize, x: u32, y: u32) -> u8 {
     let (dx, dy) = (f64::from(x) - 20.0 - k as f64, f64::from(y) - 24.0);
     (255.0 * ((14.0 - dx.hypot(dy)) / 8.0).clamp(0.0, 1.0)) as u8

@@ -1,4 +1,4 @@
-//! Bad input: each file is refused with its code, soon, and nothing is left running.
+//! Bad input: each file is refused with its error code in time, and no process remains.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use flockreel::media::Limits;
 use super::{n_processes_about, read_whole};
 use crate::common::film::Films;
 
-/// The code with which a file is refused under the usual limits.
+/// Returns the code with which a file is refused under the default limits.
 fn refusal(path: &Path) -> Code {
     refusal_within(path, &Limits::default())
 }
@@ -57,7 +57,7 @@ fn a_playlist_under_a_films_name_is_no_film_even_beside_the_film_it_names() {
     }
 }
 
-/// Texts that plain ffmpeg follows to another file.
+/// Playlists that plain ffmpeg would follow to another file.
 pub(super) const PLAYLISTS: [&str; 4] = [
     "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nother.ts\n#EXT-X-ENDLIST\n",
     "ffconcat version 1.0\nfile other.mp4\n",

@@ -1,5 +1,5 @@
-//! More than a hundred bad and odd films, made on the spot (RELIABILITY.md, S1): each with the codes that it
-//! may be refused with. What is damaged at a random place may also be read to its end, and says so here.
+//! More than a hundred bad and unusual films, generated at run time, with their allowed error codes
+//! (docs/explanation/promises.md, "Bad input"). A film damaged at a random place may also be readable.
 
 use std::path::PathBuf;
 
@@ -8,16 +8,16 @@ use flockreel::code::Code;
 use super::bad::PLAYLISTS;
 use crate::common::film::Films;
 
-/// One file and what may become of it.
+/// A file and its allowed outcomes.
 pub(crate) struct Case {
     pub(crate) path: PathBuf,
-    /// The codes that it may be refused with.
+    /// The error codes with which the file may be refused.
     pub(crate) codes: Vec<Code>,
-    /// Whether it may be read to its end.
+    /// True if all its frames may be read.
     pub(crate) may_be_good: bool,
 }
 
-/// Codes of a damaged file.
+/// Allowed error codes of damaged files.
 const DAMAGED: [Code; 5] = [
     Code::Truncated,
     Code::NotAVideo,
@@ -26,13 +26,13 @@ const DAMAGED: [Code; 5] = [
     Code::DecoderCrashed,
 ];
 
-/// The files in the making.
+/// The corpus under construction.
 struct Corpus<'a> {
     films: &'a Films,
     cases: Vec<Case>,
 }
 
-/// Makes every file.
+/// Generates all files.
 pub(crate) fn corpus(films: &Films) -> Vec<Case> {
     let cases = Vec::new();
     let mut corpus = Corpus { films, cases };
@@ -60,7 +60,7 @@ impl Corpus<'_> {
         self.damaged(path, &[]);
     }
 
-    /// Read to its end, or refused with one of the codes.
+    /// Adds a file that may be readable, or refused with one of the codes.
     fn damaged(&mut self, path: PathBuf, codes: &[Code]) {
         self.refused(path, codes);
         self.cases.last_mut().unwrap().may_be_good = true;
@@ -95,7 +95,7 @@ impl Corpus<'_> {
             for k in 1..=n_cuts {
                 let cut = &bytes[..bytes.len() * k / (n_cuts + 1)];
                 let path = self.films.write(&format!("cut{k}.{name}"), cut);
-                // Streams of packets have no end that could be missing.
+                // Packet streams have no index or end marker, so a cut may go unnoticed.
                 let endless = ["ts", "mpg", "vob", "h264", "hevc"];
                 match endless.iter().any(|ending| name.ends_with(ending)) {
                     true => self.damaged(path, &[&DAMAGED[..], &LIES[..]].concat()),
@@ -279,7 +279,7 @@ impl Corpus<'_> {
             let film = self.film(20, args);
             self.good(film);
         }
-        // Nothing but a header.
+        // A file with a header and no frames.
         let none = self
             .films
             .run("-f lavfi -i nullsrc=size=64x48:rate=25:duration=0 -c:v mpeg4 none.mkv");
@@ -294,7 +294,7 @@ impl Corpus<'_> {
         );
     }
 
-    /// A few kilobytes that claim billions of frames between two of theirs, or very many a second.
+    /// Adds small files whose time stamps imply billions of frames, or extremely high frame rates.
     fn of_leaping_times(&mut self) {
         self.film(40, "-c:v libx264 -bf 0 -pix_fmt yuv420p even.mp4");
         let micro = "time_base=1/1000000 -video_track_timescale 1000000";
@@ -335,7 +335,7 @@ impl Corpus<'_> {
             lie[at..at + bytes.len()].copy_from_slice(bytes);
             lie
         };
-        // Where each thing stands in its box, counted from the box's name.
+        // Offsets of the fields, relative to the name of their box.
         let lies = [
             (
                 "moov-size",
@@ -369,7 +369,7 @@ impl Corpus<'_> {
         let boxed = |name: &[u8], inside: &[u8]| {
             [&((inside.len() + 8) as u32).to_be_bytes(), name, inside].concat()
         };
-        // A header packed so that it claims to unfold to two gigabytes.
+        // A compressed header that claims to expand to 2 GiB.
         let unfolds = [&[0x7f, 0xff, 0xff, 0xff], &[0x78, 0x9c][..], &[0; 64]].concat();
         let bomb = [boxed(b"dcom", b"zlib"), boxed(b"cmvd", &unfolds)].concat();
         let bomb = boxed(b"moov", &boxed(b"cmov", &bomb));
@@ -384,7 +384,7 @@ impl Corpus<'_> {
     }
 }
 
-/// What a header may lie about so that a limit catches it.
+/// Allowed error codes of files with false headers, besides `DAMAGED`.
 const LIES: [Code; 8] = [
     Code::TooManyPixels,
     Code::TooFewPixels,

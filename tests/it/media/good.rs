@@ -1,4 +1,4 @@
-//! Good films of every accepted kind: whole, upright, in square pixels, at a constant rate.
+//! Films of every accepted container and codec: all frames, upright, with square pixels, at a constant rate.
 
 use std::ops::ControlFlow;
 
@@ -172,7 +172,7 @@ fn the_luma_weights_follow_the_tag_and_rgb_becomes_601() {
     );
     assert_eq!(matrix(&format!("{h264} c.mp4")), Matrix::Bt601);
     assert_eq!(matrix("-c:v ffv1 -pix_fmt bgr0 d.mkv"), Matrix::Bt601);
-    // And the colors are right: pure red stays red through RGB storage.
+    // Pure red stays red in a film that stores RGB.
     let red =
         films.run("-f lavfi -i color=red:size=64x48 -frames:v 3 -c:v ffv1 -pix_fmt bgr0 red.mkv");
     let frames = read_all(&open(&red)).expect("frames");
@@ -183,7 +183,7 @@ fn the_luma_weights_follow_the_tag_and_rgb_becomes_601() {
 #[test]
 fn a_rate_that_wanders_becomes_constant_with_true_times() {
     let films = Films::new();
-    // Of every ten frames one is missing: times 0, 1, 2, 3, 5, ... in steps of 1/25 s.
+    // One of ten frames is missing: times 0, 1, 2, 3, 5, ... in steps of 1/25 s.
     let film = films.test_picture(
         "64x48",
         36,

@@ -1,4 +1,4 @@
-//! Gray of more than 8 bits is shown from black to white by what is used of it, and that is told.
+//! Gray films of more than 8 bits: the used range is stretched to black and white, and a note reports it.
 
 use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Note, Video};
@@ -6,7 +6,8 @@ use flockreel::media::{Limits, Note, Video};
 use super::read_all;
 use crate::common::film::Films;
 
-/// A ramp of 64 levels from left to right, `lum` in words of 16 bits, then stored as `args` say.
+/// Opens a film of a ramp of 64 levels from left to right. `lum` is its 16-bit value as an ffmpeg
+/// expression of X, `args` are the encoder and the file name.
 fn ramp(films: &Films, lum: &str, args: &str) -> Video {
     let film = films.run(&format!(
         "-f lavfi -i color=black:s=64x64:rate=25,format=gray16le,geq=lum='{lum}' -frames:v 5 {args}"
@@ -56,7 +57,7 @@ fn what_is_used_of_the_range_becomes_black_to_white() {
         for (x, &luma) in row.iter().enumerate() {
             let wanted = 255.0 * x as f64 / 63.0;
             let off = (f64::from(luma) - wanted).abs();
-            // A range of 256 levels at least: the narrow ramp stays as steep as it is.
+            // At least 256 levels are mapped to the whole range, so the narrow ramp keeps its step.
             let is_narrow = args.contains("narrow");
             assert!(
                 off < if is_narrow { 6.0 } else { 2.5 },

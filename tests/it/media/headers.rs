@@ -1,4 +1,4 @@
-//! Films whose headers, clocks or streams mislead: what is there counts, not what is claimed.
+//! Films with misleading headers, clocks or streams: the actual pictures count, not the claims.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn open(film: &Path) -> Video {
     Video::open(film, &Limits::default()).unwrap_or_else(|error| panic!("{film:?}: {error}"))
 }
 
-/// The rate, and how many frames there are; each one's luma is that of plain ffmpeg's reading.
+/// Returns the frame rate and the number of frames. Asserts that the frames equal those of plain ffmpeg.
 fn read(films: &Films, film: &Path) -> (f64, usize) {
     let video = open(film);
     let frames = read_all(&video).expect("frames");
@@ -53,7 +53,7 @@ fn sound_longer_than_the_picture_cuts_nothing_off() {
 #[test]
 fn an_avi_whose_header_counts_ticks_instead_of_frames_is_whole() {
     let films = Films::new();
-    // The copied clock ticks twice a frame, and empty chunks fill every other tick.
+    // The time base has two ticks per frame. Empty chunks fill every second tick.
     films.test_picture("64x48", 40, &format!("{H264} -bf 2 even.mp4"));
     let ticking = films.run("-i even.mp4 -c copy -r 50 ticking.avi");
     let (fps, n_frames) = read(&films, &ticking);
@@ -61,7 +61,7 @@ fn an_avi_whose_header_counts_ticks_instead_of_frames_is_whole() {
         (fps - 25.0).abs() < 1e-6 && n_frames == 40,
         "{n_frames} at {fps}"
     );
-    // Dropped frames are empty chunks: the pictures that are there keep their times.
+    // Empty chunks mark dropped frames, and the remaining pictures keep their times.
     let film = films.test_picture(
         "64x48",
         36,
@@ -89,9 +89,9 @@ fn a_recorder_that_stalls_or_whose_clock_is_set_gives_each_picture_once() {
     let clocks = [
         ("N*40+gte(N\\,40)*3600000", 1),
         ("N*40+gte(N\\,40)*5000", 1),
-        // Twenty pictures are written at once, after a stall.
+        // After a stall, twenty pictures are written at once.
         ("if(between(N\\,30\\,49)\\,49*40+(N-49)*2\\,N*40)", 0),
-        // The clock stands still for twenty.
+        // The clock stops for twenty pictures.
         ("if(between(N\\,30\\,49)\\,1200\\,N*40)", 0),
     ];
     for (clock, n_notes) in clocks {

@@ -1,5 +1,5 @@
-//! The other kinds of file that we write: right in size, rate and color tags, alpha and color as they were
-//! given (ALGORITHMS.md 8, alpha output; ECOSYSTEM.md 5).
+//! Output files other than MP4: size, frame rate and color tags are right, and colors and alpha are kept
+//! (docs/explanation/algorithms.md, "Compositing").
 
 use std::path::Path;
 use std::process::Command;
@@ -20,7 +20,8 @@ const FORMAT: VideoFormat = VideoFormat {
     },
 };
 
-/// An orange disc with a soft rim that moves; the color goes on beyond its alpha, as we write it.
+/// Returns a moving orange disk with a soft edge, as RGBA with straight alpha: the color continues where
+/// alpha is 0.
 fn disc(frame_idx: usize) -> Vec<u8> {
     let center = [30.0 + 3.0 * frame_idx as f64, 33.0];
     (0..98 * 66)
@@ -49,7 +50,7 @@ fn written(films: &Films, name: &str, coding: Coding) -> std::path::PathBuf {
     path
 }
 
-/// What ffprobe says of the first stream.
+/// Returns the lines that ffprobe prints about the first stream.
 fn said(path: &Path, entries: &str) -> Vec<String> {
     let done = Command::new("ffprobe")
         .args(["-v", "error", "-count_frames", "-of", "default=nw=1"])
@@ -134,7 +135,7 @@ fn previews_are_small_move_and_repeat() {
     let films = Films::new();
     let gif = written(&films, "a.gif", Coding::Gif);
     let counted = said(&gif, "stream=nb_read_frames,width,height");
-    // 12 frames of 29.97 a second are 0.4 s: six of 15.
+    // 12 frames at 29.97 frames/s last 0.4 s, which gives six frames at 15 frames/s.
     assert!(
         counted.contains(&"nb_read_frames=6".to_owned()),
         "{counted:?}"

@@ -1,5 +1,5 @@
-//! The gate of RELIABILITY.md from outside: good films whole, bad files with their codes, nothing
-//! else opened, nothing left behind.
+//! Reading and writing of media files through ffmpeg: good films, bad input and the sandbox
+//! (docs/explanation/promises.md, "Bad input", "Confined media tools" and "Sandbox").
 
 mod advice;
 mod alpha;
@@ -23,7 +23,7 @@ use flockreel::footage::{FrameSource, SourceError};
 use flockreel::media::{Limits, Video};
 use flockreel::raster::Frame;
 
-/// All frames of a film with their times, or the code of the refusal, wherever it came.
+/// Returns all frames of a film with their times, or the code with which opening or reading is refused.
 fn read_whole(path: &Path, limits: &Limits) -> Result<Vec<(f64, Frame)>, Code> {
     let video = Video::open(path, limits).map_err(|error| error.code())?;
     read_all(&video).map_err(|error| error.code)
@@ -39,7 +39,7 @@ fn read_all(source: &dyn FrameSource) -> Result<Vec<(f64, Frame)>, SourceError> 
     Ok(frames)
 }
 
-/// How many processes have `text` among their arguments.
+/// Returns the number of processes whose arguments contain `text`.
 fn n_processes_about(text: &str) -> usize {
     let processes = std::fs::read_dir("/proc").expect("a Linux machine");
     let about = |entry: &std::fs::DirEntry| {

@@ -1,4 +1,4 @@
-//! Folders, zips and TIFFs of pictures as footage: whole, in order, and refused with a reason.
+//! Pictures as footage, in folders, zips and TIFF files: complete, in order, or refused with a reason.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ fn folder_of(films: &Films, name: &str, files: &[(String, Vec<u8>)]) -> PathBuf 
     films.path(name)
 }
 
-/// Twelve numbered pictures of one format, and what else may lie beside them.
+/// Returns twelve numbered pictures of one format, and two other files to be ignored.
 fn files(format: ImageFormat, ending: &str) -> Vec<(String, Vec<u8>)> {
     let picture = |k: usize| (format!("{k}.{ending}"), encoded(&gray(k), format));
     let mut files: Vec<_> = (0..12).rev().map(picture).collect();

@@ -1,5 +1,5 @@
-//! Real recordings decode whole, with the counts and sizes of their table. They are not part of
-//! the repository: FLOCKREEL_FOOTAGE names their folder.
+//! Real recordings are decoded completely, with the expected size, frame rate and number of frames.
+//! FLOCKREEL_FOOTAGE names the folder of recordings, which are not in the repository.
 
 use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Video};
@@ -26,7 +26,7 @@ fn every_real_clip_decodes_whole_at_its_own_size_and_rate() {
         assert_eq!(format.n_frames_hint, n_frames, "{name}");
         let full = name.starts_with("zebrafish");
         assert_eq!(format.color.range == Range::Full, full, "{name}");
-        // Two of the clips were cut without re-encoding: their last frame is late.
+        // Two of the clips were cut without re-encoding, so their last frame is late.
         let (mut stream, mut frame) = (FrameSource::open(&video).expect(name), Frame::default());
         let mut n_read = 0;
         while let Some(time_s) = stream.next_frame(&mut frame).expect(name) {

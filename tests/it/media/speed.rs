@@ -1,4 +1,4 @@
-//! How much our way of reading costs over ffmpeg alone. Run by hand on a quiet machine.
+//! Measures the time to read and write a film, against plain ffmpeg. Run by hand on a quiet machine.
 
 use std::process::Command;
 use std::time::Instant;

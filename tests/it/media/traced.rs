@@ -1,5 +1,6 @@
-//! Promises S1 and S2: every file of the corpus ends with its code in time, and under strace the media tools
-//! open nothing but the one input and what their program is made of, start nothing, and make no socket.
+//! Reads the corpus of bad films under strace (docs/explanation/promises.md, "Bad input" and "Confined media
+//! tools"). Each film ends with an allowed code in time. The media tools open only their input and their
+//! libraries, start no processes and create no sockets. The sandbox is off, so only the tools' options count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -13,9 +14,9 @@ use super::corpus::{Case, corpus};
 use super::read_all;
 use crate::common::film::Films;
 
-/// Names the folder for the test below, which is started under strace.
+/// Environment variable with the folder of films, for the test that runs under strace.
 const FOLDER: &str = "FLOCKREEL_TRACED_FOLDER";
-/// The longest that any file may take.
+/// Time limit for one file.
 const LONGEST: Duration = Duration::from_secs(30);
 
 #[test]
@@ -36,7 +37,7 @@ fn every_bad_film_ends_with_its_code_and_opens_nothing_else() {
     }
 }
 
-/// What is wrong with how a file ended.
+/// Returns a message if the file ended in a way that its case does not allow.
 fn fault(case: &Case, ends: &BTreeMap<&str, &str>) -> Option<String> {
     let name = case.path.file_name().unwrap().to_str().unwrap();
     let end = *ends.get(name).unwrap_or(&"never read");
@@ -51,7 +52,7 @@ fn fault(case: &Case, ends: &BTreeMap<&str, &str>) -> Option<String> {
 #[ignore = "started by the test above, under strace"]
 fn read_the_folder() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).expect("a folder"));
-    // The files alone are to be judged here, whether or not the sandbox would have held them.
+    // Test the command-line options of the tools without the layers that would also stop them.
     let limits = Limits {
         layers: Layers::OLD,
         ..Limits::default()
@@ -68,7 +69,7 @@ fn read_the_folder() {
     }
 }
 
-/// What reading the whole folder said, and the trace of it, where one can be had.
+/// Reads the folder in a second process. Returns its stdout, and its trace if strace is available.
 fn read_in_a_process(films: &Films) -> (String, Option<String>) {
     let log = tempfile::NamedTempFile::new().expect("a file");
     let calls = "trace=open,openat,openat2,execve,execveat,socket,connect,clone,clone3,fork,vfork";
@@ -113,7 +114,7 @@ fn read_in_a_process(films: &Films) -> (String, Option<String>) {
     (said, traces.then_some(trace))
 }
 
-/// Lines of the trace in which a media tool does what it need not.
+/// Returns the traced calls that a media tool must not make.
 fn strangers(trace: &str) -> Vec<String> {
     let mut tools = Tools::default();
     let strangers: BTreeSet<String> = trace
@@ -138,7 +139,7 @@ fn strangers(trace: &str) -> Vec<String> {
     strangers.into_iter().collect()
 }
 
-/// Which threads belong to a media tool, and what that tool's input is.
+/// The threads of media tools in the trace, each with the input file of its tool.
 #[derive(Default)]
 struct Tools {
     inputs: BTreeMap<u32, Option<String>>,
@@ -147,7 +148,7 @@ struct Tools {
 }
 
 impl Tools {
-    /// Whether a call is one that a media tool need not make.
+    /// Returns true if a media tool must not make this call.
     fn look(&mut self, thread: u32, call: &str) -> bool {
         let quoted: Vec<&str> = call.split('"').skip(1).step_by(2).collect();
         if call.starts_with("execve(") && quoted[0].ends_with(['g', 'e']) && is_tool(quoted[0]) {
@@ -187,7 +188,7 @@ fn is_tool(path: &str) -> bool {
     name.is_some_and(|name| name == "ffmpeg" || name == "ffprobe")
 }
 
-/// Libraries, and what they look at when they are loaded.
+/// Returns true for libraries and the files that they read when they are loaded.
 fn is_of_the_program(path: &str) -> bool {
     let places = [
         "/lib",
@@ -197,7 +198,7 @@ fn is_of_the_program(path: &str) -> bool {
         "/proc/",
         "/sys/devices/system/",
         "/dev/null",
-        // Libraries ask for their settings and for the time zone.
+        // Settings and time zone, which libraries read.
         "/etc/gcrypt/",
         "/etc/localtime",
     ];

@@ -1,4 +1,4 @@
-//! Films we write: equal bytes from equal frames, playable, right in color, or no file at all.
+//! Encoding to MP4: equal frames give equal bytes, colors are kept, and an error leaves no file.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ const FORMAT: VideoFormat = VideoFormat {
     },
 };
 
-/// A smooth picture that moves.
+/// Returns a smooth picture that moves with `frame_idx`.
 fn picture(format: &VideoFormat, frame_idx: usize) -> Frame {
     let mut frame = Frame::new(format.width, format.height, format.color);
     let width = format.width as usize;
@@ -55,7 +55,7 @@ fn write_within(
     all().map_err(|error| error.code())
 }
 
-/// A film that no encoder makes small.
+/// Writes a film of noise, which no encoder can compress.
 fn write_noise(path: &Path, quality: Quality) -> Result<(), Code> {
     let all = || {
         let mut writer = VideoWriter::create_with(path, &FORMAT, quality, &Limits::default())?;

@@ -1,5 +1,6 @@
-//! One service and two workers on machines of their own, one of them killed in the middle
-//! (RELIABILITY.md, R2): every job is done, once, with the bytes of a run that nobody disturbed.
+//! A service and two workers, each as on its own machine; one worker is killed during a job
+//! (docs/explanation/promises.md, "No job is lost"). Every job is done once, and its files have the bytes of
+//! an undisturbed run.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant, SystemTime};
@@ -20,7 +21,7 @@ use crate::common::app::json_of;
 use crate::common::clip::SWIM;
 use crate::common::process::{Server, WorkerProcess};
 
-/// The footage of the swimming fish, as an upload leaves it.
+/// Stores the film of the swimming fish as an upload does, and returns the footage id.
 pub(super) async fn admitted(store: &Store) -> Uuid {
     let draft = store.blobs().draft("film").unwrap();
     std::fs::write(draft.path().join(VIDEO), &*SWIM).unwrap();
@@ -38,7 +39,8 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
     footage.id
 }
 
-/// Queues two analyses, and of each a flock and a fish; returns jobs and files, in one order.
+/// Queues two analyses, and a flock and a fish from each. Returns the job ids and the paths of result
+/// files, in the same order for every call.
 async fn queue_everything(server: &Server) -> (Vec<Value>, Vec<String>) {
     let footage = json_of(server.upload(SWIM.clone()).await, StatusCode::CREATED).await;
     let (mut jobs, mut files) = (Vec::new(), Vec::new());
@@ -89,7 +91,7 @@ async fn contents(server: &Server, files: &[String]) -> Vec<Vec<u8>> {
     contents
 }
 
-/// What a run that nobody disturbs makes, on one machine.
+/// Returns the contents of the result files of an undisturbed run on one machine.
 async fn undisturbed() -> Vec<Vec<u8>> {
     let place = Place::local();
     let server = Server::start_at(&place);
@@ -100,7 +102,7 @@ async fn undisturbed() -> Vec<Vec<u8>> {
     contents
 }
 
-/// Waits until one of the workers is at work, and returns which.
+/// Waits until a worker has claimed a job and returns its index.
 async fn at_work(workers: &[WorkerProcess]) -> usize {
     let begun = Instant::now();
     loop {

@@ -1,5 +1,5 @@
-//! A service and further workers, each as on a machine of its own, on one PostgreSQL and one bucket. These run
-//! by `make scale-test`, which starts the servers.
+//! A service and further workers, each as on its own machine, that share one PostgreSQL and one bucket.
+//! `make scale-test` starts the servers and runs these tests.
 
 mod machines;
 mod stall;

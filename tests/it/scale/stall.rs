@@ -1,4 +1,5 @@
-//! A worker that is stopped for longer than its lease and then goes on (RELIABILITY.md, R3).
+//! A worker that stalls for longer than its lease and then continues (docs/explanation/promises.md,
+//! "Stalled workers cannot overwrite").
 
 use std::time::{Duration, Instant};
 

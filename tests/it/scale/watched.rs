@@ -1,4 +1,4 @@
-//! A worker and a service as those see them who watch: the worker's own metrics, and a bucket that falls silent.
+//! Monitoring of workers and services: the metrics of a worker, and readiness when the bucket is silent.
 
 use std::time::{Duration, Instant};
 
@@ -66,7 +66,7 @@ async fn a_service_whose_bucket_is_silent_says_within_seconds_that_it_is_not_rea
     assert_eq!(server.terminate(), Some(0));
 }
 
-/// A way to the bucket that can be held up: what comes then is neither answered nor refused.
+/// A TCP proxy to the bucket. While blocked, it neither answers nor refuses connections.
 struct Wire {
     url: String,
     open: watch::Sender<bool>,
@@ -97,6 +97,6 @@ async fn carry(mut from: TcpStream, address: String, mut is_open: watch::Receive
         _ = copy_bidirectional(&mut from, &mut to) => {}
         _ = is_open.wait_for(|open| !open) => {}
     }
-    // Held, not closed: whoever waits for an answer waits on.
+    // Keep the connection open, so that the client keeps waiting for its answer.
     is_open.wait_for(|open| *open).await.ok();
 }

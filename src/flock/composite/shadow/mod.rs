@@ -5,7 +5,7 @@
 //! floor (`floor`), and only if they are requested. Where shadows overlap, the darkest one counts
 //! (docs/explanation/algorithms.md, "Shadows").
 
-mod floor; // as seen from the side
+mod floor; // shadows in side view
 
 use self::floor::Floor;
 use super::layer::Appearance;

@@ -1,6 +1,7 @@
-//! A program that stands in ffmpeg's place and does what a film that has taken over its decoder would try
-//! (RELIABILITY.md, S3). Compiled by the test beside it, with nothing but the standard library. What to try
-//! is written in the film, behind its first bytes, or comes as the first frame of a film to be written.
+//! A program that replaces ffmpeg and acts like a decoder taken over by a malicious film
+//! (docs/explanation/promises.md, "Sandbox"). The test in `mod.rs` compiles it, with the standard library
+//! only. The attack is named in the film after its first bytes, or in the first frame of a film to be
+//! written.
 
 use std::ffi::{CString, c_char, c_int, c_long, c_ulong, c_void};
 use std::fs::{self, File};
@@ -68,7 +69,7 @@ fn main() {
     tell(attack(name, target, file));
 }
 
-/// The verdict, on the only way out that there is.
+/// Reports the verdict on stderr, which the sandbox leaves open, and exits.
 fn tell(verdict: Result<(), String>) -> ! {
     match verdict {
         Ok(()) => eprintln!("ATTACK DONE"),
@@ -130,9 +131,9 @@ fn is_zero(answer: c_long) -> Result<(), String> {
     }
 }
 
-/// A file of ten gigabytes, nearly all of them a hole.
+/// Creates a sparse file of 10 GiB.
 fn grow(output: &str) -> std::io::Result<()> {
-    // The signal that comes with it is not waited for: the refusal counts.
+    // Ignore SIGXFSZ: the refusal of the write counts.
     unsafe { signal(25, 1) };
     let file = File::options().write(true).open(output)?;
     file.write_all_at(b"x", 10 << 30)
@@ -142,7 +143,7 @@ fn fork_many(n: usize) -> Result<(), String> {
     for k in 0..n {
         match unsafe { fork() } {
             0 => loop {
-                // What it holds of its parent's would keep the reader waiting.
+                // Close the inherited pipes, which would keep the parent's reader waiting.
                 for fd in 0..3 {
                     unsafe { close(fd) };
                 }
@@ -155,7 +156,7 @@ fn fork_many(n: usize) -> Result<(), String> {
     Ok(())
 }
 
-/// Address space is what is bounded; nothing of it is touched.
+/// Reserves address space, which is what the sandbox limits. The memory is not touched.
 fn take_memory(n_bytes: usize) -> Result<(), String> {
     const READ_WRITE: c_int = 3;
     const PRIVATE_ANONYMOUS_UNRESERVED: c_int = 0x4022;
@@ -175,7 +176,7 @@ fn take_memory(n_bytes: usize) -> Result<(), String> {
     }
 }
 
-/// Becomes another program; returns only when it may not.
+/// Executes another program. Returns only the error of a failed attempt.
 fn start(program: &str, arguments: &[&str]) -> Error {
     let words = [&[program], arguments].concat();
     let words: Vec<CString> = words
@@ -188,7 +189,7 @@ fn start(program: &str, arguments: &[&str]) -> Error {
     Error::last_os_error()
 }
 
-/// Takes off the leash where it can, and stays.
+/// Tries to clear the parent-death signal, and stays alive for 30 s.
 fn outlive() -> Result<(), String> {
     unsafe {
         signal(13, 1);
@@ -199,9 +200,9 @@ fn outlive() -> Result<(), String> {
     Ok(())
 }
 
-/// Runs a command as on a kernel without Landlock: its first call is answered "no such call".
+/// Runs a command as on a kernel without Landlock: creating a Landlock rule set fails with ENOSYS.
 fn run_without_landlock(command: &[String]) -> Result<(), String> {
-    // Load the call's number; 444 makes a rule set; all else is allowed.
+    // Load the number of the system call; 444 is landlock_create_ruleset; allow all others.
     let filter: [(u16, u8, u8, u32); 4] = [
         (0x20, 0, 0, 0),
         (0x15, 0, 1, 444),

@@ -1,6 +1,7 @@
-//! Promise S3: a program in ffmpeg's place tries what a film that has taken over its decoder would try.
-//! Inside all layers everything is refused; outside all of them everything is done, so that each attempt is
-//! real; and of each it is known which layers hold it alone, and what passes when one of them is missing.
+//! Attacks from inside the sandbox (docs/explanation/promises.md, "Sandbox"). A program in place of ffmpeg
+//! tries what a decoder taken over by a malicious film could try. All attacks fail inside all layers. All
+//! succeed outside all layers, which shows that they are real. For each attack, the test also checks which
+//! layers stop it alone, and whether it succeeds when one layer is missing.
 
 use std::net::{TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
@@ -13,12 +14,12 @@ use flockreel::raster::{ColorSpec, Frame};
 use super::n_processes_about;
 use crate::common::film::Films;
 
-/// Names the folder of the attack for the tests below, which are started in processes of their own.
+/// Environment variable with the folder of the attack, for tests in a process of their own.
 const FOLDER: &str = "FLOCKREEL_ATTACK_FOLDER";
-/// The layer that is missing, for the one that outlives its parent.
+/// Environment variable with the name of the missing layer, for the test of the parent's death.
 const MISSING: &str = "FLOCKREEL_ATTACK_MISSING";
 
-/// The attacking program, compiled into the folder under the names of both tools.
+/// Compiles the attack into the folder, under the names of both tools, and returns its path.
 pub(crate) fn compile_attack(folder: &Path) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/media/cage/attack.rs");
     let program = folder.join("ffmpeg");
@@ -39,7 +40,7 @@ pub(crate) fn compile_attack(folder: &Path) -> PathBuf {
     program
 }
 
-/// This test program again, running one ignored test with the attack in the place of the tools.
+/// Returns a command that runs one ignored test of this program, with the attack in place of the tools.
 fn again(test: &str, folder: &Path) -> Command {
     let mut command = Command::new(std::env::current_exe().expect("the path of this program"));
     command
@@ -62,13 +63,13 @@ fn every_attack_is_held_by_the_layers_that_are_meant_to() {
     println!("{said}");
 }
 
-/// One thing to try.
+/// One attack.
 struct Attempt {
     name: &'static str,
     target: String,
-    /// The film is written, not read: the child has a file of its own to write.
+    /// True if a film is written rather than read. The child then has an output file.
     writes: bool,
-    /// Sets of layers that hold it: any of them is enough, all layers of a set are needed.
+    /// Sets of layers that stop the attack. Any one set is enough; it needs all of its layers.
     held_by: Vec<Vec<Layer>>,
 }
 
@@ -92,7 +93,7 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
     if is_root {
         traced.push(vec![Privileges]);
     }
-    // Who may raise limits at all loses that with the other powers.
+    // With CAP_SYS_RESOURCE, a process can raise its limits until the privileges are dropped.
     let held = rustix::thread::capabilities(None).expect("Linux");
     let may_raise = held
         .effective
@@ -114,7 +115,7 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
         attempt("udp", udp.to_owned(), alone(&[Calls])),
         attempt("fork", String::new(), alone(&[Calls])),
         attempt("memory", String::new(), alone(&[Limits])),
-        // Only one may trace it, and a film is read by two at once.
+        // Two tools read a film at the same time, but only one process may trace the parent. So write one.
         writing("trace", String::new(), traced),
         attempt("stop", String::new(), alone(&[Signals, Calls])),
         attempt("stop-thread", String::new(), alone(&[Signals, Calls])),
@@ -183,7 +184,7 @@ fn attack_in_every_cage() {
 }
 
 impl Attempt {
-    /// What became of it in these layers.
+    /// Runs the attack inside these layers and returns its verdict.
     fn make(&self, folder: &Path, layers: Layers) -> String {
         wait_until_untraced();
         std::fs::write(folder.join("secret"), "of another").expect("a file");
@@ -202,7 +203,8 @@ impl Attempt {
     }
 }
 
-/// Who traced this process may live on for a moment after it has told of it; until it has gone nobody else can.
+/// Waits until no process traces this one. The tracer of an earlier attack may live on for a moment, and a
+/// process has only one tracer.
 fn wait_until_untraced() {
     let is_traced = || {
         let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
@@ -258,7 +260,7 @@ fn nothing_outlives_its_parent_but_where_leash_or_calls_are_missing() {
             .spawn()
             .expect("this program");
         wait_until(|| n_processes_about(&name) > 0);
-        // It takes off the leash as soon as it runs.
+        // Leave the child time to clear its parent-death signal.
         std::thread::sleep(Duration::from_millis(300));
         parent.kill().expect("a process of ours");
         parent.wait().expect("a process of ours");
@@ -293,7 +295,7 @@ fn wait_until(condition: impl Fn() -> bool) {
     }
 }
 
-/// Ends the processes that have `text` among their arguments; they are this test's own.
+/// Kills the processes whose arguments contain `text`. All of them belong to this test.
 fn end_all(text: &str) {
     for entry in std::fs::read_dir("/proc")
         .expect("a Linux machine")

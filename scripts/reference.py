@@ -1,0 +1,149 @@
+#!/usr/bin/env python3
+"""Writes docs/reference/command-line.md, settings.md and errors.md from the texts of a built program.
+
+    scripts/reference.py target/release/flockreel            writes the three pages
+    scripts/reference.py target/release/flockreel --check    writes nothing; exit status 1 if a page differs
+
+Commands, flags and settings come from `--help`. Error codes come from `/docs/errors` of a service that the script
+starts on a free port with an empty data folder.
+"""
+import argparse
+import html
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import urllib.request
+from http import HTTPStatus
+from pathlib import Path
+from types import SimpleNamespace
+
+PAGES = Path(__file__).resolve().parent.parent / "docs" / "reference"
+NOTE = "`scripts/reference.py` writes this page from the texts of the program. Change those texts, not this page.\n"
+# Without the settings of the caller, which `--help` would print.
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("FLOCKREEL_")}
+DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores, at least 1"}  # those that depend on the machine
+
+
+def read(program, words=(), inherited=frozenset()):
+    """Reads the help of a command, without the flags in `inherited`, and of the commands below it."""
+    run = subprocess.run([program, *words, "--help"], env=ENVIRONMENT, check=True, capture_output=True, text=True)
+    about, usage, rest = re.fullmatch(r"(.*?)\n+Usage: (.*?)\n(.*)", run.stdout, re.DOTALL).groups()
+    parts = re.split(r"^(\S.*):\n", rest, flags=re.MULTILINE)
+    sections = dict(zip(parts[1::2], parts[2::2]))
+    names = re.findall(r"^  ([a-z-]+)", sections.pop("Commands", ""), re.MULTILINE)
+    found = [item for text in sections.values() for item in items(text)]
+    known = inherited | {item.term for item in found if item.term.startswith("-")}
+    own = [item for item in found if item.term not in inherited]
+    below = [read(program, (*words, name), known) for name in names if name != "help"]
+    return SimpleNamespace(words=" ".join(words), about=about, usage=usage, items=own, commands=below)
+
+
+def items(text):
+    """Returns the arguments or flags of a section of help; each has its term, meaning, default and variable."""
+    found = []
+    for line in text.splitlines():
+        if start := re.match(r" {2,6}([-<\[]\S.*?)(?: {2,}(.*))?$", line):
+            found.append([start[1], [start[2] or ""]])
+        elif found and line.strip():
+            found[-1][1].append(line.strip())
+    return [item(term, lines) for term, lines in found if not re.search("--(help|version)", term)]
+
+
+def item(term, lines):
+    values = [re.sub(r"^- (\S+?)(: +|$)", r"`\1`\2", line) for line in lines if line.startswith("- ")]
+    prose = " ".join(line for line in lines if not line.startswith("- ") and line != "Possible values:")
+    notes = dict(re.findall(r"\[(env|default|possible values): ([^]]*)\]", prose))
+    prose = " ".join(re.sub(r"\[(env|default|possible values): .*?\]", "", prose).split())
+    if choice := notes.get("possible values"):
+        values.append(f"Values: {choice}")
+    env = notes.get("env", "").rstrip("=")
+    default = DEFAULTS.get(env, f"`{notes['default']}`" if "default" in notes else "")
+    meaning = " ".join(re.sub(r"\.?$", ".", text, count=1) for text in (prose, *values) if text)
+    return SimpleNamespace(term=term, meaning=meaning, default=default, env=env)
+
+
+def tree(command):
+    yield command
+    for below in command.commands:
+        yield from tree(below)
+
+
+def table(*rows):
+    head, *rows = ([text.replace("|", "\\|") for text in row] for row in rows)
+    return "\n" + "".join(f"| {' | '.join(row)} |\n" for row in [head, ["---"] * len(head), *rows])
+
+
+def command_line(root):
+    commands = [command for command in tree(root) if command.words]
+    text = f"# Command line\n\n{NOTE}\n{root.about}\n\n```\n{root.usage}\n```\n\nResults go to files. Progress and "
+    text += "errors go to stderr. Exit status: 0 for success, 2 for bad usage or bad input, 1 for a failure inside.\n"
+    text += table(["command", "meaning"], *([f"`{command.words}`", f"{command.about}."] for command in commands))
+    text += "\n## Flags of every command\n" + flags(root)
+    for command in commands:
+        text += f"\n## flockreel {command.words}\n\n{command.about}.\n\n```\n{command.usage}\n```\n" + flags(command)
+    return text
+
+
+def flags(command):
+    rows = [[f"`{item.term}`", item.default, item.meaning] for item in command.items]
+    return table(["argument or flag", "default", "meaning"], *rows) if rows else ""
+
+
+def settings(root):
+    users = {}
+    for command, item in ((command, item) for command in tree(root) for item in command.items if item.env):
+        users.setdefault(item.env, (item, []))[1].append(f"`{command.words}`" if command.words else "all")
+    rows = [[f"`{i.term}`", f"`{env}`", i.default, ", ".join(by), i.meaning] for env, (i, by) in users.items()]
+    text = f"# Settings\n\n{NOTE}\nA flag overrides the environment variable, the variable the file of `--config`, "
+    text += "and the file the default.\nThe file is TOML. Its keys are the flags without leading dashes:\n\n"
+    text += '```toml\nbind = "127.0.0.1:9000"\nmax-upload-bytes = 1000000\nno-sample = true\n```\n'
+    return text + table(["flag", "environment variable", "default", "commands", "meaning"], *rows)
+
+
+def errors(page):
+    entry = r'<dt id="(\w+)">.*?<small>(\d+).*?</dt>\s*<dd>(.*?)</dd>\s*<dd class="soft">(.*?)</dd>'
+    rows = []
+    for code, status, *texts in re.findall(entry, page, re.DOTALL):
+        name = HTTPStatus(int(status)).phrase if int(status) in list(HTTPStatus) else ""
+        texts = [html.unescape(re.sub("</?code>", "`", text)) for text in texts]
+        rows.append([f"`{code}`", f"{status} {name}".strip(), *texts])
+    if not rows or len(rows) != page.count("<dt "):
+        sys.exit("reference.py: cannot read /docs/errors: its HTML has another form than the script expects")
+    text = f"# Error codes\n\n{NOTE}\nThe API gives the code as `code` in `application/problem+json` (RFC 9457), and "
+    text += "as `error.code` in failed jobs.\nThe command line prints it in parentheses. A code is never renamed.\n"
+    return text + table(["code", "HTTP status", "meaning", "advice"], *rows)
+
+
+def errors_page(program):
+    """Returns the HTML of /docs/errors, from a service that runs only for this."""
+    with tempfile.TemporaryDirectory() as data:
+        words = [program, "serve", "--no-sample", "--bind", "127.0.0.1:0", "--data", data, "--log", "error"]
+        with subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True) as service:
+            addresses = (re.search(r"http://[\d.:]+/", line) for line in service.stderr)
+            address = next(filter(None, addresses), None) or sys.exit("reference.py: the service did not start")
+            try:
+                return urllib.request.urlopen(f"{address[0]}docs/errors", timeout=30).read().decode()
+            finally:
+                service.terminate()
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Write the reference pages from the texts of a built program.")
+    parser.add_argument("program", metavar="FLOCKREEL")
+    parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 if a page differs")
+    options = parser.parse_args()
+    program = str(Path(options.program).resolve())
+    root = read(program)
+    texts = {"command-line": command_line(root), "settings": settings(root), "errors": errors(errors_page(program))}
+    pages = {PAGES / f"{name}.md": text for name, text in texts.items()}
+    differing = [page for page, text in pages.items() if not page.is_file() or page.read_text() != text]
+    if options.check and differing:
+        sys.exit("\n".join(f"out of date, run scripts/reference.py: {page.name}" for page in differing))
+    for page in differing:
+        page.write_text(pages[page])
+
+
+if __name__ == "__main__":
+    main()
