@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use super::motion::MotionState;
+
 /// One simulated animal with its sprites. Lists have one entry per output frame, except `fades`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Individual {
@@ -32,6 +34,10 @@ pub struct Individual {
     pub depth_m: Option<Vec<f64>>,
     /// Track of the boid that the plan is matched to.
     pub boid: BoidTrack,
+    /// Size relative to the filmed animal; `scale` includes it.
+    pub size: f64,
+    /// State of motion of the animal in the source frame. Empty in files of schema 1.
+    pub state: Vec<MotionState>,
     /// Cost of the plan.
     pub cost: PlanCost,
 }
@@ -149,6 +155,7 @@ impl Individual {
             boid.speed_bl_per_s.len(),
         ];
         lengths.iter().all(|&length| length == n_frames)
+            && [0, n_frames].contains(&self.state.len())
             && self.fades.iter().all(|fade| {
                 let n = fade.weight.len();
                 let lengths = [&fade.rotation_rad, &fade.scale].map(Vec::len);

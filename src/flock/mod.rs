@@ -40,7 +40,7 @@ use self::follow::company::CLEAR_BL;
 use self::follow::perches::Perches;
 use self::individual::rounded;
 use self::lens::Lens;
-use self::motion::motion_of;
+use self::motion::{MotionState, motion_of};
 use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
 use self::placement::{Placed, Stage};
 use self::plan::{Model, Plan, Planner};
@@ -139,7 +139,8 @@ pub fn plan_flock(
         Ok(density::spacing_bl(places_px, lens.length_px))
     })?;
     let (course, plans, placed) = play(&spaced, progress)?;
-    let individuals = individuals(&model, &course, &plans, placed);
+    let states = motion::states(library, &motion);
+    let individuals = individuals(&model, &course, (&plans, &states), placed);
     Ok(Flock {
         fps,
         image_size_px: library.poses.image_size_px,
@@ -219,7 +220,7 @@ fn told(params: &Params, lens: &Lens) -> Params {
 fn individuals(
     model: &Model,
     course: &Course,
-    plans: &[Plan],
+    (plans, states): (&[Plan], &[MotionState]),
     placed: Vec<Placed>,
 ) -> Vec<Individual> {
     (0u32..)
@@ -238,6 +239,8 @@ fn individuals(
                 heading_rad: placed.heading_rad,
                 forward: placed.forward,
                 scale: placed.scale,
+                size: placed.size,
+                state: (shown.iter().map(|shown| states[shown.0 as usize])).collect(),
                 depth_m: placed.depth_m,
                 boid: boid.clone(),
                 cost: plan.cost.told(),

@@ -1,10 +1,13 @@
 //! Motion of the filmed animal at each frame of the footage. Boids are calibrated by it and plans are matched
 //! to it (docs/explanation/algorithms.md, "Boids" and "Planning").
 
+use serde::{Deserialize, Serialize};
+
 use super::boids::vector::{Vec3, angle_between, unit};
 use super::lens::{Lens, depths_bl};
 use crate::geometry::wrap_rad;
 use crate::library::{Library, Pose, View};
+use crate::order::median;
 
 /// Least share of the direction in the image plane for which a speed in space is given. Free choice.
 const LEAST_LEVEL: f64 = 0.7;
@@ -13,6 +16,28 @@ const LEAST_LEVEL: f64 = 0.7;
 const LEAST_SEEN: f64 = 0.5;
 /// Time before and after a frame over which directions are compared, seconds. Free choice.
 const TURN_SPAN_S: f64 = 0.1;
+
+/// Speed below which the animal rests, body lengths per second. Free choice.
+const REST_BL_PER_S: f64 = 0.1;
+/// Speed below which the animal is slow, as a share of its usual speed. Free choice.
+const SLOW_SHARE: f64 = 0.5;
+/// Speed from which the animal darts, as a share of its usual speed. Free choice.
+const DART_SHARE: f64 = 2.0;
+
+/// State of motion of the animal, by its speed in the image. The usual speed is the median speed of the playable
+/// frames in which the animal does not rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionState {
+    /// Less than 0.1 body lengths per second.
+    Rest,
+    /// Less than half the usual speed.
+    Slow,
+    /// From half to twice the usual speed.
+    Go,
+    /// At least twice the usual speed.
+    Dart,
+}
 
 /// Motion of the animal at one frame of the footage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -83,6 +108,20 @@ pub fn motion_of(library: &Library, lens: &Lens) -> Vec<FrameMotion> {
             }
         })
         .collect()
+}
+
+/// Returns the state of motion at every frame.
+pub(super) fn states(library: &Library, motion: &[FrameMotion]) -> Vec<MotionState> {
+    let playable = library.playback.component.iter();
+    let speeds = playable.map(|&frame| motion[frame as usize].speed_bl_per_s);
+    let usual = median(speeds.filter(|&speed| speed >= REST_BL_PER_S)).unwrap_or(1.0);
+    let state = |moved: &FrameMotion| match moved.speed_bl_per_s {
+        speed if speed < REST_BL_PER_S => MotionState::Rest,
+        speed if speed < SLOW_SHARE * usual => MotionState::Slow,
+        speed if speed < DART_SHARE * usual => MotionState::Go,
+        _ => MotionState::Dart,
+    };
+    motion.iter().map(state).collect()
 }
 
 /// Returns the motion in the image, or `None` if the animal was not found before and after the frame.

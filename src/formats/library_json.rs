@@ -10,7 +10,7 @@ use crate::analysis::stats::{Advice, advice};
 use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Shadow, Transition};
 
 /// Name and version of the schema.
-pub const SCHEMA: &str = "flockreel/library@1";
+pub const SCHEMA: &str = "flockreel/library@2";
 
 /// The footage from which a library was made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use crate::geometry::{Camera, Rect};
 use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 
 /// Name and version of the schema.
-pub const SCHEMA: &str = "flockreel/poses@1";
+pub const SCHEMA: &str = "flockreel/poses@2";
 
 /// Returns the poses as JSON, one line per frame.
 pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {

@@ -212,6 +212,12 @@ impl Rules {
         for (name, value) in radii {
             within(name, value, 0.1, 50.0)?;
         }
+        within(
+            "rules.picture_separation_bl",
+            self.picture_separation_bl,
+            0.0,
+            50.0,
+        )?;
         within("rules.view_deg", self.view_deg, 1.0, 360.0)?;
         within("rules.neighbors", f64::from(self.neighbors), 1.0, 2000.0)?;
         self.zones.iter().try_for_each(Zones::check)

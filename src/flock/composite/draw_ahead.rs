@@ -24,7 +24,9 @@ pub(super) fn draw_ahead<E: Send>(
     draw: impl Fn(usize, &mut Shot) + Sync,
     mut take: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
 ) -> Result<(), E> {
-    let n_shots = (AHEAD_BYTES / n_bytes.max(1)).min(64).max(2 * rayon::current_num_threads());
+    let n_shots = (AHEAD_BYTES / n_bytes.max(1))
+        .min(64)
+        .max(2 * rayon::current_num_threads());
     let (give, drawn) = channel::<Shot>();
     let (give_back, used) = channel();
     for _ in 0..n_shots {

@@ -65,6 +65,8 @@ pub struct Placed {
     pub depth_m: Option<Vec<f64>>,
     /// Second sprites around jumps.
     pub fades: Vec<Fade>,
+    /// Size of the individual relative to the filmed animal.
+    pub size: f64,
 }
 
 /// Frame shown before the first one: the end of the preceding segment, or in a loop the last frame.
@@ -168,6 +170,7 @@ impl Stage<'_> {
             }),
             rotation_rad,
             centroid_px,
+            size,
             scale: (shown.iter().zip(&depth_bl))
                 .map(|(state, &depth_bl)| self.scale(state.0, depth_bl, size))
                 .collect(),

@@ -12,10 +12,11 @@ use serde::{Deserialize, Serialize};
 
 use self::space::SpaceFile;
 use self::stats::StatsFile;
+use crate::flock::motion::MotionState;
 use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 
 /// Name and version of the schema.
-pub const SCHEMA: &str = "flockreel/flock@1";
+pub const SCHEMA: &str = "flockreel/flock@2";
 
 /// Returns the flock as JSON, one line per individual.
 pub fn write(flock: &Flock) -> Vec<u8> {
@@ -98,6 +99,12 @@ struct IndividualFile {
     /// Absent in older files.
     #[serde(default)]
     continues_as: Option<u32>,
+    /// Absent in schema 1.
+    #[serde(default)]
+    variation: VariationFile,
+    /// Absent in schema 1.
+    #[serde(default)]
+    state: Vec<MotionState>,
     fade: Vec<FadeFile>,
     centroid_px: Vec<[f64; 2]>,
     heading_rad: Vec<f64>,
@@ -106,6 +113,18 @@ struct IndividualFile {
     depth_m: Option<Vec<f64>>,
     boid: BoidFile,
     cost: CostFile,
+}
+
+/// Differences between an individual and the filmed animal.
+#[derive(Serialize, Deserialize)]
+struct VariationFile {
+    size: f64,
+}
+
+impl Default for VariationFile {
+    fn default() -> VariationFile {
+        VariationFile { size: 1.0 }
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -153,6 +172,10 @@ impl IndividualFile {
             mirrored: individual.mirrored,
             rotation_rad: individual.rotation_rad,
             continues_as: individual.continues_as,
+            variation: VariationFile {
+                size: individual.size,
+            },
+            state: individual.state,
             fade: individual.fades.into_iter().map(FadeFile::of).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
@@ -176,6 +199,8 @@ impl IndividualFile {
             mirrored: self.mirrored,
             rotation_rad: self.rotation_rad,
             continues_as: self.continues_as,
+            size: self.variation.size,
+            state: self.state,
             fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,
@@ -263,7 +288,7 @@ mod tests {
         let bytes = write(&flock);
         assert_eq!(read(&bytes).unwrap(), flock);
         let head = String::from_utf8_lossy(&bytes[..60]).into_owned();
-        assert!(head.starts_with(r#"{"schema":"flockreel/flock@1","version":""#));
+        assert!(head.starts_with(r#"{"schema":"flockreel/flock@2","version":""#));
     }
 
     #[test]

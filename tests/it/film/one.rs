@@ -61,6 +61,8 @@ fn longest_run(library: &Library) -> (usize, usize) {
 fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock {
     let poses = &library.poses.frames[first..first + n_frames];
     let individual = Individual {
+        size: 1.0,
+        state: Vec::new(),
         forward: None,
         id: 0,
         source_frame: (first as u32..(first + n_frames) as u32).collect(),
