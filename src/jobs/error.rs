@@ -1,4 +1,4 @@
-//! Errors of jobs.
+//! Errors of jobs: why a job failed, with the stable code of each reason.
 
 use crate::code::Code;
 use crate::footage::SourceError;
