@@ -10,8 +10,9 @@ use rayon::prelude::*;
 
 use super::boids::measures::nearest_bl;
 use super::error::Error;
-use super::individual::{Individual, rounded};
+use super::individual::Individual;
 use super::params::Params;
+use crate::geometry::rounded;
 use crate::library::Library;
 
 /// Largest number of corrections of the separation radii. Free choice.

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::motion::MotionState;
+use serde::{Deserialize, Serialize};
 
 /// One simulated animal with its sprites. Lists have one entry per output frame, except `fades`.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +40,21 @@ pub struct Individual {
     pub state: Vec<MotionState>,
     /// Cost of the plan.
     pub cost: PlanCost,
+}
+
+/// State of motion of the animal, by its speed in the image. The usual speed is the median speed of the playable
+/// frames in which the animal does not rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MotionState {
+    /// Less than 0.1 body lengths per second.
+    Rest,
+    /// Less than half the usual speed.
+    Slow,
+    /// From half to twice the usual speed.
+    Go,
+    /// At least twice the usual speed.
+    Dart,
 }
 
 /// Track of a boid, with one entry per output frame.
@@ -163,11 +178,4 @@ impl Individual {
                     && fade.start as usize + n <= n_frames
             })
     }
-}
-
-/// Rounds `value` to this number of decimals, as in files.
-pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
-    let unit = 10f64.powi(decimals);
-    // + 0.0 turns -0 into 0.
-    (value * unit).round() / unit + 0.0
 }

@@ -8,9 +8,8 @@
 use super::boids::lanes::{Lanes, splat3};
 use super::boids::tank::Wall;
 use super::boids::vector::{Vec3, norm, unit};
-use super::individual::rounded;
 use super::params::Params;
-use crate::geometry::Camera;
+use crate::geometry::{Camera, rounded};
 use crate::library::{Library, Poses, View};
 use crate::order::median;
 

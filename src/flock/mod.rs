@@ -38,12 +38,13 @@ use self::boids::tank::Tank;
 use self::course::Course;
 use self::follow::company::CLEAR_BL;
 use self::follow::perches::Perches;
-use self::individual::rounded;
+use self::individual::MotionState;
 use self::lens::Lens;
-use self::motion::{MotionState, motion_of};
+use self::motion::motion_of;
 use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
 use self::placement::{Placed, Stage};
 use self::plan::{Model, Plan, Planner};
+use crate::geometry::rounded;
 use crate::library::Library;
 use crate::progress::{Progress, Quiet};
 

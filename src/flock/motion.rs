@@ -1,9 +1,8 @@
 //! Motion of the filmed animal at each frame of the footage. Boids are calibrated by it and plans are matched
 //! to it (docs/explanation/algorithms.md, "Boids" and "Planning").
 
-use serde::{Deserialize, Serialize};
-
 use super::boids::vector::{Vec3, angle_between, unit};
+use super::individual::MotionState;
 use super::lens::{Lens, depths_bl};
 use crate::geometry::wrap_rad;
 use crate::library::{Library, Pose, View};
@@ -23,21 +22,6 @@ const REST_BL_PER_S: f64 = 0.1;
 const SLOW_SHARE: f64 = 0.5;
 /// Speed from which the animal darts, as a share of its usual speed. Free choice.
 const DART_SHARE: f64 = 2.0;
-
-/// State of motion of the animal, by its speed in the image. The usual speed is the median speed of the playable
-/// frames in which the animal does not rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MotionState {
-    /// Less than 0.1 body lengths per second.
-    Rest,
-    /// Less than half the usual speed.
-    Slow,
-    /// From half to twice the usual speed.
-    Go,
-    /// At least twice the usual speed.
-    Dart,
-}
 
 /// Motion of the animal at one frame of the footage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -6,10 +6,10 @@ use rayon::prelude::*;
 
 use super::boids::measures::Order;
 use super::boids::vector::angle_between;
-use super::individual::{Individual, rounded};
+use super::individual::Individual;
 use super::params::{MatchBy, Params};
 use super::placement::is_jump;
-use crate::geometry::wrap_rad;
+use crate::geometry::{rounded, wrap_rad};
 use crate::library::Library;
 use crate::order::percentile;
 

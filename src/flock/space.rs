@@ -3,8 +3,8 @@
 
 use super::boids::tank::{Tank, Wall};
 use super::boids::vector::Vec3;
-use super::individual::rounded;
 use super::lens::Lens;
+use crate::geometry::rounded;
 
 /// Geometry of a flock, rounded as in files.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::poses_json::round;
+use crate::geometry::rounded;
 use crate::library::{Pose, Poses};
 
 const COLUMNS: &str = "frame,time_s,detected,cut,confidence,head_confidence,depth_sign_confidence,\
@@ -18,11 +18,11 @@ pub fn write_poses(poses: &Poses) -> String {
     let mut text = String::from(COLUMNS);
     for (idx, pose) in poses.frames.iter().enumerate() {
         let (detected, cut) = (u8::from(pose.detected()), u8::from(pose.cut));
-        write!(text, "{idx},{},{detected},{cut}", round(pose.time_s, 6)).expect("memory");
+        write!(text, "{idx},{},{detected},{cut}", rounded(pose.time_s, 6)).expect("memory");
         for value in scalars(pose).into_iter().chain([poses.tail_beat_hz(idx)]) {
             text.push(',');
             if let Some(value) = value {
-                write!(text, "{}", round(value, 6)).expect("memory");
+                write!(text, "{}", rounded(value, 6)).expect("memory");
             }
         }
         text.push('\n');

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
+use crate::geometry::rounded;
 use crate::library::{Jump, Library, LibraryStats, Patch, Playback, Shadow, Transition};
 
 /// Name and version of the schema.
@@ -154,7 +155,7 @@ struct ShadowFile {
 
 impl ShadowFile {
     fn of(shadow: &Shadow) -> ShadowFile {
-        let round = |value| super::poses_json::round(value, 4);
+        let round = |value| rounded(value, 4);
         ShadowFile {
             darkness: round(shadow.darkness),
             offset_bl: shadow.offset_bl.map(round),
@@ -187,7 +188,7 @@ impl TransitionFile {
             to: transition.to,
             mirrored: transition.mirrored,
             distance: transition.distance,
-            heading_gap_rad: super::poses_json::round(transition.heading_gap_rad, 5),
+            heading_gap_rad: rounded(transition.heading_gap_rad, 5),
         }
     }
 
@@ -311,7 +312,7 @@ impl AdviceFile {
 
 impl StatsFile {
     fn of(stats: &LibraryStats, advice: &[Advice]) -> StatsFile {
-        let digits = |n: i32| move |value: f64| super::poses_json::round(value, n);
+        let digits = |n: i32| move |value: f64| rounded(value, n);
         StatsFile {
             n_frames: stats.n_frames,
             n_detected: stats.n_detected,

@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::poses_json::round;
-use crate::geometry::Rect;
+use crate::geometry::{Rect, rounded};
 use crate::library::{Mover, MoverKind};
 
 #[derive(Serialize, Deserialize)]
@@ -34,8 +33,8 @@ impl MoverFile {
                 MoverKind::InPlace => MoverName::InPlace,
                 MoverKind::Other => MoverName::Other,
             },
-            from_s: round(mover.from_s, 3),
-            to_s: round(mover.to_s, 3),
+            from_s: rounded(mover.from_s, 3),
+            to_s: rounded(mover.to_s, 3),
             box_px: [
                 mover.box_px.x,
                 mover.box_px.y,

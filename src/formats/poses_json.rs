@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::mover::MoverFile;
 use crate::analysis::Params;
-use crate::geometry::{Camera, Rect};
+use crate::geometry::{Camera, Rect, rounded};
 use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
 
 /// Name and version of the schema.
@@ -25,7 +25,7 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
             View::Side => ViewName::Side,
             View::Top => ViewName::Top,
         },
-        view_confidence: poses.view_confidence.map(|value| round(value, 3)),
+        view_confidence: poses.view_confidence.map(|value| rounded(value, 3)),
         other_movers: poses.other_movers.iter().map(MoverFile::of).collect(),
         camera: poses.camera.map(|c| CameraFile {
             z_min_m: c.z_min_m,
@@ -89,13 +89,6 @@ pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
         frames: file.frames.into_iter().map(PoseFile::into_pose).collect(),
         tail_beat: file.tail_beat.map(TailBeatFile::into_tail_beat),
     })
-}
-
-/// Returns `value` rounded to `digits` decimals.
-pub(super) fn round(value: f64, digits: i32) -> f64 {
-    let scale = 10f64.powi(digits);
-    // Adding 0.0 turns -0 into 0.
-    (value * scale).round() / scale + 0.0
 }
 
 #[derive(Serialize, Deserialize)]
@@ -165,11 +158,11 @@ impl TailBeatFile {
     fn of(beat: &TailBeat) -> TailBeatFile {
         let span = |span: &BeatSpan| BeatSpanFile {
             frames: span.frames,
-            start_s: round(span.start_s, 6),
-            end_s: round(span.end_s, 6),
-            frequency_hz: round(span.frequency_hz, 3),
-            amplitude: round(span.amplitude, 5),
-            confidence: round(span.confidence, 4),
+            start_s: rounded(span.start_s, 6),
+            end_s: rounded(span.end_s, 6),
+            frequency_hz: rounded(span.frequency_hz, 3),
+            amplitude: rounded(span.amplitude, 5),
+            confidence: rounded(span.confidence, 4),
         };
         TailBeatFile {
             method: match beat.method {
@@ -237,10 +230,10 @@ struct RawFile {
 
 impl PoseFile {
     fn of(frame: usize, pose: &Pose) -> PoseFile {
-        let digits = |n: i32| move |value: f64| round(value, n);
+        let digits = |n: i32| move |value: f64| rounded(value, n);
         PoseFile {
             frame,
-            time_s: round(pose.time_s, 6),
+            time_s: rounded(pose.time_s, 6),
             detected: pose.detected(),
             cut: pose.cut,
             confidence: pose.confidence.map(digits(4)),

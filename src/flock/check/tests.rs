@@ -1,9 +1,8 @@
 //! Tests of the check: plans of the planner pass, and every way to corrupt them is found.
 
 use super::*;
-use crate::flock::individual::rounded;
 use crate::flock::{Params, plan_flock, synthetic};
-use crate::geometry::Turns;
+use crate::geometry::{Turns, rounded};
 use crate::library::View;
 use crate::progress::Silent;
 

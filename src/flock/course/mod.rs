@@ -10,9 +10,9 @@ use super::boids::Boids;
 use super::boids::measures::Order;
 use super::boids::vector::{Vec3, unit};
 use super::error::Error;
-use super::individual::{BoidTrack, rounded};
+use super::individual::BoidTrack;
 use super::lens::Lens;
-use crate::geometry::Turns;
+use crate::geometry::{Turns, rounded};
 use crate::progress::Progress;
 
 /// A recorded simulation.

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::company::{self, CLEAR_BL, Mover};
 use super::perches::{self, Perches, Way};
-use crate::flock::individual::{BoidTrack, rounded};
+use crate::flock::individual::BoidTrack;
 use crate::flock::placement::{Before, Stage, is_jump};
-use crate::geometry::wrap_rad;
+use crate::geometry::{rounded, wrap_rad};
 use crate::library::View;
 
 /// Time constant with which an individual is drawn to its boid, seconds. Free choice.

@@ -2,7 +2,8 @@
 //! (docs/explanation/algorithms.md, "Placement").
 
 use super::{Placed, Stage, is_jump};
-use crate::flock::individual::{BoidTrack, Fade, rounded};
+use crate::flock::individual::{BoidTrack, Fade};
+use crate::geometry::rounded;
 
 /// Inputs of fades: the states shown, with headings, depths and size.
 pub(super) struct Way<'a> {

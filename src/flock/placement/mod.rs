@@ -8,13 +8,13 @@ use rayon::prelude::*;
 use self::fades::Way;
 use super::boids::calibration::Calibration;
 use super::boids::tank::Tank;
-use super::individual::{BoidTrack, Fade, rounded};
+use super::individual::{BoidTrack, Fade};
 use super::lens::Lens;
 use super::motion::FrameMotion;
 use super::params::{Params, Position};
 use super::rotation;
 use crate::geometry::angle::mirrored_rad;
-use crate::geometry::wrap_rad;
+use crate::geometry::{rounded, wrap_rad};
 use crate::library::{Library, View};
 use crate::random;
 

@@ -2,8 +2,8 @@
 
 use std::ops::AddAssign;
 
-use crate::flock::individual::{PlanCost, rounded};
-use crate::geometry::Turns;
+use crate::flock::individual::PlanCost;
+use crate::geometry::{Turns, rounded};
 
 /// Frames shown by one individual, and their cost.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use self::space::SpaceFile;
 use self::stats::StatsFile;
-use crate::flock::motion::MotionState;
+use crate::flock::individual::MotionState;
 use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 
 /// Name and version of the schema.

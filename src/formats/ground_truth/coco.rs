@@ -8,8 +8,7 @@ use serde::Serialize;
 use super::{FilmShape, everyone, frame_name, rle};
 use crate::flock::Flock;
 use crate::flock::composite::truth::{FrameTruth, Seen};
-use crate::formats::poses_json::round;
-use crate::geometry::Rect;
+use crate::geometry::{Rect, rounded};
 
 /// Writes a coco.json.
 pub struct Coco<W: Write> {
@@ -72,7 +71,7 @@ impl<W: Write> Coco<W> {
                 width: film.size_px[0],
                 height: film.size_px[1],
                 frame,
-                time_s: round(frame as f64 / film.fps, 6),
+                time_s: rounded(frame as f64 / film.fps, 6),
             };
             out.write_all(if frame == 0 { b"\n" } else { b",\n" })?;
             serde_json::to_writer(&mut out, &image)?;
@@ -101,11 +100,11 @@ impl<W: Write> Coco<W> {
                 area: seen.visible_area,
                 bbox: [visible_box.x, visible_box.y, visible_box.w, visible_box.h],
                 segmentation: visible(truth, visible_box, individual.id),
-                visibility: round(seen.visibility, 4),
+                visibility: rounded(seen.visibility, 4),
                 amodal_area: seen.amodal_area,
                 amodal_bbox: seen.amodal_box,
                 amodal_segmentation: amodal(truth.size_px, seen),
-                centroid_px: seen.centroid_px.map(|px| round(px, 3)),
+                centroid_px: seen.centroid_px.map(|px| rounded(px, 3)),
                 heading_rad: individual.heading_rad[frame_idx],
                 source_frame: individual.source_frame[frame_idx],
                 mirrored: individual.mirrored[frame_idx],

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::{FilmShape, everyone};
 use crate::flock::Flock;
 use crate::flock::composite::truth::FrameTruth;
-use crate::formats::poses_json::round;
+use crate::geometry::rounded;
 
 /// Writes the lines of one frame, for all individuals at least partly in the picture, hidden or not.
 ///
@@ -31,7 +31,7 @@ pub fn write_frame(
             individual.id + 1,
             x + 1,
             y + 1,
-            round(seen.visibility, 4)
+            rounded(seen.visibility, 4)
         )?;
     }
     Ok(())

@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::{FilmShape, everyone};
 use crate::flock::Flock;
 use crate::flock::composite::truth::FrameTruth;
-use crate::formats::poses_json::round;
+use crate::geometry::rounded;
 
 /// The header line.
 pub const COLUMNS: &str = "frame,time_s,id,x_px,y_px,heading_rad,scale,depth_m,source_frame,mirrored,\
@@ -20,16 +20,16 @@ pub fn write_frame(
     frame_idx: usize,
     truth: &FrameTruth,
 ) -> io::Result<()> {
-    let time_s = round(frame_idx as f64 / film.fps, 6);
+    let time_s = rounded(frame_idx as f64 / film.fps, 6);
     for (individual, seen) in everyone(flock, truth) {
-        let [x, y] = seen.centroid_px.map(|px| round(px, 3));
+        let [x, y] = seen.centroid_px.map(|px| rounded(px, 3));
         let depth = individual.depth_m.as_ref().map(|depth| depth[frame_idx]);
         write!(
             out,
             "{frame_idx},{time_s},{},{x},{y},{},{},{},{},{},{},",
             individual.id,
             individual.heading_rad[frame_idx],
-            round(seen.scale, 6),
+            rounded(seen.scale, 6),
             depth.map(|depth| depth.to_string()).unwrap_or_default(),
             individual.source_frame[frame_idx],
             u8::from(individual.mirrored[frame_idx]),
@@ -44,7 +44,7 @@ pub fn write_frame(
             Some([x, y, w, h]) => write!(out, "{x},{y},{w},{h},")?,
             None => out.write_all(b",,,,")?,
         }
-        writeln!(out, "{},{}", seen.amodal_area, round(seen.visibility, 4))?;
+        writeln!(out, "{},{}", seen.amodal_area, rounded(seen.visibility, 4))?;
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 
 use super::Placement;
 use super::premultiplied::{PAD, Premultiplied, REACH};
+use super::step::Step;
 use crate::geometry::Rect;
 
 /// Maps picture coordinates to coordinates in the padded sprite, whose first pixel is (0, 0).
@@ -14,42 +15,6 @@ pub(super) struct Map {
     /// axis.
     columns: [f64; 2],
     place: Placement,
-}
-
-/// The step through the sprite for one picture column, in 1/65536 of a sprite pixel.
-pub(super) struct Way {
-    pub(super) step: [i32; 2],
-    /// Steps per 1/65536 of a pixel, as a fraction of 2^32, rounded down.
-    per_unit: [u64; 2],
-}
-
-impl Way {
-    pub(super) fn of(step: [i32; 2]) -> Way {
-        Way {
-            step,
-            per_unit: step.map(|step| (1 << 32) / u64::from(step.unsigned_abs().max(1))),
-        }
-    }
-
-    /// Returns the same path in the opposite direction.
-    pub(super) fn back(&self) -> Way {
-        Way {
-            step: self.step.map(|step| -step),
-            per_unit: self.per_unit,
-        }
-    }
-
-    /// Returns the position after `n` steps.
-    #[inline(always)]
-    pub(super) fn along(&self, from: [i32; 2], n: i32) -> [i32; 2] {
-        std::array::from_fn(|k| from[k] + self.step[k] * n)
-    }
-
-    /// Returns a number of steps, at least 1. Fewer steps stay within `distance` along the axis.
-    #[inline(always)]
-    pub(super) fn n_beyond(&self, distance: u32, axis: usize) -> usize {
-        ((u64::from(distance) * self.per_unit[axis]) >> 32) as usize + 1
-    }
 }
 
 impl Map {
@@ -78,8 +43,8 @@ impl Map {
     }
 
     /// Returns the step of a picture row through the sprite.
-    pub(super) fn way(&self) -> Way {
-        Way::of(self.per_column.map(fixed))
+    pub(super) fn way(&self) -> Step {
+        Step::of(self.per_column.map(fixed))
     }
 
     /// Returns the displacement in the sprite for `n` picture rows, in 1/65536 of a sprite pixel.

@@ -12,6 +12,7 @@ mod avx2; // AVX2 kernel
 mod catmull_rom; // interpolation of a row of pixels
 mod map; // affine map from picture to sprite
 mod premultiplied; // sprite prepared for interpolation
+mod step; // step from pixel to pixel
 
 use std::ops::Range;
 

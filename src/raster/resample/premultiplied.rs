@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use super::catmull_rom::HALF_PLACE;
-use super::map::Way;
+use super::step::Step;
 use super::{ONE, Quad};
 use crate::geometry::Rect;
 
@@ -64,7 +64,7 @@ impl Premultiplied {
     /// Returns the range of steps between the first and the last position next to a pixel with alpha, out of
     /// `n` steps from `start`. The range is empty if there is no such position.
     #[inline(always)]
-    pub(super) fn seen(&self, start: [i32; 2], way: &Way, n: usize) -> Range<usize> {
+    pub(super) fn seen(&self, start: [i32; 2], way: &Step, n: usize) -> Range<usize> {
         let first = self.n_blank(start, way, n);
         let last = way.along(start, n as i32 - 1);
         let n_after = self.n_blank(last, &way.back(), n - first);
@@ -74,7 +74,7 @@ impl Premultiplied {
     /// Returns the number of steps, at most `n`, before a position next to a pixel with alpha. The search
     /// skips from one sprite row to the next, and in each row to the start of its span.
     #[inline(always)]
-    fn n_blank(&self, start: [i32; 2], way: &Way, n: usize) -> usize {
+    fn n_blank(&self, start: [i32; 2], way: &Step, n: usize) -> usize {
         let mut at = 0;
         while at < n {
             let [u, v] = way.along(start, at as i32).map(|place| place + HALF_PLACE);

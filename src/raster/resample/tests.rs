@@ -248,7 +248,7 @@ fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
         let random = |salt| (crate::random::bits(salt, &[k]) % (1 << 22)) as i32;
         let start = [random(1), random(2)].map(|at| at % (30 << 16) + (4 << 16));
         let step = [random(3), random(4) / 4].map(|step| (step - (1 << 20)) >> (k % 20));
-        let way = map::Way::of(step);
+        let way = step::Step::of(step);
         let n = (0..60).take_while(|&k| within(way.along(start, k))).count();
         let finds = |k: &usize| {
             let [u, v] = way
