@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench accuracy ablation flocks papers vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench measure accuracy flocks papers service transitions ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -48,8 +48,8 @@ scale-test: target/vendor ## test the service on PostgreSQL and an S3 store, wit
 guards: target/vendor ## disable each protection of a promise once: its test must fail
 	@scripts/system-packages.sh test contract-test
 	@scripts/venv.sh target/contract-venv tests/contract/requirements.txt
-	python3 -B tests/guards/run.py --write
-	scripts/with-servers.sh python3 -B tests/guards/run.py --write
+	python3 -B tests/guards/run.py
+	scripts/with-servers.sh python3 -B tests/guards/run.py
 
 race: target/vendor ## let eight processes race for 2000 jobs, on SQLite and on PostgreSQL
 	FLOCKREEL_RACE_JOBS=2000 $(CARGO) test --locked --test it -- --nocapture jobs::races
@@ -93,38 +93,49 @@ deny: ## check licences, bans and sources of the dependencies, offline
 		echo "cargo deny: SKIPPED, not installed (cargo install --locked cargo-deny)"; \
 	fi
 
-bench: build ## measure the speed against ffmpeg, OpenCV and SciPy
-	@test -x target/bench-venv/bin/python || python3 -m venv target/bench-venv
-	@target/bench-venv/bin/python -c "import numpy, scipy, cv2, faiss, mesa, networkx" 2>/dev/null || target/bench-venv/bin/pip install -q numpy scipy opencv-python-headless faiss-cpu mesa networkx
-	@scripts/system-packages.sh bench
-	-python3 bench/service.py $(RELEASE)
-	-target/bench-venv/bin/python bench/analyze.py $(RELEASE)
-	python3 bench/run.py $(RELEASE)
-	target/bench-venv/bin/python bench/distance.py
-	python3 bench/transitions.py
-	python3 bench/plan.py
-	target/bench-venv/bin/python bench/boids.py
-	@test -d target/demo/library || $(MAKE) --no-print-directory demo
-	python3 bench/render.py target/demo/library $(RELEASE)
-	target/bench-venv/bin/python bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
-
-accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
-	target/bench-venv/bin/python bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST))
-
-# Python packages of the scripts in bench/ that read films and pictures.
+# Python of the scripts in bench/, with the packages to read films and to write docs/measurements.md.
+BENCH = target/bench-venv/bin/python
 target/bench-venv/ready:
 	@python3 -m venv target/bench-venv
-	@target/bench-venv/bin/pip install -q numpy opencv-python-headless pillow
+	@$(BENCH) -m pip install -q numpy opencv-python-headless pillow
 	@touch $@
 
-ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
-	target/bench-venv/bin/python bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
+bench: build target/bench-venv/ready ## measure the speed against ffmpeg, OpenCV and SciPy
+	@$(BENCH) -c "import scipy, faiss, mesa, networkx" 2>/dev/null || $(BENCH) -m pip install -q scipy faiss-cpu mesa networkx
+	@scripts/system-packages.sh bench
+	-$(BENCH) bench/service.py $(RELEASE)
+	-$(BENCH) bench/analyze.py $(RELEASE)
+	$(BENCH) bench/run.py $(RELEASE)
+	$(BENCH) bench/distance.py
+	$(BENCH) bench/transitions.py
+	$(BENCH) bench/plan.py
+	$(BENCH) bench/boids.py
+	@test -d target/demo/library || $(MAKE) --no-print-directory demo
+	$(BENCH) bench/render.py target/demo/library $(RELEASE)
+	$(BENCH) bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
+
+# The figures of bench/results. Each of these targets also writes docs/measurements.md.
+measure: accuracy flocks papers service transitions ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
+	$(BENCH) bench/measurements.py
+
+accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
+	$(BENCH) bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST))
 
 flocks: build target/bench-venv/ready ## compare flocks with the films of their animals: make flocks GENERATOR=goldfish.py [FOOTAGE=folder]
-	target/bench-venv/bin/python bench/flocks.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
+	$(BENCH) bench/flocks.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
-papers: build ## compare the papers' methods as printed with flockreel, on films with known truth
-	python3 bench/papers.py $(RELEASE)
+papers: build target/bench-venv/ready ## compare the papers' methods as printed with flockreel, on films with known truth
+	$(BENCH) bench/papers.py $(RELEASE)
+
+service: build target/bench-venv/ready ## compare the speed of the service with cp and nginx
+	@scripts/system-packages.sh bench
+	$(BENCH) bench/service.py $(RELEASE) --write
+
+transitions: target/bench-venv/ready ## measure how the search for transitions grows with the film
+	$(BENCH) bench/transitions.py --most 50000 --write
+
+ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
+	$(BENCH) bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
 vendor: ## build the page's libraries from web/package-lock.json
 	@scripts/vendor.sh

@@ -5,7 +5,7 @@
 
 One program is built from a copy of the sources in which every rule of ablation.toml has a switch. The films
 are those of cases.py and the first seconds of labeled recordings. Scores are kept in target/ablation for as
-long as the program is unchanged. Writes bench/results/ablation.json and a page of tables made from it.
+long as the program is unchanged. Writes bench/results/ablation.json and its section of docs/measurements.md.
 """
 import argparse, concurrent.futures, hashlib, json, os, pathlib, re, shutil, subprocess, tempfile, tomllib, zipfile
 
@@ -15,13 +15,12 @@ import numpy as np
 from accuracy import score_case, score_labels
 import cases
 from flocks import halo
+from table import table
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent
 PLACE = ROOT / "target" / "ablation"
 SOURCES = PLACE / "sources"
-RESULTS = HERE / "results" / "ablation.json"
-PAGE = ROOT / "docs" / "ABLATION.md"
 SWITCH = """
 /// Whether the rule of that name is switched off.
 #[doc(hidden)]
@@ -123,17 +122,24 @@ def verdict(losses):
     return {0: "nothing", 1: "one film"}.get(len(worse), "useful")
 
 
-def page(results, rules):
-    yield "# Which rules earn their place\n"
-    yield ("Written by `make ablation` from `bench/results/ablation.json`: each rule of `bench/ablation.toml` switched off, one by one. "
-           "Points of 100 that a film loses without it (frames within .1 body length, heads at their end, the view, halo of the sprites; "
-           "100 where it is refused); only those of more than a point are named, and those that a film gains have a minus.\n")
-    yield "| rule | what it says | verdict | films |\n| --- | --- | --- | --- |"
-    for rule in rules:
+def rules_of_table():
+    return tomllib.loads((HERE / "ablation.toml").read_text())["rule"]
+
+
+def page(results):
+    """Returns the section of docs/measurements.md."""
+    rows = []
+    for rule in rules_of_table():
         for name in rule.get("names", [rule["name"]]):
-            losses = results["rules"][name]
-            named = ", ".join(f"{film} {loss:.0f}" for film, loss in losses.items() if abs(loss) > CLEARLY)
-            yield f"| `{name}` | {rule['says']} | {verdict(losses)} | {named} |"
+            losses = results["rules"].get(name)
+            if losses is not None:
+                named = ", ".join(f"{film} {loss:.0f}" for film, loss in losses.items() if abs(loss) > CLEARLY)
+                rows.append((f"`{name}`", rule["says"], verdict(losses), named))
+    return ["## Contribution of each rule", "",
+            "Each rule of `bench/ablation.toml` is switched off, one at a time. The last column has the points of 100 that a film loses without it, "
+            "if more than one; negative points are gains. Points count frames within 0.1 body lengths, heads at the right end, the view, and the halo "
+            "of the mattes. A refusal is 100. The verdict is `useful` from two films on, and `doubtful` if a film gains.", "",
+            "Repeat: `make ablation GENERATOR=goldfish.py FOOTAGE=folder`", "", *table(["rule", "meaning", "verdict", "films"], rows)]
 
 
 def main():
@@ -142,7 +148,8 @@ def main():
     parser.add_argument("--footage", type=pathlib.Path)
     parser.add_argument("--films", type=pathlib.Path, default=ROOT / "target" / "accuracy")
     args = parser.parse_args()
-    rules = tomllib.loads((HERE / "ablation.toml").read_text())["rule"]
+    import measurements  # not at the top, because it imports this file
+    rules = rules_of_table()
     names = [name for rule in rules for name in rule.get("names", [rule["name"]])]
     lay_out(rules)
     program = build()
@@ -169,9 +176,8 @@ def main():
             losses = {film[0]: change(base[film[0]], score) for film, score in zip(films, scores)}
             results["rules"][name] = losses
             print(f"{name:24}{verdict(losses):10}", *(f"{f} {v:.0f}" for f, v in losses.items() if abs(v) > CLEARLY), flush=True)
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(results, indent=1) + "\n")
-    PAGE.write_text("\n".join(page(results, rules)) + "\n")
+    measurements.save("ablation", results)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -3,16 +3,19 @@
 
     accuracy.py FLOCKREEL GENERATOR [--footage FOLDER] [--against FLOCKREEL] [--films FOLDER]
 
-GENERATOR is a script called as `GENERATOR STEM --seed N [--hard] [--colour C]`. It writes STEM.mp4,
-STEM.truth.json and STEM.background.png. Films are kept in the folder, by default target/accuracy. Writes
-bench/results/accuracy.json and a page of tables made from it (docs/measurements.md). --against measures
-errors and processor time of another program on the generated films.
+GENERATOR is a script called as `GENERATOR STEM --seed N [--frames N] [--hard] [--colour C] [--size WxH]
+[--length M] [--height M] [--crf N]`. It writes STEM.mp4, STEM.background.png, and STEM.truth.json with
+`camera`, `animal` and, for each of `frames`, `centroid_px`, `box_px`, `forward` and `position_m`.
+
+Films are kept in the folder, by default target/accuracy. Writes bench/results/accuracy.json and its section of
+docs/measurements.md. --against compares errors and processor time with another program on the generated films;
+it prints the ratios and stores nothing of them.
 """
 import argparse, concurrent.futures, json, math, os, pathlib, resource, statistics, subprocess, sys, tempfile
 
+from table import starred, table
+
 HERE = pathlib.Path(__file__).resolve().parent
-RESULTS = HERE / "results" / "accuracy.json"
-PAGE = HERE.parent / "docs" / "ACCURACY.md"
 SEEDS = (1, 2, 3)
 # A centroid error up to RIGHT is right, above FAR is far off; in body lengths.
 RIGHT, FAR = .1, .25
@@ -157,8 +160,6 @@ def measure(args):
         "head_confidence": calibration([heads for _, _, _, heads in scored]),
         "generated": generated(args.program, args.generator, folder),
     }
-    if args.against:
-        results["against"] = generated(args.against, args.generator, folder)
     if args.footage:
         results["labels"] = {}
         for path in sorted((HERE / "labels").glob("*.json")):
@@ -174,72 +175,89 @@ def bars(results):
     measured = [score for score in cases if "refused" not in score]
     n = sum(score["n"] for score in measured)
     far = sum(score["sure_and_far"] for score in measured) / n
-    rows = [("sure (> .9) and more than .25 body length off, of all frames", f"{far:.3%}", "< .3 %", far < .003)]
+    rows = [("films: `confidence` above 0.9, but centroid over 0.25 BL off", f"{far:.3%}", "< 0.3%", far < .003)]
     for name in ("confidence", "head_confidence"):
         ece, worst = results[name]["ece"], results[name]["worst_bin"]
-        rows.append((f"`{name}`: expected calibration error", f"{ece:.4f}", "< .03", ece < .03))
-        rows.append((f"`{name}`: worst bin of 200 frames or more", f"{worst:.3f}", "<= .1", worst <= .1))
+        rows.append((f"films: expected calibration error of `{name}`", f"{ece:.4f}", "< 0.03", ece < .03))
+        rows.append((f"films: largest error of `{name}` in a bin of at least 200 frames", f"{worst:.3f}", "<= 0.1", worst <= .1))
     clips = {name: clip for name, clip in results.get("labels", {}).items() if "refused" not in clip}
     if clips:
         least = min(clip["found"] / clip["n"] for clip in clips.values())
-        rows.append(("recordings: found where the labeller sees the animal, least of all", f"{least:.1%}", "> 95 %", least > .95))
+        rows.append(("recordings: frames with the animal found, lowest share", f"{least:.1%}", "> 95%", least > .95))
         told = min(clip["heads_told"] / max(clip["heads"], 1) for clip in clips.values())
-        rows.append(("recordings: head told where it is visible, least of all", f"{told:.1%}", "> 85 %", told > .85))
+        rows.append(("recordings: visible heads with a decision, lowest share", f"{told:.1%}", "> 85%", told > .85))
         wrong = sum(len(clip["heads_wrong"]) for clip in clips.values()) / sum(clip["heads_told"] for clip in clips.values())
-        rows.append(("recordings: head at the wrong end", f"{wrong:.1%}", "< 1 %", wrong < .01))
+        rows.append(("recordings: heads at the wrong end", f"{wrong:.1%}", "< 1%", wrong < .01))
         off = sum(clip["far"] for clip in clips.values()) / sum(clip["centroids"] for clip in clips.values())
-        rows.append(("recordings: centroid more than .25 body length off", f"{off:.1%}", "< 1 %", off < .01))
+        rows.append(("recordings: centroids over 0.25 BL off", f"{off:.1%}", "< 1%", off < .01))
         views = sum(not clip["view_right"] for clip in clips.values())
-        rows.append(("recordings: wrong view", str(views), "0", views == 0))
+        rows.append(("recordings: clips with the wrong view", str(views), "0", views == 0))
         axis = clips["mouse_round_arena"]["axis_deg_p50"]
-        rows.append(("arena mouse: heading against the body's axis, median", f"{axis:.1f}\u00b0", "< 1.5\u00b0", axis < 1.5))
-    if "against" in results:
-        for kind in results["generated"]:
-            for key in ("centroid_px_p95", "heading_deg_p50", "forward_deg_p50"):
-                now, then = ([s[key] for s in results[name][kind]] for name in ("generated", "against"))
-                ratio = statistics.median(now) / statistics.median(then)
-                spread = (max(then) - min(then)) / statistics.median(then)
-                rows.append((f"generated, {kind}: {key} over the other program's", f"{ratio:.2f}", f"<= {1 + max(.05, spread):.2f}",
-                             ratio <= 1 + max(.05, spread)))
-        cpu = [sum(s["cpu_s"] for s in results[name]["plain"]) for name in ("generated", "against")]
-        rows.append(("processor time over the other program's", f"{cpu[0] / cpu[1]:.2f}", "<= 1.3", cpu[0] <= 1.3 * cpu[1]))
+        rows.append(("mouse_round_arena: heading against the labeled axis, median", f"{axis:.1f}\u00b0", "< 1.5\u00b0", axis < 1.5))
+    return rows
+
+
+def comparison(ours, theirs):
+    """Returns the rows of `bars` for two programs, from their scores on generated films."""
+    rows = []
+    for kind in ours:
+        for key in ("centroid_px_p95", "heading_deg_p50", "forward_deg_p50"):
+            now, then = ([score[key] for score in scores[kind]] for scores in (ours, theirs))
+            ratio = statistics.median(now) / statistics.median(then)
+            spread = (max(then) - min(then)) / statistics.median(then)
+            rows.append((f"generated, {kind}: {key} over the other program's", f"{ratio:.2f}", f"<= {1 + max(.05, spread):.2f}",
+                         ratio <= 1 + max(.05, spread)))
+    cpu = [sum(score["cpu_s"] for score in scores["plain"]) for scores in (ours, theirs)]
+    rows.append(("processor time over the other program's", f"{cpu[0] / cpu[1]:.2f}", "<= 1.3", cpu[0] <= 1.3 * cpu[1]))
     return rows
 
 
 def page(results):
-    yield "# How right the poses are\n"
-    yield "Written by `make accuracy GENERATOR=goldfish.py FOOTAGE=folder` from `bench/results/accuracy.json`. Lengths are body lengths.\n"
-    yield "| measure | figure | bar | |\n| --- | ---: | ---: | --- |"
-    for what, figure, bar, met in bars(results):
-        yield f"| {what} | {figure} | {bar} | {'' if met else 'missed'} |"
-    yield "\n## Films that go wrong\n"
-    yield "`bench/cases.py`: a synthetic fish to whose film something happens; each three times, of other seeds and strengths.\n"
-    yield "| film | found | off, median | off, p95 | within .1 | far | invented | heads wrong |\n| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
-    for name, s in results["cases"].items():
-        yield f"| {name} | refused: `{s['refused']}` | | | | | | |" if "refused" in s else (
-            f"| {name} | {s['found']:.1%} | {s['off_p50']:.3f} | {s['off_p95']:.3f} | {s['right']:.1%} | {s['far']} | {s['invented']} "
-            f"| {s['flips']} of {s['n_aside']} |")
+    """Returns the section of docs/measurements.md."""
+    return ["## Accuracy of poses", "",
+            "Poses are compared with the truth of generated films, and with labels of real recordings. Lengths without a unit are body lengths.", "",
+            "Repeat: `make accuracy GENERATOR=goldfish.py FOOTAGE=folder`", "",
+            *table(["measure", "measured", "bar"], [(what, starred(figure, met), bar) for what, figure, bar, met in bars(results)]),
+            *case_tables(results), *(label_table(results["labels"]) if "labels" in results else []), *generated_table(results["generated"])]
+
+
+def case_tables(results):
+    rows = [(name, f"refused: `{s['refused']}`") if "refused" in s else
+            (name, f"{s['found']:.1%}", f"{s['off_p50']:.3f}", f"{s['off_p95']:.3f}", f"{s['right']:.1%}", s["far"], s["invented"],
+             f"{s['flips']} of {s['n_aside']}") for name, s in results["cases"].items()]
+    yield from ("", "### Films with faults", "")
+    yield ("`bench/cases.py` makes films of a synthetic fish with typical faults, each with three seeds and strengths. Other file formats are "
+           "`pictures` (a zip of PNGs), `raw` (bare H.264), `sound` (WMV) and `old` (MPEG-1). The films below them have no fault. The error is the "
+           "distance of the centroid from the true one.")
+    yield ""
+    yield from table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads"], rows)
+    yield from ("", "### Calibration", "")
+    yield ("The films above, each with the same weight, in bins of the probability. `confidence` is right if the centroid is within 0.1, "
+           "`head_confidence` if the head is at the right end.")
     for name in ("confidence", "head_confidence"):
-        yield f"\n## `{name}`\n\nOf all these films, each of which weighs the same.\n"
-        yield "| mean | right | share of the frames | frames |\n| ---: | ---: | ---: | ---: |"
-        for row in results[name]["bins"]:
-            yield f"| {row['confidence']:.3f} | {row['right']:.3f} | {row['share']:.1%} | {row['frames']} |"
-    if "labels" in results:
-        yield "\n## Recordings\n\nForty frames of each, labelled by eye (`bench/labels`).\n"
-        yield "| clip | view | found | head told | head wrong | centroid off, most | far |\n| --- | --- | ---: | ---: | ---: | ---: | ---: |"
-        for name, c in results["labels"].items():
-            yield f"| {name} | refused: `{c['refused']}` | | | | | |" if "refused" in c else (
-                f"| {name} | {c['view']}{'' if c['view_right'] else ' (wrong)'} | {c['found']} of {c['n']} | {c['heads_told']} of {c['heads']} "
-                f"| {len(c['heads_wrong'])} | {c['off_max']:.2f} | {c['far']} |")
-    yield "\n## The papers' setting\n\nFilms of 1200 frames with a calibrated camera and a known animal, seeds 1 to 3: median, least and most.\n"
-    yield "| measure | plain | hard |\n| --- | ---: | ---: |"
-    for key in ("detected_share", "centroid_px_p50", "centroid_px_p95", "head_right_share", "heading_deg_p50", "heading_deg_p95",
-                "z_scaled_rmse_m", "forward_deg_p50", "forward_deg_p90"):
-        cells = []
-        for kind in ("plain", "hard"):
-            values = [s[key] for s in results["generated"][kind]]
-            cells.append(f"{statistics.median(values):.4g} ({min(values):.4g} to {max(values):.4g})")
-        yield f"| `{key}` | {cells[0]} | {cells[1]} |"
+        yield ""
+        yield from table([f"mean `{name}`", "right", "weighted share", "frames"], [
+            (f"{row['confidence']:.3f}", f"{row['right']:.3f}", f"{row['share']:.1%}", row["frames"]) for row in results[name]["bins"]])
+
+
+def label_table(labels):
+    rows = [(name, f"refused: `{c['refused']}`") if "refused" in c else
+            (name, c["view"] + ("" if c["view_right"] else " (wrong)"), f"{c['found']} of {c['n']}", f"{c['heads_told']} of {c['heads']}",
+             len(c["heads_wrong"]), f"{c['off_max']:.2f}", c["far"]) for name, c in labels.items()]
+    return ["", "### Recordings", "", "Forty frames of each clip, labeled by eye (`bench/labels`).", "",
+            *table(["clip", "view", "found", "head decided", "head wrong", "error, largest", "over 0.25"], rows)]
+
+
+def generated_table(scores):
+    def cell(kind, key):
+        values = [score[key] for score in scores[kind]]
+        return f"{statistics.median(values):.4g} ({min(values):.4g} to {max(values):.4g})"
+
+    rows = [(f"`{key}`", cell("plain", key), cell("hard", key)) for key in (
+        "detected_share", "centroid_px_p50", "centroid_px_p95", "head_right_share", "heading_deg_p50", "heading_deg_p95", "z_scaled_rmse_m",
+        "forward_deg_p50", "forward_deg_p90")]
+    return ["", "### Calibrated camera", "", "Generated films of 1200 frames with a known camera and animal, as in the papers, scored by "
+            "`bench/score.py`. Cells are the median over three seeds, with minimum and maximum.", "", *table(["measure", "plain", "hard"], rows)]
 
 
 def main():
@@ -251,11 +269,13 @@ def main():
     parser.add_argument("--films", type=pathlib.Path, default=HERE.parent / "target" / "accuracy")
     args = parser.parse_args()
     args.program = args.program.resolve()
+    import measurements  # not at the top, because it imports this file
     results = measure(args)
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(results, indent=1) + "\n")
-    PAGE.write_text("\n".join(page(results)) + "\n")
-    for what, figure, bar, met in bars(results):
+    measurements.save("accuracy", results)
+    rows = bars(results)
+    if args.against:
+        rows += comparison(results["generated"], generated(args.against, args.generator, args.films))
+    for what, figure, bar, met in rows:
         print(f"{what:76} {figure:>9} {bar:>9}{'' if met else '  MISSED'}")
 
 

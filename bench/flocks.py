@@ -6,19 +6,19 @@
 Each film is analyzed with default settings. Flocks of 300 frames are planned with three seeds and as many
 individuals as have room. Speeds, shown and filmed, are those of the centroid over two frames in body lengths
 per second, at least two frames away from a jump. Shown speeds are divided by the scale of the sprite. Writes
-bench/results/flocks.json and a page of tables made from it (docs/measurements.md).
+bench/results/flocks.json and its section of docs/measurements.md.
 """
-import argparse, json, math, pathlib, shutil, statistics, subprocess, tempfile
+import argparse, json, math, operator, pathlib, shutil, statistics, subprocess, tempfile
 
 import cv2
 import numpy as np
 
 import cases
+from table import starred, table
 
 HERE = pathlib.Path(__file__).resolve().parent
 PLACE = HERE.parent / "target" / "flocks"
 RESULTS = HERE / "results" / "flocks.json"
-PAGE = HERE.parent / "docs" / "FLOCKS.md"
 CLIPS = ("goldfish_black_water", "mouse_round_arena", "zebrafish_juvenile_single", "zebra_finch_cage", "mouse_homecage_bedding",
          "mouse_openfield", "dog_side_with_hand", "zebrafish_larva_single")
 GENERATED = ("plain-1", "silver-2", "dark-3")
@@ -26,25 +26,26 @@ SEEDS, N_FRAMES = (1, 2, 3), 300
 REST, MOVING = .1, .3
 # Frames on each side of a jump that a fade may change, plus one.
 AROUND = 3
-# For each figure: its label, the check of its limit, its format, and the views that it applies to.
+# For each figure: its label, its bar, its format, and the views that it applies to.
+HOLDS = {">": operator.gt, "<": operator.lt, "<=": operator.le}
 ALL, SIDE, TOP = ("side", "top"), ("side",), ("top",)
 BARS = {
-    "as_filmed": ("shown speed within 25 % or .05 BL/s of the filmed one", lambda v: v > .85, "{:.1%}", ALL),
-    "correlation": ("correlation of shown and filmed speed", lambda v: v > .9, "{:.2f}", ALL),
-    "states_off": ("share of rest, slow, go or dart off the film's, largest", lambda v: v <= .1, "{:.1%}", ALL),
-    "rest_moving": ("resting animals shown moving", lambda v: v < .01, "{:.2%}", ALL),
-    "jumps": ("jumps in 100 frames", lambda v: v < 4, "{:.1f}", ALL),
-    "heading_p90_deg": ("heading off the boid's, 90th percentile, degrees", lambda v: v < 8, "{:.1f}", SIDE),
-    "loops": ("time in loops", lambda v: v < .02, "{:.1%}", ALL),
-    "lookalikes": ("animals with a look-alike within 3 BL", lambda v: v < .25, "{:.0%}", ALL),
-    "cuts_above_natural": ("jumps whose step is above the natural 99th percentile, faded", lambda v: v == 0, "{:.1%}", ALL),
-    "overlap": ("area of bodies that lie on each other", lambda v: v < .01, "{:.1%}", TOP),
-    "halo": ("alpha more than 2.5 px outside the contour", lambda v: v < .01, "{:.1%}", TOP),
-    "stray": ("changed pixels of the film outside of every animal and shadow", lambda v: v < .03, "{:.1%}", ALL),
-    "blobs": ("separate bodies of 20 at 1.5 BL from each other, mean", lambda v: v > 16, "{:.1f}", SIDE),
-    "polarization": ("polarization", lambda v: True, "{:.2f}", ALL),
-    "playable": ("share of uncut frames that can be played", lambda v: True, "{:.0%}", ALL),
-    "individuals": ("animals that have room, at most 20", lambda v: True, "{:.0f}", ALL),
+    "as_filmed": ("frames whose speed is within 25% or 0.05 BL/s of the filmed speed", (">", .85), "{:.1%}", ALL),
+    "correlation": ("correlation of shown and filmed speed", (">", .9), "{:.2f}", ALL),
+    "states_off": ("largest change in the share of rest, slow, go or dart", ("<=", .1), "{:.1%}", ALL),
+    "rest_moving": ("frames of rest shown in motion", ("<", .01), "{:.2%}", ALL),
+    "jumps": ("jumps per 100 frames", ("<", 4), "{:.1f}", ALL),
+    "heading_p90_deg": ("heading against that of the boid, 90th percentile, degrees", ("<", 8), "{:.1f}", SIDE),
+    "loops": ("time in loops", ("<", .02), "{:.1%}", ALL),
+    "lookalikes": ("individuals with a look-alike within 3 BL", ("<", .25), "{:.0%}", ALL),
+    "cuts_above_natural": ("faded jumps with a step above the film's 99th percentile", ("<=", 0), "{:.1%}", ALL),
+    "overlap": ("area of bodies that overlaps others", ("<", .01), "{:.1%}", TOP),
+    "halo": ("alpha more than 2.5 px outside the contour", ("<", .01), "{:.1%}", TOP),
+    "stray": ("changed pixels outside of every animal and shadow", ("<", .03), "{:.1%}", ALL),
+    "blobs": ("separate bodies in a flock of 20 with 1.5 BL spacing, mean", (">", 16), "{:.1f}", SIDE),
+    "polarization": ("polarization", None, "{:.2f}", ALL),
+    "playable": ("uncut frames that can be played", None, "{:.0%}", ALL),
+    "individuals": ("individuals", None, "{:.0f}", ALL),
 }
 
 
@@ -270,23 +271,29 @@ def measure(program, name, film, flags):
 
 
 def page(results):
-    yield "# How flocks move\n"
-    yield ("Written by `make flocks GENERATOR=goldfish.py FOOTAGE=folder` from `bench/results/flocks.json`: flocks of 300 frames, the "
-           "mean of three seeds, with as many animals as have room and default settings. BL is a body length; * is missed. "
-           "Figures without a bar say what else is there.\n")
-    names = [name for name, film in results.items() if "refused" not in film]
+    """Returns the section of docs/measurements.md."""
+    yield "## Motion and appearance of flocks"
+    yield ""
+    yield ("Flocks of 300 frames are compared with the films of their animals. They have default settings, and as many individuals as have room, "
+           "at most 20. Figures are the mean of three seeds; `bench/flocks.py` defines them. The first three films from the side are generated.")
+    yield ""
+    yield "Repeat: `make flocks GENERATOR=goldfish.py FOOTAGE=folder`"
     for name, film in results.items():
         if "refused" in film:
-            yield f"`{name}` is refused: `{film['refused']}`.\n"
-    for view in ("side", "top"):
-        seen = [name for name in names if results[name]["view"] == view]
-        yield f"## Filmed from {'the side' if view == 'side' else 'above'}\n"
-        yield "| | " + " | ".join(seen) + " |\n| --- |" + " ---: |" * len(seen)
-        for key, (says, holds, written, views) in BARS.items():
-            if view in views:
-                figures = [written.format(results[name][key]) + ("" if holds(results[name][key]) else " *") for name in seen]
-                yield f"| {says} | " + " | ".join(figures) + " |"
-        yield ""
+            yield from ("", f"`{name}` is refused: `{film['refused']}`.")
+    for view, title in (("side", "From the side"), ("top", "From above")):
+        names = [name for name, film in results.items() if film.get("view") == view]
+        yield from ("", f"### {title}", "")
+        yield from table(["measure", *names, "bar"], [(label, *(figure(results[name][key], bar, form) for name in names), limit(bar, form))
+                                                      for key, (label, bar, form, views) in BARS.items() if view in views])
+
+
+def figure(value, bar, form):
+    return starred(form.format(value), bar is None or HOLDS[bar[0]](value, bar[1]))
+
+
+def limit(bar, form):
+    return f"{bar[0]} {form.format(bar[1])}" if bar else ""
 
 
 def main():
@@ -297,6 +304,7 @@ def main():
     parser.add_argument("--films", type=pathlib.Path, default=HERE.parent / "target" / "accuracy")
     parser.add_argument("--only", nargs="+", help="measure these films alone, and keep the figures of the others")
     args = parser.parse_args()
+    import measurements  # not at the top, because it imports this file
     films = [(name, path, flags) for name, path, _, flags in cases.films(args.generator, args.films) if name in GENERATED]
     if args.footage:
         clips = [json.loads((HERE / "labels" / f"{clip}.json").read_text())["clip"] for clip in CLIPS]
@@ -307,8 +315,7 @@ def main():
             results[name] = measure(args.program, name, film, flags)
             words = [f"{key} {value:.3g}" if isinstance(value, float) else f"{key} {value}" for key, value in results[name].items()]
             print(f"{name:28}", *words, flush=True)
-    RESULTS.write_text(json.dumps(results, indent=1) + "\n")
-    PAGE.write_text("\n".join(page(results)) + "\n")
+    measurements.save("flocks", results)
 
 
 if __name__ == "__main__":

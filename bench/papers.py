@@ -4,26 +4,27 @@
     papers.py FLOCKREEL [--seeds 1,2,3] [--frames 1200]
 
 Films the virtual fish and analyzes each film in three ways. The first is as Nakajima et al. and Okabe et al.
-are printed, the second corrects equation 7 of Nakajima et al., the third has default settings. Writes a table
-of the scores (docs/measurements.md).
+are printed, the second corrects equation 7 of Nakajima et al., the third has default settings. Writes
+bench/results/papers.json and its section of docs/measurements.md.
 """
 import json, pathlib, statistics, subprocess, sys, tempfile
 
+import measurements
+
 HERE = pathlib.Path(__file__).resolve().parent
-TABLE = HERE.parent / "docs" / "PAPERS.md"
 WAYS = [
-    ("N and O as printed", ["--preset", "papers", "--set", "eq7=printed"]),
-    ("preset `papers`: N (7) the right way round", ["--preset", "papers"]),
-    ("flockreel", []),
+    ("as printed", ["--preset", "papers", "--set", "eq7=printed"]),
+    ("preset `papers`", ["--preset", "papers"]),
+    ("default", []),
 ]
 MEASURES = [
-    ("detected", "detected_share", lambda v: f"{100 * v:.1f} %"),
-    ("head right", "head_right_share", lambda v: f"{100 * v:.1f} %"),
+    ("detected", "detected_share", lambda v: f"{v:.1%}"),
+    ("head right", "head_right_share", lambda v: f"{v:.1%}"),
     ("heading, median", "heading_deg_p50", lambda v: f"{v:.1f}\u00b0"),
     ("heading, p95", "heading_deg_p95", lambda v: f"{v:.1f}\u00b0"),
-    ("depth, RMSE", "z_rmse_m", lambda v: f"{1000 * v:.0f} mm"),
-    ("direction, median", "forward_deg_p50", lambda v: f"{v:.1f}\u00b0"),
-    ("direction, p90", "forward_deg_p90", lambda v: f"{v:.1f}\u00b0"),
+    ("depth, root mean square error", "z_rmse_m", lambda v: f"{1000 * v:.0f} mm"),
+    ("direction in space, median", "forward_deg_p50", lambda v: f"{v:.1f}\u00b0"),
+    ("direction in space, p90", "forward_deg_p90", lambda v: f"{v:.1f}\u00b0"),
 ]
 
 
@@ -56,30 +57,18 @@ def cell(scores, key, say):
     return middle if len(values) == 1 else f"{middle} ({say(min(values))} to {say(max(values))})"
 
 
-def table(scores, seeds, frames):
-    lines = [
-        "# The papers as printed, and flockreel",
-        "",
-        f"Written by `make papers`: {len(seeds)} films of the virtual fish (`flockreel sample`, seeds "
-        f"{', '.join(map(str, seeds))}, {frames} frames), each analyzed three ways and scored against its truth "
-        "(`bench/score.py`). Median over the films, with the least and the most.",
-        "",
-        "| | " + " | ".join(name for name, _ in WAYS) + " |",
-        "| --- |" + " ---: |" * len(WAYS),
-    ]
-    for label, key, say in MEASURES:
-        lines.append(f"| {label} | " + " | ".join(cell(scores[name], key, say) for name, _ in WAYS) + " |")
-    lines += [
-        "",
-        "What the first two columns take from the papers word for word: the arctangent of a quotient (N 4), which",
-        "gives the axis nearer the horizontal; the other axis as the height (N 5.3), each frame by itself; the head",
-        "where it was in the frame before (O 3.3), toward +axis in the first; each frame's own values, unsmoothed;",
-        "acos of the clamped quotient (N 8); the sign of the depth, which N leaves open, by the change from the",
-        "frame before. What they do not: moments are summed over the silhouette with its soft alpha, not over the",
-        "box, and pixels are square.",
-        "",
-    ]
-    return "\n".join(lines)
+def result(scores, seeds, frames):
+    return {
+        "title": "Methods of the papers",
+        "about": f"The virtual fish is filmed with a known camera (`flockreel sample`, seeds {', '.join(map(str, seeds))}, {frames} frames). "
+                 "Each film is analyzed in three ways, and `bench/score.py` compares the poses with the truth. Cells are the median over the films, "
+                 "with minimum and maximum. The first column follows both papers word for word, frame by frame and unsmoothed. The preset "
+                 "`papers` corrects equation 7 of Nakajima et al. Both sum moments over the soft silhouette, not over its box. "
+                 "[Corrections to the papers](explanation/algorithms.md#corrections-to-the-papers) explains the default.",
+        "command": "make papers",
+        "head": ["measure", *(name for name, _ in WAYS)],
+        "rows": [[label, *(cell(scores[name], key, say) for name, _ in WAYS)] for label, key, say in MEASURES],
+    }
 
 
 def main():
@@ -87,9 +76,10 @@ def main():
     seeds = [int(seed) for seed in words.get("--seeds", "1,2,3").split(",")]
     frames = int(words.get("--frames", 1200))
     with tempfile.TemporaryDirectory() as folder:
-        text = table(score_all(sys.argv[1], seeds, frames, pathlib.Path(folder)), seeds, frames)
-    TABLE.write_text(text)
-    print(text)
+        measured = result(score_all(sys.argv[1], seeds, frames, pathlib.Path(folder)), seeds, frames)
+    measurements.save("papers", measured)
+    print("\n".join(measurements.section(measured)))
 
 
-main()
+if __name__ == "__main__":
+    main()

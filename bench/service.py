@@ -1,6 +1,6 @@
 """Measures the speed of the service against common tools (docs/explanation/promises.md, "Overload").
 
-    python3 bench/service.py target/release/flockreel [FILM] [--write PAGE]
+    bench/service.py target/release/flockreel [FILM] [--write]
 
 - Upload of 1 GiB over loopback, against cp and fsync to the same disk, and the memory that it adds.
 - Requests for small JSON, per second and 99th percentile, idle and while analyses run.
@@ -8,7 +8,7 @@
 
 FILM is the film of the analyses; without it, the program makes one. Requires wrk, nginx and curl. Each figure
 is the median of three runs; an upload is compared with the copy just before it. The downloads are the best of
-three runs. --write writes the table to a page.
+three runs. --write writes bench/results/service.json and its section of docs/measurements.md.
 """
 
 import hashlib
@@ -26,10 +26,13 @@ import time
 import urllib.request
 from pathlib import Path
 
+import measurements
+from table import starred
+
 GIB = 1 << 30
 WRK_S = 5
 RUNS = 3
-TOLD = []
+ROWS = []
 
 
 def main(program, *more):
@@ -48,7 +51,7 @@ def main(program, *more):
             service.terminate()
             service.wait(timeout=60)
     if "--write" in more:
-        write(Path(more[more.index("--write") + 1]))
+        measurements.save("service", result())
 
 
 def start(program, data):
@@ -96,10 +99,10 @@ def upload_speed(service, address, film, folder):
         answer = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
         uploaded.append(time.monotonic() - start)
     added = memory_mb(service.pid, "VmHWM") - before
-    runs = ", ".join(f"{ours:.1f} and {theirs:.1f}" for ours, theirs in zip(uploaded, copied))
+    runs = ", ".join(f"{ours:.1f} s and {theirs:.1f} s" for ours, theirs in zip(uploaded, copied))
     ratio = statistics.median(theirs / ours for ours, theirs in zip(uploaded, copied))
-    line("upload of 1 GiB", f"{100 * ratio:.0f} % of the rate of cp and fsync (runs: {runs} s)", "60 %")
-    line("memory that it added", f"{added:.1f} MB", "16 MB")
+    line("rate of an upload of 1 GiB, relative to cp and fsync", f"{ratio:.0%}", runs, "> 60%", ratio > .6)
+    line("memory added by the upload", f"{added:.1f} MB", "", "< 16 MB", added < 16)
     return answer
 
 
@@ -123,21 +126,21 @@ def memory_mb(pid, field):
 def json_speed(address, film):
     footage = post(f"{address}/v1/footage", Path(film).read_bytes(), "video/mp4")
     url = f"{address}/v1/footage/{footage['id']}"
-    tell_requests("small JSON, idle", url, "5000 requests/s")
+    tell_requests("requests for small JSON, idle", url, "> 5000/s", lambda rate, p99_ms: rate > 5000)
     stop = threading.Event()
     working = threading.Thread(target=keep_busy, args=(address, footage["id"], stop))
     working.start()
     time.sleep(1)
-    tell_requests("small JSON, while analyses run", url, "p99 20 ms")
+    tell_requests("requests for small JSON, during analyses", url, "p99 < 20 ms", lambda rate, p99_ms: p99_ms < 20)
     stop.set()
     working.join()
 
 
-def tell_requests(what, url, bar):
+def tell_requests(what, url, bar, holds):
     rates, p99s_ms = zip(*(wrk(url) for _ in range(RUNS)))
-    each = ", ".join(f"{rate:.0f} at {p99_ms:.1f}" for rate, p99_ms in zip(rates, p99s_ms))
+    each = ", ".join(f"{rate:.0f}/s and {p99_ms:.1f} ms" for rate, p99_ms in zip(rates, p99s_ms))
     rate, p99_ms = statistics.median(rates), statistics.median(p99s_ms)
-    line(what, f"{rate:.0f} requests/s, p99 {p99_ms:.1f} ms (runs: {each})", bar)
+    line(what, f"{rate:.0f}/s, p99 {p99_ms:.1f} ms", each, bar, holds(rate, p99_ms))
 
 
 def keep_busy(address, footage_id, stop):
@@ -171,7 +174,9 @@ def range_speed(address, footage, folder):
     finally:
         nginx.terminate()
         nginx.wait()
-    line("a film in ranges of 8 MiB", f"{rates[ours]:.0f} MB/s, nginx {rates[theirs]:.0f} MB/s: {100 * rates[ours] / rates[theirs]:.0f} %", "80 %")
+    ratio = rates[ours] / rates[theirs]
+    line("rate of downloads in ranges of 8 MiB, relative to nginx", f"{ratio:.0%}", f"{rates[ours]:.0f} MB/s and {rates[theirs]:.0f} MB/s",
+         "> 80%", ratio > .8)
 
 
 def wrk(url, *more):
@@ -197,22 +202,21 @@ def post(url, body, media_type="application/json"):
         return json.load(answer)
 
 
-def line(what, said, bar):
-    TOLD.append(f"| {what} | {said} | {bar} |")
-    print(f"{what:32} {said} (bar: {bar})", flush=True)
+def line(what, measured, runs, bar, is_met):
+    ROWS.append([what, starred(measured, is_met), runs, bar])
+    print(f"{what:56} {ROWS[-1][1]} (bar: {bar}) {runs}", flush=True)
 
 
-def write(page):
+def result():
     cpu = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    page.write_text(f"""# How fast the service is
-
-Made by `python3 bench/service.py target/release/flockreel --write docs/SERVICE.md` on {os.cpu_count()} cores
-({cpu[1] if cpu else platform.machine()}), shared by the service, wrk and nginx; RELIABILITY.md's bars in the last column.
-
-| what | measured | bar |
-| --- | --- | --- |
-{chr(10).join(TOLD)}
-""")
+    return {
+        "title": "Speed of the service",
+        "about": f"Requests and transfers over loopback, on {os.cpu_count()} cores ({cpu[1] if cpu else platform.machine()}). The cores are shared "
+                 "with wrk, nginx and curl. Runs of transfers list flockreel first and the other program second.",
+        "command": "make service",
+        "head": ["what", "measured", "runs", "bar"],
+        "rows": ROWS,
+    }
 
 
 if __name__ == "__main__":

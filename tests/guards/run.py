@@ -1,9 +1,12 @@
 """Disables the guards of guards.toml one by one and checks that the test of each fails.
 
 One program is built from a copy of the sources in which every guard has a switch. FLOCKREEL_GUARD_OFF names
-the disabled guard. Each test must pass with all guards enabled. --write updates the table of docs/GUARDS.md.
+the disabled guard. Each test must pass with all guards enabled. Prints a line for each guard, with the
+message of the failed test. Exits with 1 if a test passes without its guard, or fails with all guards.
 
-  tests/guards/run.py [--write] [NAME...]       guards whose name starts with NAME, or all
+Where several guards stop the same attack, the test of one must look past the others.
+
+  tests/guards/run.py [NAME...]                 guards whose name starts with NAME, or all
   scripts/with-servers.sh tests/guards/run.py   guards whose tests need several machines
 """
 
@@ -29,14 +32,11 @@ pub fn guard_off(name: &str) -> bool {
     std::env::var("FLOCKREEL_GUARD_OFF").is_ok_and(|off| off == name)
 }
 """
-DOCUMENT = ROOT / "docs/GUARDS.md"
-BEGIN, END = "<!-- the table: tests/guards/run.py --write -->\n", "<!-- end of the table -->\n"
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*")
-    parser.add_argument("--write", action="store_true", help="write docs/GUARDS.md")
     asked = parser.parse_args()
     guards = tomllib.loads(Path(__file__).with_name("guards.toml").read_text())["guard"]
     lay_out(guards)
@@ -44,7 +44,7 @@ def main():
     wanted = [g for g in guards if not asked.names or any(g["name"].startswith(n) for n in asked.names)]
     servers = "FLOCKREEL_TEST_POSTGRES" in os.environ
     wanted = [g for g in wanted if servers == g["test"].startswith("scale ")]
-    green, seen, faults = {}, {}, 0
+    green, faults = {}, 0
     for guard in wanted:
         test = guard["test"]
         if test not in green:
@@ -53,13 +53,10 @@ def main():
                 print(f"RED WITH ALL GUARDS  {test}: {green[test]}", flush=True)
         began = time.monotonic()
         said = run(programs, test, guard["name"])
-        faults += said is None or green[test] is not None
         # A test that also fails with all guards enabled proves nothing about this guard.
-        seen[guard["name"]] = said if green[test] is None else None
+        faults += said is None or green[test] is not None
         verdict = "GREEN WITHOUT" if said is None else "red"
-        print(f"{verdict:14}{guard['promise']:12}{guard['name']:24}{time.monotonic() - began:6.1f} s  {said or ''}", flush=True)
-    if asked.write:
-        write(guards, seen)
+        print(f"{verdict:14}{guard['promise']:12}{guard['name']:24}{time.monotonic() - began:6.1f} s  {said or guard['out']}", flush=True)
     sys.exit(1 if faults else 0)
 
 
@@ -149,23 +146,6 @@ def reason(said):
         words = re.sub(r"(thread '[^']+') \(\d+\)", r"\1", words)
         return re.sub(r"\s+", " ", re.sub(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", "ID", words)).strip()[:160] or "failed"
     return "failed"
-
-
-def write(guards, seen):
-    """Updates the rows of the guards that were tested; keeps the other rows."""
-    text = DOCUMENT.read_text()
-    before, rest = text.split(BEGIN)
-    old, after = rest.split(END)
-    rows = {row.split("|")[1].strip(): row for row in old.splitlines() if row.startswith("| `")}
-    for guard in guards:
-        said = seen.get(guard["name"])
-        if said:
-            said = said.replace("|", "\\|").replace("<", "&lt;")
-            rows[f"`{guard['name']}`"] = f"| `{guard['name']}` | {guard['promise']} | {guard['out']} | `{guard['test'].split(' ')[1]}` | {said} |"
-    head = "| guard | promise | taken out | test | what it said then |\n| --- | --- | --- | --- | --- |\n"
-    order = [f"`{guard['name']}`" for guard in guards]
-    table = "".join(rows[name] + "\n" for name in order if name in rows)
-    DOCUMENT.write_text(before + BEGIN + head + table + END + after)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-//! The nearest neighbors of a boid (ALGORITHMS.md 7): whoever is within a guessed radius, and only if those are too
-//! few within a greater one. The guess decides how long it takes and never what is found.
+//! The nearest neighbors of a boid (docs/explanation/algorithms.md, "Boids"): those within a guessed radius, and
+//! within a larger one if they are too few. The guess affects the time only, not the result.
 //!
-//! Neighbors come nearest first, equal distances by id: an order that does not depend on the grid.
+//! Neighbors are sorted by distance, then by id, so their order does not depend on the grid.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
