@@ -5,7 +5,6 @@
 //! used. Without one, a default camera is assumed, and the size of the animal in the image gives its
 //! distance.
 
-use super::boids::lanes::{Lanes, splat3};
 use super::boids::tank::Wall;
 use super::boids::vector::{Vec3, norm, unit};
 use super::params::Params;
@@ -126,36 +125,32 @@ impl Lens {
         let Some(camera) = &self.camera else {
             return [velocity[0], velocity[1]];
         };
-        let receding: f64 = camera.receding(place, velocity);
+        let receding = camera.receding(place, velocity);
         let px = camera.focal_px / camera.apparent_bl(place[2]) / self.length_px;
         [0, 1].map(|axis| px * (velocity[axis] - place[axis] * receding))
     }
 
     /// Returns the direction of the line of sight at `place`, a unit vector away from the camera. Motion
     /// along it does not change the position in the image.
-    #[inline(always)]
-    pub fn sight<L: Lanes>(&self, place: [L; 3]) -> [L; 3] {
-        let away = splat3([0.0, 0.0, 1.0]);
-        let receding = self.receding(place, away);
-        unit([place[0] * receding, place[1] * receding, L::splat(1.0)])
+    pub fn sight(&self, place: Vec3) -> Vec3 {
+        let receding = self.receding(place, [0.0, 0.0, 1.0]);
+        unit([place[0] * receding, place[1] * receding, 1.0])
     }
 
     /// Returns two vertical speeds, positive downward, for a boid at `place` with the other components of
     /// `velocity`. At the first its motion in the image is horizontal. The first plus or minus the second
     /// gives motion at 45 degrees in the image.
-    #[inline(always)]
-    pub fn seen_level<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> [L; 2] {
+    pub fn seen_level(&self, place: Vec3, velocity: Vec3) -> [f64; 2] {
         let receding = self.receding(place, velocity);
         let across = velocity[0] - place[0] * receding;
         [place[1] * receding, across.abs()]
     }
 
     /// Returns `Pinhole::receding`, or 0 for a flat lens.
-    #[inline(always)]
-    fn receding<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> L {
+    fn receding(&self, place: Vec3, velocity: Vec3) -> f64 {
         match &self.camera {
             Some(camera) => camera.receding(place, velocity),
-            None => L::splat(0.0),
+            None => 0.0,
         }
     }
 
@@ -216,18 +211,16 @@ impl Pinhole {
         }
     }
 
-    #[inline(always)]
-    fn apparent_bl<L: Lanes>(&self, depth_bl: L) -> L {
-        let pane_bl = L::splat(self.pane_bl);
-        let beyond_bl = (depth_bl - pane_bl) / L::splat(self.medium_index);
-        (pane_bl + beyond_bl).max(L::splat(0.05))
+    /// Returns the distance at which a boid appears, refracted at the front pane, body lengths.
+    fn apparent_bl(&self, depth_bl: f64) -> f64 {
+        let beyond_bl = (depth_bl - self.pane_bl) / self.medium_index;
+        (self.pane_bl + beyond_bl).max(0.05)
     }
 
     /// Returns the growth rate of the apparent depth of a boid at `place` with `velocity`, as a share per
     /// second.
-    #[inline(always)]
-    fn receding<L: Lanes>(&self, place: [L; 3], velocity: [L; 3]) -> L {
-        velocity[2] / L::splat(self.medium_index) / self.apparent_bl(place[2])
+    fn receding(&self, place: Vec3, velocity: Vec3) -> f64 {
+        velocity[2] / self.medium_index / self.apparent_bl(place[2])
     }
 }
 

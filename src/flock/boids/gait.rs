@@ -2,7 +2,6 @@
 //! the direction to the rules. A loop adds the positions to return to.
 
 use super::Boids;
-use super::lanes::{self, Lanes};
 use super::step::Pace;
 use super::vector::{Vec3, add_scaled, minus, norm, scaled, unit};
 
@@ -28,66 +27,40 @@ impl Boids<'_> {
 
     /// Returns the velocity at which a boid moves, body lengths per second.
     pub fn motion(&self, id: usize) -> Vec3 {
-        self.at_filmed_speed::<f64>(
-            &[id as u32; lanes::MOST],
-            self.positions[id],
-            self.velocities[id],
-        )
+        self.at_filmed_speed(id, self.positions[id], self.velocities[id])
     }
 
-    /// Returns cosine and sine of the greatest turn of each boid in one step. It shrinks with an imposed
-    /// speed below cruising speed, to 0 at rest.
-    #[inline(always)]
-    pub(super) fn widest_turn<L: Lanes>(&self, ids: &[u32; lanes::MOST], pace: &Pace) -> (L, L) {
-        if self.gaits.is_empty() {
-            return (L::splat(pace.cos_sin.0), L::splat(pace.cos_sin.1));
-        }
-        let mut turns_rad = [0.0; lanes::MOST];
-        for lane in 0..L::N {
-            let speed = self.gaits[ids[lane] as usize].speed_bl_per_s;
-            let share = (speed / self.calibration.cruise_bl_per_s).min(1.0);
-            turns_rad[lane] = share * pace.turn_rad;
-        }
-        (
-            L::from_fn(|lane| libm::cos(turns_rad[lane])),
-            L::from_fn(|lane| libm::sin(turns_rad[lane])),
-        )
+    /// Returns cosine and sine of the greatest turn of a boid in one step. It shrinks with an imposed speed
+    /// below cruising speed, to 0 at rest.
+    pub(super) fn widest_turn(&self, id: usize, pace: &Pace) -> (f64, f64) {
+        let Some(gait) = self.gaits.get(id) else {
+            return pace.cos_sin;
+        };
+        let share = (gait.speed_bl_per_s / self.calibration.cruise_bl_per_s).min(1.0);
+        let turn_rad = share * pace.turn_rad;
+        (libm::cos(turn_rad), libm::sin(turn_rad))
     }
 
-    /// Returns the velocities turned at the imposed turn rates.
-    #[inline(always)]
-    pub(super) fn turned_as_filmed<L: Lanes>(
-        &self,
-        ids: &[u32; lanes::MOST],
-        velocity: [L; 3],
-    ) -> [L; 3] {
-        if self.gaits.is_empty() || !self.tank.is_flat() {
+    /// Returns the velocity turned at the imposed turn rate.
+    pub(super) fn turned_as_filmed(&self, id: usize, velocity: Vec3) -> Vec3 {
+        let Some(gait) = self.gaits.get(id).filter(|_| self.tank.is_flat()) else {
             return velocity;
-        }
-        let mut turns_rad = [0.0; lanes::MOST];
-        for lane in 0..L::N {
-            turns_rad[lane] = self.step_s * self.gaits[ids[lane] as usize].turn_rad_per_s;
-        }
-        let cos = L::from_fn(|lane| libm::cos(turns_rad[lane]));
-        let sin = L::from_fn(|lane| libm::sin(turns_rad[lane]));
+        };
+        let turn_rad = self.step_s * gait.turn_rad_per_s;
+        let (cos, sin) = (libm::cos(turn_rad), libm::sin(turn_rad));
         let [x, y, z] = velocity;
         [cos * x - sin * y, sin * x + cos * y, z]
     }
 
-    /// Returns the velocities at the imposed speeds. In flight the speed is at least that of the boid itself.
-    #[inline(always)]
-    pub(super) fn at_filmed_speed<L: Lanes>(
-        &self,
-        ids: &[u32; lanes::MOST],
-        position: [L; 3],
-        velocity: [L; 3],
-    ) -> [L; 3] {
-        if self.gaits.is_empty() {
+    /// Returns the velocity at the imposed speed. In flight the speed is at least that of the boid itself.
+    pub(super) fn at_filmed_speed(&self, id: usize, position: Vec3, velocity: Vec3) -> Vec3 {
+        let Some(gait) = self.gaits.get(id) else {
             return velocity;
+        };
+        let mut speed = gait.speed_bl_per_s;
+        if self.habitat.flees(position, self.hunter.as_ref()) {
+            speed = speed.max(norm(velocity));
         }
-        let filmed = L::from_fn(|lane| self.gaits[ids[lane] as usize].speed_bl_per_s);
-        let flees = self.habitat.flees(position, self.hunter.as_ref());
-        let speed = L::select(flees, filmed.max(norm(velocity)), filmed);
         scaled(speed, unit(velocity))
     }
 }

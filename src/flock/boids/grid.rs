@@ -12,9 +12,6 @@ const FINEST: f64 = 6.0;
 /// Largest number of cells per boid. Free choice.
 const CELLS_PER_BOID: f64 = 0.6;
 
-/// Number of positions that may be read from any slot on. The arrays of `along` are padded by as many.
-pub const BLOCK: usize = 4;
-
 /// Boids sorted by cell. A slot is an index in this order.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
@@ -29,13 +26,11 @@ pub struct Grid {
     /// Index in the order given, by slot.
     given: Vec<u32>,
     boids: Vec<Boid>,
-    /// Positions by slot, axis by axis.
-    axes: [Vec<f64>; 3],
 }
 
-/// A boid in one cache line, with position and velocity first.
+/// A boid in one cache line.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(C, align(64))]
+#[repr(align(64))]
 pub struct Boid {
     /// Position, body lengths.
     pub position: Vec3,
@@ -58,7 +53,7 @@ impl Iterator for Rows<'_> {
     type Item = (usize, usize);
 
     /// Returns the first slot of a row and one past its last.
-    #[inline(always)]
+    #[inline]
     fn next(&mut self) -> Option<(usize, usize)> {
         let [y, z] = self.next;
         if z > self.to[2] {
@@ -86,23 +81,12 @@ impl Grid {
         for (given, &slot) in (0..).zip(&self.slots) {
             self.given[slot as usize] = given;
         }
-        for axis in &mut self.axes {
-            axis.clear();
-            axis.resize(boids.len() + BLOCK, f64::INFINITY);
-        }
-        self.boids.resize(boids.len(), Boid::default());
-        let [x, y, z] = &mut self.axes;
-        (&mut self.boids, &self.given, x, y, z)
-            .into_par_iter()
-            .with_min_len(CHUNK)
-            .for_each(|(boid, &given, x, y, z)| {
-                *boid = boids[given as usize];
-                [*x, *y, *z] = boid.position;
-            });
+        let given = self.given.par_iter().with_min_len(CHUNK);
+        (given.map(|&given| boids[given as usize])).collect_into_vec(&mut self.boids);
     }
 
     /// Returns the index in the order given, by slot. Boids in successive slots are near each other.
-    #[inline(always)]
+    #[inline]
     pub fn given(&self) -> &[u32] {
         &self.given
     }
@@ -113,32 +97,20 @@ impl Grid {
     }
 
     /// Returns all boids, by slot.
-    #[inline(always)]
+    #[inline]
     pub fn boids(&self) -> &[Boid] {
         &self.boids
     }
 
     /// Returns the boid at `slot`.
-    #[inline(always)]
+    #[inline]
     pub fn at(&self, slot: usize) -> &Boid {
         &self.boids[slot]
     }
 
-    /// Returns all positions along an axis, by slot, followed by `BLOCK` infinite ones.
-    #[inline(always)]
-    pub fn along(&self, axis: usize) -> &[f64] {
-        &self.axes[axis]
-    }
-
-    /// Returns whether all boids have the same z.
-    #[inline(always)]
-    pub fn is_flat(&self) -> bool {
-        self.cells_per_bl[2] == 0.0
-    }
-
     /// Returns the slots of each row of cells that may hold a boid within `radius_bl` of `place`. The rows
     /// may hold farther boids too.
-    #[inline(always)]
+    #[inline]
     pub fn rows(&self, place: Vec3, radius_bl: f64) -> Rows<'_> {
         // The margin covers rounding.
         let out = radius_bl * (1.0 + 1e-9) + 1e-9;
@@ -200,7 +172,7 @@ impl Grid {
         self.slots = slots;
     }
 
-    #[inline(always)]
+    #[inline]
     fn cell_of(&self, position: Vec3) -> [usize; 3] {
         let mut cell = [0; 3];
         for axis in 0..3 {
@@ -210,7 +182,7 @@ impl Grid {
         cell
     }
 
-    #[inline(always)]
+    #[inline]
     fn index(&self, [x, y, z]: [usize; 3]) -> usize {
         (z * self.n_cells[1] + y) * self.n_cells[0] + x
     }

@@ -2,7 +2,6 @@
 //! lengths.
 
 use super::calibration::Calibration;
-use super::lanes::{self, Lanes, by_lane, in_lane, splat3};
 use super::params::{Goal, Obstacle, Predator, Waypoint};
 use super::tank::Tank;
 use super::vector::{Vec3, add_scaled, dot, minus, norm, scaled, turned_at_most, unit};
@@ -51,50 +50,30 @@ impl<'a> Habitat<'a> {
 
     /// Returns the sum of the wishes for all goals at `time_s`, in cruising speeds. A wish is the wanted
     /// velocity minus the current one. Without a goal the sum is 0.
-    #[inline(always)]
-    pub fn toward_goals<L: Lanes>(
-        &self,
-        time_s: f64,
-        position: [L; 3],
-        velocity: [L; 3],
-        cruise: f64,
-    ) -> [L; 3] {
-        let mut sum = [L::splat(0.0); 3];
+    pub fn toward_goals(&self, time_s: f64, position: Vec3, velocity: Vec3, cruise: f64) -> Vec3 {
+        let mut sum = [0.0; 3];
         for goal in self.goals {
             if time_s < goal.from_s || goal.until_s.is_some_and(|until_s| until_s <= time_s) {
                 continue;
             }
-            let place = splat3(self.place(goal.at_px, goal.depth_bl));
-            let way = minus(place, position);
-            let share = (norm(way) / L::splat(THERE_BL)).min(L::splat(1.0));
-            let gap = minus(scaled(L::splat(cruise) * share, unit(way)), velocity);
-            sum = add_scaled(sum, L::splat(goal.weight / cruise), gap);
+            let way = minus(self.place(goal.at_px, goal.depth_bl), position);
+            let share = (norm(way) / THERE_BL).min(1.0);
+            let gap = minus(scaled(cruise * share, unit(way)), velocity);
+            sum = add_scaled(sum, goal.weight / cruise, gap);
         }
         sum
     }
 
-    /// Returns pushes away from obstacles that a boid would reach within `horizon_s`. A push grows to 1 at
-    /// the obstacle.
-    #[inline(always)]
-    pub fn push<L: Lanes>(&self, position: [L; 3], velocity: [L; 3], horizon_s: f64) -> [L; 3] {
-        if self.obstacles.is_empty() {
-            return [L::splat(0.0); 3];
-        }
-        let mut pushes = [[0.0; 3]; lanes::MOST];
-        for lane in 0..L::N {
-            let (position, velocity) = (in_lane(position, lane), in_lane(velocity, lane));
-            pushes[lane] = self.push_one(position, velocity, horizon_s);
-        }
-        by_lane(|lane| pushes[lane])
-    }
-
-    fn push_one(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
+    /// Returns the push away from obstacles that a boid would reach within `horizon_s`. It grows to 1 at the
+    /// obstacle.
+    pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
         self.obstacles.iter().fold([0.0; 3], |push, obstacle| {
             let (room, outward) = self.room(obstacle, position);
             let approach = -dot(outward, velocity) * horizon_s;
-            match approach > room.max(0.0) {
-                true => add_scaled(push, (approach - room.max(0.0)) / approach, outward),
-                false => push,
+            if approach > room.max(0.0) {
+                add_scaled(push, (approach - room.max(0.0)) / approach, outward)
+            } else {
+                push
             }
         })
     }
@@ -121,12 +100,6 @@ impl<'a> Habitat<'a> {
                 break;
             }
         }
-    }
-
-    /// Returns whether `keep_out` may change any of these positions.
-    #[inline(always)]
-    pub fn may_hold_off<L: Lanes>(&self, position: [L; 3]) -> bool {
-        !self.obstacles.is_empty() || self.tank.is_left_by_any(position)
     }
 
     /// Returns the predator at the start, if there is one.
@@ -177,30 +150,22 @@ impl<'a> Habitat<'a> {
 
     /// Returns the wish to flee from the predator. It grows as the predator comes near and is 0 beyond its
     /// reach.
-    #[inline(always)]
-    pub fn flight<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> [L; 3] {
+    pub fn flight(&self, position: Vec3, hunter: Option<&Hunter>) -> Vec3 {
         let Some((away, share)) = self.away(position, hunter) else {
-            return [L::splat(0.0); 3];
+            return [0.0; 3];
         };
-        let urgency = (L::splat(1.0) - share).max(L::splat(0.0));
-        scaled(L::splat(FLEE_WEIGHT) * urgency, unit(away))
+        scaled(FLEE_WEIGHT * (1.0 - share).max(0.0), unit(away))
     }
 
-    /// Returns which boids are within the reach of the predator.
-    #[inline(always)]
-    pub fn flees<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> L::Mask {
-        match self.away(position, hunter) {
-            Some((_, share)) => share.less(L::splat(1.0)),
-            None => L::mask(|_| false),
-        }
+    /// Returns whether a boid is within the reach of the predator.
+    pub fn flees(&self, position: Vec3, hunter: Option<&Hunter>) -> bool {
+        (self.away(position, hunter)).is_some_and(|(_, share)| share < 1.0)
     }
 
-    /// Returns the vector from the predator to each boid, and its length as a share of the reach.
-    #[inline(always)]
-    fn away<L: Lanes>(&self, position: [L; 3], hunter: Option<&Hunter>) -> Option<([L; 3], L)> {
-        let away = minus(position, splat3(hunter?.position));
-        let share = norm(away) / L::splat(self.predator?.flee_bl());
-        Some((away, share))
+    /// Returns the vector from the predator to a boid, and its length as a share of the reach.
+    fn away(&self, position: Vec3, hunter: Option<&Hunter>) -> Option<(Vec3, f64)> {
+        let away = minus(position, hunter?.position);
+        Some((away, norm(away) / self.predator?.flee_bl()))
     }
 
     fn on_path(&self, path: &[Waypoint], time_s: f64) -> Vec3 {
@@ -209,9 +174,10 @@ impl<'a> Habitat<'a> {
             [next.saturating_sub(1), next.min(path.len() - 1)].map(|at| &path[at]);
         let (from, to) = (self.waypoint(before), self.waypoint(after));
         let span_s = after.time_s - before.time_s;
-        match span_s > 0.0 {
-            true => add_scaled(from, (time_s - before.time_s) / span_s, minus(to, from)),
-            false => from,
+        if span_s > 0.0 {
+            add_scaled(from, (time_s - before.time_s) / span_s, minus(to, from))
+        } else {
+            from
         }
     }
 

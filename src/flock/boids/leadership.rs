@@ -20,7 +20,8 @@ pub fn taken(
     key: [u64; 3],
     velocity: Vec3,
     offsets: impl Iterator<Item = Vec3> + Clone,
-    (cohesion_bl, step_s): (f64, f64),
+    cohesion_bl: f64,
+    step_s: f64,
 ) -> Option<f64> {
     let draw = random::unit(seed, &key);
     if draw >= RATE_PER_S * step_s {

@@ -9,7 +9,6 @@ pub mod calibration;
 mod gait;
 pub mod grid;
 pub mod habitat;
-pub mod lanes;
 pub mod leadership;
 pub mod measures;
 pub mod nearest;
@@ -32,7 +31,6 @@ use self::tank::Tank;
 use self::vector::{Vec3, scaled};
 use super::lens::Lens;
 use super::params::Params;
-use crate::cpu::Level;
 use crate::random;
 
 /// Greatest distance covered in one step, body lengths (docs/explanation/algorithms.md, "Boids").
@@ -70,8 +68,6 @@ pub struct Boids<'a> {
     n_substeps: u32,
     n_frames_before: usize,
     step_idx: u64,
-    /// Vector instructions in use. They affect the speed, not the result.
-    cpu: Level,
     /// Time of the video, seconds; negative before its start.
     time_s: f64,
     positions: Vec<Vec3>,
@@ -124,7 +120,6 @@ impl<'a> Boids<'a> {
             n_substeps,
             n_frames_before,
             step_idx: 0,
-            cpu: Level::detect(),
             time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],
@@ -251,9 +246,10 @@ impl<'a> Boids<'a> {
             let at = |word| random::unit(self.params.seed, &key(word));
             let angle = course + spread * (2.0 * at(3) - 1.0);
             let (cos, sin) = (libm::cos(angle), libm::sin(angle));
-            let direction = match self.tank.is_flat() {
-                true => [cos, sin, 0.0],
-                false => [cos, 0.0, sin],
+            let direction = if self.tank.is_flat() {
+                [cos, sin, 0.0]
+            } else {
+                [cos, 0.0, sin]
             };
             self.positions[id] = std::array::from_fn(|axis| {
                 least[axis] + at(axis as u64) * (greatest[axis] - least[axis])

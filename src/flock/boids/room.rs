@@ -55,9 +55,6 @@ impl Room {
     }
 }
 
-/// Part of a crowd, to be filled.
-pub(super) type Part<'a> = (&'a mut [Boid], &'a mut [Inner]);
-
 impl Default for Inner {
     fn default() -> Inner {
         Inner {

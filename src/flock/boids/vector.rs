@@ -1,53 +1,50 @@
-//! Vectors of three numbers, for one boid or for several in the lanes of a vector register. In a flat tank
-//! the third number stays 0.
-
-use super::lanes::{Lanes, select3};
+//! Vectors of three numbers: positions, velocities and wishes of boids. In a flat tank the third number
+//! stays 0.
 
 /// x right, y down, z away from the camera.
 pub type Vec3 = [f64; 3];
 
 /// a . b
-#[inline(always)]
-pub fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
+#[inline]
+pub fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// |a|
-#[inline(always)]
-pub fn norm<L: Lanes>(a: [L; 3]) -> L {
+#[inline]
+pub fn norm(a: Vec3) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// a + k b
-#[inline(always)]
-pub fn add_scaled<L: Lanes>(a: [L; 3], k: L, b: [L; 3]) -> [L; 3] {
+#[inline]
+pub fn add_scaled(a: Vec3, k: f64, b: Vec3) -> Vec3 {
     [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]]
 }
 
 /// a + b
-#[inline(always)]
-pub fn plus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+#[inline]
+pub fn plus(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// a - b
-#[inline(always)]
-pub fn minus<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+#[inline]
+pub fn minus(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// k a
-#[inline(always)]
-pub fn scaled<L: Lanes>(k: L, a: [L; 3]) -> [L; 3] {
+#[inline]
+pub fn scaled(k: f64, a: Vec3) -> Vec3 {
     [k * a[0], k * a[1], k * a[2]]
 }
 
 /// a / |a|, or 0 if |a| is nearly 0.
-#[inline(always)]
-pub fn unit<L: Lanes>(a: [L; 3]) -> [L; 3] {
+#[inline]
+pub fn unit(a: Vec3) -> Vec3 {
     let length = norm(a);
-    let is_long = L::splat(1e-12).less(length);
-    let share = L::select(is_long, L::splat(1.0) / length, L::splat(0.0));
+    let share = if length > 1e-12 { 1.0 / length } else { 0.0 };
     scaled(share, a)
 }
 
@@ -57,8 +54,8 @@ pub fn angle_between(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// a x b
-#[inline(always)]
-pub fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
+#[inline]
+pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -68,24 +65,18 @@ pub fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
 
 /// Returns `to`, turned toward `from` until the angle between them is at most the one with this (cos, sin).
 /// The length of `to` is kept. Opposite directions turn toward `aside`.
-#[inline(always)]
-pub fn turned_at_most<L: Lanes>(
-    from: [L; 3],
-    to: [L; 3],
-    (cos, sin): (L, L),
-    aside: [L; 3],
-) -> [L; 3] {
+#[inline]
+pub fn turned_at_most(from: Vec3, to: Vec3, (cos, sin): (f64, f64), aside: Vec3) -> Vec3 {
     let (speed, u, course) = (norm(to), unit(from), unit(to));
     let along = dot(course, u);
-    let turns = L::and(along.less(cos), L::splat(0.0).less(norm(u)));
-    if !L::any(turns) {
+    if along >= cos || norm(u) == 0.0 {
         return to;
     }
-    let across = add_scaled(course, -along, u);
-    let is_opposite = norm(across).less(L::splat(1e-6));
-    let across = select3::<L>(is_opposite, add_scaled(aside, -dot(aside, u), u), across);
-    let turned = add_scaled(scaled(cos, u), sin, unit(across));
-    select3::<L>(turns, scaled(speed, turned), to)
+    let mut across = add_scaled(course, -along, u);
+    if norm(across) < 1e-6 {
+        across = add_scaled(aside, -dot(aside, u), u);
+    }
+    scaled(speed, add_scaled(scaled(cos, u), sin, unit(across)))
 }
 
 #[cfg(test)]

@@ -2,7 +2,6 @@
 //! stop the boid and turn it no faster than it can turn.
 
 use super::Boids;
-use super::lanes::{self, Lanes, by_lane, in_lane};
 use super::vector::{Vec3, cross, dot, norm, scaled, turned_at_most, unit};
 
 /// Cosine between a velocity and its reflection below which a boid is thrown back. Free choice.
@@ -11,29 +10,15 @@ const THROWN_BACK: f64 = -0.7;
 const TURNING: f64 = 0.3;
 
 impl Boids<'_> {
-    /// Returns positions and velocities as the habitat allows. `before` is the velocity before the step. A
-    /// wall turns no boid faster than it can turn.
-    #[inline(always)]
-    pub(super) fn kept_in<L: Lanes>(
-        &self,
-        place: [L; 3],
-        (before, velocity): ([L; 3], [L; 3]),
-    ) -> ([L; 3], [L; 3]) {
-        if !self.habitat.may_hold_off(place) {
+    /// Returns position and velocity as the habitat allows. `before` is the velocity before the step.
+    pub(super) fn kept_in(&self, mut place: Vec3, before: Vec3, velocity: Vec3) -> (Vec3, Vec3) {
+        let mut reflected = velocity;
+        self.habitat.keep_out(&mut place, &mut reflected);
+        if reflected == velocity {
             return (place, velocity);
         }
-        let mut kept = [([0.0; 3], [0.0; 3]); lanes::MOST];
-        for lane in 0..L::N {
-            let (mut place, velocity) = (in_lane(place, lane), in_lane(velocity, lane));
-            let mut reflected = velocity;
-            self.habitat.keep_out(&mut place, &mut reflected);
-            kept[lane] = (place, velocity);
-            if reflected != velocity {
-                let before = in_lane(before, lane);
-                kept[lane].1 = self.turned(before, self.onward(before, velocity, reflected));
-            }
-        }
-        (by_lane(|lane| kept[lane].0), by_lane(|lane| kept[lane].1))
+        let onward = self.onward(before, velocity, reflected);
+        (place, self.turned(before, onward))
     }
 
     /// Returns the velocity to turn toward after a reflection. A boid that is thrown back continues to the
@@ -45,9 +30,10 @@ impl Boids<'_> {
         let speed = norm(velocity);
         let turn_rad = libm::asin((dot(velocity, side) / speed).clamp(-1.0, 1.0));
         let most_rad = self.calibration.turn_rad_per_s * self.step_s;
-        match is_thrown_back && turn_rad.abs() > TURNING * most_rad {
-            true => scaled(speed.copysign(turn_rad), side),
-            false => reflected,
+        if is_thrown_back && turn_rad.abs() > TURNING * most_rad {
+            scaled(speed.copysign(turn_rad), side)
+        } else {
+            reflected
         }
     }
 

@@ -1,59 +1,50 @@
-//! Sums over the visible neighbors of boids, from which the rules are computed (Reynolds 1987;
+//! Sums over the visible neighbors of a boid, from which the rules are computed (Reynolds 1987;
 //! docs/explanation/algorithms.md, "Boids").
 
-use crate::flock::boids::lanes::Lanes;
 use crate::flock::boids::nearest::Neighbor;
 use crate::flock::boids::params::Rules;
-use crate::flock::boids::vector::{add_scaled, dot, scaled};
+use crate::flock::boids::vector::{Vec3, add_scaled, dot, plus, scaled};
 
-/// Sums over the visible neighbors of boids.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Seen<L> {
+/// Sums over the visible neighbors of a boid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Seen {
     /// sum (p_i - p_j)/|.| (r_s/|.| - 1) over neighbors within r_s.
-    pub(super) apart: [L; 3],
+    pub(super) apart: Vec3,
     /// sum v_j over neighbors within r_a, and their number.
-    pub(super) along: [L; 3],
-    pub(super) n_along: L,
+    pub(super) along: Vec3,
+    pub(super) n_along: f64,
     /// sum p_j - p_i over neighbors within r_c, and their number.
-    toward: [L; 3],
-    n_toward: L,
+    toward: Vec3,
+    n_toward: f64,
 }
 
-impl<L: Lanes> Seen<L> {
-    /// Returns the sums for boids that swim along the unit vectors `ahead`.
-    #[inline(always)]
+impl Seen {
+    /// Returns the sums for a boid that swims along the unit vector `ahead`.
     pub(super) fn of(
-        neighbors: &[Neighbor<L>],
-        ahead: [L; 3],
+        neighbors: &[Neighbor],
+        ahead: Vec3,
         cos_half_view: f64,
         rules: &Rules,
-    ) -> Seen<L> {
-        let apart_bl2 = L::splat(rules.separation_bl * rules.separation_bl);
-        let along_bl2 = L::splat(rules.alignment_bl * rules.alignment_bl);
-        let toward_bl2 = L::splat(rules.cohesion_bl * rules.cohesion_bl);
-        let (nothing, one) = (L::splat(0.0), L::splat(1.0));
-        let mut seen = Seen {
-            apart: [nothing; 3],
-            along: [nothing; 3],
-            n_along: nothing,
-            toward: [nothing; 3],
-            n_toward: nothing,
-        };
+    ) -> Seen {
+        let [apart_bl2, along_bl2, toward_bl2] =
+            [rules.separation_bl, rules.alignment_bl, rules.cohesion_bl].map(|bl| bl * bl);
+        let mut seen = Seen::default();
         for neighbor in neighbors {
-            // Invisible neighbors add 0. A branch on visibility would often be mispredicted.
+            if !is_seen(neighbor, ahead, cos_half_view) {
+                continue;
+            }
             let square_bl2 = neighbor.square_bl2;
-            let is_seen = is_seen(neighbor, ahead, cos_half_view);
-            let along = L::one_where(L::and(is_seen, square_bl2.less(along_bl2)));
-            let toward = L::one_where(L::and(is_seen, square_bl2.less(toward_bl2)));
-            seen.n_along = seen.n_along + along;
-            seen.n_toward = seen.n_toward + toward;
-            seen.along = add_scaled(seen.along, along, neighbor.velocity);
-            seen.toward = add_scaled(seen.toward, toward, neighbor.offset);
-            let is_near = L::and(is_seen, square_bl2.less(apart_bl2));
-            if L::any(is_near) {
-                let distance = square_bl2.sqrt().max(L::splat(0.05));
-                let strength = (L::splat(rules.separation_bl) / distance - one) / distance;
-                let strength = L::select(is_near, strength, nothing);
+            if square_bl2 < along_bl2 {
+                seen.n_along += 1.0;
+                seen.along = plus(seen.along, neighbor.velocity);
+            }
+            if square_bl2 < toward_bl2 {
+                seen.n_toward += 1.0;
+                seen.toward = plus(seen.toward, neighbor.offset);
+            }
+            if square_bl2 < apart_bl2 {
+                let distance = square_bl2.sqrt().max(0.05);
+                let strength = (rules.separation_bl / distance - 1.0) / distance;
                 seen.apart = add_scaled(seen.apart, -strength, neighbor.offset);
             }
         }
@@ -64,52 +55,34 @@ impl<L: Lanes> Seen<L> {
     }
 
     /// Adds (p_i - p_j)/|.| (1 - |.|/r) in the image plane, over neighbors within r there, visible or not.
-    #[inline(always)]
-    fn part_in_picture(&mut self, neighbors: &[Neighbor<L>], radius_bl: f64) {
-        let nothing = L::splat(0.0);
+    fn part_in_picture(&mut self, neighbors: &[Neighbor], radius_bl: f64) {
         for neighbor in neighbors {
             let [x, y, _] = neighbor.offset;
             let distance = (x * x + y * y).sqrt();
-            let is_near = L::and(neighbor.is_there(), distance.less(L::splat(radius_bl)));
-            let strength = L::splat(1.0) / distance.max(L::splat(0.05)) - L::splat(1.0 / radius_bl);
-            let strength = L::select(is_near, strength, nothing);
-            self.apart = add_scaled(self.apart, -strength, [x, y, nothing]);
+            if distance < radius_bl {
+                let strength = 1.0 / distance.max(0.05) - 1.0 / radius_bl;
+                self.apart = add_scaled(self.apart, -strength, [x, y, 0.0]);
+            }
         }
     }
 
     /// Returns mean p_j - p_i over neighbors within r_c, in units of r_c.
-    #[inline(always)]
-    pub(super) fn cohesion(&self, rules: &Rules) -> [L; 3] {
-        let n = at_least_one(self.n_toward) * L::splat(rules.cohesion_bl);
-        scaled(L::splat(1.0) / n, self.toward)
+    pub(super) fn cohesion(&self, rules: &Rules) -> Vec3 {
+        let n = self.n_toward.max(1.0) * rules.cohesion_bl;
+        scaled(1.0 / n, self.toward)
     }
 }
 
-/// Returns the count, or 1 instead of 0, as a divisor.
-#[inline(always)]
-pub(super) fn at_least_one<L: Lanes>(count: L) -> L {
-    count.max(L::splat(1.0))
-}
-
-/// Returns whether a neighbor exists and is in the field of view of a boid that swims along `ahead`.
-#[inline(always)]
-pub(super) fn is_seen<L: Lanes>(
-    neighbor: &Neighbor<L>,
-    ahead: [L; 3],
-    cos_half_view: f64,
-) -> L::Mask {
-    let least = L::splat(cos_half_view) * neighbor.square_bl2.sqrt();
-    L::and(
-        neighbor.is_there(),
-        dot(ahead, neighbor.offset).at_least(least),
-    )
+/// Returns whether a neighbor is in the field of view of a boid that swims along `ahead`.
+pub(super) fn is_seen(neighbor: &Neighbor, ahead: Vec3, cos_half_view: f64) -> bool {
+    dot(ahead, neighbor.offset) >= cos_half_view * neighbor.square_bl2.sqrt()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn neighbor(offset: [f64; 3]) -> Neighbor<f64> {
+    fn neighbor(offset: [f64; 3]) -> Neighbor {
         Neighbor {
             offset,
             square_bl2: dot(offset, offset),

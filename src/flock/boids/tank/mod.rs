@@ -6,7 +6,6 @@ mod floor;
 mod site;
 
 use super::OVERLAP_BL;
-use super::lanes::{Lanes, splat3};
 use super::vector::{Vec3, add_scaled, dot, minus, scaled};
 
 /// Side of the square that a boid needs to keep the usual distances, body lengths. Free choice.
@@ -88,9 +87,10 @@ impl Tank {
         }
         let area = (greatest[0] - least[0]) * (greatest[1] - least[1]);
         self.section_bl2 = area * n / (N_SAMPLES * N_SAMPLES) as f64;
-        self.middle = match n > 0.0 {
-            true => scaled(1.0 / n, sum),
-            false => [at(0, N_SAMPLES / 2), at(1, N_SAMPLES / 2), depth],
+        self.middle = if n > 0.0 {
+            scaled(1.0 / n, sum)
+        } else {
+            [at(0, N_SAMPLES / 2), at(1, N_SAMPLES / 2), depth]
         };
         // Half the span of a uniform distribution is the root of three times its variance.
         let half = |axis: usize| {
@@ -108,9 +108,10 @@ impl Tank {
     /// Returns the axis about which boids turn: the normal of the image plane in a flat tank, else the
     /// vertical.
     pub fn up(&self) -> Vec3 {
-        match self.is_flat() {
-            true => [0.0, 0.0, 1.0],
-            false => [0.0, 1.0, 0.0],
+        if self.is_flat() {
+            [0.0, 0.0, 1.0]
+        } else {
+            [0.0, 1.0, 0.0]
         }
     }
 
@@ -124,22 +125,25 @@ impl Tank {
     /// Returns the least distance between `n` boids, body lengths: `OVERLAP_BL` if boids can keep it while
     /// they swim, else `OVERLAP_BL` times `closeness`.
     pub fn overlap_bl(&self, n: usize) -> f64 {
-        let kept = match self.is_deep_for(n) {
-            true => KEPT_IN_DEPTH,
-            false => KEPT,
+        let kept = if self.is_deep_for(n) {
+            KEPT_IN_DEPTH
+        } else {
+            KEPT
         };
-        match kept * self.apart_bl(n) >= OVERLAP_BL {
-            true => OVERLAP_BL,
-            false => OVERLAP_BL * self.closeness(n),
+        if kept * self.apart_bl(n) >= OVERLAP_BL {
+            OVERLAP_BL
+        } else {
+            OVERLAP_BL * self.closeness(n)
         }
     }
 
     /// Returns the distance between `n` boids that share the tank evenly.
     fn apart_bl(&self, n: usize) -> f64 {
         let (beside_bl, depth_bl) = (self.beside_bl(n), 2.0 * self.reach_bl[2]);
-        match self.is_deep_for(n) {
-            true => libm::cbrt(beside_bl * beside_bl * depth_bl),
-            false => beside_bl,
+        if self.is_deep_for(n) {
+            libm::cbrt(beside_bl * beside_bl * depth_bl)
+        } else {
+            beside_bl
         }
     }
 
@@ -161,40 +165,27 @@ impl Tank {
     /// Returns the number of animals that the tank has room for. In side view, neighbors are `OVERLAP_BL`
     /// apart, side by side and one behind another. In top view, each animal has a square of side `ROAM_BL`.
     pub fn room_for(&self) -> u32 {
-        let n = match self.is_flat() {
-            true => self.section_bl2 / (ROAM_BL * ROAM_BL),
-            false => {
-                let layers = (2.0 * self.reach_bl[2]).max(1.0);
-                self.section_bl2 / (OVERLAP_BL * OVERLAP_BL) * layers
-            }
+        let n = if self.is_flat() {
+            self.section_bl2 / (ROAM_BL * ROAM_BL)
+        } else {
+            let layers = (2.0 * self.reach_bl[2]).max(1.0);
+            self.section_bl2 / (OVERLAP_BL * OVERLAP_BL) * layers
         };
         n.max(1.0) as u32
     }
 
-    /// Returns inward pushes for boids that would pass a wall within `horizon_s`. A push grows to 1 at the
+    /// Returns the inward push for a boid that would pass walls within `horizon_s`. A push grows to 1 at the
     /// wall.
-    #[inline(always)]
-    pub fn push<L: Lanes>(&self, position: [L; 3], velocity: [L; 3], horizon_s: f64) -> [L; 3] {
-        let nothing = L::splat(0.0);
-        let mut push = [nothing; 3];
+    pub fn push(&self, position: Vec3, velocity: Vec3, horizon_s: f64) -> Vec3 {
+        let mut push = [0.0; 3];
         for wall in self.upright_walls() {
-            let outward = splat3(wall.outward);
-            let room = (L::splat(wall.offset_bl) - dot(outward, position)).max(nothing);
-            let approach = dot(outward, velocity) * L::splat(horizon_s);
-            let strength = (approach - room) / approach;
-            let strength = L::select(room.less(approach), strength, nothing);
-            push = add_scaled(push, -strength, outward);
+            let room = (wall.offset_bl - dot(wall.outward, position)).max(0.0);
+            let approach = dot(wall.outward, velocity) * horizon_s;
+            if room < approach {
+                push = add_scaled(push, -((approach - room) / approach), wall.outward);
+            }
         }
         push
-    }
-
-    /// Returns whether any of the positions is beyond a wall.
-    #[inline(always)]
-    pub fn is_left_by_any<L: Lanes>(&self, position: [L; 3]) -> bool {
-        (self.walls.iter()).any(|wall| {
-            let offset = L::splat(wall.offset_bl);
-            L::any(offset.less(dot(splat3(wall.outward), position)))
-        })
     }
 
     /// Moves a position into the tank and reflects the part of the velocity that leads out. If that part were
@@ -236,9 +227,10 @@ impl Tank {
                 share
             }
         });
-        match share < 1.0 {
-            true => add_scaled(from, share, way),
-            false => to,
+        if share < 1.0 {
+            add_scaled(from, share, way)
+        } else {
+            to
         }
     }
 
