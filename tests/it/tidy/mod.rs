@@ -291,13 +291,13 @@ fn the_page_stays_within_its_budget() {
 }
 
 #[test]
-fn the_readme_names_every_setting() {
-    let readme = read("README.md");
+fn settings_page_names_every_setting() {
+    let page = read("docs/reference/settings.md");
     let config = read("src/config.rs");
     let faults = (config.split("env = \"").skip(1))
         .filter_map(|rest| rest.split('"').next())
-        .filter(|variable| !readme.contains(&format!("`{variable}`")))
-        .map(|variable| format!("README.md: says nothing of {variable}"));
+        .filter(|variable| !page.contains(&format!("`{variable}`")))
+        .map(|variable| format!("docs/reference/settings.md: does not name {variable}"));
     assert_no(faults.collect());
 }
 
