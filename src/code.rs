@@ -101,7 +101,7 @@ codes! {
     SceneChanges "scene_changes" "The film shows several scenes, none of them for long enough."
         "Measure the scene with the animal alone, for example with `--from 2 --to 20`."
     AnimalTooLarge "animal_too_large" "The animal fills too much of the picture."
-        "Step back, or zoom out, until the animal covers less than a third of the picture."
+        "Step back, or zoom out, until the animal covers less than 15 % of the picture."
     SeveralAnimals "several_animals" "More than one animal moves in the footage."
         "Film one alone, without its mirror image; or say which one is the animal, for example with \
          `--animal-at 60:320,240` (frame, x, y), or follow the largest with `--follow-largest`."

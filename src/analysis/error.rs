@@ -70,7 +70,7 @@ pub enum Error {
         at_s: f64,
     },
     /// The animal covers too much of the image.
-    #[error("the animal covers {:.0} % of the picture, at most 35 % can be measured", 100.0 * share)]
+    #[error("the animal covers {:.0} % of the picture, at most 15 % can be measured", 100.0 * share)]
     AnimalTooLarge {
         /// Share of the image that the animal covers, 0..=1.
         share: f64,
