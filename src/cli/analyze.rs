@@ -57,8 +57,8 @@ pub struct Args {
     /// the file says.
     #[arg(long, value_name = "F")]
     fps: Option<f64>,
-    /// Start of the measured part, seconds from the first frame of the file. Frame numbers and times in the
-    /// library count from here. Default: the first frame.
+    /// Start of the measured part, seconds from the first frame of the file. Frames keep their numbers and
+    /// times in the film; those before have no animal. Default: the first frame.
     #[arg(long, value_name = "SECONDS")]
     from: Option<f64>,
     /// End of the measured part, seconds from the first frame of the file. Default: the last frame.

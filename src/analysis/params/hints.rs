@@ -13,7 +13,7 @@ const MOST_IGNORED: usize = 64;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AnimalAtParam {
-    /// Frame number, counted from 0.
+    /// Frame number in the film, counted from 0.
     pub frame: u32,
     /// A point on the animal, pixels.
     #[serde(alias = "point")]

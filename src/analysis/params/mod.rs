@@ -22,8 +22,8 @@ pub struct Params {
     pub fps: Option<f64>,
     /// Width of a pixel divided by its height, 0.1..=10. null = as the file says.
     pub pixel_aspect: Option<f64>,
-    /// Start of the measured part, seconds from the first frame of the file. null = the first frame. Frame
-    /// numbers and times in the results count from here.
+    /// Start of the measured part, seconds from the first frame of the file. null = the first frame. Frames
+    /// keep their numbers and times in the film; those before have no animal.
     pub from_s: Option<f64>,
     /// End of the measured part, seconds from the first frame of the file. null = the last frame.
     pub to_s: Option<f64>,
