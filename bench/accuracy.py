@@ -175,25 +175,25 @@ def bars(results):
     measured = [score for score in cases if "refused" not in score]
     n = sum(score["n"] for score in measured)
     far = sum(score["sure_and_far"] for score in measured) / n
-    rows = [("films: `confidence` above 0.9, but centroid over 0.25 BL off", f"{far:.3%}", "< 0.3%", far < .003)]
+    rows = [("films: frames with `confidence` above 0.9 and an error over 0.25 BL", f"{far:.3%}", "< 0.3%", far < .003)]
     for name in ("confidence", "head_confidence"):
         ece, worst = results[name]["ece"], results[name]["worst_bin"]
-        rows.append((f"films: expected calibration error of `{name}`", f"{ece:.4f}", "< 0.03", ece < .03))
-        rows.append((f"films: largest error of `{name}` in a bin of at least 200 frames", f"{worst:.3f}", "<= 0.1", worst <= .1))
+        rows.append((f"films: mean calibration error of `{name}`", f"{ece:.4f}", "< 0.03", ece < .03))
+        rows.append((f"films: largest calibration error of `{name}` in a bin of at least 200 frames", f"{worst:.3f}", "<= 0.1", worst <= .1))
     clips = {name: clip for name, clip in results.get("labels", {}).items() if "refused" not in clip}
     if clips:
         least = min(clip["found"] / clip["n"] for clip in clips.values())
-        rows.append(("recordings: frames with the animal found, lowest share", f"{least:.1%}", "> 95%", least > .95))
+        rows.append(("recordings: share of frames in which the animal is found, lowest of all clips", f"{least:.1%}", "> 95%", least > .95))
         told = min(clip["heads_told"] / max(clip["heads"], 1) for clip in clips.values())
-        rows.append(("recordings: visible heads with a decision, lowest share", f"{told:.1%}", "> 85%", told > .85))
+        rows.append(("recordings: share of visible heads with `head_confidence` above 0.5, lowest of all clips", f"{told:.1%}", "> 85%", told > .85))
         wrong = sum(len(clip["heads_wrong"]) for clip in clips.values()) / sum(clip["heads_told"] for clip in clips.values())
-        rows.append(("recordings: heads at the wrong end", f"{wrong:.1%}", "< 1%", wrong < .01))
+        rows.append(("recordings: share of these heads at the wrong end, all clips together", f"{wrong:.1%}", "< 1%", wrong < .01))
         off = sum(clip["far"] for clip in clips.values()) / sum(clip["centroids"] for clip in clips.values())
-        rows.append(("recordings: centroids over 0.25 BL off", f"{off:.1%}", "< 1%", off < .01))
+        rows.append(("recordings: share of centroids with an error over 0.25 BL", f"{off:.1%}", "< 1%", off < .01))
         views = sum(not clip["view_right"] for clip in clips.values())
         rows.append(("recordings: clips with the wrong view", str(views), "0", views == 0))
         axis = clips["mouse_round_arena"]["axis_deg_p50"]
-        rows.append(("mouse_round_arena: heading against the labeled axis, median", f"{axis:.1f}\u00b0", "< 1.5\u00b0", axis < 1.5))
+        rows.append(("clip mouse_round_arena: difference from the labeled heading, median", f"{axis:.1f}\u00b0", "< 1.5\u00b0", axis < 1.5))
     return rows
 
 
@@ -215,7 +215,9 @@ def comparison(ours, theirs):
 def page(results):
     """Returns the section of docs/measurements.md."""
     return ["## Accuracy of poses", "",
-            "Poses are compared with the truth of generated films, and with labels of real recordings. Lengths without a unit are body lengths.", "",
+            "Poses are compared with the truth of generated films, and with labels of real recordings. Lengths without a unit are body lengths (BL). "
+            "The error is the distance of the measured centroid from the true one. The calibration error of a confidence is the difference "
+            "between the confidence and the share of frames in which the measurement is right.", "",
             "Repeat: `make accuracy GENERATOR=goldfish.py FOOTAGE=folder`", "",
             *table(["measure", "measured", "bar"], [(what, starred(figure, met), bar) for what, figure, bar, met in bars(results)]),
             *case_tables(results), *(label_table(results["labels"]) if "labels" in results else []), *generated_table(results["generated"])]
@@ -226,14 +228,16 @@ def case_tables(results):
             (name, f"{s['found']:.1%}", f"{s['off_p50']:.3f}", f"{s['off_p95']:.3f}", f"{s['right']:.1%}", s["far"], s["invented"],
              f"{s['flips']} of {s['n_aside']}") for name, s in results["cases"].items()]
     yield from ("", "### Films with faults", "")
-    yield ("`bench/cases.py` makes films of a synthetic fish with typical faults, each with three seeds and strengths. Other file formats are "
-           "`pictures` (a zip of PNGs), `raw` (bare H.264), `sound` (WMV) and `old` (MPEG-1). The films below them have no fault. The error is the "
-           "distance of the centroid from the true one.")
+    yield ("`bench/cases.py` makes films of a synthetic fish with typical faults, each in three strengths and with three seeds. The number "
+           "in a name is the seed. Four films without a fault are stored in other file formats: `pictures` (a zip of PNGs), `raw` (bare H.264), "
+           "`sound` (WMV) and `old` (MPEG-1). The films from `plain-1` on have no fault added. *Over 0.25* and *false detections* (in frames "
+           "without the animal) are numbers of frames. Wrong heads are counted where "
+           "the animal points less than 60 degrees out of the picture plane.")
     yield ""
     yield from table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads"], rows)
     yield from ("", "### Calibration", "")
-    yield ("The films above, each with the same weight, in bins of the probability. `confidence` is right if the centroid is within 0.1, "
-           "`head_confidence` if the head is at the right end.")
+    yield ("A row has all frames of the films above with similar confidence. The columns *mean* and *right* should be equal. `confidence` is right if "
+           "the error is at most 0.1 BL, `head_confidence` if the head is at the right end. Each film has the same weight.")
     for name in ("confidence", "head_confidence"):
         yield ""
         yield from table([f"mean `{name}`", "right", "weighted share", "frames"], [
@@ -244,7 +248,8 @@ def label_table(labels):
     rows = [(name, f"refused: `{c['refused']}`") if "refused" in c else
             (name, c["view"] + ("" if c["view_right"] else " (wrong)"), f"{c['found']} of {c['n']}", f"{c['heads_told']} of {c['heads']}",
              len(c["heads_wrong"]), f"{c['off_max']:.2f}", c["far"]) for name, c in labels.items()]
-    return ["", "### Recordings", "", "Forty frames of each clip, labeled by eye (`bench/labels`).", "",
+    return ["", "### Recordings", "", "Forty frames of each clip are labeled by eye (`bench/labels`). Frames in which the animal is hidden or ambiguous are left out. A head is "
+            "decided if `head_confidence` is above 0.5. The last column is the number of frames with an error over 0.25 BL.", "",
             *table(["clip", "view", "found", "head decided", "head wrong", "error, largest", "over 0.25"], rows)]
 
 
@@ -257,7 +262,8 @@ def generated_table(scores):
         "detected_share", "centroid_px_p50", "centroid_px_p95", "head_right_share", "heading_deg_p50", "heading_deg_p95", "z_scaled_rmse_m",
         "forward_deg_p50", "forward_deg_p90")]
     return ["", "### Calibrated camera", "", "Generated films of 1200 frames with a known camera and animal, as in the papers, scored by "
-            "`bench/score.py`. Cells are the median over three seeds, with minimum and maximum.", "", *table(["measure", "plain", "hard"], rows)]
+            "`bench/score.py`. Cells are the median over three seeds, with minimum and maximum. Names end in the unit (`px`, `deg`, `m`) and the "
+            "percentile (`p50`, `p90`, `p95`). `z_scaled_rmse_m` is the root mean square error of the depth after the best scaling.", "", *table(["measure", "plain", "hard"], rows)]
 
 
 def main():

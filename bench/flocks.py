@@ -30,21 +30,21 @@ AROUND = 3
 HOLDS = {">": operator.gt, "<": operator.lt, "<=": operator.le}
 ALL, SIDE, TOP = ("side", "top"), ("side",), ("top",)
 BARS = {
-    "as_filmed": ("frames whose speed is within 25% or 0.05 BL/s of the filmed speed", (">", .85), "{:.1%}", ALL),
+    "as_filmed": ("frames whose speed is within 25% or 0.05 BL/s of that of the film frame shown", (">", .85), "{:.1%}", ALL),
     "correlation": ("correlation of shown and filmed speed", (">", .9), "{:.2f}", ALL),
-    "states_off": ("largest change in the share of rest, slow, go or dart", ("<=", .1), "{:.1%}", ALL),
-    "rest_moving": ("frames of rest shown in motion", ("<", .01), "{:.2%}", ALL),
+    "states_off": ("share of frames at rest, slow, usual and fast speed: largest difference from the film", ("<=", .1), "{:.1%}", ALL),
+    "rest_moving": ("film frames at rest that are shown moving (over 0.3 BL/s)", ("<", .01), "{:.2%}", ALL),
     "jumps": ("jumps per 100 frames", ("<", 4), "{:.1f}", ALL),
-    "heading_p90_deg": ("heading against that of the boid, 90th percentile, degrees", ("<", 8), "{:.1f}", SIDE),
-    "loops": ("time in loops", ("<", .02), "{:.1%}", ALL),
-    "lookalikes": ("individuals with a look-alike within 3 BL", ("<", .25), "{:.0%}", ALL),
-    "cuts_above_natural": ("faded jumps with a step above the film's 99th percentile", ("<=", 0), "{:.1%}", ALL),
-    "overlap": ("area of bodies that overlaps others", ("<", .01), "{:.1%}", TOP),
-    "halo": ("alpha more than 2.5 px outside the contour", ("<", .01), "{:.1%}", TOP),
-    "stray": ("changed pixels outside of every animal and shadow", ("<", .03), "{:.1%}", ALL),
-    "blobs": ("separate bodies in a flock of 20 with 1.5 BL spacing, mean", (">", 16), "{:.1f}", SIDE),
-    "polarization": ("polarization", None, "{:.2f}", ALL),
-    "playable": ("uncut frames that can be played", None, "{:.0%}", ALL),
+    "heading_p90_deg": ("difference of the heading from that of the simulated boid, 90th percentile, degrees", ("<", 8), "{:.1f}", SIDE),
+    "loops": ("frames in which a short run repeats three times or more", ("<", .02), "{:.1%}", ALL),
+    "lookalikes": ("animals with a neighbor within 3 BL that shows nearly the same frame, mean over frames", ("<", .25), "{:.0%}", ALL),
+    "cuts_above_natural": ("visible jumps: change between frames above the 99th percentile of the film", ("<=", 0), "{:.1%}", ALL),
+    "overlap": ("share of the area of bodies that overlaps other bodies", ("<", .01), "{:.1%}", TOP),
+    "halo": ("halo: share of alpha more than 2.5 px outside the outline", ("<", .01), "{:.1%}", TOP),
+    "stray": ("changed pixels that belong to no animal and no shadow", ("<", .03), "{:.1%}", ALL),
+    "blobs": ("separate bodies in the picture of a flock of 20 with 1.5 BL spacing, mean", (">", 16), "{:.1f}", SIDE),
+    "polarization": ("polarization (1 = all head in one direction)", None, "{:.2f}", ALL),
+    "playable": ("frames that a flock may show, of those that the border does not cut", None, "{:.0%}", ALL),
     "individuals": ("individuals", None, "{:.0f}", ALL),
 }
 
@@ -274,8 +274,9 @@ def page(results):
     """Returns the section of docs/measurements.md."""
     yield "## Motion and appearance of flocks"
     yield ""
-    yield ("Flocks of 300 frames are compared with the films of their animals. They have default settings, and as many individuals as have room, "
-           "at most 20. Figures are the mean of three seeds; `bench/flocks.py` defines them. The first three films from the side are generated.")
+    yield ("Flocks of 300 frames are compared with the films of their animals. They have default settings, and as many individuals as fit, "
+           "at most 20. Figures are the mean of three seeds, and `bench/flocks.py` defines them. The first three films from the side are generated, "
+           "all others are recordings.")
     yield ""
     yield "Repeat: `make flocks GENERATOR=goldfish.py FOOTAGE=folder`"
     for name, film in results.items():

@@ -20,11 +20,13 @@ INTRO = """\
 # Measurements
 
 `bench/measurements.py` writes this page from the figures in `bench/results`. To change it, repeat a measurement.
-A `*` marks a figure that misses its bar. BL is the length of the animal in the picture.
+The column *bar* has the target of a figure, and a `*` marks a figure that misses it. BL is the length of the animal in
+the picture. p50, p95 and p99 are percentiles.
 
-`make measure GENERATOR=goldfish.py FOOTAGE=folder` repeats accuracy, flocks, papers, service and transitions.
-`GENERATOR` draws films with known truth; `bench/accuracy.py` describes its interface. `FOOTAGE` has the recordings
-that `bench/labels` names. Neither is part of the repository."""
+`make measure GENERATOR=goldfish.py FOOTAGE=folder` repeats all sections but the speed of plans, boids,
+films and distances. `GENERATOR` is a program that draws films with known poses of the
+animal (the truth); `bench/accuracy.py` describes its interface. `FOOTAGE` is the folder of the recordings that
+`bench/labels` names. Neither is part of the repository."""
 
 
 def section(result):
