@@ -226,7 +226,9 @@ impl FromStr for Database {
                 Ok(Database::Sqlite(PathBuf::from(path)))
             }
             Some(("postgres" | "postgresql", _)) => Ok(Database::Postgres(url.to_owned())),
-            _ => Err("a database is sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME".to_owned()),
+            _ => Err(
+                "the database must be sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME".to_owned(),
+            ),
         }
     }
 }
@@ -237,14 +239,14 @@ impl FromStr for Files {
     fn from_str(place: &str) -> Result<Files, String> {
         let Some(bucket) = place.strip_prefix("s3://") else {
             let is_url = place.contains("://");
-            let wrong = || "a store is a folder or s3://BUCKET/PREFIX".to_owned();
+            let wrong = || "the store must be a folder or s3://BUCKET/PREFIX".to_owned();
             return (!is_url)
                 .then(|| Files::Folder(place.into()))
                 .ok_or_else(wrong);
         };
         let (name, prefix) = bucket.split_once('/').unwrap_or((bucket, ""));
         match name.is_empty() {
-            true => Err("the bucket has no name: s3://BUCKET/PREFIX".to_owned()),
+            true => Err("the bucket name is missing: use s3://BUCKET/PREFIX".to_owned()),
             false => Ok(Files::Bucket {
                 name: name.to_owned(),
                 prefix: prefix.trim_matches('/').to_owned(),

@@ -169,7 +169,7 @@ pub struct Masked<'a> {
 #[derive(Debug, thiserror::Error)]
 pub enum MasksDiffer {
     /// The picture sizes differ.
-    #[error("the masks are of {masks:?} pixels, the footage of {footage:?}")]
+    #[error("the masks have {masks:?} pixels, but the footage has {footage:?}")]
     Size {
         /// Width and height of the masks.
         masks: [u32; 2],
@@ -177,13 +177,13 @@ pub enum MasksDiffer {
         footage: [u32; 2],
     },
     /// There are fewer masks than frames.
-    #[error("there are {n_masks} masks for more frames: one for each frame is needed")]
+    #[error("the footage has more frames than masks: send one mask per frame (masks: {n_masks})")]
     TooFew {
         /// Number of masks.
         n_masks: usize,
     },
     /// There are more masks than frames.
-    #[error("there are more masks than the {n_frames} frames: one for each frame is needed")]
+    #[error("the masks outnumber the frames: send one mask per frame (frames: {n_frames})")]
     TooMany {
         /// Number of frames.
         n_frames: usize,

@@ -22,7 +22,7 @@ pub trait Scratch: Debug + Send + Sync {
 
 /// The storage cannot take more bytes.
 #[derive(Debug, thiserror::Error)]
-#[error("the animal's pictures could not be put aside: {0}")]
+#[error("the temporary file for the pixels of the animal could not be written: {0}")]
 pub struct Full(#[from] io::Error);
 
 impl Full {

@@ -13,7 +13,7 @@ pub enum Error {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// The footage has too few frames.
-    #[error("there are {n_frames} frames to measure, at least {least} are needed")]
+    #[error("the footage has {n_frames} frames to measure, but at least {least} are needed")]
     TooFewFrames {
         /// Number of frames found.
         n_frames: usize,
@@ -21,7 +21,9 @@ pub enum Error {
         least: usize,
     },
     /// The given background differs in size from the footage.
-    #[error("the background image is {found:?} pixels, the footage {wanted:?}")]
+    #[error(
+        "the size of the background image is {found:?} pixels, but that of the footage is {wanted:?}"
+    )]
     BackgroundSizeDiffers {
         /// Width and height of the background, pixels.
         found: [u32; 2],
@@ -30,21 +32,21 @@ pub enum Error {
     },
     /// Nothing moves at the point that `animal_at` gives.
     #[error(
-        "nothing that moves is at {},{} in frame {}",
-        .0.at_px[0], .0.at_px[1], .0.frame
+        "frame {} has no moving object at {},{}: point at the animal in a frame in which it has moved",
+        .0.frame, .0.at_px[0], .0.at_px[1]
     )]
     NothingAtPoint(AnimalAtParam),
     /// The masks uploaded with the footage show no animal.
     #[error(
-        "the masks show no animal: none has a white place of {} pixels",
+        "the masks show no animal: no mask has a white region of at least {} pixels",
         super::subject::LEAST_AREA_PX
     )]
     MasksEmpty,
     /// No component is large enough in enough frames.
-    #[error("nothing moves before the background")]
+    #[error("no moving animal was found in the film")]
     NothingMoves,
     /// Much of the image changes throughout the footage.
-    #[error("the background moves throughout the film, from {at_s:.1} s on")]
+    #[error("the background changes during the whole film, from {at_s:.1} s on")]
     BackgroundNotStatic {
         /// Start of the change, seconds.
         at_s: f64,
@@ -70,7 +72,7 @@ pub enum Error {
         at_s: f64,
     },
     /// The animal covers too much of the image.
-    #[error("the animal covers {:.0} % of the picture, at most 15 % can be measured", 100.0 * share)]
+    #[error("the animal covers {:.0} % of the picture, but at most 15 % can be measured", 100.0 * share)]
     AnimalTooLarge {
         /// Share of the image that the animal covers, 0..=1.
         share: f64,
@@ -81,7 +83,7 @@ pub enum Error {
     },
     /// Two components of similar area persist through the footage.
     #[error(
-        "more than one animal moves in the footage: in frame {frame} one is at {} and another at {}",
+        "several animals move in the film: frame {frame} shows one at {} and another at {}",
         center(&boxes_px[0]), center(&boxes_px[1])
     )]
     SeveralAnimals {

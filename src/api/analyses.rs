@@ -95,7 +95,7 @@ pub(super) struct AnalysisForm {
     request_body(content((AnalysisRequest = "application/json"), ([u8] = "application/octet-stream"),
         (AnalysisForm = "multipart/form-data"))), responses(
     (status = 202, body = AnalysisAccepted, headers(("location" = String), ("link" = String))),
-    (status = 201, body = AnalysisAccepted, headers(("location" = String)), description = "done within the wait asked for"),
+    (status = 201, body = AnalysisAccepted, headers(("location" = String)), description = "done within the requested wait"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
@@ -117,7 +117,7 @@ pub(super) async fn create_analysis(
     let footage_id = request.footage_id;
     let footage = state.context.store.footage(footage_id.0, &caller.reach);
     if footage.await?.is_none() {
-        let sentence = format!("there is no such footage: {footage_id}");
+        let sentence = format!("the footage does not exist: {footage_id}");
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
     measure(&state, &caller, footage_id, params).await

@@ -84,7 +84,7 @@ pub(super) struct FishView {
 /// `queue_full`.
 #[utoipa::path(post, path = "/v1/fish", request_body = FishRequest, responses(
     (status = 202, body = FishAccepted, headers(("location" = String), ("link" = String))),
-    (status = 201, body = FishAccepted, headers(("location" = String)), description = "done within the wait asked for"),
+    (status = 201, body = FishAccepted, headers(("location" = String)), description = "done within the requested wait"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
@@ -136,7 +136,7 @@ pub(super) async fn get_fish(
 
 /// Delete a virtual fish and its job.
 #[utoipa::path(delete, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), responses(
-    (status = 204, description = "it is gone"),
+    (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn delete_fish(
@@ -157,8 +157,8 @@ pub(super) async fn delete_fish(
 #[utoipa::path(get, path = "/v1/fish/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
-    (status = 206, description = "a part of the file"),
-    (status = 304, description = "the client has it already"),
+    (status = 206, description = "the requested range of the file"),
+    (status = 304, description = "not modified"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_fish_file(

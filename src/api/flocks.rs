@@ -143,7 +143,7 @@ pub(super) struct FlockView {
 #[utoipa::path(post, path = "/v1/flocks",
     request_body(content((FlockRequest = "application/json"), (FlockForm = "multipart/form-data"))), responses(
     (status = 202, body = FlockAccepted, headers(("location" = String), ("link" = String))),
-    (status = 201, body = FlockAccepted, headers(("location" = String)), description = "done within the wait asked for"),
+    (status = 201, body = FlockAccepted, headers(("location" = String)), description = "done within the requested wait"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
@@ -227,7 +227,7 @@ pub(super) async fn preview_flock(
         return Err(Problem {
             code: Code::InvalidParams,
             detail: format!(
-                "a preview has at most {MOST_PREVIEWED} individuals times frames, not {n_shown}: make the flock"
+                "count times frames of a preview must be at most {MOST_PREVIEWED}, not {n_shown}: make a flock instead"
             ),
         });
     }
@@ -271,7 +271,7 @@ pub(super) async fn get_flock(
 
 /// Delete a flock and its job.
 #[utoipa::path(delete, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
-    (status = 204, description = "it is gone"),
+    (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn delete_flock(
@@ -297,8 +297,8 @@ pub(super) async fn delete_flock(
 #[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
-    (status = 206, description = "a part of the file"),
-    (status = 304, description = "the client has it already"),
+    (status = 206, description = "the requested range of the file"),
+    (status = 304, description = "not modified"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_flock_file(

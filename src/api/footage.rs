@@ -91,7 +91,7 @@ pub(super) struct FootageForm {
     request_body(content(([u8] = "application/octet-stream"), (FootageForm = "multipart/form-data"))),
     responses(
         (status = 201, body = FootageView, headers(("location" = String))),
-        (status = 200, body = FootageView, description = "the same bytes were there already"),
+        (status = 200, body = FootageView, description = "the owner has already stored the same file"),
         (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
         (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
     ))]
@@ -154,7 +154,7 @@ pub(super) async fn get_footage(
 ///
 /// Its libraries, flocks, virtual fish and jobs are deleted too. Running jobs are stopped.
 #[utoipa::path(delete, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), responses(
-    (status = 204, description = "it is gone"),
+    (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn delete_footage(
@@ -172,7 +172,7 @@ pub(super) async fn delete_footage(
 #[utoipa::path(get, path = "/v1/footage/{id}/file", params(("id" = Uuid, Path)), responses(
     (status = 200, content_type = "application/octet-stream"),
     (status = 206, content_type = "application/octet-stream"),
-    (status = 304, description = "the client has it already"),
+    (status = 304, description = "not modified"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_footage_file(

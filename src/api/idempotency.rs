@@ -174,7 +174,7 @@ async fn keep(mut held: Held, answer: Response, tally: &Tally) -> Result<Respons
     };
     let (parts, body) = answer.into_parts();
     let body = to_bytes(body, MAX_JSON_BYTES).await.map_err(|error| {
-        tracing::error!(%error, "an answer could not be kept");
+        tracing::error!(%error, "the response of an Idempotency-Key could not be stored");
         Code::Internal
     })?;
     let text_of = |name: &HeaderName| {
@@ -218,7 +218,7 @@ impl Drop for Held {
         };
         tokio::spawn(async move {
             if let Err(error) = store.interrupt_key(&scope).await {
-                tracing::warn!(%error, "an idempotency key could not be given back");
+                tracing::warn!(%error, "an Idempotency-Key could not be released");
             }
         });
     }
@@ -280,7 +280,7 @@ impl Tally {
 fn scope_of(request: &Request, key: &HeaderValue) -> Result<Scope, Problem> {
     let key = key.to_str().unwrap_or_default();
     if key.is_empty() || key.len() > MAX_KEY_BYTES {
-        let sentence = "an Idempotency-Key has 1 to 255 visible characters";
+        let sentence = "an Idempotency-Key must have 1 to 255 visible characters";
         return Err(Problem::new(Code::MalformedRequest, sentence));
     }
     let caller = request.extensions().get::<Caller>();

@@ -102,7 +102,7 @@ pub(super) async fn get_library(
 ///
 /// Its flocks, virtual fish and jobs are deleted too. Running jobs are stopped.
 #[utoipa::path(delete, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), responses(
-    (status = 204, description = "it is gone"),
+    (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn delete_library(
@@ -132,8 +132,8 @@ pub(super) async fn delete_library(
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
-    (status = 206, description = "a part of the file"),
-    (status = 304, description = "the client has it already"),
+    (status = 206, description = "the requested range of the file"),
+    (status = 304, description = "not modified"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_library_file(

@@ -105,7 +105,7 @@ impl AppState {
         let tool = tool.map_err(std::io::Error::other)?;
         match &tool {
             Ok(walls) => tracing::info!(version = walls.version, "media tool found"),
-            Err(error) => tracing::error!(%error, "no media tool: install ffmpeg"),
+            Err(error) => tracing::error!(%error, "ffmpeg was not found: install it"),
         }
         let requests = Requests::default();
         Ok(AppState(Arc::new(Shared {

@@ -105,11 +105,11 @@ impl From<params::Error> for Problem {
 fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
     match code {
         Code::Internal | Code::DecoderCrashed => {
-            tracing::error!(%error, "a request failed inside");
+            tracing::error!(%error, "request failed with an internal error");
             code.into()
         }
         Code::StorageFull => {
-            tracing::warn!(%error, "a request found no room on the disk");
+            tracing::warn!(%error, "request refused: the disk is full");
             code.into()
         }
         _ => Problem::new(code, error.to_string()),

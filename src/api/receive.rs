@@ -121,14 +121,14 @@ async fn receive_form(
                 let wish = wishes.iter().find(|wish| name == Some(wish));
                 let wish = wish.filter(|wish| !wished.contains_key(*wish));
                 let wish =
-                    wish.ok_or_else(|| malformed("the form has fields that are not asked for"))?;
+                    wish.ok_or_else(|| malformed("the form has an unknown or repeated field"))?;
                 wished.insert(wish, receive_wish(field).await?);
             }
         }
     }
     let arrival = Arrival {
         draft,
-        video: video.ok_or_else(|| malformed("the form has no field: video"))?,
+        video: video.ok_or_else(|| malformed("the form lacks the field: footage"))?,
         background,
         masks,
         name: label(&name.or(file_name).unwrap_or_default()),

@@ -55,7 +55,7 @@ pub(super) async fn speak_tus(request: Request, next: Next) -> Response<Body> {
 }
 
 /// Describe the upload protocol in the headers `Tus-*`: extensions, checksums, and largest upload in bytes.
-#[utoipa::path(options, path = "/v1/uploads", responses((status = 204, description = "in the headers Tus-*")))]
+#[utoipa::path(options, path = "/v1/uploads", responses((status = 204, description = "see the Tus-* headers")))]
 pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<Body> {
     let headers = [
         ("tus-max-size", state.config.max_upload_bytes.to_string()),
@@ -119,7 +119,7 @@ pub(super) async fn create_upload(
 /// Get the state of an upload. Send the next bytes from `Upload-Offset` on.
 #[utoipa::path(head, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, headers(("upload-offset" = i64), ("upload-length" = i64), ("upload-expires" = String))),
-    (status = "4XX", description = "as problem+json, of which HEAD has no body"),
+    (status = "4XX", description = "an error; a response to HEAD has no body"),
 ))]
 pub(super) async fn head_upload(
     State(state): State<AppState>,
@@ -143,7 +143,7 @@ pub(super) async fn head_upload(
 #[utoipa::path(patch, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)),
     request_body(content = [u8], content_type = "application/offset+octet-stream"), responses(
     (status = 204, headers(("upload-offset" = i64), ("upload-expires" = String), ("link" = String)),
-        description = "with the last bytes Link names the footage"),
+        description = "after the last part, Link holds the address of the footage"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
@@ -154,7 +154,7 @@ pub(super) async fn patch_upload(
     request: Request,
 ) -> Result<Response<Body>, Problem> {
     if !is_piece(request.headers()) {
-        let sentence = format!("the bytes of an upload come as {PIECE_TYPE}");
+        let sentence = format!("the Content-Type of an upload part must be {PIECE_TYPE}");
         return Err(Problem::new(Code::UnsupportedMediaType, sentence));
     }
     let offset_bytes = number(request.headers(), &OFFSET)?;
@@ -162,7 +162,7 @@ pub(super) async fn patch_upload(
     let hold = state.context.store.hold_upload(id).await;
     let upload = find(&state, &caller.reach, id).await?;
     if offset_bytes != upload.offset_bytes {
-        let sentence = format!("the upload stands at {} bytes", upload.offset_bytes);
+        let sentence = format!("the stored offset is {} bytes", upload.offset_bytes);
         return Err(Problem::new(Code::OffsetDiffers, sentence));
     }
     let upload = take(&state, &hold, upload, request).await?;
@@ -171,7 +171,7 @@ pub(super) async fn patch_upload(
 
 /// Cancel an upload and delete its bytes. Footage that it has become is kept.
 #[utoipa::path(delete, path = "/v1/uploads/{id}", params(("id" = Uuid, Path)), responses(
-    (status = 204, description = "it is gone"),
+    (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn delete_upload(
@@ -322,7 +322,8 @@ fn number(headers: &HeaderMap, name: &HeaderName) -> Result<i64, Problem> {
 
 /// Returns `filename` or `name` of Upload-Metadata, or an empty string. Fails if it cannot be parsed.
 fn file_name(headers: &HeaderMap) -> Result<String, Problem> {
-    let malformed = || Problem::new(Code::MalformedRequest, "Upload-Metadata cannot be read");
+    let sentence = "Upload-Metadata must be pairs of a key and a base64 value";
+    let malformed = || Problem::new(Code::MalformedRequest, sentence);
     let Some(pairs) = headers.get("upload-metadata") else {
         return Ok(String::new());
     };
@@ -360,12 +361,8 @@ impl Checksum {
         let Some(line) = headers.get("upload-checksum") else {
             return Ok(None);
         };
-        let malformed = || {
-            Problem::new(
-                Code::MalformedRequest,
-                "Upload-Checksum: sha1 or sha256, and base64",
-            )
-        };
+        let sentence = "Upload-Checksum must be sha1 or sha256, a space, and the hash in base64";
+        let malformed = || Problem::new(Code::MalformedRequest, sentence);
         let (name, value) = (line.to_str().ok())
             .and_then(|line| line.split_once(' '))
             .ok_or_else(malformed)?;

@@ -112,7 +112,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     .flatten()
     {
         File::open(path).map_err(|cause| {
-            Error::Usage(format!("cannot be read: {cause}: {}", path.display()))
+            Error::Usage(format!("cannot read the file: {cause}: {}", path.display()))
         })?;
     }
     media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
@@ -171,7 +171,10 @@ fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) 
     let folder = output.parent().unwrap_or(Path::new(""));
     let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, picture));
     match written {
-        Ok(()) => super::say(&format!("what was seen: {}", path.display())),
+        Ok(()) => super::say(&format!(
+            "picture of the refused frames: {}",
+            path.display()
+        )),
         Err(cause) => super::say(&format!("cannot write {}: {cause}", path.display())),
     }
 }
@@ -309,9 +312,9 @@ fn view_sentence(poses: &Poses) -> String {
         View::Top => ("from above", "side"),
     };
     match poses.view_confidence {
-        None => format!("the animal is seen {seen}, as you said"),
+        None => format!("the view is {seen}, as set by --view"),
         Some(probability) => format!(
-            "the animal seems to be seen {seen} ({:.0} % sure; --view {other} if it is not)",
+            "the view seems to be {seen} (probability {:.0} %); use --view {other} if this is wrong",
             100.0 * probability
         ),
     }

@@ -26,14 +26,14 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     if args.target.file_name().is_none() || args.target.exists() {
         let sentence = format!(
-            "a backup wants a folder of its own: {}",
+            "the backup folder must not exist: {}",
             args.target.display()
         );
         return Err(Error::Usage(sentence));
     }
     if let Database::Postgres(_) = args.storage.database() {
-        let sentence = "rows on a server are copied with its own tools (pg_dump), files in a bucket with those of the \
-                        bucket: first the rows, then the files";
+        let sentence = "backup needs a SQLite database: copy a database on a server with its own tools (pg_dump), \
+                        then the stored files";
         return Err(Error::Usage(sentence.to_owned()));
     }
     let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;

@@ -42,7 +42,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         0 => Ok(Some(Summary(json!({"faults": []})))),
         n_faults => Err(Error::Work {
             code: Code::Internal,
-            sentence: format!("the data folder has faults: {n_faults}"),
+            sentence: format!("faults in the data folder: {n_faults}"),
         }),
     }
 }

@@ -34,7 +34,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let report = check(&library, &flock, &Listener::new())
         .map_err(|violation| Error::Usage(format!("{violation} ({})", violation.code())))?;
     super::say(&format!(
-        "the plan holds: {} individuals, {} frames, {} jumps; every plan is proven the cheapest over {} edges",
+        "the plan is valid: {} individuals, {} frames, {} jumps; each individual's plan is proven cheapest over {} \
+         edges",
         report.n_individuals, report.n_frames, report.n_jumps, report.n_edges
     ));
     Ok(Some(Summary(json!({

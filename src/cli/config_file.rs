@@ -56,18 +56,21 @@ fn read(file: &Path) -> Result<Settings, Error> {
             .matches('\n')
             .count()
             + 1;
-        wrong(&format!("line {line} is no TOML: {}", error.message()))
+        wrong(&format!(
+            "line {line} is not valid TOML: {}",
+            error.message()
+        ))
     })?;
     let known = settings_of(&Cli::command());
     let mut settings = Settings::new();
     for (key, value) in table {
         let id = key.replace('-', "_");
         let Some((flag, is_switch)) = known.get(&id) else {
-            return Err(wrong(&format!("no setting is called {key}, in")));
+            return Err(wrong(&format!("the setting {key} is unknown, in")));
         };
         let text = text_of(&value, *is_switch);
         let text =
-            text.ok_or_else(|| wrong(&format!("the value of {key} is of a wrong kind, in")))?;
+            text.ok_or_else(|| wrong(&format!("the value of {key} has the wrong type, in")))?;
         check(flag, &text, *is_switch).map_err(|why| wrong(&format!("{key}: {why}, in")))?;
         settings.insert(id, text);
     }
@@ -192,19 +195,19 @@ mod tests {
             ""
         );
         for (text, start) in [
-            ("speed = 1", "no setting is called speed, in: "),
-            ("config = 'b'", "no setting is called config"),
+            ("speed = 1", "the setting speed is unknown, in: "),
+            ("config = 'b'", "the setting config is unknown"),
             (
                 "rate = 'many'",
                 "rate: invalid value 'many' for '--rate <N>'",
             ),
             ("auth = 'never'", "auth: invalid value 'never'"),
-            ("rate = 1.5", "the value of rate is of a wrong kind"),
+            ("rate = 1.5", "the value of rate has the wrong type"),
             (
                 "no_sample = 'yes'",
-                "the value of no_sample is of a wrong kind",
+                "the value of no_sample has the wrong type",
             ),
-            ("bind = '127.0.0.1:1'\nrate = ", "line 2 is no TOML"),
+            ("bind = '127.0.0.1:1'\nrate = ", "line 2 is not valid TOML"),
         ] {
             assert!(said(text).starts_with(start), "{}", said(text));
         }

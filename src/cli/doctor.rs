@@ -50,7 +50,7 @@ fn tools(findings: &mut Vec<Finding>) {
     match media::tool_version() {
         Ok(version) => findings.push(finding("ffmpeg", &version, None)),
         Err(error) => {
-            let meaning = "no film can be read or written: install ffmpeg";
+            let meaning = "films cannot be read or written: install ffmpeg";
             findings.push(finding("ffmpeg", &error.to_string(), Some(meaning)));
             return;
         }
@@ -62,7 +62,7 @@ fn tools(findings: &mut Vec<Finding>) {
             findings.extend(lacks.map(|(name, meaning)| finding(name, "missing", Some(meaning))));
         }
         Err(error) => {
-            let meaning = "it is unknown which films can be read";
+            let meaning = "the readable codecs are unknown";
             findings.push(finding("codecs", &error.to_string(), Some(meaning)));
         }
     }
@@ -86,7 +86,8 @@ fn walls(findings: &mut Vec<Finding>) {
 
 fn machine(findings: &mut Vec<Finding>) {
     let level = Level::detect();
-    let slow = (level == Level::Scalar).then_some("comparing moments takes several times as long");
+    let slow =
+        (level == Level::Scalar).then_some("computing distances takes several times as long");
     findings.push(finding("vectors", level.name(), slow));
     let workers = config::default_workers();
     let threads = config::threads_per_worker(workers);
@@ -105,14 +106,18 @@ fn disk(data: &Path) -> Finding {
         Ok(disk) => {
             let room = disk.f_bavail.saturating_mul(disk.f_frsize);
             let gib = room as f64 / f64::from(1 << 30);
-            let full = (room < reserve).then_some("uploads are refused until there is room");
+            let full = (room < reserve).then_some("uploads are refused until disk space is free");
             finding(
                 "disk",
-                &format!("{gib:.1} GiB left for {}", data.display()),
+                &format!("{gib:.1} GiB free for {}", data.display()),
                 full,
             )
         }
-        Err(error) => finding("disk", &error.to_string(), Some("the data cannot be kept")),
+        Err(error) => finding(
+            "disk",
+            &error.to_string(),
+            Some("the free space of the data folder is unknown"),
+        ),
     }
 }
 

@@ -20,7 +20,7 @@ pub enum Error {
         sentence: String,
     },
     /// `doctor` found missing parts and has printed them.
-    #[error("this machine lacks what flockreel needs or wants, as told above: {n_lacks}")]
+    #[error("parts that flockreel needs are missing, see LACK above: {n_lacks}")]
     Lacks {
         /// Number of missing parts.
         n_lacks: usize,

@@ -49,7 +49,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     match extension(&args.output).as_str() {
         "glb" if args.side_by_side => {
             return Err(Error::Usage(
-                "--side-by-side makes a video: name it .mp4".into(),
+                "--side-by-side needs an output that ends in .mp4".into(),
             ));
         }
         "glb" => std::fs::write(&args.output, glb::write(&motion))

@@ -34,7 +34,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let format = Format::of(&args.output)?;
     if args.candidates && matches!(format, Format::Numbers) {
         return Err(Error::Usage(format!(
-            "--candidates is a picture, its name must end in .png: {}",
+            "the file name of --candidates must end in .png: {}",
             args.output.display()
         )));
     }
@@ -104,7 +104,7 @@ fn write_numbers(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
 fn cancelled(_: Cancelled) -> Error {
     Error::Work {
         code: Code::Cancelled,
-        sentence: "the work was cancelled".into(),
+        sentence: "the command was cancelled".into(),
     }
 }
 

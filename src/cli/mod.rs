@@ -161,8 +161,12 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
 /// Reads a library for a command that writes to `output`. Temporary data that is too large for memory goes to
 /// the same disk.
 fn read_library(folder: &Path, output: &Path) -> Result<StoredLibrary, Error> {
-    library_dir::read(folder, scratch_beside(output))
-        .map_err(|error| Error::Usage(format!("not a library: {}: {error}", folder.display())))
+    library_dir::read(folder, scratch_beside(output)).map_err(|error| {
+        Error::Usage(format!(
+            "cannot read the library: {}: {error}",
+            folder.display()
+        ))
+    })
 }
 
 /// Returns temporary storage on the disk of the output, in its nearest existing parent folder.

@@ -85,7 +85,7 @@ pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').map(|(w, h)| (w.parse(), h.parse()));
     match sides {
         Some((Ok(width), Ok(height))) => Ok([width, height]),
-        _ => Err("a size looks like 640x480".into()),
+        _ => Err("the size must have the form 640x480".into()),
     }
 }
 

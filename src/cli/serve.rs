@@ -100,8 +100,8 @@ async fn refuse_open_door(config: &Config) -> Result<(), Error> {
     match has_tokens {
         true => Ok(()),
         false => Err(Error::Usage(format!(
-            "listening beyond this machine needs a token: make one with `flockreel token create \
-             --name NAME`, or bind to 127.0.0.1 instead of: {}",
+            "an address beyond loopback needs a token: run `flockreel token create --name NAME`, or bind to 127.0.0.1 \
+             instead of: {}",
             config.bind
         ))),
     }

@@ -24,8 +24,11 @@ impl Set {
                 .split_once('=')
                 .ok_or_else(|| Error::Usage(format!("--set takes NAME=JSON: {setting}")))?;
             let value = serde_json::from_str(value).unwrap_or_else(|_| json!(value));
-            insert(overrides, name, value)
-                .ok_or_else(|| Error::Usage(format!("--set: no object to set this in: {name}")))?;
+            insert(overrides, name, value).ok_or_else(|| {
+                Error::Usage(format!(
+                    "--set: the name leads into a value that is not an object: {name}"
+                ))
+            })?;
         }
         Ok(())
     }

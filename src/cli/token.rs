@@ -120,7 +120,7 @@ async fn create(store: &Store, wishes: CreateArgs) -> Result<Value, Error> {
             .map(|lasts_ms| now_ms.saturating_add(lasts_ms)),
     };
     let (token, text) = store.add_token(&new, now_ms).await.map_err(from_store)?;
-    say("flockreel: keep this token, it is not shown again");
+    say("flockreel: store this token, it is not shown again");
     let mut value = described(&token);
     value["token"] = json!(text);
     Ok(value)
@@ -137,7 +137,7 @@ async fn revoke(store: &Store, id: &str) -> Result<Value, Error> {
     let id = id.split('_').next().unwrap_or(id);
     match store.revoke_token(id, now_ms()).await.map_err(from_store)? {
         true => Ok(json!({"id": id, "revoked": true})),
-        false => Err(Error::Usage(format!("no token to revoke has the id: {id}"))),
+        false => Err(Error::Usage(format!("no unrevoked token has the id: {id}"))),
     }
 }
 
@@ -157,7 +157,7 @@ fn described(token: &Token) -> Value {
 
 /// Parses a whole number of days, hours or minutes, such as `30d`. Returns milliseconds, > 0.
 fn duration_ms(text: &str) -> Result<i64, String> {
-    let wrong = || "a whole number with d, h or m, such as 30d".to_owned();
+    let wrong = || "the duration must be a whole number with d, h or m, such as 30d".to_owned();
     let unit = text.chars().next_back().ok_or_else(wrong)?;
     let minutes = match unit {
         'd' => 24 * 60,

@@ -42,8 +42,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 async fn work(args: Args) -> Result<(), Error> {
     if let Database::Sqlite(file) = args.storage.database() {
         return Err(Error::Usage(format!(
-            "workers beside a service need a database that processes share: \
-             --database postgres://... instead of: {}",
+            "a worker needs a shared database: use --database postgres://... instead of: {}",
             file.display()
         )));
     }

@@ -10,8 +10,8 @@ const SHORT_LOOP_RAD: f64 = 0.35;
 pub enum Advice {
     /// The flock has more individuals than the tank has room for.
     #[error(
-        "there is room for about {room_for} of the {count} animals: some lie over others, or rest where the filmed animal never \
-         rested; make a flock of fewer, or film from farther away"
+        "the tank has room for about {room_for} of the {count} animals, so some overlap or rest where the filmed \
+         animal never rested: request fewer animals, or film from a greater distance"
     )]
     LittleRoom {
         /// Number of individuals that the tank has room for.
@@ -21,8 +21,8 @@ pub enum Advice {
     },
     /// The loop is too short for the animals to return to where they started.
     #[error(
-        "this loop of {length_s:.1} s is too short for the animals to come back to where they began: in a tenth of what is \
-         shown they head {off_deg:.0} degrees or more off their way; ask for more frames"
+        "the loop of {length_s:.1} s is too short for the animals to return to their start: in a tenth of the frames \
+         the heading is off by {off_deg:.0} degrees or more; request more frames"
     )]
     ShortLoop {
         /// Length of the loop, seconds.

@@ -7,14 +7,14 @@ use crate::code::Code;
 pub enum Error {
     /// Playback of the library would end, because no jump leads back.
     #[error(
-        "no two moments of the footage look alike enough to play on without an end; \
-         film longer, and let the animal come back to the same poses"
+        "no two moments of the footage are similar enough for endless playback: film for longer, until the animal \
+         returns to the same poses"
     )]
     NoTransitions,
     /// The library has no sprites, because the animal covers too few pixels.
     #[error(
-        "the animal is too small in the picture: film it from nearer, \
-         or analyze it again with sprites set to always"
+        "the animal is too small in the picture: film from a shorter distance, or analyze again with sprites set to \
+         always"
     )]
     AnimalTooSmall,
     /// A parameter is out of range. The text names the parameter and its range.
@@ -22,7 +22,8 @@ pub enum Error {
     InvalidParams(String),
     /// No plan of this number of frames leads back to the start of the loop.
     #[error(
-        "no loop of {0} frames comes back to where it began with this footage; ask for another number of frames, best for more"
+        "no loop of {0} frames returns to its first frame with this footage: request another number of frames, \
+         preferably more"
     )]
     LoopDoesNotClose(usize),
     /// The job was cancelled.

@@ -296,7 +296,7 @@ impl Params {
             within("frames of a loop", f64::from(self.frames), 30.0, 5000.0)?;
             if self.position == Position::Papers {
                 return Err(
-                    "position papers sums up speeds and never comes back: not in a loop".into(),
+                    "position must not be papers in a loop: that placement never returns to its start".into(),
                 );
             }
         }

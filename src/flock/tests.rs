@@ -360,7 +360,7 @@ fn a_loop_of_sums_of_speeds_is_refused() {
         ..params("papers")
     };
     let error = plan_flock(&synthetic::library(View::Side), &params, &Silent).expect_err("open");
-    assert!(error.to_string().contains("never comes back"), "{error}");
+    assert!(error.to_string().contains("never returns"), "{error}");
 }
 
 #[test]
@@ -369,7 +369,7 @@ fn a_library_without_jumps_is_refused_with_advice() {
     library.playback.jumps.clear();
     let error = plan_flock(&library, &params("school"), &Silent).expect_err("playback would end");
     assert_eq!(error.code(), crate::code::Code::NoTransitions);
-    assert!(error.to_string().contains("film longer"));
+    assert!(error.to_string().contains("film for longer"));
 }
 
 #[test]
@@ -378,7 +378,7 @@ fn an_animal_too_small_for_sprites_is_refused_with_advice() {
     library.stats.animal_too_small = true;
     let error = plan_flock(&library, &params("school"), &Silent).expect_err("there are no sprites");
     assert_eq!(error.code(), crate::code::Code::AnimalTooSmall);
-    assert!(error.to_string().contains("film it from nearer"));
+    assert!(error.to_string().contains("film from a shorter distance"));
 }
 
 #[test]

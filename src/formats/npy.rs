@@ -17,8 +17,8 @@ pub const MAX_FRAMES: usize = 8192;
 pub enum Error {
     /// The footage is too long for a whole matrix.
     #[error(
-        "the library has {n_frames} frames, a whole matrix is written of at most {MAX_FRAMES}; \
-         take distance.png, which is never refused, or analyze a shorter piece"
+        "the library has {n_frames} frames, but a full matrix is limited to {MAX_FRAMES}: use distance.png, which has \
+         no limit, or analyze a shorter part"
     )]
     TooManyFrames {
         /// Number of frames of the footage.

@@ -20,7 +20,7 @@ pub trait Preset: Serialize + DeserializeOwned + Default {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// The preset is unknown.
-    #[error("there is no such preset: {0}")]
+    #[error("the preset is unknown: {0}")]
     UnknownPreset(String),
     /// A parameter is unknown, of the wrong type, or out of its range.
     #[error("{0}")]
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn what_is_unknown_or_out_of_range_is_named() {
         let said = |json| analysis(json).unwrap_err().to_string();
-        assert_eq!(said(r#"{"preset": "p"}"#), "there is no such preset: \"p\"");
+        assert_eq!(said(r#"{"preset": "p"}"#), "the preset is unknown: \"p\"");
         assert!(said(r#"{"colour": 1}"#).contains("colour"));
         assert_eq!(
             said(r#"{"threshold": 0}"#),

@@ -24,7 +24,7 @@ pub enum Error {
         found: (ColorType, BitDepth),
     },
     /// The picture is larger than allowed.
-    #[error("{width} x {height} pixels are more than there can be")]
+    #[error("{width} x {height} pixels exceed the maximum size of a PNG")]
     TooLarge {
         /// Width, pixels.
         width: u32,

@@ -67,14 +67,14 @@ pub fn entries(
         let frame_idx = (entry.name()?.strip_suffix(".png")).and_then(|stem| stem.parse().ok());
         let slot = frame_idx.and_then(|idx: usize| entries.get_mut(idx));
         let slot = slot.ok_or(Error::Mismatch(
-            "an archive has an entry that is no frame of the footage",
+            "the archive has an entry that is no frame of the footage",
         ))?;
         let stored = entry.compression() == zip::CompressionMethod::Stored;
         let ends = |at: &u64| at.checked_add(entry.size());
         let at =
             (entry.data_start()).filter(|at| stored && ends(at).is_some_and(|end| end <= n_bytes));
         let at = at.ok_or(Error::Mismatch(
-            "an entry of an archive is compressed or cut off",
+            "an entry of the archive is compressed or incomplete",
         ))?;
         *slot = Some(Entry {
             at,

@@ -8,10 +8,10 @@ use crate::{analysis, fish, flock, formats, media, store};
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// This version cannot read the stored input.
-    #[error("the job's input cannot be read: {0}")]
+    #[error("this version cannot read the stored input of the job: {0}")]
     Input(#[from] serde_json::Error),
     /// The input footage or library no longer exists.
-    #[error("what the job was to be made of is not there: {0}")]
+    #[error("the footage or library of the job no longer exists: {0}")]
     InputAbsent(uuid::Uuid),
     /// The footage could not be opened, or a video could not be written.
     #[error(transparent)]
@@ -47,19 +47,19 @@ pub enum Error {
     #[error(transparent)]
     Store(#[from] store::Error),
     /// A file of the attempt could not be read or written.
-    #[error("a file of the job failed: {0}")]
+    #[error("a file of the job could not be read or written: {0}")]
     Io(#[from] std::io::Error),
     /// The computation panicked.
     #[error("the computation stopped unexpectedly")]
     Panicked,
     /// The job exceeded its time limit.
-    #[error("the job took longer than a job may")]
+    #[error("the job exceeded its time limit")]
     OverTime,
     /// The disk has too little space for the job's output.
-    #[error("there is too little room on the disk for what the job makes")]
+    #[error("the disk has too little free space for the output of the job")]
     NoRoom,
     /// No permit for work during a request became free in time (`places`).
-    #[error("too much is asked for at once: ask again soon")]
+    #[error("the service is too busy: try again soon")]
     Busy,
     /// A user cancelled the job, or the process is stopping.
     #[error("the job was cancelled")]

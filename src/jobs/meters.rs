@@ -62,12 +62,12 @@ impl Meters {
     pub fn register(&self, registry: &mut Registry) {
         registry.register(
             "flockreel_job_attempts",
-            "Attempts at jobs, by how they ended",
+            "Attempts of jobs, by outcome",
             self.ended.clone(),
         );
         registry.register(
             "flockreel_job_stage_seconds",
-            "How long each stage of an attempt took",
+            "Duration of each stage of an attempt",
             self.stages.clone(),
         );
         registry.register(
@@ -77,7 +77,7 @@ impl Meters {
         );
         registry.register(
             "flockreel_decode_frames_per_second",
-            "How fast the films of analyses were decoded",
+            "Decoding rate of the films of analyses",
             (*self.decode_fps).clone(),
         );
     }

@@ -23,7 +23,8 @@ pub fn illustrated(source: &dyn FrameSource, cause: analysis::Error) -> Error {
 pub fn picture(source: &dyn FrameSource, cause: &analysis::Error) -> Option<Vec<u8>> {
     let shown = cause.evidence(source.format().fps)?;
     let frames = frames(source, &shown.frames);
-    let frames = frames.inspect_err(|error| tracing::warn!(%error, "no picture of a refusal"));
+    let frames = frames
+        .inspect_err(|error| tracing::warn!(%error, "the picture of a refusal could not be made"));
     let frames = frames.ok().filter(|frames| !frames.is_empty())?;
     Some(evidence::draw(frames, &shown.boxes_px))
 }

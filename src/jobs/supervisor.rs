@@ -46,7 +46,7 @@ impl Supervisor {
         self.context.draining.cancel();
         let all = async { while self.tasks.join_next().await.is_some() {} };
         if timeout(DRAIN, all).await.is_err() {
-            tracing::warn!("a job did not let go in time; it is rescued at the next start");
+            tracing::warn!("a job did not stop within 15 s; it is rescued at the next start");
         }
     }
 }
@@ -65,7 +65,7 @@ async fn work(context: Context) {
             // Other jobs may depend on the job that ended.
             Ok(_) => context.wake.notify_one(),
             Err(error) => {
-                tracing::error!(%error, "a worker could not reach its queue");
+                tracing::error!(%error, "the queue returned an error to a worker");
                 sleep(POLL).await;
             }
         }
@@ -77,7 +77,7 @@ async fn rescue(context: Context) {
         match rescue_silent(&context).await {
             Ok(rescued) if rescued.is_empty() => {}
             Ok(_) => context.wake.notify_one(),
-            Err(error) => tracing::error!(%error, "silent workers could not be looked for"),
+            Err(error) => tracing::error!(%error, "the search for ended leases failed"),
         }
         tokio::select! {
             () = sleep(POLL) => {}
@@ -105,7 +105,7 @@ async fn listen(context: Context) {
             () = context.draining.cancelled() => return,
         };
         let Err(error) = lost;
-        tracing::warn!(%error, "jobs of other processes are looked for, not heard of");
+        tracing::warn!(%error, "notifications of new jobs are interrupted; workers poll the queue until they are back");
         sleep(POLL).await;
     }
 }
@@ -118,7 +118,7 @@ async fn sweep(context: Context) {
             () = context.draining.cancelled() => return,
         }
         if let Err(error) = sweep_expired(&context.store).await {
-            tracing::error!(%error, "what has expired could not be swept");
+            tracing::error!(%error, "the sweep of expired data failed");
         }
     }
 }

@@ -162,11 +162,11 @@ impl Worker {
     ) -> Result<Outcome, Error> {
         match start.elapsed() > self.context.budget {
             _ if lacks_room => result.map_err(|error| {
-                tracing::warn!(%error, "a job was stopped for want of room");
+                tracing::warn!(%error, "a job was stopped: too little disk space");
                 Error::NoRoom
             }),
             true => result.map_err(|error| {
-                tracing::warn!(%error, "a job took too long");
+                tracing::warn!(%error, "a job was stopped: time limit exceeded");
                 Error::OverTime
             }),
             false => result,
@@ -178,7 +178,9 @@ impl Worker {
             Ok(Beat::Held) => {}
             Ok(Beat::CancelRequested | Beat::Lost) => listener.cancel(),
             // If the lease expires, the fence still prevents a second result.
-            Err(error) => tracing::warn!(job.id = %lease.job_id, %error, "a heartbeat failed"),
+            Err(error) => {
+                tracing::warn!(job.id = %lease.job_id, %error, "the heartbeat of a job failed")
+            }
         }
     }
 
@@ -204,7 +206,7 @@ impl Worker {
         let (change, step) = match result {
             Ok(change) => (change, Step::Done(job)),
             Err(error) if was_stopped(&error, listener) => {
-                tracing::debug!(job.id = %job, %error, "the work let go");
+                tracing::debug!(job.id = %job, %error, "the computation of a job ended as requested");
                 if self.context.draining.is_cancelled() {
                     (store.release(lease).await?, Step::Released(job))
                 } else {
@@ -212,7 +214,7 @@ impl Worker {
                 }
             }
             Err(error) if error.may_pass() && lease.attempt < MAX_ATTEMPTS => {
-                tracing::warn!(job.id = %job, %error, "the work failed, perhaps for a moment");
+                tracing::warn!(job.id = %job, %error, "transient error in a job; it is retried");
                 let wait_ms = BACKOFF_MS << (2 * (lease.attempt - 1));
                 let run_at_ms = self.context.now_ms().await? + wait_ms;
                 let change = store.retry(lease, run_at_ms).await?;
@@ -287,7 +289,7 @@ where
 fn step_back() {
     let usual = getpriority_process(None).unwrap_or(0);
     if let Err(error) = setpriority_process(None, usual + PATIENCE) {
-        tracing::debug!(%error, "a job runs with the priority of the service");
+        tracing::debug!(%error, "the priority of a job could not be lowered");
     }
 }
 
@@ -314,7 +316,7 @@ fn was_stopped(error: &Error, listener: &Listener) -> bool {
 fn said(error: &Error) -> String {
     match error.code() {
         Code::Internal | Code::DecoderCrashed => {
-            tracing::error!(%error, "a job failed inside");
+            tracing::error!(%error, "internal error in a job");
             error.code().meaning().to_owned()
         }
         _ => error.to_string(),

@@ -28,12 +28,12 @@ const DECODERS: [(&str, &[&str]); 14] = [
 const ENCODERS: [(&str, &str); 5] = [
     (
         "libx264",
-        "no MP4 can be written: neither flocks nor overlays",
+        "MP4 cannot be written, so flocks and overlays fail",
     ),
-    ("libvpx-vp9", "no WebM can be written"),
-    ("prores_ks", "no ProRes can be written"),
-    ("libwebp_anim", "no animated WebP can be written"),
-    ("gif", "no GIF can be written"),
+    ("libvpx-vp9", "WebM cannot be written"),
+    ("prores_ks", "ProRes cannot be written"),
+    ("libwebp_anim", "animated WebP cannot be written"),
+    ("gif", "GIF cannot be written"),
 ];
 
 /// Decoders and encoders of an ffmpeg, among those that flockreel uses.

@@ -56,8 +56,12 @@ const SOUNDS: [(usize, &[u8]); 6] = [
 const OTHER_CONTAINERS: [(usize, &[u8], &str); 6] = [
     (0, b"DKIF", "ivf"),
     (0, b"YUV4MPEG2", "yuv4mpeg"),
-    (0, b"\0\0\x01\xb3", "a bare MPEG-1 or MPEG-2 stream"),
-    (0, b"\0\0\x01\xb0", "a bare MPEG-4 stream"),
+    (
+        0,
+        b"\0\0\x01\xb3",
+        "an MPEG-1 or MPEG-2 stream without a container",
+    ),
+    (0, b"\0\0\x01\xb0", "an MPEG-4 stream without a container"),
     (0, b"\x06\x0e\x2b\x34", "mxf"),
     (0, b".RMF", "realmedia"),
 ];
@@ -110,7 +114,7 @@ impl Container {
             Some((_, _, what)) => what,
             None if head.is_empty() => "the file is empty",
             None if std::str::from_utf8(head).is_ok() => "a text",
-            None => "of no known kind",
+            None => "the file format is unknown",
         };
         Err(Error::NotAVideo(what.into()))
     }

@@ -10,10 +10,10 @@ use crate::footage::SourceError;
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Damage {
     /// The index that locates the pictures is missing.
-    #[error("it has no index")]
+    #[error("the index is missing")]
     NoIndex,
     /// The file ends before its own structure does.
-    #[error("its pictures end after {span_s:.1} s, with number {n_pictures}")]
+    #[error("the pictures end after {span_s:.1} s, at picture {n_pictures}")]
     EndsAt {
         /// Number of pictures found.
         n_pictures: usize,
@@ -21,7 +21,7 @@ pub enum Damage {
         span_s: f64,
     },
     /// Some pictures cannot be decoded.
-    #[error("{n_decoded} of {n_pictures} pictures can be decoded")]
+    #[error("only {n_decoded} of {n_pictures} pictures can be decoded")]
     Undecodable {
         /// Number of decoded pictures.
         n_decoded: usize,
@@ -37,10 +37,10 @@ pub enum Error {
     #[error("not a video: {0}")]
     NotAVideo(String),
     /// The container is not on the allow-list.
-    #[error("the container is not among those accepted: {0}")]
+    #[error("the container format is not supported: {0}")]
     ContainerNotAllowed(&'static str),
     /// The codec is not on the allow-list.
-    #[error("the codec is not among those accepted: {0}")]
+    #[error("the video codec is not supported: {0}")]
     CodecNotAllowed(String),
     /// The file holds only audio, subtitles or data.
     #[error("the file holds no video stream")]
@@ -63,7 +63,7 @@ pub enum Error {
     },
     /// The pictures have different sizes.
     #[error(
-        "the pictures differ in size: number {number} is {}x{}, the first {}x{}",
+        "the pictures differ in size: picture {number} has {}x{} pixels, the first {}x{}",
         found[0], found[1], first[0], first[1]
     )]
     PicturesDiffer {
@@ -113,16 +113,16 @@ pub enum Error {
     #[error("the video is encrypted")]
     Encrypted,
     /// A time limit was exceeded: wall clock, waiting for a frame, or processor time.
-    #[error("the media tool took longer than its time limit")]
+    #[error("ffmpeg or ffprobe exceeded its time limit")]
     TimeLimit,
     /// The child ran out of address space.
-    #[error("the media tool needed more memory than its limit: {complaint}")]
+    #[error("ffmpeg or ffprobe exceeded its memory limit: {complaint}")]
     MemoryLimit {
         /// The end of ffmpeg's stderr.
         complaint: String,
     },
     /// The child died or failed.
-    #[error("the media tool stopped unexpectedly ({status}): {complaint}")]
+    #[error("ffmpeg or ffprobe stopped unexpectedly ({status}): {complaint}")]
     Crashed {
         /// Exit code or signal.
         status: String,
@@ -130,16 +130,18 @@ pub enum Error {
         complaint: String,
     },
     /// The disk is full.
-    #[error("there is no room left for the output")]
+    #[error("the disk has too little free space for the output")]
     StorageFull,
     /// The encoder was given a frame of the wrong size, or an invalid size or rate.
-    #[error("the encoder was given what it cannot take: {0}")]
+    #[error("the encoder does not accept this input: {0}")]
     BadOutput(&'static str),
     /// ffmpeg is not installed or does not run.
-    #[error("the media tool is not installed: {0}")]
+    #[error("a required program is missing or does not run: {0}")]
     ToolMissing(String),
     /// `--sandbox strict` is set and a layer is missing.
-    #[error("the sandbox is not whole, as `--sandbox strict` demands: {layer}: {reason}")]
+    #[error(
+        "`--sandbox strict` needs all layers of the sandbox, and one is missing: {layer}: {reason}"
+    )]
     SandboxIncomplete {
         /// The first missing layer.
         layer: &'static str,

@@ -257,7 +257,7 @@ impl Child {
         match self.end().and_then(End::check) {
             Err(error) => error,
             Ok(end) => Error::Crashed {
-                status: "it closed its input".into(),
+                status: "it closed its input early".into(),
                 complaint: end.complaint,
             },
         }

@@ -56,7 +56,7 @@ pub(super) fn decode(
             .collect();
         let accepted = accepted.join(", ");
         return Err(Error::NotAVideo(format!(
-            "the picture is none of: {accepted}"
+            "the picture format must be one of: {accepted}"
         )));
     }
     let reader = || ImageReader::with_format(Cursor::new(bytes), format);

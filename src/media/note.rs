@@ -5,8 +5,8 @@
 pub enum Note {
     /// The file is cut off after its last picture.
     #[error(
-        "The file is cut off after its last picture: what is missing belongs to its sound or its index. All \
-         {n_pictures} pictures are there."
+        "The file is cut off after its last picture, so only sound or the index is incomplete. All {n_pictures} \
+         pictures are readable."
     )]
     CutAfterPictures {
         /// Number of pictures found.
@@ -14,8 +14,8 @@ pub enum Note {
     },
     /// The recorder's clock was set, or the recording paused.
     #[error(
-        "The times in the file leap, first by {by_s:.1} s at {at_s:.1} s ({n_leaps} in all): the pictures are \
-         taken to follow each other at the usual rate. If the recording paused there, cut it there."
+        "The timestamps of the file jump {n_leaps} times, first by {by_s:.1} s at {at_s:.1} s. The pictures are \
+         assumed to follow each other at the usual rate. If the recording paused there, cut the film there."
     )]
     TimesLeap {
         /// Time of the first leap, seconds from the first picture.
@@ -27,14 +27,17 @@ pub enum Note {
     },
     /// Neither the file nor a hint gives the frame rate.
     #[error(
-        "The file does not say its frame rate: {fps} is assumed. Say it with --fps (`fps` in the API)."
+        "The file does not state its frame rate, so {fps} frames per second are assumed. Set the rate with --fps \
+         (`fps` in the API)."
     )]
     RateAssumed {
         /// Assumed frame rate, frames per second.
         fps: f64,
     },
     /// Gray of more than 8 bits was reduced to 8 bits.
-    #[error("Gray levels {from} to {to} of 0 to {most} are used, and are shown as black to white.")]
+    #[error(
+        "The pictures use gray levels {from} to {to} of 0 to {most}. These levels were stretched to black and white."
+    )]
     GrayStretched {
         /// Level that becomes black.
         from: u16,

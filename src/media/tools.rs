@@ -173,7 +173,7 @@ fn find(tool: Tool) -> Result<Found, Error> {
     let mut lacks = Vec::new();
     for layer in Layer::ALL {
         let reason = match mode() == Sandbox::Off && !Layers::OLD.has(layer) {
-            true => Some("it is turned off".to_owned()),
+            true => Some("turned off by `--sandbox off`".to_owned()),
             false => lack_of(layer),
         };
         if let Some(reason) = reason {
@@ -253,7 +253,10 @@ fn try_out(place: &mut Place) -> Result<(String, Vec<(Layer, String)>), Error> {
         let unbearable = Layer::ALL
             .into_iter()
             .filter(|&layer| all.has(layer) && !layers.has(layer));
-        let reason = format!("{} does not run in it: {whole}", place.path.display());
+        let reason = format!(
+            "{} does not run with this layer: {whole}",
+            place.path.display()
+        );
         let lacks = unbearable.map(|layer| (layer, reason.clone()));
         return Ok((version, lacks.collect()));
     }

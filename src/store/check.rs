@@ -31,7 +31,7 @@ impl Store {
         for folder in self.folders_without_row().await? {
             let is_old = SystemTime::now().duration_since(folder.modified);
             if is_old.is_ok_and(|found| found >= age) {
-                faults.push(format!("I2: no row names the folder: {}", folder.name));
+                faults.push(format!("I2: the folder has no row: {}", folder.name));
             }
         }
         for (name, sql) in RULES_OF_JOBS {
@@ -41,7 +41,8 @@ impl Store {
         }
         let broken = sql::query_scalar(WRONG_SIZES);
         let folders: Vec<String> = broken.fetch_all(&self.reader).await?;
-        let said = |folder| format!("I6: sizes do not add up: {folder}");
+        let said =
+            |folder| format!("I6: the recorded size differs from the sum of the files: {folder}");
         faults.extend(folders.into_iter().map(said));
         Ok(faults)
     }
@@ -57,9 +58,10 @@ impl Store {
         let sql = "select distinct \"table\" from pragma_foreign_key_check";
         let lost: Vec<String> = sql::query_scalar(sql).fetch_all(&self.reader).await?;
         let broken = said.into_iter().filter(|line| line != "ok");
-        let broken = broken.map(|line| format!("I3: the database is broken: {line}"));
+        let broken = broken.map(|line| format!("I3: the database is damaged: {line}"));
         let lost = lost.into_iter();
-        let lost = lost.map(|table| format!("I3: rows refer to rows that are not there: {table}"));
+        let lost =
+            lost.map(|table| format!("I3: references to missing rows in the table: {table}"));
         Ok(broken.chain(lost).collect())
     }
 
@@ -76,7 +78,9 @@ impl Store {
             file.map_or(0, |file| file.len()) < offset_bytes.unsigned_abs()
         });
         Ok(rows
-            .map(|(id, _)| format!("I1: too short: uploads/{id}"))
+            .map(|(id, _)| {
+                format!("I1: the upload file is shorter than its recorded offset: uploads/{id}")
+            })
             .collect())
     }
 
@@ -106,7 +110,7 @@ impl Store {
 /// Constraints of the table ensure that every job is in a legal state (I3).
 const RULES_OF_JOBS: &[(&str, &str)] = &[
     (
-        "I4: done without exactly one result of its fence, or a result without done",
+        "I4: a done job must have exactly one result with its fence, and any other job none",
         "select j.id from jobs j where $1 is not null and (case when j.state = 'done' then 1 else 0 end) != ( \
          (select count(*) from footage r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from libraries r where r.job_id = j.id and r.fence = j.fence) \

@@ -17,30 +17,29 @@ const SQLITE_IOERR_SHMSIZE: u32 = 4874;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The database returned an error.
-    #[error("the database failed: {0}")]
+    #[error("the database returned an error: {0}")]
     Sql(#[from] sqlx::Error),
     /// The database could not be migrated to this version's schema.
     #[error("the database could not be migrated: {0}")]
     Migrate(#[from] sqlx::migrate::MigrateError),
     /// A file could not be read or written.
-    #[error("a file of the store failed: {0}")]
+    #[error("a file of the store could not be read or written: {0}")]
     Io(#[from] std::io::Error),
     /// The bucket returned an error or was not reached.
-    #[error("the bucket failed: {0}")]
+    #[error("the bucket returned an error or was not reached: {0}")]
     Bucket(#[from] object_store::Error),
     /// The content of a stored file differs from its recorded size or hash.
-    #[error("a file of the store has been altered: {0}")]
+    #[error("the size or hash of a stored file has changed: {0}")]
     Altered(String),
     /// The operation needs a SQLite file, but the database is on a server.
-    #[error("the rows are on a server: copy them with its own tools")]
+    #[error("the database is on a server: copy it with the server's own tools")]
     RowsElsewhere,
     /// Another process serves the same data folder.
     #[error("the data folder is in use by another flockreel: {}", .0.display())]
     InUse(PathBuf),
     /// The files are marked as belonging to another database.
     #[error(
-        "these files are another database's: name the database and the store that belong together, or an empty \
-         place for the files"
+        "the store belongs to another database: use the matching `--database` and `--store`, or an empty store"
     )]
     OtherFiles,
     /// The upload exceeds its maximum size.
@@ -50,25 +49,25 @@ pub enum Error {
         limit_bytes: u64,
     },
     /// The video that a sample job made is already stored under another id.
-    #[error("the same film was uploaded while this one was made")]
+    #[error("the same film was stored by an upload while this job ran")]
     FilmIsKnown,
     /// A repeated request has the ids of an earlier one but different content.
-    #[error("the request was another one when it came first: {0}")]
+    #[error("the Idempotency-Key belongs to an earlier request with another body, job {0}")]
     IdInUse(sqlx::types::Uuid),
     /// The owner has reached the maximum number of queued and running jobs.
-    #[error("no more than {quota} jobs may be queued or running at once: wait for one to end")]
+    #[error("the quota of {quota} queued and running jobs is reached: wait until one ends")]
     QuotaExceeded {
         /// The maximum per owner.
         quota: i64,
     },
     /// The queue has reached the maximum number of queued and running jobs of all owners.
-    #[error("the queue is full, {room} jobs are under way: ask again when some have ended")]
+    #[error("the queue is full ({room} queued and running jobs): try again when some have ended")]
     QueueFull {
         /// The maximum of the queue.
         room: i64,
     },
     /// A row contains a value that this version does not know.
-    #[error("a row of {table} cannot be read: {value}")]
+    #[error("a row of {table} has a value that this version does not know: {value}")]
     UnknownValue {
         /// Name of the table.
         table: &'static str,

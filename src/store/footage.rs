@@ -182,7 +182,7 @@ pub(super) async fn insert_filmed(
     now_ms: i64,
 ) -> Result<(), Error> {
     let video = files.iter().find(|file| file.name == VIDEO);
-    let video = video.ok_or_else(|| io::Error::other("a job that films left no video"))?;
+    let video = video.ok_or_else(|| io::Error::other("the sample job produced no video"))?;
     let added = sql::query(
         "insert into footage (id, job_id, fence, folder, sha256, background_sha256, name, size_bytes, width, \
          height, fps, n_frames_hint, sample, created_ms, owner) \

@@ -122,7 +122,7 @@ impl Intake {
     }
 
     async fn idle_writer(&mut self) -> Result<Writer, Error> {
-        let gone = || io::Error::other("what came before could not be written");
+        let gone = || io::Error::other("an earlier part of the upload could not be written");
         let writing = self.writer.take().ok_or_else(gone)?;
         Ok(writing.await.map_err(io::Error::other)??)
     }

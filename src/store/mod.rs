@@ -102,7 +102,7 @@ impl Store {
         };
         let is_alone = is_locked && writer.is_file();
         if let Err(error) = reserve.require().await {
-            tracing::warn!(%error, "there is no room for the reserve: nothing new is stored");
+            tracing::warn!(%error, "the disk has too little space for the reserve: new data is refused");
         }
         let store = Store {
             writer,

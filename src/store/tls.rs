@@ -10,7 +10,7 @@ pub fn choose_cryptography() {
     CHOSEN.call_once(|| {
         let provider = rustls::crypto::ring::default_provider();
         if provider.install_default().is_err() {
-            tracing::debug!("the cryptography of TLS was chosen before");
+            tracing::debug!("the TLS crypto provider was already installed");
         }
     });
 }

@@ -5,7 +5,7 @@
 export class Problem extends Error {
   /** @param {{title?: string, detail?: string, code?: string, advice?: string, picture?: string | null, status?: number}} body */
   constructor(body) {
-    super(body.title ?? "Something went wrong");
+    super(body.title ?? "The request failed");
     this.title = this.message;
     this.detail = body.detail ?? "";
     this.code = body.code ?? "";
@@ -17,7 +17,7 @@ export class Problem extends Error {
 
 export const unreachable = () => new Problem({
   title: "The service cannot be reached",
-  detail: "It may have been stopped, or the connection was cut. Nothing that was stored is lost.",
+  detail: "The service may have stopped, or the connection was interrupted. Stored data is not lost.",
 });
 
 /** @param {string} text @param {number} status */

@@ -23,7 +23,7 @@ export const byId = (id) => document.getElementById(id);
 export function showProblem(place, problem) {
   const box = element("div", { className: "problem", role: "alert" }, element("strong", {}, problem.title ?? problem.message));
   if (problem.detail && problem.detail !== problem.title) box.append(problem.detail);
-  if (problem.picture) box.append(element("img", { src: problem.picture, alt: "What was seen in the film" }));
+  if (problem.picture) box.append(element("img", { src: problem.picture, alt: "Frames that show the reason" }));
   if (problem.advice) box.append(element("p", {}, problem.advice.replaceAll("`", "")));
   if (problem.code) box.append(element("small", {}, `Reason code: ${problem.code}`));
   place.replaceChildren(box);

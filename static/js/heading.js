@@ -42,7 +42,7 @@ function drawing(poses, onFrame) {
   svg.setAttribute("viewBox", `0 -180 ${n_frames - 1} 360`);
   svg.setAttribute("preserveAspectRatio", "none");
   svg.setAttribute("role", "img");
-  svg.setAttribute("aria-label", "Heading of the animal over the film; the slider below reads it moment by moment");
+  svg.setAttribute("aria-label", "Heading of the animal over time; the slider below shows the value at one time");
   const now = line("now", "");
   svg.append(line("grid", [-90, 0, 90].map((y) => `M0 ${y}H${n_frames - 1}`).join("")),
     line("unsure", pathOf(points, false)), line("sure", pathOf(points, true)), now);
@@ -64,7 +64,7 @@ function drawing(poses, onFrame) {
 function reading(poses, frame) {
   const pose = poses.frames[frame];
   const when = `${seconds(pose.time_s)}, frame ${frame}: `;
-  if (pose.heading_rad === null || pose.heading_rad === undefined) return `${when}the animal was not measured here`;
-  const sure = pose.head_confidence ? `, head certain to ${percent(pose.head_confidence)}` : "";
+  if (pose.heading_rad === null || pose.heading_rad === undefined) return `${when}no heading was measured`;
+  const sure = pose.head_confidence ? `, head confidence ${percent(pose.head_confidence)}` : "";
   return `${when}heading ${direction(pose.heading_rad)}${sure}`;
 }

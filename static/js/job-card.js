@@ -46,4 +46,4 @@ export async function showJob(place, id) {
   }
 }
 
-const attemptNote = (job) => (job.attempt > 1 ? `Begun again after an interruption (attempt ${job.attempt}).` : "");
+const attemptNote = (job) => (job.attempt > 1 ? `Restarted after an interruption (attempt ${job.attempt}).` : "");

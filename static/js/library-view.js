@@ -10,7 +10,7 @@ const PICTURES = [["overlay", "overlay.mp4"], ["trajectory", "trajectory.svg"], 
 /** @param {any} library */
 export async function showLibrary(library) {
   const at = `/v1/libraries/${library.id}`;
-  byId("library-title").textContent = library.name || "What the film holds";
+  byId("library-title").textContent = library.name || "Measurements";
   byId("library-numbers").replaceChildren(...numbersOf(library).map(([term, value]) => element("div", {}, element("dt", {}, term), element("dd", {}, value))));
   byId("library-distance").src = `${at}/distance.png`;
   byId("library-candidates").src = `${at}/candidates.png`;
@@ -44,7 +44,7 @@ function numbersOf(library) {
     [`frames, ${seconds(length_s)} at ${count(library.fps)} a second`, library.n_frames, count],
     ["of the frames show the animal", library.detected_share, percent],
     ["seen from", view, String],
-    ["places where playback may jump", library.n_transitions, count],
-    ["of the film can be played for ever", library.component_share, percent],
+    ["transitions of playback", library.n_transitions, count],
+    ["of the film can be used by endless playback", library.component_share, percent],
   ].filter(([, value]) => value !== undefined && value !== null).map(([term, value, say]) => [term, say(value)]);
 }

@@ -34,7 +34,7 @@ const isReady = (thing) => (thing.state ?? "done") === "done";
 const redrawLists = () => showEarlier(made.libraries, made.flocks, current, { onLibrary: own(chooseLibrary), onFlock: own(watch) });
 
 /** Shows a library and its newest flock. Without a flock, the stage shows the text `next`. */
-async function chooseLibrary(id, next = "Press “Make the flock”, and its flock will play here.") {
+async function chooseLibrary(id, next = "Press “Make the flock”. The flock will play here.") {
   const flock = made.flocks.find((one) => one.library_id === id);
   if (flock) return chooseFlock(flock.id);
   current.flock = null;
@@ -87,7 +87,7 @@ async function showNewest(job) {
 
 /** Fills an empty page during a job: with the library of a flock if it is ready, else with a sentence. */
 async function announce({ kind, subject }) {
-  if (made.libraries.some((library) => library.id === subject?.id)) return chooseLibrary(subject.id, "A flock of it is being made and will play here.");
+  if (made.libraries.some((library) => library.id === subject?.id)) return chooseLibrary(subject.id, "A flock of this film is being made and will play here.");
   if (kind !== "analysis") return showEmptyStage("A flock is being made. It will play here.");
   const { name } = await getFootage(subject.id).catch(() => ({ name: "" }));
   showEmptyStage(`${quoted(name)} is being measured. The result will be shown here.`);

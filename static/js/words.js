@@ -23,20 +23,20 @@ export function direction(heading_rad) {
 
 const STAGES = {
   filming: "Filming a virtual goldfish",
-  background: "Finding the still scene",
+  background: "Estimating the background",
   tracking: "Following the animal",
-  distances: "Comparing its moments",
+  distances: "Comparing moments",
   writing: "Storing the result",
   overlay: "Drawing the measurement over the film",
   loading: "Opening the film’s library",
-  simulating: "Letting the boids move",
+  simulating: "Simulating the boids",
   planning: "Choosing frames for every individual",
-  rendering: "Painting the flock",
+  rendering: "Drawing the flock",
 };
 
 /** Returns the current stage of a job as text. */
 export function stageOf(job) {
-  if (job.state === "queued") return "Waiting its turn";
+  if (job.state === "queued") return "Waiting in the queue";
   const stage = job.stage ?? "";
   return STAGES[stage] ?? (stage ? stage[0].toUpperCase() + stage.slice(1).replaceAll("_", " ") : "Starting");
 }

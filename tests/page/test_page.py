@@ -65,7 +65,7 @@ def test_the_next_visit_shows_the_newest_flock_at_once(page, filled_service):
 
 def test_the_slider_reads_the_heading_moment_by_moment(page, filled_service):
     page.goto(filled_service)
-    slider = page.get_by_role("slider", name="Moment")
+    slider = page.get_by_role("slider", name="Time")
     expect(slider).to_have_attribute("max", "149")
     slider.focus()
     page.keyboard.press("ArrowRight")
@@ -151,7 +151,7 @@ def test_the_api_is_described_and_can_be_tried_under_the_policy_of_all_pages(pag
     call.get_by_role("button", name="Execute").click()
     expect(call.locator(".live-responses-table")).to_contain_text('"ready": true')
     page.goto(filled_service + "/docs/errors#nothing_moves")
-    expect(page.locator("#nothing_moves + dd")).to_have_text("Nothing moves before the background.")
+    expect(page.locator("#nothing_moves + dd")).to_have_text("No moving animal was found in the film.")
 
 
 def test_all_tabs_follow_their_jobs_by_one_stream(browser, filled_service):

@@ -7,7 +7,7 @@ from playwright.sync_api import expect
 from conftest import make_film
 from test_page import LONG_MS, until
 
-IN_ANALYSIS = re.compile("Starting|Finding the still scene|Following the animal|Comparing its moments")
+IN_ANALYSIS = re.compile("Starting|Estimating the background|Following the animal|Comparing moments")
 UPLOADING = re.compile("Sending the film|Checking the film")
 
 
@@ -54,7 +54,7 @@ def test_jobs_of_others_leave_the_card_of_an_upload_in_its_place(page, starting_
     expect(stage).to_have_text("Filming a virtual goldfish")
     page.locator("#film-file").set_input_files(film)
     expect(stage).to_have_text(UPLOADING)
-    expect(page.locator("#stage-note")).to_contain_text("A flock of it is being made", timeout=3 * LONG_MS)
+    expect(page.locator("#stage-note")).to_contain_text("A flock of this film is being made", timeout=3 * LONG_MS)
     expect(stage).to_have_text(UPLOADING)
     page.locator("#film-job").get_by_role("button", name="Cancel").click()
     expect(page.locator("#film-job .job")).to_have_count(0)
@@ -78,7 +78,7 @@ def test_reload_during_rendering_shows_the_flock_of_that_film(page, filled_servi
     page.get_by_role("spinbutton", name="Individuals").fill("8")
     page.get_by_role("spinbutton", name="Frames").fill("2400")
     page.get_by_role("button", name="Make the flock").click()
-    expect(page.locator("#flock-job .job strong")).to_have_text("Painting the flock", timeout=LONG_MS)
+    expect(page.locator("#flock-job .job strong")).to_have_text("Drawing the flock", timeout=LONG_MS)
     page.reload()
     expect(page.locator("#make-of")).to_have_text(f"Of “{film.name}”")
     expect(page.locator("#flock-job .job")).to_be_visible()

@@ -72,13 +72,17 @@ impl Params {
         }
         if self.ignore.len() > MOST_IGNORED {
             let n = self.ignore.len();
-            return Err(format!("ignore takes {MOST_IGNORED} boxes at most: {n}"));
+            return Err(format!(
+                "ignore must have at most {MOST_IGNORED} boxes: {n}"
+            ));
         }
         for ignore in &self.ignore {
             check_span("ignore.", ignore.from_s, ignore.to_s)?;
             let [x, y, w, h] = ignore.box_px;
             if w == 0 || h == 0 {
-                return Err(format!("ignore.box_px must hold a pixel: {x},{y},{w},{h}"));
+                return Err(format!(
+                    "ignore.box_px must contain at least one pixel: {x},{y},{w},{h}"
+                ));
             }
         }
         Ok(())

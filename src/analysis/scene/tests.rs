@@ -237,6 +237,6 @@ fn a_film_of_a_few_frames_is_refused() {
     assert_eq!(code, Code::TooFewFrames);
     assert_eq!(
         sentence,
-        "there are 12 frames to measure, at least 16 are needed"
+        "the footage has 12 frames to measure, but at least 16 are needed"
     );
 }

@@ -118,7 +118,7 @@ impl<S: Send + Sync> FromRequestParts<S> for Caller {
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Caller, Problem> {
         let caller = parts.extensions.get::<Caller>().cloned();
         caller.ok_or_else(|| {
-            tracing::error!("a route asks for its caller and is open to all");
+            tracing::error!("an open route requires a caller: the route table is wrong");
             Code::Internal.into()
         })
     }

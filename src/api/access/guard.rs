@@ -93,13 +93,14 @@ fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Resul
     }
     // A small compressed body can expand to a huge one, and no body of this API gains from compression.
     if headers.contains_key(header::CONTENT_ENCODING) {
-        let sentence = "a body is sent as it is, without Content-Encoding";
+        let sentence = "the body must be sent without Content-Encoding";
         return Err(Problem::new(Code::UnsupportedMediaType, sentence));
     }
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let host = text(header::HOST).or(uri.authority().map(|authority| authority.as_str()));
     if names == Names::Loopback && !host.is_some_and(is_loopback) {
-        let sentence = "the service is asked for under a name that is not this machine's own";
+        let sentence = "the host name of the request is not a loopback name: use localhost or 127.0.0.1, or start the \
+                        service with `--auth required`";
         return Err(Problem::new(Code::CrossSite, sentence));
     }
     if method.is_safe() {

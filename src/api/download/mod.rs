@@ -128,7 +128,7 @@ pub(super) fn built(
     answer: Result<Response<Body>, axum::http::Error>,
 ) -> Result<Response<Body>, Problem> {
     answer.map_err(|error| {
-        tracing::error!(%error, "an answer could not be built");
+        tracing::error!(%error, "a response could not be built");
         Code::Internal.into()
     })
 }

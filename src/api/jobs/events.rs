@@ -73,7 +73,7 @@ pub(in crate::api) struct JobEvent {
 ///
 /// The stream ends when the token or session is no longer valid, and when the service stops.
 #[utoipa::path(get, path = "/v1/events",
-    params(("Last-Event-ID" = Option<String>, Header, description = "the id of the last event seen")),
+    params(("Last-Event-ID" = Option<String>, Header, description = "id of the last event received")),
     responses(
     (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -181,7 +181,7 @@ impl Feed {
             }
             if let Err(error) = self.look().await {
                 // The client reconnects with the last id that it received.
-                tracing::warn!(%error, "a stream of events could not look at its jobs");
+                tracing::warn!(%error, "an event stream could not read its jobs");
                 return None;
             }
         }

@@ -218,7 +218,11 @@ pub(super) async fn absent_result(
     let Some(job) = job.await? else {
         return Ok(Problem::not_found());
     };
-    let sentence = format!("its job is {}: /v1/jobs/{}", job.state.name(), job.id);
+    let sentence = format!(
+        "the job of this result is {}: /v1/jobs/{}",
+        job.state.name(),
+        job.id
+    );
     Ok(Problem::new(Code::NotReady, sentence))
 }
 
@@ -236,7 +240,7 @@ pub(super) async fn job_to_follow(
     match store.job_of_result(library_id.0, &caller.reach).await? {
         Some(job) if job.kind == Kind::Analysis && !is_lost(job.state) => Ok(Some(job.id)),
         _ => {
-            let sentence = format!("there is no such library: {library_id}");
+            let sentence = format!("the library does not exist: {library_id}");
             Err(Problem::new(Code::InvalidParams, sentence))
         }
     }

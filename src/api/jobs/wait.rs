@@ -97,7 +97,7 @@ pub(in crate::api) async fn wait_for_result(
             }
         }
         Ok(_) => {}
-        Err(error) => tracing::warn!(%error, "a job could not be waited for"),
+        Err(error) => tracing::warn!(%error, "the wait for a job failed"),
     }
     answer
 }

@@ -67,18 +67,19 @@ fn description() -> String {
     let head = "<link rel=\"stylesheet\" href=\"/docs/swagger-ui.css\">\n\
         <script defer src=\"/docs/swagger-ui-bundle.js\"></script>\n\
         <script type=\"module\" src=\"/static/js/docs.js\"></script>";
-    let body = "<div class=\"docs\"><p>The same as data: <a href=\"/openapi.json\">openapi.json</a>. \
-        What can go wrong: <a href=\"/docs/errors\">the errors</a>. <a href=\"/\">The page</a>.</p></div>\n\
-        <div class=\"api\" id=\"api\"></div>\n<noscript><p>To draw it takes JavaScript.</p></noscript>";
+    let body = "<div class=\"docs\"><p>The same description as data: <a href=\"/openapi.json\">openapi.json</a>. \
+        <a href=\"/docs/errors\">Error codes</a>. <a href=\"/\">The page</a>.</p></div>\n\
+        <div class=\"api\" id=\"api\"></div>\n<noscript><p>This reference needs JavaScript.</p></noscript>";
     page("The API", head, body)
 }
 
 fn errors() -> String {
     let entries: String = Code::ALL.iter().map(|&code| entry(code)).collect();
     let body = format!(
-        "<div class=\"docs\"><h1>What can go wrong</h1>\n<p>Every answer that is not a success is \
-         <code>application/problem+json</code> (RFC 9457) with a stable <code>code</code>; so is the <code>error</code> \
-         of a job that failed. A code is never renamed. <a href=\"/docs\">The API</a>.</p>\n<dl>\n{entries}</dl></div>"
+        "<div class=\"docs\"><h1>Error codes</h1>\n<p>Every response that reports a failure is \
+         <code>application/problem+json</code> (RFC 9457) with a stable <code>code</code>. The <code>error</code> of a \
+         failed job has the same form. A code is never renamed. <a href=\"/docs\">The API</a>.</p>\n\
+         <dl>\n{entries}</dl></div>"
     );
     page("Errors", "", &body)
 }

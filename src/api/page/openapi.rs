@@ -16,7 +16,7 @@ use crate::api::{AppState, idempotency};
 #[openapi(
     info(
         title = "flockreel",
-        description = "One filmed animal in, a flock of it out.",
+        description = "Measures one filmed animal and makes flocks of it.",
     ),
     modifiers(&Schemes),
     security((), ("token" = []), ("session" = [])),
@@ -31,8 +31,8 @@ pub(in crate::api) fn add_headers(document: &mut OpenApi) {
             .as_mut()
             .filter(|_| idempotency::ROUTES.contains(&path.as_str()))
         {
-            let meaning = "The same key with the same body gets the same answer for a day, marked by \
-                Idempotent-Replayed: true; another body 422; 409 while the first still runs.";
+            let meaning = "For a day, the same key and body get the same response, with Idempotent-Replayed: true. \
+                           Another body gets 422; a request that is still running gets 409.";
             add_header(post, "Idempotency-Key", meaning);
         }
         let waits = item
@@ -41,8 +41,8 @@ pub(in crate::api) fn add_headers(document: &mut OpenApi) {
             .filter(|post| post.responses.responses.contains_key("202"));
         let get = item.get.as_mut().filter(|_| path == "/v1/jobs/{id}");
         for operation in waits.into_iter().chain(get) {
-            let meaning = "wait=N: answer when the job has ended, or after N seconds, at most 60. A POST whose job \
-                is done by then answers 201 with the result's address in Location.";
+            let meaning = "wait=N delays the response until the job ends, at most N seconds (60 at most). If the job \
+                           is done by then, a POST answers 201 with the address of the result in Location.";
             add_header(operation, "Prefer", meaning);
         }
     }

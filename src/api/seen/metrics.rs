@@ -66,13 +66,13 @@ impl Metrics {
         registry.register("flockreel_jobs", "Jobs, by kind and state", jobs.clone());
         registry.register_with_unit(
             "flockreel_queue_oldest",
-            "How long the job that is queued longest has waited",
+            "Waiting time of the oldest queued job",
             Unit::Seconds,
             oldest_queued.clone(),
         );
         registry.register_with_unit(
             "flockreel_stored",
-            "What is stored, by what it is",
+            "Stored objects, by kind",
             Unit::Bytes,
             stored.clone(),
         );
@@ -158,7 +158,7 @@ impl Collector for LostLines {
         let lost = ConstCounter::new(logging::n_lost_lines());
         let (name, help) = (
             "flockreel_log_lines_lost",
-            "Log lines dropped because stderr did not take them in time",
+            "Log lines dropped because stderr was too slow or failed",
         );
         lost.encode(encoder.encode_descriptor(name, help, None, lost.metric_type())?)
     }
@@ -168,7 +168,7 @@ impl Collector for LostLines {
 fn counted(meters: &Meters) -> Registry {
     let mut registry = Registry::default();
     let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
-    registry.register("flockreel_build", "What is running", version);
+    registry.register("flockreel_build", "Version of the running process", version);
     registry.register_collector(Box::new(LostLines));
     meters.register(&mut registry);
     registry

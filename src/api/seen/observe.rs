@@ -71,17 +71,17 @@ impl Requests {
     pub(in crate::api) fn register(&self, registry: &mut Registry) {
         registry.register(
             "flockreel_http_requests",
-            "Requests answered, by the template of their route",
+            "Answered requests, by route template",
             self.answered.clone(),
         );
         registry.register(
             "flockreel_http_request_seconds",
-            "Time until the head of the answer",
+            "Time until the response header is sent",
             self.times.clone(),
         );
         registry.register(
             "flockreel_http_requests_under_way",
-            "Requests whose answer has not begun",
+            "Requests without a response yet",
             self.under_way.clone(),
         );
     }

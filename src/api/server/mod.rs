@@ -69,7 +69,10 @@ pub async fn serve(listener: TcpListener, router: Router, stop: Stop) {
     let ended = async {
         if timeout(DRAIN, under_way.wait()).await.is_err() {
             let n_connections = under_way.len();
-            tracing::warn!(n_connections, "requests under way were cut off");
+            tracing::warn!(
+                n_connections,
+                "open requests were cut off at the end of the grace period"
+            );
         }
         stop.over.cancelled().await;
     };

@@ -134,7 +134,7 @@ fn planned(path: &Path, library: &Library, params: Params) -> Result<Flock, Erro
     let mut flock =
         flock_json::read(&bytes).map_err(|cause| named(&format!("not a flock.json: {cause}")))?;
     if !flock.fits(library) {
-        return Err(named("the plan is of another library"));
+        return Err(named("the plan belongs to another library"));
     }
     flock.params.render = params.render;
     Ok(flock)

@@ -84,7 +84,7 @@ impl Outputs {
     pub(super) fn targets(&self, render: &Render) -> Result<Vec<Target>, Error> {
         let format = match &self.format {
             Some(name) => serde_json::from_value(Value::from(name.as_str()))
-                .map_err(|_unknown| Error::Usage(format!("there is no such format: {name}")))?,
+                .map_err(|_unknown| Error::Usage(format!("the format is unknown: {name}")))?,
             None => format_of(&self.output)?,
         };
         let mut targets = vec![Target {
@@ -102,7 +102,7 @@ impl Outputs {
         let clear = render.background == Background::Transparent;
         match targets.iter().find(|target| clear && !keeps_alpha(target)) {
             Some(target) => Err(Error::Usage(format!(
-                "no transparency in this kind of file, take .webm, .mov, .webp or --format png: {}",
+                "this format has no transparency, use .webm, .mov, .webp or --format png: {}",
                 target.path.display()
             ))),
             None => Ok(targets),
@@ -118,7 +118,7 @@ impl Outputs {
         let path = Path::new(path);
         if !path.is_file() {
             return Err(Error::Usage(format!(
-                "neither plate, transparent, #rrggbb nor a file: {}",
+                "--background must be plate, transparent, #rrggbb or a file: {}",
                 path.display()
             )));
         }
@@ -168,7 +168,7 @@ fn format_of(path: &Path) -> Result<Format, Error> {
         "png" | "jpg" | "jpeg" => Ok(Format::Poster),
         "zip" => Ok(Format::Png),
         _ => Err(Error::Usage(format!(
-            "the name does not tell what to make, say --format mp4, webm, mov, png, gif or webp: {}",
+            "the file name has no known extension, add --format mp4, webm, mov, png, gif or webp: {}",
             path.display()
         ))),
     }

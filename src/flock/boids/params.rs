@@ -298,7 +298,7 @@ impl Predator {
             .all(|pair| pair[0].time_s < pair[1].time_s);
         in_order
             .then_some(())
-            .ok_or("predator.path must be in order of time".into())
+            .ok_or("the times of predator.path must increase".into())
     }
 }
 

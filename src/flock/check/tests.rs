@@ -128,7 +128,7 @@ fn a_step_that_the_library_does_not_know_is_named() {
     assert!(
         violation
             .to_string()
-            .starts_with("individual 2, frame 41: from source frame")
+            .starts_with("individual 2, frame 41: the step from source frame")
     );
 }
 

@@ -6,19 +6,19 @@ use crate::geometry::Turns;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Violation {
     /// A parameter is out of range.
-    #[error("the flock's params: {0}")]
+    #[error("a parameter of the flock is out of range: {0}")]
     Params(String),
     /// Frame rate or picture size of flock and library differ.
-    #[error("the flock was made of another library: frame rate or picture size differ")]
+    #[error("the flock belongs to another library: its frame rate or picture size differs")]
     OtherLibrary,
     /// Number of individuals found, and the number in `params.count`.
-    #[error("there are {0} individuals where params.count says {1}")]
+    #[error("the flock has {0} individuals, but params.count is {1}")]
     Count(usize, u32),
     /// Position in the list of individuals, and the id found there.
-    #[error("individual {1} stands in the place of individual {0}")]
+    #[error("the individual at position {0} has id {1}; ids must count up from 0")]
     Order(usize, u32),
     /// A list does not have one entry per frame.
-    #[error("individual {id}: {list} has {found} entries where params.frames says {wanted}")]
+    #[error("individual {id}: {list} has {found} entries, but params.frames is {wanted}")]
     Length {
         /// Id of the individual.
         id: usize,
@@ -40,7 +40,7 @@ pub enum Violation {
         frame: u32,
     },
     /// A sprite is mirrored although `params.mirror` is false.
-    #[error("individual {id}, frame {t}: mirrored, which params.mirror does not allow")]
+    #[error("individual {id}, frame {t}: the sprite is mirrored, but params.mirror is false")]
     Mirror {
         /// Id of the individual.
         id: usize,
@@ -49,7 +49,8 @@ pub enum Violation {
     },
     /// A step leads neither to the next frame nor along a jump of the library.
     #[error(
-        "individual {id}, frame {t}: from source frame {from} to {to}{} is neither the next frame nor a jump of the library",
+        "individual {id}, frame {t}: the step from source frame {from} to {to}{} is neither the next frame nor a jump \
+         of the library",
         if *.turned { ", changing the mirror side," } else { "" }
     )]
     IllegalStep {
@@ -66,7 +67,7 @@ pub enum Violation {
     },
     /// A jump follows the last one too soon.
     #[error(
-        "individual {id}, frame {t}: jumps {since} frames after its last jump, the least is {dwell}"
+        "individual {id}, frame {t}: the jump follows the last one after {since} frames, but the minimum is {dwell}"
     )]
     Dwell {
         /// Id of the individual.
@@ -80,14 +81,17 @@ pub enum Violation {
     },
     /// `continues_as` is wrong. In a loop it must be a permutation of the ids; otherwise it must be null.
     #[error(
-        "individual {id}: continues_as does not say, as params.loop has it, whose first frame follows its last"
+        "individual {id}: continues_as is wrong; in a loop each individual must be named once, otherwise it must be \
+         null"
     )]
     Heir {
         /// Id of the individual.
         id: usize,
     },
     /// A cost in the file is not a whole number of turns (65536 to the circle).
-    #[error("individual {id}: {part} is no whole number of 65536ths of a circle: {value} rad")]
+    #[error(
+        "individual {id}: {part} is not a whole number of turns (65536 to the circle): {value} rad"
+    )]
     NotWhole {
         /// Id of the individual.
         id: usize,
@@ -98,7 +102,7 @@ pub enum Violation {
     },
     /// A cost in the file differs from the sum over the plan's steps.
     #[error(
-        "individual {id}: {part} says {:.6} rad, the plan's steps add up to {:.6} rad",
+        "individual {id}: {part} is {:.6} rad, but the steps of the plan cost {:.6} rad",
         rad(*.said), rad(*.found)
     )]
     Cost {
@@ -113,7 +117,8 @@ pub enum Violation {
     },
     /// A cheaper plan exists.
     #[error(
-        "individual {id}, frame {t}: here the plan leaves the cheapest way: it costs {:.6} rad where {:.6} rad is possible",
+        "individual {id}, frame {t}: here the plan departs from the cheapest one: it costs {:.6} rad, and {:.6} rad is \
+         possible",
         rad(*.cost), rad(*.cheapest)
     )]
     Suboptimal {
@@ -128,7 +133,7 @@ pub enum Violation {
     },
     /// Without crowd cost, a plan costs less than `cost.lower_bound`.
     #[error(
-        "individual {id}: cost.lower_bound says {:.6} rad, yet a plan of {:.6} rad is possible",
+        "individual {id}: cost.lower_bound is {:.6} rad, but a plan of {:.6} rad exists",
         rad(*.said), rad(*.cheapest)
     )]
     LowerBound {
@@ -140,7 +145,10 @@ pub enum Violation {
         cheapest: u64,
     },
     /// An edge offers less than the certificate says. This is a bug of the check itself.
-    #[error("individual {id}, frame {t}: an edge offers less than the certificate says")]
+    #[error(
+        "individual {id}, frame {t}: the check itself is faulty: an edge costs less than the certificate allows; \
+         report this as a bug"
+    )]
     Certificate {
         /// Id of the individual.
         id: usize,

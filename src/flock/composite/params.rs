@@ -108,7 +108,7 @@ impl Render {
             && u64::from(width) * u64::from(height) > MOST_PIXELS
         {
             return Err(format!(
-                "render.size_px must have at most {MOST_PIXELS} pixels in all, as 3840 x 2160 has: {width} x {height}"
+                "render.size_px must have at most {MOST_PIXELS} pixels (3840 x 2160): {width} x {height}"
             ));
         }
         for (name, value) in [

@@ -39,25 +39,27 @@ fn everyone<'a>(
 
 /// Explanation of the files, for users who unpack them.
 pub const README: &str = "\
-The ground truth of a flock made by flockreel, told by the compositor itself.
+The ground truth of a flock made by flockreel, computed by the compositor from the alpha with which it draws.
 
-masks/NNNNNN.png  labels, 16-bit gray: id + 1 of the individual that makes up at least half of the pixel, counting what
-                  covers it; 0 where nobody does: the background, where soft edges of several meet, and where
-                  something known to stand before them (wires of a cage: the library's occluders.png) is in the film.
-                  A film without background has no such thing; of two films this is of the opaque one. Frames
-                  from 000000.
-shadows/NNNNNN.png  8-bit gray: the share of its light that the shadows of all take of a pixel, 255 = all of it, where no
-                  animal covers it. Only in a film with shadows; labels take no notice of them.
-coco.json         COCO instances. One annotation for each individual and frame in which it has a label:
-                  segmentation (compressed run lengths, as pycocotools decodes them), bbox and area are of what is
-                  visible; amodal_segmentation is of the whole animal within the picture, amodal_bbox and
-                  amodal_area of the whole animal wherever it is; visibility is the share of its alpha that is seen.
+masks/NNNNNN.png  labels, 16-bit gray: id + 1 of the individual whose visible share of the pixel is at least half;
+                  0 elsewhere: the background, soft edges where no individual reaches half, and occluders (such as
+                  wires of a cage, see occluders.png of the library). A film without background has no occluders.
+                  If an opaque and a transparent film are made, the labels belong to the opaque one. File numbers
+                  start at 000000.
+shadows/NNNNNN.png  8-bit gray: the share of the light that all shadows together remove from a pixel, 255 = all of
+                  it, reduced by the alpha of what is in front. Only for films with shadows. Labels ignore shadows.
+coco.json         COCO instances: one annotation per individual and frame with at least one labelled pixel.
+                  segmentation (compressed run lengths for pycocotools), bbox and area describe the visible part;
+                  amodal_segmentation describes the whole animal within the picture, amodal_bbox and amodal_area
+                  the whole animal also beyond it; visibility is the share of the animal's alpha that lies in the
+                  picture and is not covered.
                   track_id = label; heading_rad = atan2(dy, dx), y down; centroid_px = the animal's own centroid.
 gt/gt.txt         MOTChallenge: frame, id, left, top, width, height, 1, 1, visibility. Frames, ids, left and top
-seqinfo.ini       count from 1; boxes are amodal. Everyone who is at least partly in the picture,
+                  count from 1. Boxes are amodal. Every individual that is at least partly in the picture has a row,
                   hidden or not.
-tracks.csv        one row for each frame and individual, hidden or not. Boxes are x, y, width, height from 0; empty
-                  where there is none.
+seqinfo.ini       MOTChallenge: frame rate, number of frames and picture size.
+tracks.csv        one row per frame and individual, hidden or not. Boxes are x, y, width, height, counted from 0; a
+                  missing box is empty.
 
 Coordinates are pixels of the film: x right, y down, the center of the first pixel at (0.5, 0.5); lengths in px, times
 in s, angles in rad. The pictures named in coco.json and seqinfo.ini are the film's frames:

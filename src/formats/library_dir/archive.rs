@@ -43,7 +43,7 @@ impl Archive<'_> {
         let centers_px = &summary.matte_center_px;
         if centers_px.is_empty() && summary.sprite_scale.is_some() {
             return Err(Error::Mismatch(
-                "sprites of one height are no longer read: analyze the footage again",
+                "the library has an old format (sprites of one height): analyze the footage again",
             ));
         }
         let name = if centers_px.is_empty() {
@@ -68,7 +68,7 @@ impl Archive<'_> {
     ) -> Result<Vec<Option<Matte>>, Error> {
         if self.centers_px.is_some_and(|all| all.len() != n_frames) {
             return Err(Error::Mismatch(
-                "library.json must tell the centroid of every frame's matte",
+                "library.json must have one matte centroid per frame",
             ));
         }
         let entries = self.entries(n_frames)?;
@@ -82,7 +82,7 @@ impl Archive<'_> {
             };
             let is_near = |center_px: &[f64; 2]| center_px.iter().all(|px| px.abs() < 1e5);
             let center_px = center_px.filter(is_near).ok_or(Error::Mismatch(
-                "library.json does not tell the centroid of a matte",
+                "the centroid of a matte in library.json is missing or out of range",
             ))?;
             Ok(Some(Matte {
                 size,

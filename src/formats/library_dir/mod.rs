@@ -214,7 +214,7 @@ fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
     let scales = summary.sprite_scale.as_deref();
     if scales.is_some_and(|all| all.len() != n_frames || !all.iter().all(is_sound)) {
         return Err(Error::Mismatch(
-            "library.json must name a size for the sprite of every frame",
+            "sprite_scale in library.json must have one value from 0.01 to 100 per frame",
         ));
     }
     let is_shadow = |shadow: &Shadow| {
@@ -223,13 +223,15 @@ fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
             && (0.0..=1.0).contains(&shadow.blur_bl)
     };
     if !summary.shadow.as_ref().is_none_or(is_shadow) {
-        return Err(Error::Mismatch("library.json names an impossible shadow"));
+        return Err(Error::Mismatch(
+            "the shadow in library.json is out of range",
+        ));
     }
     let mut sides_px = summary.sprite_size_px.iter();
     match sides_px.all(|side| (1..=MOST_SIDE_PX).contains(side)) {
         true => Ok(()),
         false => Err(Error::Mismatch(
-            "library.json names an impossible size of sprites",
+            "the sprite size in library.json is out of range",
         )),
     }
 }

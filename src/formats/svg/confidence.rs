@@ -23,7 +23,7 @@ pub fn confidence(poses: &Poses) -> String {
     let bottom = TOP + n_strips as f64 * (STRIP[0] + STRIP[1]) - STRIP[1];
     let mut sheet = Sheet::new(
         bottom + 32.0,
-        "How sure the measurement is",
+        "Confidence of the measurement",
         &format!(
             "Frame by frame over {:.1} seconds: the animal was found in {found} of {} frames, {cut} of them \
              at the border of the picture.",
@@ -31,7 +31,12 @@ pub fn confidence(poses: &Poses) -> String {
             poses.frames.len()
         ),
     );
-    sheet.text("ink", "start", [16.0, 26.0], "How sure the measurement is");
+    sheet.text(
+        "ink",
+        "start",
+        [16.0, 26.0],
+        "Confidence of the measurement",
+    );
     axis.draw(&mut sheet, TOP, bottom);
     let mut rows = Rows {
         sheet: &mut sheet,

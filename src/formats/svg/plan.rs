@@ -32,7 +32,7 @@ pub fn plan(flock: &Flock) -> String {
     let row_height = ROOM[0] + plot_height + ROOM[1];
     let bottom = TOP + n_rows as f64 * row_height;
     let said = summary(flock, drawn.len());
-    let title = "What the boids ask for and what is shown: headings, degrees";
+    let title = "Headings of boids and of the frames shown, degrees";
     let mut sheet = Sheet::new(bottom + 26.0, title, &said);
     sheet.text("ink", "start", [16.0, 26.0], title);
     sheet.text("soft", "start", [16.0, 46.0], &said);
@@ -61,8 +61,8 @@ fn summary(flock: &Flock, n_drawn: usize) -> String {
         false => format!("All {n_all} individuals"),
     };
     format!(
-        "{who}. Of all: half of the headings shown are within {:.1}° of the boid's, nine in ten within {:.1}°; \
-         {:.1} jumps in 100 frames.",
+        "{who}. Over all individuals, half of the shown headings are within {:.1}° of the boid's, 90 % within {:.1}°; \
+         {:.1} jumps per 100 frames.",
         flock.stats.heading_error_median_rad.to_degrees(),
         flock.stats.heading_error_p90_rad.to_degrees(),
         flock.stats.jumps_per_100_frames

@@ -30,14 +30,14 @@ pub fn trajectory(poses: &Poses) -> String {
     let seen = poses.frames.iter().filter(|pose| pose.detected()).count();
     let mut sheet = Sheet::new(
         height,
-        "The way of the animal",
+        "Path of the animal",
         &format!(
             "The path of the animal's centroid over a picture of {width_px} by {height_px} pixels, colored by \
              time; seen in {seen} of {} frames.",
             poses.frames.len()
         ),
     );
-    sheet.text("ink", "start", [left, 26.0], "The way of the animal");
+    sheet.text("ink", "start", [left, 26.0], "Path of the animal");
     sheet.rect(
         "sunken",
         [left, MARGINS[0], zoom * width_px, zoom * height_px],

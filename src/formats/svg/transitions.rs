@@ -89,8 +89,8 @@ pub fn transitions(library: &Library) -> String {
     let band = [above, above + BAND];
     let bottom = band[1] + highest(true).unwrap_or(0.0) + 6.0;
     let said = summary(library, n_mirrored, jumps.len());
-    let mut sheet = Sheet::new(bottom + 66.0, "What may follow what", &said);
-    sheet.text("ink", "start", [16.0, 26.0], "What may follow what");
+    let mut sheet = Sheet::new(bottom + 66.0, "Jumps of the library", &said);
+    sheet.text("ink", "start", [16.0, 26.0], "Jumps of the library");
     sheet.text("soft", "start", [16.0, 46.0], &said);
     axis.draw(&mut sheet, TOP, bottom);
     sheet.text("soft", "end", [LEFT - 8.0, band[0] - 12.0], "same side");
@@ -111,8 +111,8 @@ fn summary(library: &Library, n_mirrored: usize, n_drawn: usize) -> String {
         false => String::new(),
     };
     format!(
-        "{} transitions make {n_jumps} jumps, {n_mirrored} of them to the mirror image{drawn}; {share:.0} % of {} \
-         frames can be played without an end.",
+        "{} transitions allow {n_jumps} jumps, {n_mirrored} of them mirrored{drawn}; endless playback uses {share:.0} \
+         % of {} frames.",
         library.transitions.len(),
         library.poses.frames.len()
     )
@@ -235,7 +235,7 @@ mod tests {
         };
         assert!(arc_of("accent").contains(" 0 0 1 "), "above, left to right");
         assert!(arc_of("soft").contains(" 0 0 0 "), "below");
-        assert!(svg.contains("make 2 jumps, 1 of them to the mirror image"));
+        assert!(svg.contains("allow 2 jumps, 1 of them mirrored"));
     }
 
     #[test]

@@ -140,7 +140,9 @@ impl VideoWriter {
         if (frame.width, frame.height, frame.color) != (width, height, color)
             || self.coding.takes_rgba()
         {
-            return Err(Error::BadOutput("a frame of another size or color"));
+            return Err(Error::BadOutput(
+                "the size or color format of a frame differs from that of the video",
+            ));
         }
         if width % 2 == 0 && height % 2 == 0 || !self.coding.is_even() {
             return self.give(&frame.planes);
@@ -156,14 +158,18 @@ impl VideoWriter {
     pub fn write_rgba(&mut self, rgba: &[u8]) -> Result<(), Error> {
         let n_bytes = self.format.width as usize * self.format.height as usize * 4;
         if rgba.len() != n_bytes || !self.coding.takes_rgba() {
-            return Err(Error::BadOutput("a picture of another size or kind"));
+            return Err(Error::BadOutput(
+                "the size or kind of a picture differs from that of the output",
+            ));
         }
         self.give(rgba)
     }
 
     fn give(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let Some(child) = &mut self.child else {
-            return Err(Error::BadOutput("a frame after a failure"));
+            return Err(Error::BadOutput(
+                "the encoder has failed before and takes no more frames",
+            ));
         };
         let written = child.write_all(bytes);
         if written.is_err() {
@@ -174,12 +180,11 @@ impl VideoWriter {
 
     /// Completes the video and moves the file to its path.
     pub fn finish(mut self) -> Result<(), Error> {
-        let child = self
-            .child
-            .take()
-            .ok_or(Error::BadOutput("an end after a failure"))?;
+        let child = self.child.take().ok_or(Error::BadOutput(
+            "the encoder has failed before and cannot finish the file",
+        ))?;
         child.finish()?.check()?;
-        std::fs::rename(&self.part.0, &self.path).map_err(Error::io("naming the video"))
+        std::fs::rename(&self.part.0, &self.path).map_err(Error::io("renaming the finished video"))
     }
 }
 

@@ -203,7 +203,7 @@ fn in_order<T>(mut named: Vec<(String, T)>, place: &str, limits: &Limits) -> Res
     if named.is_empty() {
         let endings = ENDINGS.join(", .");
         return Err(Error::NotAVideo(format!(
-            "{place} holds no pictures (.{endings})"
+            "{place} contains no pictures (.{endings})"
         )));
     }
     if named.len() > limits.max_frames {

@@ -75,7 +75,9 @@ pub(super) fn read_header(
     let mut json = vec![0; MAX_HEADER_BYTES];
     let n_read = child.read_full(&mut json)?;
     if n_read == json.len() {
-        return Err(Error::NotAVideo("its header has no end".into()));
+        return Err(Error::NotAVideo(
+            "the header of the file is too large".into(),
+        ));
     }
     let end = child.finish()?;
     let says = |what| end.complaint.contains(what);

@@ -45,7 +45,7 @@ const fn high(argument: u32) -> u32 {
 /// Returns why this machine does not support the filter; `None` if it does.
 pub(super) fn lack() -> Option<String> {
     if ARCH.is_none() {
-        return Some("the list of system calls is not written for this processor".to_owned());
+        return Some("the system call filter does not support this processor".to_owned());
     }
     const ASK_ACTION: libc::c_ulong = 2;
     let action = libc::SECCOMP_RET_ERRNO;

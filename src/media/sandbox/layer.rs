@@ -55,11 +55,13 @@ impl Layer {
     /// Returns what a malicious film could do without the layer.
     pub fn meaning(self) -> &'static str {
         match self {
-            Layer::Leash => "a decoder could go on after flockreel has died",
-            Layer::Privileges => "a decoder run by root would have root's powers",
+            Layer::Leash => "without this layer, a decoder could outlive flockreel",
+            Layer::Privileges => {
+                "without this layer, a decoder started by root would have root's privileges"
+            }
             Layer::Limits => "a film could use up memory, processor or disk",
             Layer::Files => "a film that takes over its decoder could read other files",
-            Layer::Network => "a second wall before the network is missing",
+            Layer::Network => "without this layer, only the layer `calls` blocks the network",
             Layer::Signals => "a film that takes over its decoder could stop other processes",
             Layer::Calls => {
                 "a film that takes over its decoder could use the network and start programs"
@@ -112,7 +114,7 @@ pub(in crate::media) fn lack_of(layer: Layer) -> Option<String> {
     let landlock = |since: i64, linux: &str| match landlock_abi() {
         Ok(abi) if abi >= since => None,
         Ok(abi) => Some(format!(
-            "Landlock {abi} of this kernel is too old: it needs Linux {linux}"
+            "this kernel has Landlock {abi}, which is too old: the layer needs Linux {linux}"
         )),
         Err(errno) => Some(format!("this kernel has no Landlock: {errno}")),
     };

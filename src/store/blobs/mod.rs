@@ -279,8 +279,15 @@ impl Store {
             {
                 self.blobs.discard(folder).await?;
             }
-            Ok(false) => tracing::warn!(folder, "a folder without a row is left to the sweep"),
-            Err(unknown) => tracing::warn!(folder, %unknown, "a folder is left to the sweep"),
+            Ok(false) => tracing::warn!(
+                folder,
+                "a folder without a row was not removed; the sweep removes it if no row names it then"
+            ),
+            Err(unknown) => tracing::warn!(
+                folder,
+                %unknown,
+                "the outcome of a transaction is unknown; the sweep removes the folder if no row names it"
+            ),
         }
         Ok(false)
     }

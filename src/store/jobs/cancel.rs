@@ -53,7 +53,7 @@ impl Store {
             ended => Cancel::Final(ended),
         };
         transaction.commit().await?;
-        tracing::info!(job.id = %job, ?met, "job cancel asked for");
+        tracing::info!(job.id = %job, ?met, "job cancellation requested");
         Ok(met)
     }
 }

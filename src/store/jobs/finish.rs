@@ -65,7 +65,7 @@ impl Store {
         .execute(&mut transaction)
         .await?;
         if Change::of_rows(n_rows) == Change::Lost {
-            tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job finished too late");
+            tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job result discarded: its lease was lost");
             return Ok(Change::Lost);
         }
         blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;

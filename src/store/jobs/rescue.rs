@@ -56,7 +56,7 @@ impl Store {
         }
         transaction.commit().await?;
         for (job, state) in &rescued {
-            tracing::warn!(job.id = %job, state = state.name(), "job rescued from a silent worker");
+            tracing::warn!(job.id = %job, state = state.name(), "job rescued: its worker stopped or its lease ended");
         }
         Ok(rescued)
     }

@@ -169,7 +169,7 @@ async fn is_idle(connection: &mut SqliteConnection) -> bool {
     let begun = connection.execute(sqlx::raw_sql("begin; rollback")).await;
     let is_idle = begun.is_ok() && !connection.is_in_transaction();
     if !is_idle {
-        tracing::warn!("the database's connection is opened again after a transaction that failed");
+        tracing::warn!("a database connection is replaced after a failed transaction");
     }
     is_idle
 }

@@ -77,7 +77,7 @@ impl Reserve {
         kept.give()?;
         let ended = work().await;
         if let Err(error) = kept.make().await {
-            tracing::warn!(%error, "the disk is full: nothing new is stored until there is room");
+            tracing::warn!(%error, "the disk is full: new data is refused until space is free");
         }
         ended
     }

@@ -49,7 +49,8 @@ impl Store {
             }
             snapshot.close().await;
         }
-        let sentence = "files are deleted faster than they can be copied: try again";
+        let sentence =
+            "stored files are deleted faster than they can be copied: run the backup again later";
         Err(Error::Io(io::Error::other(sentence)))
     }
 
@@ -115,7 +116,9 @@ impl Store {
             Ok(found) if found == (file.size_bytes, file.sha256.clone()) => {}
             Ok(_) => {
                 let name = &file.name;
-                let sentence = format!("a stored file is broken, run `check`: {folder}/{name}");
+                let sentence = format!(
+                    "a stored file is damaged, `flockreel check` lists all: {folder}/{name}"
+                );
                 return Err(io::Error::other(sentence).into());
             }
             Err(error) => return Err(error),

@@ -58,7 +58,7 @@ fn a_film_whose_scene_moves_leaves_the_picture_that_it_tells_of() {
     let done = flockreel(&films, "analyze pan.mp4 -o deep/library");
     let said = String::from_utf8(done.stderr).expect("it is text");
     assert!(
-        said.contains("what was seen: deep/library.refused.jpg"),
+        said.contains("picture of the refused frames: deep/library.refused.jpg"),
         "{said}"
     );
     let picture = std::fs::read(films.path("deep/library.refused.jpg")).expect("it is there");
@@ -83,7 +83,7 @@ fn every_option_that_an_advice_names_is_one() {
         let sentence = String::from_utf8(done.stderr).expect("it is text");
         // The option was parsed, because the error is about the film.
         assert!(
-            sentence.contains("cannot be read") && sentence.contains("nowhere.mp4"),
+            sentence.contains("cannot read the file") && sentence.contains("nowhere.mp4"),
             "{option}: {sentence}"
         );
     }
@@ -122,7 +122,7 @@ fn a_folder_that_is_no_library_is_named() {
         let done = flockreel(&films, &format!("{command} nowhere -o out.mp4"));
         let sentence = String::from_utf8(done.stderr).expect("it is text");
         assert_eq!(done.status.code(), Some(2), "{command}: {sentence}");
-        let named = sentence.contains("not a library: nowhere") || command == "matrix";
+        let named = sentence.contains("cannot read the library: nowhere") || command == "matrix";
         assert!(named, "{command}: {sentence}");
         assert!(names(&films).is_empty(), "{command}");
     }

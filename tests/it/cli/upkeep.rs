@@ -271,6 +271,6 @@ async fn a_flag_wins_over_the_environment_that_over_the_file_and_that_over_the_d
     assert_eq!(done.status.code(), Some(2));
     assert_eq!(
         said(&done),
-        "flockreel: no setting is called rat, in: settings.toml\n"
+        "flockreel: the setting rat is unknown, in: settings.toml\n"
     );
 }

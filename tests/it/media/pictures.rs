@@ -207,7 +207,7 @@ fn more_pictures_than_the_limit_are_refused_and_a_folder_without_any() {
     let refused = Video::open(&films.path("empty"), &Limits::default()).expect_err("no picture");
     assert_eq!(refused.code(), Code::NotAVideo);
     assert!(
-        refused.to_string().contains("holds no pictures"),
+        refused.to_string().contains("contains no pictures"),
         "{refused}"
     );
 }

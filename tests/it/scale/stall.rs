@@ -55,7 +55,7 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
 
     stalled.signal(Signal::CONT);
     let lets_go = async || {
-        ["job stopped", "job finished too late", "job failed"]
+        ["job stopped", "job result discarded", "job failed"]
             .iter()
             .any(|words| stalled.has_said(words))
     };

@@ -13,8 +13,8 @@ impl Advice {
             Advice::OtherMovers(n, mover) => write_movers(f, *n, mover),
             Advice::ForeignFrames(n, from_s) => write!(
                 f,
-                "{n} frames show another scene, the first at {from_s:.1} s, and nothing is measured in them: cut them off \
-                 before you send the film"
+                "{n} frames show another scene, the first at {from_s:.1} s, and are not measured: cut them out of the \
+                 film"
             ),
             Advice::ViewUnsure(view, probability) => {
                 let (seen, other) = match view {
@@ -23,7 +23,7 @@ impl Advice {
                 };
                 write!(
                     f,
-                    "the animal seems to be filmed {seen} ({}): if it is not, set view to {other}",
+                    "the film seems to show the animal {seen} (probability {}): set view to {other} if this is wrong",
                     percent(probability)
                 )
             }
@@ -53,16 +53,16 @@ impl Motion {
         match (playable_s > 0.0, filmed_s > 0.0) {
             (false, false) => write!(
                 f,
-                "this footage never shows the animal {words}: film longer"
+                "the footage never shows the animal {words}: film for longer"
             ),
             (false, true) => write!(
                 f,
-                "this footage shows the animal {words} for {filmed_s:.1} s, but never where playback can go \
-                 on: film longer"
+                "the footage shows the animal {words} for {filmed_s:.1} s, but in no part that playback can use: film \
+                 for longer"
             ),
             (true, _) => write!(
                 f,
-                "only {:.1} s of what can be played show the animal {words}: film longer",
+                "playback can show the animal {words} for only {:.1} s: film for longer",
                 (10.0 * playable_s).ceil() / 10.0
             ),
         }
@@ -74,58 +74,59 @@ impl fmt::Display for Advice {
         match self {
             Advice::AnimalTooSmall => write!(
                 f,
-                "the animal covers too few pixels to be cut out: come nearer, or film at a higher resolution"
+                "the animal covers too few pixels for sprites: film from a shorter distance, or at a higher resolution"
             ),
             Advice::SeveralAnimals => write!(
                 f,
-                "several animals move in this footage, and the largest was followed: film one alone"
+                "several animals move in the film, and the largest was followed: film a single animal"
             ),
             Advice::OtherMovers(..) | Advice::ForeignFrames(..) | Advice::ViewUnsure(..) => {
                 self.write_scene(f)
             }
             Advice::SeldomFound(share) => write!(
                 f,
-                "the animal was found in only {} of the frames: keep it in view, before a background that it \
-                 stands out from",
+                "the animal was found in only {} of the frames: point at it (animal_at) if it rests for long; \
+                 otherwise keep it in view, in front of a contrasting background",
                 percent(share)
             ),
             Advice::OftenAtBorder(share) => write!(
                 f,
-                "the animal touches the border of the picture in {} of the frames: step back",
+                "the animal touches the border of the picture in {} of the frames in which it was found: film from a \
+                 greater distance",
                 percent(share)
             ),
             Advice::NoTransitions => write!(
                 f,
-                "no moment of this footage leads back to an earlier one, so no flock can be made of it: film longer"
+                "no moment of the footage is similar to an earlier one, so playback always ends and no flock can be \
+                 made: film for longer"
             ),
             Advice::LittlePlayback(share, seconds) => write!(
                 f,
-                "only {} of the footage ({seconds:.1} s) can be played without an end: film longer",
+                "endless playback can use only {} of the footage ({seconds:.1} s): film for longer",
                 percent(share)
             ),
             Advice::FewJumps(n) => write!(
                 f,
-                "playback can leave its course at only {n} moments, so a flock will repeat itself: film longer"
+                "playback can jump at only {n} frames, so a flock will repeat itself: film for longer"
             ),
             Advice::LooseJumps(kappa) => write!(
                 f,
-                "to find enough moments that look alike, differences up to {kappa:.1} times a natural step had to be \
-                 allowed, so jumps may be seen: film longer"
+                "similar moments are rare: the limit for jumps was raised to {kappa:.1} times a natural step, so \
+                 jumps may be visible; film for longer"
             ),
             Advice::MostlyRests(share) => write!(
                 f,
-                "the animal moves in only {} of what can be played: film it while it is lively",
+                "the animal moves in only {} of the playable frames: film it while it is active",
                 percent(share)
             ),
             Advice::SomeMissed(recall) => write!(
                 f,
-                "like moments were looked for approximately, and {} of them were found: set approximate to false \
-                 to find all",
+                "the approximate search found {} of the similar moments: set approximate to false to find all",
                 percent(recall)
             ),
             Advice::ManyFrames(n) => write!(
                 f,
-                "all {n} frames were compared with one another: set approximate to true where that takes too long"
+                "all {n} frames were compared with each other: set approximate to true if the analysis takes too long"
             ),
             Advice::Lacks(motion, playable_s, filmed_s) => {
                 motion.lacking(f, *playable_s, *filmed_s)
@@ -141,23 +142,23 @@ fn percent(share: &f64) -> String {
 /// Writes what else moved, with time and box.
 fn write_movers(f: &mut fmt::Formatter<'_>, n: usize, mover: &Mover) -> fmt::Result {
     let what = match mover.kind {
-        MoverKind::Animal => "something that looks like the animal",
+        MoverKind::Animal => "an object that looks like the animal",
         MoverKind::MirrorImage => "the animal's mirror image",
-        MoverKind::FromBorder => "something that reaches in across the border (a hand, a cable)",
-        MoverKind::InPlace => "something that stays at its place (a plant, a clock, a reflection)",
+        MoverKind::FromBorder => "an object that reaches across the border (a hand, a cable)",
+        MoverKind::InPlace => "an object that stays in one place (a plant, a clock, a reflection)",
         MoverKind::Other => "something else",
     };
     let Rect { x, y, w, h } = mover.box_px;
     write!(
         f,
-        "besides the animal {what} moved, from {:.1} to {:.1} s, within the box {x},{y},{w},{h}",
+        "{what} also moves, from {:.1} to {:.1} s, within the box {x},{y},{w},{h}",
         mover.from_s, mover.to_s
     )?;
     match n {
-        1 => write!(f, ": see whether the right one was measured"),
+        1 => write!(f, ": check that the measured object is the animal"),
         n => write!(
             f,
-            ", and {} more: see whether the right one was measured",
+            ", and {} more: check that the measured object is the animal",
             n - 1
         ),
     }
