@@ -99,7 +99,7 @@ mod tests {
         assert_eq!(error.exit_code(), 2);
         let sentence = error.to_string();
         assert!(
-            sentence.starts_with("individual 1: cost.total says 0.000000 rad"),
+            sentence.starts_with("individual 1: cost.total is 0.000000 rad"),
             "{sentence}"
         );
         assert!(sentence.ends_with("(wrong_cost)"), "{sentence}");

@@ -208,7 +208,7 @@ fn above_fifty_thousand_frames_an_approximate_search_is_offered_and_its_misses_a
     library.stats.recall = Some(0.934);
     let said = said(&library, true);
     assert_eq!(said[0].0, "some_missed");
-    assert!(said[0].1.contains("93 % of them were found"), "{said:?}");
+    assert!(said[0].1.contains("found 93 %"), "{said:?}");
     library.stats.n_frames = 50_000;
     library.stats.recall = None;
     assert_eq!(codes(&library, true), [""; 0]);
