@@ -91,8 +91,7 @@ impl fmt::Display for Advice {
             ),
             Advice::OftenAtBorder(share) => write!(
                 f,
-                "the animal touches the border of the picture in {} of the frames in which it was found: film from a \
-                 greater distance",
+                "the animal touches the border in {} of the frames in which it was found: film from farther away",
                 percent(share)
             ),
             Advice::NoTransitions => write!(
