@@ -26,5 +26,6 @@ HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
     CMD ["curl", "-fsS", "-o", "/dev/null", "http://127.0.0.1:8080/healthz"]
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["flockreel"]
-# The service listens on loopback. Run with `--network host`, or create a token and bind to 0.0.0.0 (README).
+# The service listens on loopback. Run with `--network host`, or create a token and bind to 0.0.0.0
+# (docs/how-to/run-behind-nginx.md).
 CMD ["serve", "--data", "/data"]

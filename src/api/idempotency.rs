@@ -1,6 +1,6 @@
 //! `Idempotency-Key` on every POST that creates something (docs/explanation/promises.md).
 //!
-//! The same key with the same body returns the stored response. Another body gets 422, and a key whose first
+//! An equal key with an equal body returns the stored response. Another body gets 422, and a key whose first
 //! request still runs gets 409. Keys are kept for a day, separately for each owner and route. Server errors
 //! and other transient errors are not stored. A request that is repeated after a crash runs again with the
 //! same ids (`jobs::allotted`), so it creates nothing twice.

@@ -144,3 +144,30 @@ fn forward(pose: &Pose, view: View, length_px: f64) -> Option<Vec3> {
     let seen = (pose.length_px? / length_px).clamp(0.0, 1.0);
     Some([seen * cos, seen * sin, (1.0 - seen * seen).sqrt()])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::synthetic;
+
+    #[test]
+    fn states_rank_frames_by_speed() {
+        let library = synthetic::library(View::Top);
+        let at = |speed_bl_per_s| FrameMotion {
+            speed_bl_per_s,
+            ..FrameMotion::default()
+        };
+        // The usual speed is 1.
+        let mut motion = vec![at(1.0); library.poses.frames.len()];
+        for (moved, speed) in motion.iter_mut().zip([0.05, 0.3, 1.5, 2.5]) {
+            *moved = at(speed);
+        }
+        let wanted = [
+            MotionState::Rest,
+            MotionState::Slow,
+            MotionState::Go,
+            MotionState::Dart,
+        ];
+        assert_eq!(states(&library, &motion)[..4], wanted);
+    }
+}

@@ -388,6 +388,9 @@ mod tests {
         let sentence = "count times frames must be at most 4000000: 20000000";
         assert_eq!(crowd, Err(sentence.into()));
         let mut params = Params::default();
+        params.rules.picture_separation_bl = -1.0;
+        assert!(params.check().is_err(), "a negative radius");
+        let mut params = Params::default();
         params.matching.wx = f64::NAN;
         let sentence = params.check().expect_err("NaN lies in no range");
         assert!(sentence.starts_with("matching.wx"), "{sentence}");

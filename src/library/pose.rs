@@ -133,7 +133,7 @@ pub struct Pose {
     pub pitch_rad: Option<f64>,
     /// Angle between `forward` and the image plane, radians, 0..=pi/2 (Nakajima et al., equation 8).
     pub gamma_rad: Option<f64>,
-    /// The same quantities from this frame only, before smoothing over all frames.
+    /// Pose from this frame only, before smoothing over all frames.
     pub raw: Option<Raw>,
 }
 

@@ -19,7 +19,7 @@ const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
 /// milliseconds. Free choice.
 pub const LEASE_MS: i64 = 15_000;
 
-/// What identifies a key: the same text from another caller or for another route is another key.
+/// Identity of a key. Equal texts from different callers, or for different routes, are different keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scope {
     /// Owner of everything that the request creates.
@@ -70,7 +70,7 @@ impl Store {
         now_ms: i64,
     ) -> Result<Begun, Error> {
         let mut transaction = self.writer.begin().await?;
-        // Of two simultaneous requests one begins, and the other sees its key.
+        // One of two simultaneous requests begins, and the other sees its key.
         let name = format!("key {} {} {}", scope.caller, scope.route, scope.key);
         transaction.lock(&name).await?;
         sql::query("delete from idempotency where created_ms <= $1")

@@ -69,7 +69,7 @@ impl Coat<'_> {
 
     /// Returns the difference as a share of the brightest channel of pixel and background, 0..=1.
     ///
-    /// The same shadow differs by more levels where the floor is brighter; the share stays equal.
+    /// A shadow differs by more levels where the floor is brighter; the share stays equal.
     fn share(&self, k: usize) -> f64 {
         let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
         let (x, y) = ((k % width) as u32, (k / width) as u32);

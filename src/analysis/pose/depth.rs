@@ -2,8 +2,8 @@
 //!
 //! The height of the silhouette gives the depth. The visible share of the known length at that depth gives
 //! the angle to the image plane. The paper leaves open whether the animal swims away or toward the camera.
-//! Here the change of depth since the previous measured frame decides. These are the raw values; `direction`
-//! has the best estimate. See docs/explanation/algorithms.md, "Corrections to the papers".
+//! This module decides by the change of depth since the previous measured frame. Its values are raw;
+//! `direction` has the best estimate. See docs/explanation/algorithms.md, "Corrections to the papers".
 
 use crate::analysis::Params;
 use crate::analysis::params::Eq7;

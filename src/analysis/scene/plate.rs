@@ -15,7 +15,7 @@ pub(super) const SIGMA_FLOOR: f32 = 1.5;
 pub struct Plate {
     /// The picture, in the decoder's format.
     pub frame: Frame,
-    /// The same picture in RGB.
+    /// The background in RGB.
     pub rgb: RgbImage,
     /// Second color of pixels that scenery sways across; equal to `rgb` elsewhere. Colors between the two
     /// count as background. `None` where nothing sways.

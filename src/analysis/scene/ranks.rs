@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn what_stays_as_it_is_is_the_commonest_though_something_passes_more_often() {
-        // Of 60 free samples, 20 show the scene, and no ten of the other 40 are alike. Four samples are not
+        // Among 60 free samples, 20 show the scene, and no ten of the other 40 are alike. Four samples are not
         // free.
         let value = |k: usize| {
             if k.is_multiple_of(3) {

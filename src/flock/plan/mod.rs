@@ -118,8 +118,8 @@ pub struct Planner<'a> {
     /// Positions of all boids, by frame.
     places: Vec<Places>,
     boids: &'a [BoidTrack],
-    /// What was shown before the segment, by id; empty for the first segment. In later segments frame 0 of
-    /// `places` is that of the frame before the segment.
+    /// State of each individual before the segment, by id; empty for the first segment. In later segments,
+    /// entry 0 of `places` belongs to the last frame of the previous segment.
     standings: &'a [Standing],
     /// Whether no segment follows.
     is_last: bool,

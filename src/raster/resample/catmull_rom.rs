@@ -12,9 +12,9 @@ pub(super) const HALF_PLACE: i32 = (1 << 16) / (2 * PLACES as i32);
 
 /// The weights of the four taps at each position; their sum is 32767.
 pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
-/// The same weights, each repeated for the four values of a pixel.
+/// Weights as above, each repeated for the four values of a pixel.
 pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
-/// The same weights, each stored twice in 32 bits, ready for a broadcast to a vector register.
+/// Weights as above, each stored twice in 32 bits, ready for a broadcast to a vector register.
 #[cfg(target_arch = "x86_64")]
 pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
 

@@ -1,4 +1,4 @@
-//! Who may import whom: the table, and the reader that finds what a file imports.
+//! Table of allowed imports, and the reader that finds the imports of a file.
 
 pub(super) const VALUES: &[&str] = &[
     "geometry", "raster", "random", "cpu", "progress", "code", "ids", "scratch", "order",

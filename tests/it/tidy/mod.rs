@@ -33,7 +33,7 @@ fn a_module_imports_only_what_its_ring_may() {
 fn the_outside_world_has_its_doors() {
     let algorithms: Vec<&str> = [VALUES, MIDDLE, ALGORITHMS].concat();
     let with = |more: &[&'static str]| [algorithms.as_slice(), more].concat();
-    // What is looked for, and the modules it may not stand in.
+    // Forbidden texts, and the modules that may not contain them.
     let rules: Vec<(&[&str], Vec<&str>)> = vec![
         (
             &["axum::", "tower_http::", "hyper::"],

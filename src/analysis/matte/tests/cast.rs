@@ -67,7 +67,7 @@ fn a_limb_apart_from_the_body_is_no_image() {
     }
 }
 
-/// The same body, half of it in front of the wall.
+/// That body, half of it in front of the wall.
 fn across_the_wall(x: u32, y: u32) -> u8 {
     match away([x.saturating_sub(25), y], BODY) {
         0 => FUR,
@@ -84,7 +84,7 @@ fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
     }
 }
 
-/// The same scene, and an image farther along the wall, as dark as the body.
+/// That scene, and an image farther along the wall, as dark as the body.
 fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
     let is_image = (92..102).contains(&x) && (29..36).contains(&y);
     if is_image { FUR } else { across_the_wall(x, y) }
