@@ -117,16 +117,6 @@ impl fmt::Display for Advice {
                 "the animal moves in only {} of what can be played: film it while it is lively",
                 percent(share)
             ),
-            Advice::SomeMissed(recall) => write!(
-                f,
-                "like moments were looked for approximately, and {} of them were found: set approximate to false \
-                 to find all",
-                percent(recall)
-            ),
-            Advice::ManyFrames(n) => write!(
-                f,
-                "all {n} frames were compared with one another: set approximate to true where that takes too long"
-            ),
             Advice::Lacks(motion, playable_s, filmed_s) => {
                 motion.lacking(f, *playable_s, *filmed_s)
             }
