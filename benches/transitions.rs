@@ -2,8 +2,8 @@
 //! (docs/explanation/algorithms.md, "Transitions and playback" and "Quality measures").
 //!
 //! With `LIBRARY_DIR`, uses the sprites of that library. Compares the time for all distances with the time
-//! for the transitions below its epsilon, on one thread and on all. With `N [approximate]`, draws N sprites
-//! and times the whole search, exact or approximate. Prints one line of JSON.
+//! for the transitions below its epsilon, on one thread and on all. With `N`, draws N sprites
+//! and times the whole search. Prints one line of JSON.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -25,10 +25,7 @@ fn main() {
     match arguments.next() {
         None => println!("arguments: LIBRARY_DIR, or a number of frames"),
         Some(argument) => match argument.parse() {
-            Ok(n_frames) => {
-                let approximate = arguments.next().is_some_and(|word| word == "approximate");
-                from_end_to_end(n_frames, approximate);
-            }
+            Ok(n_frames) => from_end_to_end(n_frames),
             Err(_) => pruned_against_all(Path::new(&argument)),
         },
     }
@@ -129,7 +126,7 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
 }
 
 /// Draws sprites of 96 x 64 pixels and times the search for their transitions only.
-fn from_end_to_end(n_frames: usize, approximate: bool) {
+fn from_end_to_end(n_frames: usize) {
     let swim = Swim::new(n_frames);
     let scratch = Arc::new(Spill::into(&std::env::temp_dir()));
     let sprites = Sprites::drawn([96, 64], n_frames, scratch, |frame_idx, rgba| {
@@ -138,24 +135,18 @@ fn from_end_to_end(n_frames: usize, approximate: bool) {
     });
     let sprites = sprites.expect("the disk has room");
     let poses = swim.poses();
-    let params = Params {
-        approximate,
-        ..Params::default()
-    };
+    let params = Params::default();
     let start = Instant::now();
     let found = transition::connect(&sprites, &poses, &params, Level::detect(), &Silent);
     let found = found.expect("nobody cancels");
     println!(
         "{{\"frames\":{n_frames},\"seconds\":{:.3},\"peak_mb\":{},\"candidates\":{},\
-         \"transitions\":{},\"component_share\":{:.3},\"recall\":{}}}",
+         \"transitions\":{},\"component_share\":{:.3}}}",
         start.elapsed().as_secs_f64(),
         peak_mb(),
         found.n_candidates,
         found.transitions.len(),
         found.component_share,
-        found
-            .recall
-            .map_or("null".into(), |recall| format!("{recall:.4}")),
     );
 }
 

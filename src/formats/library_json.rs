@@ -59,7 +59,7 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
     let file = LibraryFile {
         schema: SCHEMA.into(),
         version: env!("CARGO_PKG_VERSION").into(),
-        params: params.clone(),
+        params: Some(params.clone()),
         footage: footage.clone(),
         sprite_size_px: [library.sprites.width(), library.sprites.height()],
         sprite_scale: library.sprites.scales().map(<[f64]>::to_vec),
@@ -90,7 +90,7 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
     let file: LibraryFile = serde_json::from_slice(bytes)?;
     Ok(Summary {
         footage: file.footage,
-        params: file.params,
+        params: file.params.unwrap_or_default(),
         sprite_size_px: file.sprite_size_px,
         sprite_scale: file.sprite_scale,
         matte_center_px: file.matte_center_px,
@@ -121,7 +121,8 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
 struct LibraryFile {
     schema: String,
     version: String,
-    params: Params,
+    #[serde(deserialize_with = "super::params::of_any_version")]
+    params: Option<Params>,
     footage: FootageSummary,
     sprite_size_px: [u32; 2],
     /// Absent in older files.
@@ -276,8 +277,6 @@ struct StatsFile {
     #[serde(default)]
     animal_too_small: bool,
     n_candidates: u64,
-    #[serde(default)]
-    recall: Option<f64>,
     n_transitions: usize,
     kappa_used: Option<f64>,
     component_share: f64,
@@ -324,7 +323,6 @@ impl StatsFile {
             first_foreign_s: stats.first_foreign_s.map(digits(3)),
             animal_too_small: stats.animal_too_small,
             n_candidates: stats.n_candidates,
-            recall: stats.recall.map(digits(5)),
             n_transitions: stats.n_transitions,
             kappa_used: stats.kappa_used,
             component_share: digits(5)(stats.component_share),
@@ -346,7 +344,6 @@ impl StatsFile {
             first_foreign_s: self.first_foreign_s,
             animal_too_small: self.animal_too_small,
             n_candidates: self.n_candidates,
-            recall: self.recall,
             n_transitions: self.n_transitions,
             kappa_used: self.kappa_used,
             component_share: self.component_share,
@@ -377,6 +374,7 @@ mod tests {
         assert_eq!(file["stats"]["advice"][0]["code"], "no_transitions");
         let stats = file["stats"].as_object_mut().expect("an object");
         stats.remove("advice").expect("just seen");
+        file["params"]["approximate"] = true.into();
         let older = serde_json::to_vec(&file).expect("JSON");
         assert_eq!(
             read(&older).expect("a library").stats,

@@ -1,8 +1,8 @@
 //! Parameters from JSON: `{"preset": "papers", "kappa": 3}` overrides values of a preset; without a preset it
 //! overrides the defaults. All kinds of parameters use this module.
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
 use crate::{analysis, fish, flock};
@@ -84,6 +84,21 @@ impl Preset for fish::Params {
     fn check(&self) -> Result<(), String> {
         fish::Params::check(self)
     }
+}
+
+/// Parameters of an analysis that no longer exist. Files of older versions hold them.
+const REMOVED: [&str; 1] = ["approximate"];
+
+/// Reads the parameters of an analysis from a file of any version; null if the file has none.
+pub(super) fn of_any_version<'de, D: Deserializer<'de>>(
+    file: D,
+) -> Result<Option<analysis::Params>, D::Error> {
+    let Some(mut fields) = Option::<Map<String, Value>>::deserialize(file)? else {
+        return Ok(None);
+    };
+    fields.retain(|name, _| !REMOVED.contains(&name.as_str()));
+    let params = serde_json::from_value(Value::Object(fields));
+    params.map(Some).map_err(D::Error::custom)
 }
 
 fn invalid(error: serde_json::Error) -> Error {

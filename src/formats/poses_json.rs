@@ -95,6 +95,7 @@ pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
 struct PosesFile<Frames> {
     schema: String,
     version: String,
+    #[serde(default, deserialize_with = "super::params::of_any_version")]
     params: Option<Params>,
     fps: f64,
     image_size_px: [u32; 2],

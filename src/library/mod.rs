@@ -108,9 +108,6 @@ pub struct LibraryStats {
     /// Such clips are complete and far enough apart; the animal has the same heading, or from above the same
     /// turn rate.
     pub n_candidates: u64,
-    /// Share of such pairs that an approximate search finds, 0..=1, estimated from 256 clips. Null if the
-    /// search compared all pairs.
-    pub recall: Option<f64>,
     /// Number of transitions: pairs that are also local minima of the distance (72 in Okabe et al.).
     pub n_transitions: usize,
     /// Ratio of epsilon to the natural step; null if epsilon was given.

@@ -10,7 +10,6 @@ mod asked;
 mod bounds;
 mod group;
 mod kernel;
-mod lists;
 mod marks;
 mod matrix;
 mod minima;
@@ -24,7 +23,6 @@ mod window;
 pub(crate) mod tests;
 
 pub use asked::{Asked, Everything};
-pub use lists::Lists;
 pub use marks::Marks;
 pub use matrix::DistanceMatrix;
 pub use minima::{ClipPair, LocalMinima};

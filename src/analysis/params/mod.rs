@@ -58,9 +58,6 @@ pub struct Params {
     /// Multiple of the natural step that gives `epsilon` when that is null, > 0. If playback is then too
     /// short, the analysis tries larger values.
     pub kappa: f64,
-    /// Whether to compare only roughly similar clips. That is faster above 50,000 frames and misses some
-    /// transitions. Those found are correct; `stats.recall` reports their share.
-    pub approximate: bool,
     /// Largest difference between the mean headings of two similar clips in side view, degrees, 0..=180.
     pub heading_gate_deg: f64,
     /// Image planes that are compared: color and alpha (`rgba`), or color only (`rgb`, Okabe et al., equation
@@ -217,7 +214,6 @@ impl Default for Params {
             clip_weights: ClipWeights::Uniform,
             epsilon: None,
             kappa: 2.0,
-            approximate: false,
             heading_gate_deg: 15.0,
             planes: Planes::Rgba,
             mirror: true,

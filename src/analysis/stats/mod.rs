@@ -24,7 +24,6 @@ pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
         n_frames: poses.frames.len(),
         n_detected: poses.frames.iter().filter(|pose| pose.detected()).count(),
         n_candidates: connections.n_candidates,
-        recall: connections.recall,
         n_transitions: connections.transitions.len(),
         kappa_used: connections.kappa_used,
         component_share: component.len() as f64 / poses.frames.len().max(1) as f64,

@@ -198,18 +198,3 @@ fn how_it_was_filmed_comes_before_what_it_shows() {
     assert_eq!(codes(&library, true)[0], "animal_too_small");
     assert!(!codes(&library, true).contains(&"no_transitions"));
 }
-
-#[test]
-fn above_fifty_thousand_frames_an_approximate_search_is_offered_and_its_misses_are_told() {
-    let mut library = library(View::Side, all_round);
-    library.stats.n_detected = 50_001;
-    library.stats.n_frames = 50_001;
-    assert_eq!(codes(&library, true), ["many_frames"]);
-    library.stats.recall = Some(0.934);
-    let said = said(&library, true);
-    assert_eq!(said[0].0, "some_missed");
-    assert!(said[0].1.contains("found 93 %"), "{said:?}");
-    library.stats.n_frames = 50_000;
-    library.stats.recall = None;
-    assert_eq!(codes(&library, true), [""; 0]);
-}

@@ -12,10 +12,10 @@ mod joinable;
 mod tests;
 
 use crate::analysis::distance::{
-    Cancelled, ClipPair, ComparedSprites, Distances, Lists, LocalMinima, Marks, Side,
+    Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Marks, Side,
 };
 use gate::Gate;
-use joinable::{Approximate, Joinable};
+use joinable::Joinable;
 
 use crate::analysis::{Error, Params, playback};
 use crate::cpu::Level;
@@ -45,12 +45,9 @@ pub struct Connections {
     pub natural_step: u64,
     /// Multiple of the natural step that gave epsilon (rounded up); `None` if epsilon was given.
     pub kappa_used: Option<f64>,
-    /// Number of compared unmirrored pairs i < j with D < epsilon that may be joined, before the selection of
+    /// Number of unmirrored pairs i < j with D < epsilon that may be joined, before the selection of
     /// local minima.
     pub n_candidates: u64,
-    /// Share of similar pairs that the approximate search compares, measured on the pairs of 256 clips,
-    /// 0..=1; `None` for an exact search.
-    pub recall: Option<f64>,
     /// Sorted by (from, to, mirrored).
     pub transitions: Vec<Transition>,
     /// The jumps, and the component in which playback never ends.
@@ -101,16 +98,12 @@ pub fn connect_compared(
         clips: &clips,
         gate: Gate::new(poses, clip_frames, params),
         usable,
-        approximate: params.approximate.then(|| {
-            let lists = Lists::of(pixels, clip, params.mirror, cpu);
-            Approximate::new(lists, clips.usable.len())
-        }),
         least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
     };
     let at = |rung: Rung| -> Result<Connections, Error> {
         let found = search.run(rung, params.mirror, progress);
         let found = found.map_err(|Cancelled| Error::Cancelled)?;
-        Ok(found.connections(rung, &clips, steps.median, params.approximate))
+        Ok(found.connections(rung, &clips, steps.median))
     };
     strictest_enough(&rungs(params, steps), &clips, poses.fps, at)
 }
@@ -254,7 +247,6 @@ struct Search<'a> {
     /// The clips that can be used.
     usable: Marks,
     least_gap: usize,
-    approximate: Option<Approximate>,
 }
 
 /// The result of a search below one epsilon.
@@ -263,9 +255,6 @@ struct Found {
     transitions: Vec<Transition>,
     /// Number of pairs before the selection of local minima.
     n_candidates: u64,
-    /// Similar pairs of the sampled clips, and how many of them the approximate search compares.
-    n_alike: u64,
-    n_compared: u64,
 }
 
 impl Search<'_> {
@@ -319,15 +308,9 @@ impl Search<'_> {
     }
 
     /// Returns the transition of a local minimum, or `None` if the pair may not be joined.
-    ///
-    /// An approximate search also measures the neighbors of a compared pair. They compete as local minima,
-    /// but do not become transitions.
     fn transition(&self, pair: ClipPair, asked: &Joinable<'_>) -> Option<Transition> {
         let mirrored = asked.side == Side::Mirrored;
         let heading_gap_rad = self.gate.pass(pair.from, pair.to, mirrored)?;
-        if !asked.is_compared(pair.from, pair.to) {
-            return None;
-        }
         Some(Transition {
             from: pair.from as u32,
             to: pair.to as u32,
@@ -345,30 +328,13 @@ impl Found {
             .iter()
             .map(|pair| pair.to)
             .filter(|j| j - i >= asked.least_gap);
-        let joinable: Vec<usize> = later.filter(|&j| asked.holds(i, j)).collect();
-        let n_compared = joinable
-            .iter()
-            .filter(|&&j| asked.is_compared(i, j))
-            .count() as u64;
         if asked.side == Side::Plain {
-            self.n_candidates += n_compared;
-        }
-        if let Some(approximate) = &asked.search.approximate
-            && approximate.sampled[i]
-        {
-            self.n_alike += joinable.len() as u64;
-            self.n_compared += n_compared;
+            self.n_candidates += later.filter(|&j| asked.holds(i, j)).count() as u64;
         }
     }
 
     /// Builds the playback graph of the transitions.
-    fn connections(
-        self,
-        rung: Rung,
-        clips: &Clips,
-        natural_step: u64,
-        is_approximate: bool,
-    ) -> Connections {
+    fn connections(self, rung: Rung, clips: &Clips, natural_step: u64) -> Connections {
         let playback = clips.playback(&self.transitions);
         let n_frames = clips.shown.len();
         Connections {
@@ -377,10 +343,6 @@ impl Found {
             natural_step,
             kappa_used: rung.kappa,
             n_candidates: self.n_candidates,
-            recall: is_approximate.then(|| match self.n_alike {
-                0 => 1.0,
-                n_alike => self.n_compared as f64 / n_alike as f64,
-            }),
             component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
             patches: playback::patches(&playback),
             transitions: self.transitions,

@@ -193,64 +193,6 @@ proptest! {
     }
 }
 
-/// Returns an animal whose stroke drifts, so that no two moments are identical.
-fn drifting(n_frames: u64) -> (Sprites, Poses) {
-    let mut phase = 0.0f64;
-    let moments: Vec<Option<Moment>> = (0..n_frames)
-        .map(|t| {
-            phase = (phase + 0.05 + 0.02 * random::normal(9, &[t])).rem_euclid(1.0);
-            Some((phase, 0.2 * sin(t as f64 / 50.0)))
-        })
-        .collect();
-    film(&moments)
-}
-
-#[test]
-fn what_an_approximate_search_finds_is_true_and_what_it_misses_is_told() {
-    let (sprites, poses) = drifting(230);
-    let exact = Params {
-        mirror: false,
-        ..params()
-    };
-    let approximate = Params {
-        approximate: true,
-        ..exact.clone()
-    };
-    let of = |params| connect(&sprites, &poses, params, Level::detect(), &Silent);
-    let (all, some) = (of(&exact), of(&approximate));
-    let (all, some) = (all.expect("not cancelled"), some.expect("not cancelled"));
-    assert_eq!((all.recall, all.epsilon), (None, some.epsilon));
-    assert!(!some.transitions.is_empty());
-    assert!(some.transitions.iter().all(|t| all.transitions.contains(t)));
-    // All clips are in the sample, because there are fewer than 256.
-    let share = some.n_candidates as f64 / all.n_candidates as f64;
-    assert_eq!(some.recall, Some(share));
-    assert!((0.8..1.0).contains(&share), "{share}");
-}
-
-#[test]
-fn an_approximate_search_is_the_same_with_any_number_of_threads_and_at_any_level() {
-    let (sprites, poses) = drifting(700);
-    let params = Params {
-        approximate: true,
-        ..params()
-    };
-    let with = |n_threads, cpu| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(n_threads)
-            .build();
-        let run = || connect(&sprites, &poses, &params, cpu, &Silent).expect("not cancelled");
-        pool.expect("threads can be made").install(run)
-    };
-    let one = with(1, Level::Scalar);
-    assert!(
-        one.recall.is_some_and(|recall| recall > 0.7),
-        "{:?}",
-        one.recall
-    );
-    assert_eq!(one, with(2, Level::detect()));
-}
-
 #[test]
 fn epsilon_is_strict() {
     let with = |epsilon| {

@@ -23,8 +23,6 @@ const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
 const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
 /// A guessed view below this probability gives advice. Free choice.
 const SURE: f64 = 0.9;
-/// Above this number of frames the advice recommends the approximate search. Free choice.
-const MANY_FRAMES: usize = 50_000;
 /// Speed below which the animal rests, body lengths per second. Free choice.
 const REST_BL_PER_S: f64 = 0.1;
 /// Half the time span over which speed and turning rate are measured, seconds. Free choice.
@@ -57,10 +55,6 @@ pub enum Advice {
     LooseJumps(f64),
     /// Share of playable frames in which the animal moves, below 0.25.
     MostlyRests(f64),
-    /// Share of the similar moments that the approximate search found, 0..=1.
-    SomeMissed(f64),
-    /// Number of frames that were all compared with each other, above 50,000. `approximate` is faster.
-    ManyFrames(usize),
     /// A motion, its duration in playback (below 0.5 s), and its duration in the footage, seconds.
     Lacks(Motion, f64, f64),
 }
@@ -104,8 +98,6 @@ impl Advice {
             Advice::FewJumps(_) => "few_jumps",
             Advice::LooseJumps(_) => "loose_jumps",
             Advice::MostlyRests(_) => "mostly_rests",
-            Advice::SomeMissed(_) => "some_missed",
-            Advice::ManyFrames(_) => "many_frames",
             Advice::Lacks(motion, ..) => motion.names().0,
         }
     }
@@ -132,7 +124,6 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     if cut > 0.2 {
         all.push(Advice::OftenAtBorder(cut));
     }
-    of_search(library, params, &mut all);
     match library.playback.jumps.is_empty() {
         // Without sprites nothing is compared. The size of the animal is then the reason.
         true if stats.animal_too_small => {}
@@ -160,18 +151,6 @@ fn of_scene(library: &Library, all: &mut Vec<Advice>) {
             all.push(Advice::ViewUnsure(poses.view, probability));
         }
         _ => {}
-    }
-}
-
-/// Adds advice about the search for transitions.
-fn of_search(library: &Library, params: &Params, all: &mut Vec<Advice>) {
-    let n_frames = library.stats.n_frames;
-    match library.stats.recall {
-        Some(recall) => all.push(Advice::SomeMissed(recall)),
-        None if n_frames > MANY_FRAMES && !params.approximate => {
-            all.push(Advice::ManyFrames(n_frames));
-        }
-        None => {}
     }
 }
 

@@ -118,15 +118,6 @@ impl fmt::Display for Advice {
                 "the animal moves in only {} of the playable frames: film it while it is active",
                 percent(share)
             ),
-            Advice::SomeMissed(recall) => write!(
-                f,
-                "the approximate search found {} of the similar moments: set approximate to false to find all",
-                percent(recall)
-            ),
-            Advice::ManyFrames(n) => write!(
-                f,
-                "all {n} frames were compared with each other: set approximate to true if the analysis takes too long"
-            ),
             Advice::Lacks(motion, playable_s, filmed_s) => {
                 motion.lacking(f, *playable_s, *filmed_s)
             }
