@@ -52,7 +52,7 @@ fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
         .build()
         .expect("threads");
     pool.install(|| {
-        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        let mut boids = Boids::at_random(&params, &calibration, &lens, &tank, 30.0);
         let mut run = || {
             let start = Instant::now();
             (0..steps).for_each(|_| boids.advance());

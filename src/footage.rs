@@ -91,7 +91,7 @@ pub struct Part<'a> {
 impl<'a> Part<'a> {
     /// Selects the frames from `from_s` up to `to_s`, seconds from the first frame of `source`. `None` leaves
     /// that end open.
-    pub fn of(source: &'a dyn FrameSource, from_s: Option<f64>, to_s: Option<f64>) -> Part<'a> {
+    pub fn new(source: &'a dyn FrameSource, from_s: Option<f64>, to_s: Option<f64>) -> Part<'a> {
         let format = source.format();
         // The cast saturates: a time beyond the end of the video selects its end.
         let idx = |time_s: f64| (time_s * format.fps).round() as usize;
@@ -128,9 +128,10 @@ impl FrameSource for Part<'_> {
     }
 
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
-        match self.frames == (0..usize::MAX) {
-            true => self.source.spread(n, visit),
-            false => spread_by_reading(self, n, visit),
+        if self.frames == (0..usize::MAX) {
+            self.source.spread(n, visit)
+        } else {
+            spread_by_reading(self, n, visit)
         }
     }
 }
@@ -201,7 +202,7 @@ impl From<MasksDiffer> for SourceError {
 
 impl<'a> Masked<'a> {
     /// Combines a video with its masks; [`GivenMask`] explains `is_mixed`. Fails if the picture sizes differ.
-    pub fn of(
+    pub fn new(
         video: &'a dyn FrameSource,
         masks: &'a dyn FrameSource,
         is_mixed: bool,
@@ -210,16 +211,16 @@ impl<'a> Masked<'a> {
             let format = source.format();
             [format.width, format.height]
         };
-        match (size(masks), size(video)) {
-            (masks, footage) if masks != footage => {
-                Err(MasksDiffer::Size { masks, footage }.into())
-            }
-            _ => Ok(Masked {
-                video,
-                masks,
-                is_mixed,
-            }),
+        let sizes = (size(masks), size(video));
+        if sizes.0 != sizes.1 {
+            let (masks, footage) = sizes;
+            return Err(MasksDiffer::Size { masks, footage }.into());
         }
+        Ok(Masked {
+            video,
+            masks,
+            is_mixed,
+        })
     }
 }
 
@@ -267,14 +268,10 @@ impl FrameStream for MaskedStream<'_> {
             (Some(time_s), Some(_)) => {
                 self.n_read += 1;
                 let levels = self.mask.gray_levels();
+                let masked = self.mask.luma().iter();
                 let mut alpha = alpha.unwrap_or_default();
                 alpha.clear();
-                alpha.extend(
-                    self.mask
-                        .luma()
-                        .iter()
-                        .map(|&luma| levels[usize::from(luma)]),
-                );
+                alpha.extend(masked.map(|&luma| levels[usize::from(luma)]));
                 frame.mask = Some(GivenMask {
                     alpha,
                     is_mixed: self.is_mixed,

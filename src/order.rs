@@ -17,7 +17,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranks_are_counted_from_the_least_to_the_most() {
+    fn percentile_takes_the_nearest_rank() {
         let mut values = [3.0, 1.0, 2.0, 5.0, 4.0];
         let at = [0.0, 0.25, 0.5, 1.0].map(|share| percentile(&mut values, share));
         assert_eq!(at, [Some(1.0), Some(2.0), Some(3.0), Some(5.0)]);

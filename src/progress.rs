@@ -20,9 +20,9 @@ impl Progress for Silent {
 }
 
 /// Ignores the reports of a trial run but passes on cancellation.
-pub struct Quiet<'a>(pub &'a dyn Progress);
+pub struct CancelOnly<'a>(pub &'a dyn Progress);
 
-impl Progress for Quiet<'_> {
+impl Progress for CancelOnly<'_> {
     fn report(&self, _stage: &'static str, _fraction: f64) {}
 
     fn cancelled(&self) -> bool {

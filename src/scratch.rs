@@ -41,14 +41,14 @@ pub struct InMemory(RwLock<Vec<u8>>);
 
 impl Scratch for InMemory {
     fn put(&self, bytes: &[u8]) -> Result<u64, Full> {
-        let mut held = self.0.write().unwrap_or_else(PoisonError::into_inner);
-        let at = held.len() as u64;
-        held.extend_from_slice(bytes);
+        let mut stored = self.0.write().unwrap_or_else(PoisonError::into_inner);
+        let at = stored.len() as u64;
+        stored.extend_from_slice(bytes);
         Ok(at)
     }
 
     fn get(&self, at: u64, bytes: &mut [u8]) {
-        let held = self.0.read().unwrap_or_else(PoisonError::into_inner);
-        bytes.copy_from_slice(&held[at as usize..][..bytes.len()]);
+        let stored = self.0.read().unwrap_or_else(PoisonError::into_inner);
+        bytes.copy_from_slice(&stored[at as usize..][..bytes.len()]);
     }
 }

@@ -67,7 +67,7 @@ pub fn analyze(
     scratch: &Arc<dyn Scratch>,
     progress: &dyn Progress,
 ) -> Result<Library, Error> {
-    let part = Part::of(source, params.from_s, params.to_s);
+    let part = Part::new(source, params.from_s, params.to_s);
     let first = part.first_frame();
     let inner = params.counted_from(first);
     let mut library = analyze_part(&part, background, &inner, cpu, scratch, progress)

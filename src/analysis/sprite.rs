@@ -72,7 +72,7 @@ pub fn align(
             .then(|| matte(sighting))
     };
     let mattes = track.frames.iter().map(of).collect();
-    Sprites::of(size, mattes, scales, Arc::clone(&track.scratch))
+    Sprites::new(size, mattes, scales, Arc::clone(&track.scratch))
 }
 
 fn matte(sighting: &Sighting) -> Matte {

@@ -5,8 +5,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::mesh::{Layer, Sketch, SketchPoint};
-use super::paint::Coat;
+use super::colors::Colors;
+use super::mesh::{Layer, Material, MeshBuilder, SurfacePoint};
 
 /// Position along the body where the trunk ends and the tail fin begins: 0 = nose, 1 = tip of the tail.
 /// Free choice.
@@ -40,9 +40,8 @@ const PROFILE: [[f64; 4]; 12] = [
 /// lengths.
 pub(super) fn profile_bl(s: f64) -> [f64; 3] {
     let u = (s / TRUNK_END_S).clamp(0.0, 1.0);
-    let k = PROFILE
-        .partition_point(|knot| knot[0] <= u)
-        .clamp(1, PROFILE.len() - 1);
+    let after = PROFILE.partition_point(|knot| knot[0] <= u);
+    let k = after.clamp(1, PROFILE.len() - 1);
     std::array::from_fn(|column| HALF_DEPTH_BL * hermite(k - 1, column + 1, u))
 }
 
@@ -54,52 +53,58 @@ fn sag_bl(s: f64) -> f64 {
 }
 
 /// Adds the trunk to the mesh.
-pub(super) fn add_trunk(sketch: &mut Sketch, coat: &Coat) {
-    sketch.add_grid(Layer::Body, RINGS, SPOKES, |i, j| {
+pub(super) fn add_trunk(builder: &mut MeshBuilder, colors: &Colors) {
+    builder.add_grid(Layer::Body, RINGS, SPOKES, |i, j| {
         let s = TRUNK_END_S * ring_u(i);
         let angle = TAU * j as f64 / (SPOKES - 1) as f64;
         // The last point equals the first, so the seam closes exactly.
-        let (sin, cos) = match j {
-            j if j == SPOKES - 1 => (0.0, 1.0),
-            _ => (libm::sin(angle), libm::cos(angle)),
+        let (sin, cos) = if j == SPOKES - 1 {
+            (0.0, 1.0)
+        } else {
+            (libm::sin(angle), libm::cos(angle))
         };
         let [above, below, side] = profile_bl(s);
-        let (down, left) = (-sin * if sin > 0.0 { above } else { below }, cos * side);
-        SketchPoint {
-            at: [s, sag_bl(s) + down, left],
-            color: coat.skin(s, sin),
+        let down = -sin * if sin > 0.0 { above } else { below };
+        let material = Material {
+            color: colors.skin(s, sin),
             shine: 0.55,
             grain: [(s * 44.0) as f32, (angle / TAU * 40.0) as f32],
             grain_depth: 0.16 * (((s - 0.19) / 0.05).clamp(0.0, 1.0) as f32),
+        };
+        SurfacePoint {
+            at: [s, sag_bl(s) + down, cos * side],
+            material,
         }
     });
 }
 
 /// Adds an eye on each side to the mesh.
-pub(super) fn add_eyes(sketch: &mut Sketch, coat: &Coat) {
+pub(super) fn add_eyes(builder: &mut MeshBuilder, colors: &Colors) {
     const AT: [f64; 2] = [0.098, -0.016];
     const RADIUS: f64 = 0.0235;
     let [above, _, side] = profile_bl(AT[0]);
     let height_share = (sag_bl(AT[0]) - AT[1]) / above;
     let skin = side * (1.0 - height_share * height_share).sqrt();
     for sign in [1.0, -1.0] {
-        sketch.add_grid(Layer::Body, 10, 21, |i, j| {
+        builder.add_grid(Layer::Body, 10, 21, |i, j| {
             let polar = 0.5 * PI * i as f64 / 9.0;
             let angle = if j == 20 { 0.0 } else { TAU * j as f64 / 20.0 };
             let (sin, cos) = (libm::sin(polar), libm::cos(polar));
             let rise = RADIUS * (0.62 * cos - 0.20);
             let up = sin * libm::sin(angle);
             let lean = -0.35 * RADIUS * up;
-            SketchPoint {
+            SurfacePoint {
                 at: [
                     AT[0] + RADIUS * sin * libm::cos(angle) * sign,
                     AT[1] - RADIUS * up,
                     sign * (skin + rise + lean),
                 ],
-                color: coat.eye(cos, up),
-                shine: 1.0,
-                grain: [0.0; 2],
-                grain_depth: 0.0,
+                material: Material {
+                    color: colors.eye(cos, up),
+                    shine: 1.0,
+                    grain: [0.0; 2],
+                    grain_depth: 0.0,
+                },
             }
         });
     }
@@ -137,7 +142,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_profile_passes_through_its_knots_and_never_dents() {
+    fn profile_passes_through_its_knots_without_dents() {
         for knot in PROFILE {
             let got = profile_bl(knot[0] * TRUNK_END_S);
             for (g, want) in got.iter().zip(&knot[1..]) {

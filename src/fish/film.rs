@@ -2,7 +2,6 @@
 
 use super::motion::Motion;
 use super::render::{Drawing, Renderer};
-use crate::geometry::Rect;
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
 /// Motion, renderer and background of the film of a virtual fish.
@@ -19,12 +18,12 @@ impl Film {
     pub fn new(motion: Motion, background: RgbImage) -> Film {
         let [width, height] = motion.image_size_px;
         assert_eq!(
-            [background.width, background.height],
+            background.size(),
             motion.image_size_px,
             "the background has the size of the footage"
         );
         let mut plate = Frame::new(width, height, ColorSpec::default());
-        plate.draw_rgb(&background, Rect::of_size(width, height));
+        plate.draw_all_rgb(&background);
         Film {
             renderer: Renderer::new(motion.size, motion.palette),
             motion,
@@ -63,19 +62,4 @@ impl Film {
         drawing.over(&mut canvas);
         frame.draw_rgb(&canvas, drawing.rect);
     }
-}
-
-/// Returns a picture of empty water, lighter at the top.
-pub fn plain_water(width: u32, height: u32) -> RgbImage {
-    let (top, bottom) = ([128.0, 182.0, 190.0], [38.0, 84.0, 100.0]);
-    let mut image = RgbImage::new(width, height);
-    for y in 0..height {
-        let share = f64::from(y) / f64::from(height.max(2) - 1);
-        let rgb: [u8; 3] =
-            std::array::from_fn(|c: usize| (top[c] + share * (bottom[c] - top[c]) + 0.5) as u8);
-        for x in 0..width {
-            image.set_pixel(x, y, rgb);
-        }
-    }
-    image
 }

@@ -3,79 +3,48 @@
 //! The fish has a forked tail fin, one dorsal and one anal fin, and pairs of pelvic and pectoral fins.
 
 use super::body::{TRUNK_END_S, profile_bl};
-use super::mesh::{Layer, Sketch, SketchPoint};
-use super::paint::Coat;
+use super::colors::Colors;
+use super::mesh::{Layer, Material, MeshBuilder, SurfacePoint};
 
 /// Adds all fins to the mesh.
-pub(super) fn add_fins(sketch: &mut Sketch, coat: &Coat) {
-    add_fin(
-        sketch,
-        coat,
-        &FinShape {
-            across: 33,
-            out: 13,
-            rays: 20.0,
-        },
-        tail,
-    );
-    add_fin(
-        sketch,
-        coat,
-        &FinShape {
-            across: 25,
-            out: 9,
-            rays: 17.0,
-        },
-        dorsal,
-    );
-    add_fin(
-        sketch,
-        coat,
-        &FinShape {
-            across: 13,
-            out: 9,
-            rays: 8.0,
-        },
-        anal,
-    );
+pub(super) fn add_fins(builder: &mut MeshBuilder, colors: &Colors) {
+    let mut add = |resolution, n_rays, point: &dyn Fn(f64, f64) -> [f64; 3]| {
+        add_fin(builder, colors, resolution, n_rays, point);
+    };
+    add([33, 13], 20.0, &tail);
+    add([25, 9], 17.0, &dorsal);
+    add([13, 9], 8.0, &anal);
     for sign in [1.0, -1.0] {
-        let shape = FinShape {
-            across: 11,
-            out: 9,
-            rays: 8.0,
-        };
-        add_fin(sketch, coat, &shape, |v, w| mirrored(pelvic(v, w), sign));
-        add_fin(sketch, coat, &shape, |v, w| mirrored(pectoral(v, w), sign));
+        add([11, 9], 8.0, &|v, w| mirrored(pelvic(v, w), sign));
+        add([11, 9], 8.0, &|v, w| mirrored(pectoral(v, w), sign));
     }
-}
-
-/// Resolution and texture of a fin: grid points across the rays, grid points from base to edge, number of
-/// rays.
-struct FinShape {
-    across: usize,
-    out: usize,
-    rays: f64,
 }
 
 /// Adds one fin. `point(v, w)` is its surface: v in 0..=1 from the first ray to the last, w in 0..=1 from
 /// base to edge.
+///
+/// The grid has `n_across` points across the rays and `n_out` points from base to edge.
 fn add_fin(
-    sketch: &mut Sketch,
-    coat: &Coat,
-    shape: &FinShape,
-    point: impl Fn(f64, f64) -> [f64; 3],
+    builder: &mut MeshBuilder,
+    colors: &Colors,
+    [n_across, n_out]: [usize; 2],
+    n_rays: f64,
+    point: &dyn Fn(f64, f64) -> [f64; 3],
 ) {
-    sketch.add_grid(Layer::Fins, shape.across, shape.out, |i, j| {
-        let v = i as f64 / (shape.across - 1) as f64;
+    builder.add_grid(Layer::Fins, n_across, n_out, |i, j| {
+        let v = i as f64 / (n_across - 1) as f64;
         // Rows are denser toward the edge, where the opacity changes.
-        let t = j as f64 / (shape.out - 1) as f64;
+        let t = j as f64 / (n_out - 1) as f64;
         let w = t * (1.35 - 0.35 * t);
-        SketchPoint {
-            at: point(v, w),
-            color: coat.fin(w),
+        let material = Material {
+            color: colors.fin(w),
             shine: 0.25,
-            grain: [(v * shape.rays) as f32, w as f32],
+            grain: [(v * n_rays) as f32, w as f32],
             grain_depth: -0.20,
+        };
+        SurfacePoint {
+            at: point(v, w),
+            material,
         }
     });
 }

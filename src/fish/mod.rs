@@ -17,9 +17,10 @@ pub mod spine;
 pub mod swimmer;
 
 mod body;
+mod colors;
 mod fins;
+mod goldfish;
 mod light;
-mod paint;
 mod scenery;
 
 pub use drive::drive;

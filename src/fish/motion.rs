@@ -81,7 +81,7 @@ pub fn bank_rad(turn_rad_per_s: f64, speed_m_per_s: f64, limit_rad: f64) -> f64 
 
 /// Returns `rotation` with the sign that is nearer to `previous`. Both signs are the same rotation, but
 /// only the nearer one interpolates the short way.
-pub fn same_side(previous: DQuat, rotation: DQuat) -> DQuat {
+pub fn nearest_sign(previous: DQuat, rotation: DQuat) -> DQuat {
     if previous.dot(rotation) < 0.0 {
         -rotation
     } else {
@@ -91,7 +91,7 @@ pub fn same_side(previous: DQuat, rotation: DQuat) -> DQuat {
 
 /// Returns the rotation at `share` of the short way from `a` to `b`, at a constant angular rate.
 pub fn slerp(a: DQuat, b: DQuat, share: f64) -> DQuat {
-    let b = same_side(a, b);
+    let b = nearest_sign(a, b);
     let angle = libm::acos(a.dot(b).clamp(-1.0, 1.0));
     if angle < 1e-6 {
         return (a * (1.0 - share) + b * share).normalize();
@@ -105,18 +105,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn yaw_turns_from_right_to_away_and_pitch_points_the_nose_down() {
+    fn yaw_turns_right_to_away_and_pitch_points_the_nose_down() {
         let close = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-12, "{a} {b}");
         close(rotation_of(0.0, 0.0, 0.0) * DVec3::X, DVec3::X);
-        close(
-            rotation_of(std::f64::consts::FRAC_PI_2, 0.0, 0.0) * DVec3::X,
-            DVec3::Z,
-        );
+        let away = rotation_of(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+        close(away * DVec3::X, DVec3::Z);
         assert!((rotation_of(0.3, 0.4, 0.0) * DVec3::X).y > 0.3);
     }
 
     #[test]
-    fn the_belly_stays_below_whichever_way_it_swims() {
+    fn belly_stays_below_at_every_yaw() {
         for k in 0..24 {
             let yaw = f64::from(k) * 0.27 - 3.1;
             assert!((rotation_of(yaw, 0.5, 0.15) * DVec3::Y).y > 0.8);
@@ -124,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fish_leans_into_its_turn() {
+    fn fish_rolls_into_its_turn() {
         let lean = bank_rad(2.0, 0.2, 0.3);
         let back = rotation_of(0.0, 0.0, lean) * -DVec3::Y;
         assert!(
@@ -135,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn slerp_goes_the_short_way_at_constant_rate() {
+    fn slerp_takes_the_short_way_at_a_constant_rate() {
         let (a, b) = (rotation_of(0.0, 0.0, 0.0), -rotation_of(1.0, 0.0, 0.0));
         for k in 0..=4 {
             let share = f64::from(k) / 4.0;

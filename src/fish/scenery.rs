@@ -12,7 +12,7 @@ const WATER: [[f64; 3]; 2] = [[126.0, 184.0, 188.0], [34.0, 84.0, 98.0]];
 
 /// Returns the scene without the fish.
 pub(super) fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
-    let mut scene = Painting::of_water(width, height, seed);
+    let mut scene = Painting::new(width, height, seed);
     scene.plants(&PlantBed {
         key: 1,
         n: 16,
@@ -80,7 +80,7 @@ struct Pebble {
 }
 
 impl Painting {
-    fn of_water(width: u32, height: u32, seed: u64) -> Painting {
+    fn new(width: u32, height: u32, seed: u64) -> Painting {
         let (w, h) = (width as usize, height as usize);
         let mut pixels = Vec::with_capacity(w * h);
         for y in 0..h {
@@ -97,35 +97,34 @@ impl Painting {
     }
 
     /// Returns random number `k` of a plant or stone, in [0, 1).
-    fn unit(&self, key: u64, item: u64, k: u64) -> f64 {
-        random::unit(self.seed, &[0x73_6365_6e65, key, item, k])
+    fn random(&self, key: u64, item: u64, k: u64) -> f64 {
+        random::uniform(self.seed, &[0x73_6365_6e65, key, item, k])
     }
 
     /// Draws a row of plants. Their leaves are ribbons that sway individually and narrow toward the tip.
     fn plants(&mut self, bed: &PlantBed) {
         for plant in 0..bed.n {
-            let at = |k: u64| self.unit(bed.key, plant, k);
+            let at = |k: u64| self.random(bed.key, plant, k);
             let root = bed.span[0] + (bed.span[1] - bed.span[0]) * at(0);
             let n_leaves = 3 + (4.0 * at(1)) as u64;
-            let green = [
-                38.0 + 60.0 * at(2),
-                112.0 + 52.0 * at(3),
-                40.0 + 22.0 * at(4),
-            ];
+            let (red, green, blue) = (60.0 * at(2), 52.0 * at(3), 22.0 * at(4));
+            let color = [38.0 + red, 112.0 + green, 40.0 + blue];
             let tall = bed.tall[0] + (bed.tall[1] - bed.tall[0]) * at(5);
             for leaf in 0..n_leaves {
                 let id = bed.key * 100 + plant;
-                let of = |k: u64| self.unit(id, leaf, 10 + k);
+                let of = |k: u64| self.random(id, leaf, 10 + k);
                 let spread = 2.0 * of(0) - 1.0;
                 let light = 0.72 + 0.5 * of(1);
                 let blade = Blade {
                     root: [root + 0.006 * spread, bed.foot + 0.012 * of(2)],
                     tall: tall * (0.6 + 0.4 * of(3)),
                     lean: 0.055 * spread,
-                    sway: [0.012 * (2.0 * of(4) - 1.0), 3.0 + 3.0 * of(5), 6.3 * of(6)],
+                    sway: 0.012 * (2.0 * of(4) - 1.0),
+                    wave_rad: 3.0 + 3.0 * of(5),
+                    phase_rad: 6.3 * of(6),
                     wide: bed.wide * (0.7 + 0.6 * of(7)),
                 };
-                self.blade(&blade, green.map(|c| c * light), bed.haze);
+                self.blade(&blade, color.map(|c| c * light), bed.haze);
             }
         }
     }
@@ -135,12 +134,10 @@ impl Painting {
         let n = (blade.tall * h * 1.5) as usize + 2;
         for k in 0..n {
             let t = k as f64 / (n - 1) as f64;
-            let [size, waves, start] = blade.sway;
-            let sway = size * t * libm::sin(waves * t + start) + blade.lean * t * t;
-            let at = [
-                (blade.root[0] + sway) * w,
-                (blade.root[1] - blade.tall * t) * h,
-            ];
+            let wave = libm::sin(blade.wave_rad * t + blade.phase_rad);
+            let sway = blade.sway * t * wave + blade.lean * t * t;
+            let [x, y] = [blade.root[0] + sway, blade.root[1] - blade.tall * t];
+            let at = [x * w, y * h];
             let radius = blade.wide * w * (1.0 - 0.85 * t * t) * (0.5 + 0.5 * (6.0 * t).min(1.0));
             // The foot is dark and the tip bright. The left edge is brighter than the rest.
             let glow = 0.62 + 0.55 * t;
@@ -170,7 +167,7 @@ impl Painting {
         for k in 0..N {
             let depth = k as f64 / N as f64;
             let near = depth * depth * (0.35 + 0.65 * depth);
-            let of = |i: u64| self.unit(50, k, i);
+            let of = |i: u64| self.random(50, k, i);
             let y = HORIZON + 0.012 + (1.03 - HORIZON) * near + 0.012 * (of(0) - 0.5);
             let size = w * (0.0018 + 0.0068 * near) * (0.55 + 0.75 * of(1));
             let gray = 92.0 + 92.0 * of(2);
@@ -212,14 +209,14 @@ impl Painting {
         let ([cx, cy], [rx, ry]) = (stone.at, stone.radii);
         let (w, h) = (self.width as f64, self.height as f64);
         let grain_seed = self.seed ^ (cx * 64.0) as u64;
-        self.each_near([cx, cy], [rx + 1.0, ry + 1.0], |[x, y]| {
+        self.blend_near([cx, cy], [rx + 1.0, ry + 1.0], |[x, y]| {
             let [u, v] = [(x - cx) / rx, (y - cy) / ry];
             let out = (u * u + v * v).sqrt();
             let cover = ((1.0 - out) * ry.min(rx) + 0.5).clamp(0.0, 1.0);
             let height = (1.0 - (out * out).min(1.0)).sqrt();
             let lit = 0.46 + 0.60 * (0.62 * height - 0.30 * u - 0.62 * v).max(0.0);
             let cell = [(x * 0.9) as u64, (y * 0.9) as u64];
-            let grain = 0.93 + 0.14 * random::unit(grain_seed, &cell);
+            let grain = 0.93 + 0.14 * random::uniform(grain_seed, &cell);
             let far = water([x / w, y / h], 0);
             let color = std::array::from_fn(|c| {
                 stone.color[c] * lit * grain * (1.0 - haze) + far[c] * haze
@@ -229,7 +226,7 @@ impl Painting {
     }
 
     fn disc(&mut self, center: [f64; 2], radius: f64, color: [f64; 3]) {
-        self.each_near(center, [radius + 1.0; 2], |[x, y]| {
+        self.blend_near(center, [radius + 1.0; 2], |[x, y]| {
             let gap = (x - center[0]).hypot(y - center[1]);
             ((radius + 0.5 - gap).clamp(0.0, 1.0), color)
         });
@@ -237,7 +234,7 @@ impl Painting {
 
     /// Blends the coverage and color that `paint` returns for every pixel center within `reach` of
     /// `center`.
-    fn each_near(
+    fn blend_near(
         &mut self,
         center: [f64; 2],
         reach: [f64; 2],
@@ -271,7 +268,10 @@ struct Blade {
     root: [f64; 2],
     tall: f64,
     lean: f64,
-    sway: [f64; 3],
+    sway: f64,
+    /// Phase of the sway along the leaf, and at its root.
+    wave_rad: f64,
+    phase_rad: f64,
     wide: f64,
 }
 
@@ -294,13 +294,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_scene_is_the_same_each_time_and_another_for_another_seed() {
+    fn scene_depends_only_on_the_seed() {
         assert_eq!(tank_scene(96, 72, 5), tank_scene(96, 72, 5));
         assert_ne!(tank_scene(96, 72, 5), tank_scene(96, 72, 6));
     }
 
     #[test]
-    fn no_part_of_the_scene_is_as_orange_as_the_fish() {
+    fn scene_has_no_color_of_the_fish() {
         let scene = tank_scene(160, 120, 1);
         for rgb in scene.pixels.chunks_exact(3) {
             assert!(i32::from(rgb[0]) - i32::from(rgb[2]) < 110, "{rgb:?}");

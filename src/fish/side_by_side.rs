@@ -4,7 +4,6 @@
 //! the same frame.
 
 use super::film::Film;
-use crate::geometry::Rect;
 use crate::library::Library;
 use crate::raster::{Frame, RgbImage};
 
@@ -12,28 +11,20 @@ use crate::raster::{Frame, RgbImage};
 /// either, and if their sizes differ.
 pub fn render(library: &Library, film: &Film, frame_idx: usize, frame: &mut Frame) {
     let real = real_frame(library, frame_idx);
-    let mut twin = film.background().clone();
-    film.draw(frame_idx).over(&mut twin);
-    assert_eq!(
-        (real.width, real.height),
-        (twin.width, twin.height),
-        "sizes differ"
-    );
+    let mut virtual_frame = film.background().clone();
+    film.draw(frame_idx).over(&mut virtual_frame);
+    assert_eq!(real.size(), virtual_frame.size(), "sizes differ");
     let (width, height) = (2 * real.width, real.height);
     let mut both = RgbImage::new(width, height);
     let row_bytes = real.width as usize * 3;
-    let sides = real
-        .pixels
-        .chunks_exact(row_bytes)
-        .zip(twin.pixels.chunks_exact(row_bytes));
-    for (row, (left, right)) in both.pixels.chunks_exact_mut(2 * row_bytes).zip(sides) {
-        row[..row_bytes].copy_from_slice(left);
-        row[row_bytes..].copy_from_slice(right);
+    for (k, half_row) in both.pixels.chunks_exact_mut(row_bytes).enumerate() {
+        let side = [&real, &virtual_frame][k % 2];
+        half_row.copy_from_slice(&side.pixels[k / 2 * row_bytes..][..row_bytes]);
     }
     if (frame.width, frame.height) != (width, height) {
         *frame = Frame::new(width, height, frame.color);
     }
-    frame.draw_rgb(&both, Rect::of_size(width, height));
+    frame.draw_all_rgb(&both);
 }
 
 /// Returns the background with the animal's matte of one frame at its place. If the animal was not found,

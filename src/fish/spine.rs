@@ -60,15 +60,9 @@ impl Swimming {
 
     /// Returns the joint angles that bend the spine along this curve, in radians.
     pub fn joint_angles_rad(&self) -> [f64; N_JOINTS] {
-        let slope = |from: f64, to: f64| {
+        angles_of_tangents(|from, to| {
             libm::atan2(self.lateral_bl(to) - self.lateral_bl(from), to - from)
-        };
-        let mut tangents = [0.0; N_JOINTS];
-        for (j, tangent) in tangents.iter_mut().enumerate() {
-            let from = if j == 0 { 0.0 } else { JOINT_S[j] };
-            *tangent = slope(from, segment_end(j));
-        }
-        differences(tangents)
+        })
     }
 }
 
@@ -101,14 +95,12 @@ pub fn joint_angles_of_midline_rad(
         return None;
     }
     let at = |s: f64| point_at(midline_px, &along_px, s * total_px);
-    let mut tangents = [0.0; N_JOINTS];
-    for (j, tangent) in tangents.iter_mut().enumerate() {
-        let from = at(if j == 0 { 0.0 } else { JOINT_S[j] });
-        let to = at(segment_end(j));
+    let angles_rad = angles_of_tangents(|from, to| {
+        let (from, to) = (at(from), at(to));
         let tailward = libm::atan2(to[1] - from[1], to[0] - from[0]);
-        *tangent = wrap_rad(tailward - heading_rad - PI);
-    }
-    Some(differences(tangents).map(wrap_rad))
+        wrap_rad(tailward - heading_rad - PI)
+    });
+    Some(angles_rad.map(wrap_rad))
 }
 
 /// Returns the position (in metres) and the rotation of each joint in the fish's own frame, for a fish of
@@ -136,16 +128,32 @@ pub fn about_y(angle_rad: f64) -> DQuat {
     DQuat::from_xyzw(0.0, libm::sin(half), 0.0, libm::cos(half))
 }
 
-/// Returns the two joints that move a point at `s`, and the weight of the second, 0..=1.
-pub fn joints_at(s: f64) -> (usize, usize, f64) {
-    let middle = |j: usize| 0.5 * (JOINT_S[j] + segment_end(j));
-    let next = (0..N_JOINTS).find(|&j| s < middle(j)).unwrap_or(N_JOINTS);
-    match next {
-        0 => (0, 0, 0.0),
-        N_JOINTS => (N_JOINTS - 1, N_JOINTS - 1, 0.0),
-        j => {
-            let share = (s - middle(j - 1)) / (middle(j) - middle(j - 1));
-            (j - 1, j, share)
+/// The two joints that move a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointWeights {
+    /// Indices of the joints.
+    pub joints: [u8; 2],
+    /// Weight of the second joint, 0..=1.
+    pub second_weight: f32,
+}
+
+impl JointWeights {
+    /// Returns the joints that move a point at `s`.
+    pub fn at(s: f64) -> JointWeights {
+        const LAST: usize = N_JOINTS - 1;
+        let middle = |j: usize| 0.5 * (JOINT_S[j] + segment_end(j));
+        let next = (0..N_JOINTS).find(|&j| s < middle(j)).unwrap_or(N_JOINTS);
+        let (joints, second_weight) = match next {
+            0 => ([0, 0], 0.0),
+            N_JOINTS => ([LAST, LAST], 0.0),
+            j => {
+                let share = (s - middle(j - 1)) / (middle(j) - middle(j - 1));
+                ([j - 1, j], share)
+            }
+        };
+        JointWeights {
+            joints: joints.map(|j| j as u8),
+            second_weight: second_weight as f32,
         }
     }
 }
@@ -154,14 +162,19 @@ fn segment_end(j: usize) -> f64 {
     JOINT_S.get(j + 1).copied().unwrap_or(1.0)
 }
 
-fn differences(tangents: [f64; N_JOINTS]) -> [f64; N_JOINTS] {
+/// Returns the joint angles for the tangents of the segments. `tangent` gets start and end of a segment. The
+/// first segment begins at the nose.
+fn angles_of_tangents(tangent: impl Fn(f64, f64) -> f64) -> [f64; N_JOINTS] {
+    let tangents: [f64; N_JOINTS] = std::array::from_fn(|j| {
+        let from = if j == 0 { 0.0 } else { JOINT_S[j] };
+        tangent(from, segment_end(j))
+    });
     std::array::from_fn(|j| tangents[j] - if j == 0 { 0.0 } else { tangents[j - 1] })
 }
 
 fn point_at(points: &[[f64; 2]], along: &[f64], target: f64) -> [f64; 2] {
-    let k = along
-        .partition_point(|&a| a < target)
-        .clamp(1, points.len() - 1);
+    let after = along.partition_point(|&a| a < target);
+    let k = after.clamp(1, points.len() - 1);
     let span = along[k] - along[k - 1];
     let share = if span > 0.0 {
         ((target - along[k - 1]) / span).clamp(0.0, 1.0)
@@ -184,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_wave_travels_from_head_to_tail_and_grows_on_its_way() {
+    fn wave_travels_from_head_to_tail_and_grows() {
         let phase_of_crest = |s: f64| {
             (0..1000)
                 .map(|k| f64::from(k) / 1000.0)
@@ -203,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn the_joints_lie_on_the_wave() {
+    fn joints_lie_on_the_wave() {
         let swimming = cruising(0.3);
         let frames = joint_frames(1.0, &swimming.joint_angles_rad());
         let at_root = swimming.lateral_bl(JOINT_S[0]);
@@ -218,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn a_left_turn_bends_the_tail_to_the_left() {
+    fn left_turn_bends_the_tail_to_the_left() {
         let turning = Swimming {
             phase_turns: 0.0,
             effort: 0.0,
@@ -229,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_midline_gives_a_straight_spine_and_a_curved_one_its_own_turn() {
+    fn spine_bends_as_the_midline_does() {
         let heading: f64 = 2.5;
         let straight: Vec<[f64; 2]> = (0..11)
             .map(|k| {
@@ -254,10 +267,13 @@ mod tests {
     }
 
     #[test]
-    fn weights_change_gradually_from_joint_to_joint() {
-        assert_eq!(joints_at(0.0), (0, 0, 0.0));
-        assert_eq!(joints_at(1.0), (7, 7, 0.0));
-        let (a, b, share) = joints_at(0.45);
-        assert!((a, b) == (1, 2) && (share - 0.5).abs() < 1e-9);
+    fn joint_weights_change_linearly_between_joints() {
+        let at = |s| {
+            let weights = JointWeights::at(s);
+            (weights.joints, weights.second_weight)
+        };
+        assert_eq!(at(0.0), ([0, 0], 0.0));
+        assert_eq!(at(1.0), ([7, 7], 0.0));
+        assert_eq!(at(0.45), ([1, 2], 0.5));
     }
 }

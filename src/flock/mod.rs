@@ -46,7 +46,7 @@ use self::placement::{Placed, Stage};
 use self::plan::{Model, Plan, Planner};
 use crate::geometry::rounded;
 use crate::library::Library;
-use crate::progress::{Progress, Quiet};
+use crate::progress::{CancelOnly, Progress};
 
 /// A simulated, planned and placed flock, without its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -108,17 +108,17 @@ pub fn plan_flock(
     let lens = Lens::of(library, params);
     let mut params = told(params, &lens);
     let motion = motion_of(library, &lens);
-    let tank = Tank::of(library, &lens, &motion, &params);
+    let tank = Tank::from_library(library, &lens, &motion, &params);
     let perches = Perches::of(library, &motion, &lens);
     let to_rest = perches.room_for(CLEAR_BL * lens.length_px);
-    let room_for = tank.room_for().min(to_rest.unwrap_or(u32::MAX));
+    let room_for = tank.capacity().min(to_rest.unwrap_or(u32::MAX));
     params.count = params.count.or(Some(room_for.clamp(2, MOST_BY_DEFAULT)));
     let params = &params;
-    let calibration = Calibration::of(library, &motion, lens.is_flat()).in_tank(&tank);
+    let calibration = Calibration::from_library(library, &motion, lens.is_flat()).in_tank(&tank);
     let fps = library.poses.fps;
     let model = Model::new(library, &motion, params);
     let play = |params: &Params, progress: &dyn Progress| {
-        let boids = Boids::at_random(params, &calibration, (&lens, &tank), fps);
+        let boids = Boids::at_random(params, &calibration, &lens, &tank, fps);
         let stage = Stage {
             library,
             motion: &motion,
@@ -135,7 +135,7 @@ pub fn plan_flock(
         }
     };
     let spaced = density::spaced(params, fps, |params| {
-        let (.., placed) = play(params, &Quiet(progress))?;
+        let (.., placed) = play(params, &CancelOnly(progress))?;
         let places_px = placed.iter().map(|one| &one.centroid_px[..]);
         Ok(density::spacing_bl(places_px, lens.length_px))
     })?;

@@ -86,18 +86,18 @@ impl FlockOverlay {
             let beside = [at[0] + dx * dot_px, at[1] + dy * dot_px];
             self.pen.text(text, beside, dot_px);
         }
-        self.pen.ink(frame, RIM);
+        self.pen.draw(frame, RIM);
         self.pen.text(text, at, dot_px);
-        self.pen.ink(frame, NUMBER);
+        self.pen.draw(frame, NUMBER);
     }
 
     /// Draws a line in one color with a dark outline.
     fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
         self.pen
             .polyline(points, radius_px + 0.7 * self.unit_px, 0.45);
-        self.pen.ink(frame, RIM);
+        self.pen.draw(frame, RIM);
         self.pen.polyline(points, radius_px, 1.0);
-        self.pen.ink(frame, rgb);
+        self.pen.draw(frame, rgb);
     }
 }
 

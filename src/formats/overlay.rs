@@ -80,7 +80,7 @@ impl<'a> Overlay<'a> {
                     self.pen.line(from, to, 0.9 * self.unit_px + rim_px, alpha);
                 }
             }
-            self.pen.ink(frame, rgb);
+            self.pen.draw(frame, rgb);
         }
     }
 
@@ -118,9 +118,9 @@ impl<'a> Overlay<'a> {
             let beside = [at[0] + dx * dot_px, at[1] + dy * dot_px];
             self.pen.text(label, beside, dot_px);
         }
-        self.pen.ink(frame, RIM);
+        self.pen.draw(frame, RIM);
         self.pen.text(label, at, dot_px);
-        self.pen.ink(frame, BOX);
+        self.pen.draw(frame, BOX);
     }
 
     fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
@@ -138,9 +138,9 @@ pub(super) fn stroke(
     rgb: [u8; 3],
 ) {
     pen.polyline(points, radius_px + 0.9 * unit_px, 0.55);
-    pen.ink(frame, RIM);
+    pen.draw(frame, RIM);
     pen.polyline(points, radius_px, 1.0);
-    pen.ink(frame, rgb);
+    pen.draw(frame, rgb);
 }
 
 /// Returns the unit of stroke widths for a picture size, pixels.

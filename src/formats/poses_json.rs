@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::mover::MoverFile;
 use crate::analysis::Params;
 use crate::geometry::{Camera, Rect, rounded};
-use crate::library::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
+use crate::library::{Animal, BeatSpan, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "flockreel/poses@2";
@@ -289,7 +289,7 @@ impl PoseFile {
             yaw_rad: self.yaw_rad,
             pitch_rad: self.pitch_rad,
             gamma_rad: self.gamma_rad,
-            raw: self.raw.map(|raw| Raw {
+            raw: self.raw.map(|raw| RawPose {
                 heading_rad: raw.heading_rad,
                 position_m: raw.position_m,
                 forward: raw.forward,
@@ -315,10 +315,10 @@ mod tests {
                 h: 6,
             }),
             heading_rad: Some(-1.5),
-            raw: Some(Raw {
+            raw: Some(RawPose {
                 heading_rad: Some(-1.25),
                 forward: Some([0.6, 0.0, -0.8]),
-                ..Raw::default()
+                ..RawPose::default()
             }),
             ..Pose::default()
         };

@@ -51,16 +51,6 @@ impl Turns {
     pub fn to_rad(self) -> f64 {
         wrap_rad(f64::from(self.0) / Self::PER_RAD)
     }
-
-    /// Returns the absolute difference along the shorter arc, 0..=32768.
-    pub fn gap(self, other: Turns) -> u16 {
-        (self.0.wrapping_sub(other.0) as i16).unsigned_abs()
-    }
-
-    /// Returns the heading after a left-right mirror.
-    pub fn mirrored(self) -> Turns {
-        Turns(32768u16.wrapping_sub(self.0))
-    }
 }
 
 #[cfg(test)]
@@ -68,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turns_and_radians_agree_round_the_circle() {
+    fn turns_survive_the_round_trip_through_radians() {
         for k in 0..65536u32 {
             let turns = Turns(k as u16);
             assert_eq!(Turns::from_rad(turns.to_rad()), turns);
@@ -76,20 +66,13 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_taken_the_short_way_round() {
-        let (a, b) = (Turns::from_rad(3.1), Turns::from_rad(-3.1));
-        assert!((f64::from(a.gap(b)) / Turns::PER_RAD - (TAU - 6.2)).abs() < 2e-4);
+    fn mirroring_a_heading_twice_returns_it() {
+        assert!((mirrored_rad(mirrored_rad(1.234)) - 1.234).abs() < 1e-12);
+        assert!((mirrored_rad(0.0) - PI).abs() < 1e-12);
     }
 
     #[test]
-    fn mirroring_twice_changes_nothing() {
-        let heading = Turns::from_rad(1.234);
-        assert_eq!(heading.mirrored().mirrored(), heading);
-        assert_eq!(heading.mirrored(), Turns::from_rad(mirrored_rad(1.234)));
-    }
-
-    #[test]
-    fn the_mean_of_angles_across_the_seam_lies_on_the_seam() {
+    fn mean_of_angles_across_the_seam_lies_on_the_seam() {
         let mean = mean_rad([3.0, -3.0]).expect("the two do not cancel");
         assert!((mean.abs() - PI).abs() < 1e-12);
         assert_eq!(mean_rad([]), None);

@@ -73,14 +73,14 @@ mod tests {
     }
 
     #[test]
-    fn a_farther_fish_looks_smaller_and_is_put_farther() {
+    fn smaller_image_means_greater_depth() {
         let z = |px| camera(1.0).apparent_depth_m(0.057, px);
         assert!((z(57.0) - 0.7).abs() < 1e-12);
         assert!((z(28.5) - 1.4).abs() < 1e-12);
     }
 
     #[test]
-    fn projecting_a_point_and_placing_it_again_returns_it() {
+    fn projection_and_back_projection_are_inverse() {
         for n in [1.0, 4.0 / 3.0] {
             let camera = camera(n);
             let z_app = camera.apparent_from_true_depth_m(0.9);

@@ -14,23 +14,27 @@ pub struct Rect {
 }
 
 impl Rect {
+    /// Returns the rectangle with its upper left pixel at (`x`, `y`) and `w` by `h` pixels.
+    pub const fn new(x: u32, y: u32, w: u32, h: u32) -> Rect {
+        Rect { x, y, w, h }
+    }
+
     /// Returns the rectangle that covers an image of `w` by `h` pixels.
     pub fn of_size(w: u32, h: u32) -> Rect {
-        Rect { x: 0, y: 0, w, h }
+        Rect::new(0, 0, w, h)
+    }
+
+    /// Returns the pixels with columns `left..right` and rows `top..bottom`.
+    pub fn from_edges(left: u32, top: u32, right: u32, bottom: u32) -> Rect {
+        let (w, h) = (right.saturating_sub(left), bottom.saturating_sub(top));
+        Rect::new(left, top, w, h)
     }
 
     /// Returns the part of the rectangle `left..right`, `top..bottom` that lies in an image of `w` by `h`
     /// pixels.
     pub fn clipped(left: i64, top: i64, right: i64, bottom: i64, w: u32, h: u32) -> Rect {
         let clip = |v: i64, limit: u32| v.clamp(0, i64::from(limit)) as u32;
-        let (x0, x1) = (clip(left, w), clip(right, w));
-        let (y0, y1) = (clip(top, h), clip(bottom, h));
-        Rect {
-            x: x0,
-            y: y0,
-            w: x1.saturating_sub(x0),
-            h: y1.saturating_sub(y0),
-        }
+        Rect::from_edges(clip(left, w), clip(top, h), clip(right, w), clip(bottom, h))
     }
 
     /// Returns the index after the last column.
@@ -56,14 +60,9 @@ impl Rect {
     /// Returns the rectangle grown by `margin_px` on every side and clipped to an image of `w` by `h`.
     pub fn inflated(&self, margin_px: u32, w: u32, h: u32) -> Rect {
         let m = i64::from(margin_px);
-        Rect::clipped(
-            i64::from(self.x) - m,
-            i64::from(self.y) - m,
-            i64::from(self.right()) + m,
-            i64::from(self.bottom()) + m,
-            w,
-            h,
-        )
+        let edges = [self.x, self.y, self.right(), self.bottom()];
+        let [left, top, right, bottom] = edges.map(i64::from);
+        Rect::clipped(left - m, top - m, right + m, bottom + m, w, h)
     }
 
     /// Returns the smallest rectangle that contains both. An empty rectangle adds nothing.
@@ -74,32 +73,18 @@ impl Rect {
         if other.is_empty() {
             return *self;
         }
-        let (x, y) = (self.x.min(other.x), self.y.min(other.y));
-        let (right, bottom) = (
-            self.right().max(other.right()),
-            self.bottom().max(other.bottom()),
-        );
-        Rect {
-            x,
-            y,
-            w: right - x,
-            h: bottom - y,
-        }
+        let (left, top) = (self.x.min(other.x), self.y.min(other.y));
+        let right = self.right().max(other.right());
+        let bottom = self.bottom().max(other.bottom());
+        Rect::from_edges(left, top, right, bottom)
     }
 
     /// Returns the pixels common to both; empty if they do not overlap.
     pub fn intersection(&self, other: &Rect) -> Rect {
-        let (x, y) = (self.x.max(other.x), self.y.max(other.y));
-        let (right, bottom) = (
-            self.right().min(other.right()),
-            self.bottom().min(other.bottom()),
-        );
-        Rect {
-            x,
-            y,
-            w: right.saturating_sub(x),
-            h: bottom.saturating_sub(y),
-        }
+        let (left, top) = (self.x.max(other.x), self.y.max(other.y));
+        let right = self.right().min(other.right());
+        let bottom = self.bottom().min(other.bottom());
+        Rect::from_edges(left, top, right, bottom)
     }
 
     /// Returns whether the pixel (x, y) lies inside.
@@ -114,65 +99,17 @@ mod tests {
 
     #[test]
     fn inflating_stops_at_the_border() {
-        let rect = Rect {
-            x: 2,
-            y: 3,
-            w: 4,
-            h: 5,
-        };
         assert_eq!(
-            rect.inflated(3, 8, 100),
-            Rect {
-                x: 0,
-                y: 0,
-                w: 8,
-                h: 11
-            }
+            Rect::new(2, 3, 4, 5).inflated(3, 8, 100),
+            Rect::new(0, 0, 8, 11)
         );
     }
 
     #[test]
-    fn union_and_intersection_hold_what_their_names_say() {
-        let (a, b) = (
-            Rect {
-                x: 0,
-                y: 0,
-                w: 4,
-                h: 4,
-            },
-            Rect {
-                x: 2,
-                y: 3,
-                w: 5,
-                h: 5,
-            },
-        );
-        assert_eq!(
-            a.union(&b),
-            Rect {
-                x: 0,
-                y: 0,
-                w: 7,
-                h: 8
-            }
-        );
-        assert_eq!(
-            a.intersection(&b),
-            Rect {
-                x: 2,
-                y: 3,
-                w: 2,
-                h: 1
-            }
-        );
-        assert!(
-            a.intersection(&Rect {
-                x: 9,
-                y: 9,
-                w: 1,
-                h: 1
-            })
-            .is_empty()
-        );
+    fn union_covers_both_and_intersection_is_common_to_both() {
+        let (a, b) = (Rect::new(0, 0, 4, 4), Rect::new(2, 3, 5, 5));
+        assert_eq!(a.union(&b), Rect::new(0, 0, 7, 8));
+        assert_eq!(a.intersection(&b), Rect::new(2, 3, 2, 1));
+        assert!(a.intersection(&Rect::new(9, 9, 1, 1)).is_empty());
     }
 }

@@ -132,7 +132,7 @@ impl Input {
             .map_err(|cause| refusal::illustrated(source, cause))?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
-            &Part::of(source, self.params.from_s, self.params.to_s),
+            &Part::new(source, self.params.from_s, self.params.to_s),
             &library.poses,
             &attempt.folder().join("overlay.mp4"),
             progress,

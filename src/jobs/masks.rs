@@ -59,7 +59,7 @@ impl Masks {
 
     /// Returns the footage with its masks. Fails if their picture sizes differ.
     pub fn over<'a>(&'a self, footage: &'a Video) -> Result<Masked<'a>, Error> {
-        Ok(Masked::of(footage, &self.video, self.is_mixed)?)
+        Ok(Masked::new(footage, &self.video, self.is_mixed)?)
     }
 
     /// Returns whether any checked frame has transparent pixels.

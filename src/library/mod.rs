@@ -9,7 +9,7 @@ pub mod pose;
 pub mod sprites;
 
 pub use playback::{Jump, Patch, Playback, Transition};
-pub use pose::{Animal, BeatSpan, Pose, Poses, Raw, TailBeat, TailBeatMethod, View};
+pub use pose::{Animal, BeatSpan, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
 pub use sprites::{Matte, Sprites};
 
 use crate::geometry::Rect;

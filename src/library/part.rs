@@ -14,22 +14,16 @@ impl Library {
         let end = first + self.poses.frames.len();
         let n_after = n_frames.saturating_sub(end);
         let frames = std::mem::take(&mut self.poses.frames);
-        self.poses.frames = (0..first)
-            .map(empty)
-            .chain(frames)
-            .chain((end..end + n_after).map(empty))
-            .collect();
-        for span in self
-            .poses
-            .tail_beat
-            .iter_mut()
-            .flat_map(|beat| &mut beat.spans)
-        {
+        let before = (0..first).map(empty);
+        let after = (end..end + n_after).map(empty);
+        self.poses.frames = before.chain(frames).chain(after).collect();
+        let beats = self.poses.tail_beat.iter_mut();
+        for span in beats.flat_map(|beat| &mut beat.spans) {
             span.frames = span.frames.map(|frame| frame + first);
             span.start_s += first as f64 / fps;
             span.end_s += first as f64 / fps;
         }
-        self.sprites.surround(first, n_after);
+        self.sprites.pad(first, n_after);
         let offset = first as u32;
         for transition in &mut self.transitions {
             transition.from += offset;

@@ -134,12 +134,12 @@ pub struct Pose {
     /// Angle between `forward` and the image plane, radians, 0..=pi/2 (Nakajima et al., equation 8).
     pub gamma_rad: Option<f64>,
     /// Pose from this frame only, before smoothing over all frames.
-    pub raw: Option<Raw>,
+    pub raw: Option<RawPose>,
 }
 
 /// Estimates from one frame only (Nakajima et al., sections 5 and 6).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Raw {
+pub struct RawPose {
     /// Heading along the length axis, radians, in (-pi, pi].
     pub heading_rad: Option<f64>,
     /// Position from the height of the silhouette, metres.

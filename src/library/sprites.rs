@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::cpu::Level;
 use crate::geometry::Rect;
 use crate::raster::canvas::straight;
-use crate::raster::resample::{Placement, Premultiplied, Resampled, Room, bounds_of};
+use crate::raster::resample::{Placement, Premultiplied, Resampled, Viewport, bounds_of};
 use crate::scratch::{Full, InMemory, Scratch};
 
 /// The animal in every frame of the footage, in straight-alpha RGBA.
@@ -53,17 +53,13 @@ impl Matte {
 impl Sprites {
     /// Returns `n_frames` missing sprites of `width` by `height` pixels.
     pub fn missing(width: u32, height: u32, n_frames: usize) -> Sprites {
-        Sprites::of(
-            [width, height],
-            vec![None; n_frames],
-            None,
-            Arc::new(InMemory::default()),
-        )
+        let scratch = Arc::new(InMemory::default());
+        Sprites::new([width, height], vec![None; n_frames], None, scratch)
     }
 
     /// Makes sprites of `size` pixels from mattes stored in `scratch`. `scales` holds one scale per frame;
     /// `None` means 1.
-    pub fn of(
+    pub fn new(
         [width, height]: [u32; 2],
         mattes: Vec<Option<Matte>>,
         scales: Option<Vec<f64>>,
@@ -95,10 +91,10 @@ impl Sprites {
             if !draw(frame_idx, picture)? {
                 return Ok(None);
             }
-            let bounds = match bounds_of(picture, width) {
-                nothing if nothing.is_empty() => Rect::of_size(1, 1),
-                bounds => bounds,
-            };
+            let mut bounds = bounds_of(picture, width);
+            if bounds.is_empty() {
+                bounds = Rect::of_size(1, 1);
+            }
             packed.clear();
             for row in rows(bounds, width) {
                 packed.extend_from_slice(&picture[row]);
@@ -116,7 +112,7 @@ impl Sprites {
             .into_par_iter()
             .map_init(Default::default, cut)
             .collect::<Result<_, E>>()?;
-        Ok(Sprites::of([width, height], mattes, None, scratch))
+        Ok(Sprites::new([width, height], mattes, None, scratch))
     }
 
     /// Returns the width of each sprite, pixels.
@@ -135,7 +131,7 @@ impl Sprites {
     }
 
     /// Adds frames without a sprite before the first frame and after the last.
-    pub(super) fn surround(&mut self, n_before: usize, n_after: usize) {
+    pub(super) fn pad(&mut self, n_before: usize, n_after: usize) {
         let n_frames = n_before + self.mattes.len() + n_after;
         self.mattes.splice(0..0, (0..n_before).map(|_| None));
         self.mattes.resize(n_frames, None);
@@ -220,10 +216,10 @@ impl Sprites {
             scale,
             mirrored: false,
         };
-        let premultiplied = Premultiplied::of(rgba, matte.size, matte.center_px, scale);
+        let premultiplied = Premultiplied::new(rgba, matte.size, matte.center_px, scale);
         let mut placed = Resampled::default();
-        let room = Room { size, nearer: None };
-        placed.draw(&premultiplied, &place, room, Level::detect());
+        let viewport = Viewport { size, nearer: None };
+        placed.draw(&premultiplied, &place, viewport, Level::detect());
         for ([x, y], row) in placed.shown() {
             let at = (y * self.width + x) as usize * 4;
             let out = &mut picture[at..at + row.len() * 4];
@@ -241,10 +237,7 @@ impl Sprites {
 
 /// Clears the color of a pixel whose alpha is 0.
 fn visible(pixel: [u8; 4]) -> [u8; 4] {
-    match pixel[3] {
-        0 => [0; 4],
-        _ => pixel,
-    }
+    if pixel[3] > 0 { pixel } else { [0; 4] }
 }
 
 /// Returns the byte range of each row of a box in an RGBA picture of `width` columns.
@@ -276,7 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sprite_comes_back_with_its_empty_rim_and_a_missing_one_empty() {
+    fn drawn_sprites_keep_their_transparent_border_and_missing_ones_are_empty() {
         let mut picture = vec![0; 6 * 5 * 4];
         for (x, y) in [(2, 1), (4, 3)] {
             picture[(y * 6 + x) * 4..][..4].copy_from_slice(&[10, 20, 30, 1]);
@@ -304,13 +297,13 @@ mod tests {
             center_px,
             at: scratch.put(&rgba).expect("memory has room"),
         };
-        let sprites = Sprites::of([4, 2], vec![Some(matte)], scales, Arc::new(scratch));
+        let sprites = Sprites::new([4, 2], vec![Some(matte)], scales, Arc::new(scratch));
         let sprite = sprites.sprite(0);
         sprite.chunks_exact(4).map(|pixel| pixel[3]).collect()
     }
 
     #[test]
-    fn the_centroid_comes_to_lie_in_the_middle_and_what_has_no_room_is_left_out() {
+    fn centroid_lies_in_the_middle_and_the_rest_is_clipped() {
         assert_eq!(
             alpha_of_bar([3.0, 1.0], None),
             [0, 0, 0, 0, 255, 255, 255, 0]
@@ -319,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn between_pixels_a_sprite_is_interpolated_and_another_scale_shows_it_larger() {
+    fn fractional_shifts_and_scales_are_interpolated() {
         let half = alpha_of_bar([2.5, 1.0], None);
         assert_eq!(half[..4], [0; 4]);
         // Catmull-Rom weights half way up an edge: 9/16 - 1/16.

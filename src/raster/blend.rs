@@ -6,27 +6,27 @@ use crate::cpu::Level;
 use crate::geometry::Rect;
 
 /// Blends `weight` (0..=1) of `second` with the rest of `main`, and stores the result in `main`. The box of
-/// `main` grows to contain both. `memory` is a reused buffer. This machine must support the instructions of
+/// `main` grows to contain both. `buffer` is a reused buffer. This machine must support the instructions of
 /// `cpu`.
-pub fn mix(
+pub fn cross_fade(
     main: &mut Resampled,
     second: &Resampled,
     weight: f64,
-    memory: &mut Resampled,
+    buffer: &mut Resampled,
     cpu: Level,
 ) {
-    memory.begin(main.rect.union(&second.rect));
-    memory.runs.extend(main.runs.iter().chain(&second.runs));
-    join(&mut memory.runs);
-    clear_runs(memory);
+    buffer.begin(main.rect.union(&second.rect));
+    buffer.runs.extend(main.runs.iter().chain(&second.runs));
+    merge_touching(&mut buffer.runs);
+    clear_runs(buffer);
     let share = (weight * 32767.0).round() as i16;
-    add(memory, (main, 32767 - share), cpu);
-    add(memory, (second, share), cpu);
-    std::mem::swap(main, memory);
+    add_weighted(buffer, main, 32767 - share, cpu);
+    add_weighted(buffer, second, share, cpu);
+    std::mem::swap(main, buffer);
 }
 
 /// Merges runs that touch.
-fn join(runs: &mut Vec<[u32; 3]>) {
+fn merge_touching(runs: &mut Vec<[u32; 3]>) {
     runs.sort_unstable();
     runs.dedup_by(|next, run| {
         let is_touching = next[0] == run[0] && next[1] <= run[2];
@@ -62,7 +62,8 @@ pub fn haze(layer: &mut Resampled, share: f64, color: Quad) {
     }
 }
 
-fn add(sum: &mut Resampled, (layer, weight): (&Resampled, i16), cpu: Level) {
+/// Adds a layer, with its colors and alpha multiplied by `weight`/32768.
+fn add_weighted(sum: &mut Resampled, layer: &Resampled, weight: i16, cpu: Level) {
     let rect = sum.rect;
     for ([x, y], row) in layer.shown() {
         let first = ((y - rect.y) * rect.w + x - rect.x) as usize;
@@ -110,16 +111,11 @@ mod tests {
     }
 
     #[test]
-    fn mixing_a_layer_with_itself_changes_nothing() {
-        let rect = Rect {
-            x: 3,
-            y: 2,
-            w: 4,
-            h: 3,
-        };
+    fn fade_of_a_layer_into_itself_changes_nothing() {
+        let rect = Rect::new(3, 2, 4, 3);
         let mut main = layer(rect, [6400, 3201, 1603, 8192]);
         let before = main.clone();
-        mix(
+        cross_fade(
             &mut main,
             &before,
             0.25,
@@ -138,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn haze_takes_the_color_and_leaves_the_alpha() {
+    fn haze_replaces_color_and_keeps_alpha() {
         let white = [16384; 4];
         let half = [8192, 4096, 0, 8192];
         for (share, want) in [
@@ -155,16 +151,11 @@ mod tests {
     }
 
     #[test]
-    fn mixing_boxes_apart_holds_both() {
-        let at = |x| Rect {
-            x,
-            y: 0,
-            w: 1,
-            h: 1,
-        };
+    fn fade_between_separate_boxes_contains_both() {
+        let at = |x| Rect::new(x, 0, 1, 1);
         let mut main = layer(at(0), [8000, 0, 0, 16384]);
         let second = layer(at(2), [0, 8000, 0, 16384]);
-        mix(
+        cross_fade(
             &mut main,
             &second,
             0.25,
@@ -178,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_in_the_memory_lent_is_not_seen() {
+    fn old_pixels_of_the_buffer_are_not_visible() {
         let rect = Rect::of_size(4, 2);
         let half = Resampled {
             rect,
@@ -189,8 +180,8 @@ mod tests {
             runs: vec![[0, 1, 3]],
             ..half.clone()
         };
-        let (mut main, mut memory) = (half, layer(rect, [9999; 4]));
-        mix(&mut main, &other, 0.5, &mut memory, Level::Scalar);
+        let (mut main, mut buffer) = (half, layer(rect, [9999; 4]));
+        cross_fade(&mut main, &other, 0.5, &mut buffer, Level::Scalar);
         assert_eq!(main.runs, [[0, 0, 3], [1, 3, 4]]);
         let shown: Vec<i16> = (main.shown().flat_map(|(_, row)| row))
             .map(|pixel| pixel[3])
@@ -199,13 +190,8 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_mixes_to_the_same_numbers() {
-        let rect = |x| Rect {
-            x,
-            y: 1,
-            w: 41,
-            h: 7,
-        };
+    fn every_instruction_set_fades_to_the_same_numbers() {
+        let rect = |x| Rect::new(x, 1, 41, 7);
         let drawn = |x, seed| {
             let mut drawn = layer(rect(x), [0; 4]);
             for (k, value) in (0..).zip(drawn.pixels.as_flattened_mut()) {
@@ -213,9 +199,9 @@ mod tests {
             }
             drawn
         };
-        let mixed = |weight, cpu| {
+        let faded = |weight, cpu| {
             let mut main = drawn(3, 1);
-            mix(
+            cross_fade(
                 &mut main,
                 &drawn(9, 2),
                 weight,
@@ -228,7 +214,7 @@ mod tests {
             .into_iter()
             .flat_map(|cpu| [0.0, 0.3, 0.5, 1.0].map(|weight| (cpu, weight)))
         {
-            assert_eq!(mixed(weight, cpu), mixed(weight, Level::Scalar), "{cpu:?}");
+            assert_eq!(faded(weight, cpu), faded(weight, Level::Scalar), "{cpu:?}");
         }
     }
 }

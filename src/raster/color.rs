@@ -45,13 +45,27 @@ pub struct ToRgb {
     b_u: i32,
 }
 
-/// Fixed-point factors from RGB to YUV.
+/// Fixed-point factors from RGB to YUV, in units of 2^-`SHIFT` of the product with one color value.
 #[derive(Clone, Copy, Debug)]
-pub struct FromRgb {
-    y_offset: i32,
-    y: [i32; 3],
-    u: [i32; 3],
-    v: [i32; 3],
+pub struct ToYuv<const SHIFT: u32> {
+    pub(super) y_offset: i32,
+    pub(super) y: [i32; 3],
+    pub(super) u: [i32; 3],
+    pub(super) v: [i32; 3],
+}
+
+/// Factors from 8-bit RGB to YUV.
+pub type FromRgb = ToYuv<16>;
+
+/// Factors from opaque premultiplied colors, in units of 1/16384, to YUV. Products with sums of four pixels
+/// stay below 2^31.
+pub type FromQuads = ToYuv<21>;
+
+/// Luma of black, and spans of luma and chroma.
+struct Levels {
+    black: f64,
+    luma_span: f64,
+    chroma_span: f64,
 }
 
 impl ColorSpec {
@@ -63,31 +77,33 @@ impl ColorSpec {
         }
     }
 
-    /// Returns (luma offset, luma span, chroma span).
-    fn spans(self) -> (f64, f64, f64) {
-        match self.range {
-            Range::Limited => (16.0, 219.0, 224.0),
-            Range::Full => (0.0, 255.0, 255.0),
+    fn levels(self) -> Levels {
+        let [black, luma_span, chroma_span] = match self.range {
+            Range::Limited => [16.0, 219.0, 224.0],
+            Range::Full => [0.0, 255.0, 255.0],
+        };
+        Levels {
+            black,
+            luma_span,
+            chroma_span,
         }
     }
 
     /// Returns the luma of black, 0..=255.
     pub fn black(self) -> f32 {
-        match self.range {
-            Range::Limited => 16.0,
-            Range::Full => 0.0,
-        }
+        self.levels().black as f32
     }
 
     /// Returns the factors for the conversion of YUV to RGB.
     pub fn to_rgb(self) -> ToRgb {
         let (kr, kb) = self.weights();
         let kg = 1.0 - kr - kb;
-        let (offset, luma, chroma) = self.spans();
+        let levels = self.levels();
+        let chroma = levels.chroma_span;
         let fixed = |v: f64| (v * ONE).round() as i32;
         ToRgb {
-            y_offset: offset as i32,
-            y: fixed(255.0 / luma),
+            y_offset: levels.black as i32,
+            y: fixed(255.0 / levels.luma_span),
             r_v: fixed(2.0 * (1.0 - kr) * 255.0 / chroma),
             g_u: fixed(-2.0 * (1.0 - kb) * kb / kg * 255.0 / chroma),
             g_v: fixed(-2.0 * (1.0 - kr) * kr / kg * 255.0 / chroma),
@@ -95,70 +111,30 @@ impl ColorSpec {
         }
     }
 
-    /// Returns the factors for the conversion of RGB to YUV.
+    /// Returns the factors for the conversion of 8-bit RGB to YUV.
     pub fn from_rgb(self) -> FromRgb {
-        let (kr, kb) = self.weights();
-        let kg = 1.0 - kr - kb;
-        let (offset, luma, chroma) = self.spans();
-        let fixed = |v: f64, span: f64| (v * span / 255.0 * ONE).round() as i32;
-        let (u, v) = (0.5 / (1.0 - kb), 0.5 / (1.0 - kr));
-        FromRgb {
-            y_offset: offset as i32,
-            y: [fixed(kr, luma), fixed(kg, luma), fixed(kb, luma)],
-            u: [
-                fixed(-kr * u, chroma),
-                fixed(-kg * u, chroma),
-                fixed(0.5, chroma),
-            ],
-            v: [
-                fixed(0.5, chroma),
-                fixed(-kg * v, chroma),
-                fixed(-kb * v, chroma),
-            ],
-        }
+        self.to_yuv(|factor| factor / 255.0 * ONE)
     }
-}
 
-/// Fixed-point factors from opaque premultiplied colors, in units of 1/16384, to YUV.
-#[derive(Clone, Copy, Debug)]
-pub struct FromQuads {
-    pub(super) y_offset: i32,
-    pub(super) y: [i32; 3],
-    pub(super) u: [i32; 3],
-    pub(super) v: [i32; 3],
-}
-
-impl ColorSpec {
     /// Returns the factors for the conversion of colors in units of 1/16384 to YUV.
     pub fn from_quads(self) -> FromQuads {
+        self.to_yuv(|factor| factor * 128.0)
+    }
+
+    /// Returns the factors to YUV. `scale` converts the share of a color in a span to fixed point.
+    fn to_yuv<const SHIFT: u32>(self, scale: impl Fn(f64) -> f64) -> ToYuv<SHIFT> {
         let (kr, kb) = self.weights();
         let kg = 1.0 - kr - kb;
-        let (offset, luma, chroma) = self.spans();
-        // In units of 2^-21, so that products with sums of four pixels stay below 2^31.
-        let fixed = |v: f64, span: f64| (v * span * 128.0).round() as i32;
+        let levels = self.levels();
         let (u, v) = (0.5 / (1.0 - kb), 0.5 / (1.0 - kr));
-        FromQuads {
-            y_offset: offset as i32,
-            y: [kr, kg, kb].map(|k| fixed(k, luma)),
-            u: [-kr * u, -kg * u, 0.5].map(|k| fixed(k, chroma)),
-            v: [0.5, -kg * v, -kb * v].map(|k| fixed(k, chroma)),
+        let luma = |k: f64| scale(k * levels.luma_span).round() as i32;
+        let chroma = |k: f64| scale(k * levels.chroma_span).round() as i32;
+        ToYuv {
+            y_offset: levels.black as i32,
+            y: [kr, kg, kb].map(luma),
+            u: [-kr * u, -kg * u, 0.5].map(chroma),
+            v: [0.5, -kg * v, -kb * v].map(chroma),
         }
-    }
-}
-
-impl FromQuads {
-    /// Returns the luma of one pixel.
-    #[inline(always)]
-    pub fn luma(&self, [r, g, b, _]: [i16; 4]) -> u8 {
-        let y = dot(self.y, [r, g, b].map(i32::from));
-        (self.y_offset + ((y + (1 << 20)) >> 21)).clamp(0, 255) as u8
-    }
-
-    /// Returns the chroma (U, V) of a block, given the channel sums of its four pixels.
-    #[inline(always)]
-    pub fn chroma_of_block(&self, sum: [i32; 3]) -> [u8; 2] {
-        let chroma = |k: [i32; 3]| (128 + ((dot(k, sum) + (1 << 22)) >> 23)).clamp(0, 255) as u8;
-        [chroma(self.u), chroma(self.v)]
     }
 }
 
@@ -176,23 +152,32 @@ impl ToRgb {
     }
 }
 
-impl FromRgb {
+impl<const SHIFT: u32> ToYuv<SHIFT> {
     /// Returns the luma of one pixel.
-    pub fn luma(&self, rgb: [u8; 3]) -> u8 {
-        let y = dot(self.y, rgb.map(i32::from));
-        (self.y_offset + ((y + 32768) >> 16)).clamp(0, 255) as u8
+    #[inline(always)]
+    pub fn luma(&self, rgb: [impl Into<i32>; 3]) -> u8 {
+        let y = dot(self.y, rgb.map(Into::into));
+        (self.y_offset + rounded_shift(y, SHIFT)).clamp(0, 255) as u8
     }
 
     /// Returns the chroma (U, V) of a block, given the channel sums of its four pixels.
+    #[inline(always)]
     pub fn chroma_of_block(&self, sum: [i32; 3]) -> [u8; 2] {
-        // The sum of four pixels needs a shift by two more bits; half of the divisor is added for rounding.
-        let chroma = |k: [i32; 3]| (128 + ((dot(k, sum) + (1 << 17)) >> 18)).clamp(0, 255) as u8;
-        [chroma(self.u), chroma(self.v)]
+        // The sum of four pixels needs a shift by two more bits.
+        let chroma = |k: [i32; 3]| 128 + rounded_shift(dot(k, sum), SHIFT + 2);
+        [self.u, self.v].map(|k| chroma(k).clamp(0, 255) as u8)
     }
 }
 
+#[inline(always)]
 fn dot(k: [i32; 3], v: [i32; 3]) -> i32 {
     k[0] * v[0] + k[1] * v[1] + k[2] * v[2]
+}
+
+/// Returns the value divided by 2^`shift` and rounded.
+#[inline(always)]
+fn rounded_shift(value: i32, shift: u32) -> i32 {
+    (value + (1 << (shift - 1))) >> shift
 }
 
 #[cfg(test)]

@@ -69,20 +69,13 @@ impl Frame {
         self.width.div_ceil(2)
     }
 
-    /// Returns a box converted to RGB. Panics if it does not lie inside the frame.
-    pub fn rgb(&self, rect: Rect) -> RgbImage {
-        let mut image = RgbImage::new(rect.w, rect.h);
-        self.rgb_into(rect, &mut image);
-        image
-    }
-
     /// Returns the whole frame converted to RGB.
     pub fn to_rgb(&self) -> RgbImage {
         self.rgb(Rect::of_size(self.width, self.height))
     }
 
-    /// Like `rgb`, but writes to `image`, which is resized to the box and whose memory is reused.
-    pub fn rgb_into(&self, rect: Rect, image: &mut RgbImage) {
+    /// Returns a box converted to RGB. Panics if it does not lie inside the frame.
+    pub fn rgb(&self, rect: Rect) -> RgbImage {
         assert!(
             rect.right() <= self.width && rect.bottom() <= self.height,
             "box outside the frame"
@@ -90,21 +83,18 @@ impl Frame {
         let convert = self.color.to_rgb();
         let (u, v) = self.chroma();
         let (width, chroma_width) = (self.width as usize, self.chroma_width() as usize);
-        image.width = rect.w;
-        image.height = rect.h;
-        image.pixels.resize(rect.area() as usize * 3, 0);
+        let mut image = RgbImage::new(rect.w, rect.h);
         let rows = image.pixels.chunks_exact_mut(rect.w.max(1) as usize * 3);
         for (row, y) in rows.zip(rect.y as usize..) {
             let luma = &self.luma()[y * width + rect.x as usize..][..rect.w as usize];
             let chroma = y / 2 * chroma_width;
-            for (pixel, (&luma, x)) in row
-                .chunks_exact_mut(3)
-                .zip(luma.iter().zip(rect.x as usize..))
-            {
+            let pixels = row.chunks_exact_mut(3).zip(luma);
+            for ((pixel, &luma), x) in pixels.zip(rect.x as usize..) {
                 let at = chroma + x / 2;
                 pixel.copy_from_slice(&convert.convert(luma, u[at], v[at]));
             }
         }
+        image
     }
 
     /// Writes a whole canvas into the planes. Panics if its size differs from the frame's.
@@ -117,11 +107,7 @@ impl Frame {
     ///
     /// Panics if the sizes of canvas and frame differ.
     pub fn draw_rgb(&mut self, canvas: &RgbImage, rect: Rect) {
-        assert_eq!(
-            (canvas.width, canvas.height),
-            (self.width, self.height),
-            "sizes differ"
-        );
+        assert_eq!(canvas.size(), [self.width, self.height], "sizes differ");
         if rect.is_empty() {
             return;
         }
@@ -139,11 +125,7 @@ impl Frame {
                     // At an odd right or bottom edge the last pixel is used twice.
                     let (x, y) = ((2 * bx + dx).min(width - 1), (2 * by + dy).min(height - 1));
                     let at = y * width + x;
-                    let rgb = [
-                        canvas.pixels[3 * at],
-                        canvas.pixels[3 * at + 1],
-                        canvas.pixels[3 * at + 2],
-                    ];
+                    let rgb = canvas.pixel(x as u32, y as u32);
                     luma[at] = from.luma(rgb);
                     for (s, c) in sum.iter_mut().zip(rgb) {
                         *s += i32::from(c);
@@ -162,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drawing_a_canvas_and_reading_it_back_returns_it_where_blocks_are_even_colored() {
+    fn rgb_round_trip_keeps_blocks_of_one_color() {
         let mut canvas = RgbImage::new(7, 5);
         for y in 0..5 {
             for x in 0..7 {
@@ -177,20 +159,12 @@ mod tests {
     }
 
     #[test]
-    fn a_box_is_the_same_as_that_part_of_the_whole() {
+    fn box_equals_the_same_part_of_the_whole_frame() {
         let mut frame = Frame::new(9, 6, ColorSpec::default());
         for (k, byte) in frame.planes.iter_mut().enumerate() {
             *byte = (k * 37 % 251) as u8;
         }
-        let (whole, part) = (
-            frame.to_rgb(),
-            frame.rgb(Rect {
-                x: 3,
-                y: 1,
-                w: 5,
-                h: 4,
-            }),
-        );
+        let (whole, part) = (frame.to_rgb(), frame.rgb(Rect::new(3, 1, 5, 4)));
         for y in 0..4 {
             for x in 0..5 {
                 assert_eq!(part.pixel(x, y), whole.pixel(x + 3, y + 1));

@@ -1,5 +1,5 @@
 //! Binary masks over a rectangle, with the operations for silhouettes: filling holes, majority filter,
-//! erosion, dilation and opening (docs/explanation/algorithms.md, "Silhouette").
+//! erosion and dilation (docs/explanation/algorithms.md, "Silhouette").
 
 use crate::geometry::Rect;
 
@@ -65,34 +65,18 @@ impl Mask {
             return;
         }
         let mut outside = vec![false; self.bits.len()];
-        let mut open: Vec<usize> = Vec::new();
         let border = (0..w).flat_map(|x| [x, (h - 1) * w + x]);
-        for at in border.chain((0..h).flat_map(|y| [y * w, y * w + w - 1])) {
-            if self.bits[at] == 0 && !outside[at] {
-                outside[at] = true;
-                open.push(at);
-            }
-        }
+        let border = border.chain((0..h).flat_map(|y| [y * w, y * w + w - 1]));
+        let mut open: Vec<usize> = border.collect();
         while let Some(at) = open.pop() {
+            if self.bits[at] != 0 || std::mem::replace(&mut outside[at], true) {
+                continue;
+            }
             let (x, y) = (at % w, at / w);
-            let mut visit = |next: usize| {
-                if self.bits[next] == 0 && !outside[next] {
-                    outside[next] = true;
-                    open.push(next);
-                }
-            };
-            if x > 0 {
-                visit(at - 1);
-            }
-            if x + 1 < w {
-                visit(at + 1);
-            }
-            if y > 0 {
-                visit(at - w);
-            }
-            if y + 1 < h {
-                visit(at + w);
-            }
+            open.extend((x > 0).then(|| at - 1));
+            open.extend((x + 1 < w).then(|| at + 1));
+            open.extend((y > 0).then(|| at - w));
+            open.extend((y + 1 < h).then(|| at + w));
         }
         for (bit, outside) in self.bits.iter_mut().zip(outside) {
             *bit |= u8::from(!outside);
@@ -101,17 +85,17 @@ impl Mask {
 
     /// Returns the majority of each 3 x 3 neighborhood: set if at least 5 of 9 pixels are.
     pub fn majority(&self) -> Mask {
-        self.counted(|n, _| n >= 5)
+        self.by_count(|n| n >= 5)
     }
 
     /// Returns the pixels whose 3 x 3 neighborhood is completely set. Pixels outside `rect` count as clear.
     pub fn eroded(&self) -> Mask {
-        self.counted(|n, _| n == 9)
+        self.by_count(|n| n == 9)
     }
 
     /// Returns the pixels with any set pixel in their 3 x 3 neighborhood.
     pub fn dilated(&self) -> Mask {
-        self.counted(|n, _| n > 0)
+        self.by_count(|n| n > 0)
     }
 
     /// Returns the mask eroded `n_px` times.
@@ -124,45 +108,34 @@ impl Mask {
         (0..n_px).fold(self.clone(), |mask, _| mask.dilated())
     }
 
-    /// Returns the mask eroded, then dilated, which removes parts thinner than 3 pixels.
-    pub fn opened(&self) -> Mask {
-        self.eroded().dilated()
-    }
-
     /// Returns, for each pixel, the number of erosions that clear it; 0 if it is clear. This is the
     /// chessboard distance to the nearest clear pixel, with pixels outside `rect` clear.
     pub fn depth_px(&self) -> Vec<u32> {
         let (w, h) = (self.width(), self.height());
-        let mut depth = vec![0; w * h];
-        let least = |depth: &[u32], x: usize, y: usize, around: [[isize; 2]; 4]| {
-            let of = |[dx, dy]: [isize; 2]| {
-                let (x, y) = (x.checked_add_signed(dx)?, y.checked_add_signed(dy)?);
-                (x < w && y < h).then(|| depth[y * w + x])
-            };
+        // A border of zeros surrounds the depths.
+        let stride = w + 2;
+        let index = |at: usize| (at / w + 1) * stride + at % w + 1;
+        let set_pixels = (0..w * h).filter(|&at| self.bits[at] == 1);
+        let set_pixels: Vec<usize> = set_pixels.map(index).collect();
+        let mut depth = vec![0u32; stride * (h + 2)];
+        let least = |depth: &[u32], around: [usize; 4]| {
             around
-                .into_iter()
-                .map(|to| of(to).unwrap_or(0))
-                .min()
-                .unwrap_or(0)
+                .iter()
+                .fold(u32::MAX, |least, &k| least.min(depth[k]))
         };
-        for at in 0..w * h {
-            if self.bits[at] == 1 {
-                let around = [[-1, 0], [-1, -1], [0, -1], [1, -1]];
-                depth[at] = 1 + least(&depth, at % w, at / w, around);
-            }
+        for &k in &set_pixels {
+            let above = k - stride;
+            depth[k] = 1 + least(&depth, [k - 1, above - 1, above, above + 1]);
         }
-        for at in (0..w * h).rev() {
-            if self.bits[at] == 1 {
-                let around = [[1, 0], [1, 1], [0, 1], [-1, 1]];
-                depth[at] = depth[at].min(1 + least(&depth, at % w, at / w, around));
-            }
+        for &k in set_pixels.iter().rev() {
+            let below = k + stride;
+            depth[k] = depth[k].min(1 + least(&depth, [k + 1, below + 1, below, below - 1]));
         }
-        depth
+        (0..w * h).map(|at| depth[index(at)]).collect()
     }
 
-    /// Returns a mask computed from the number of set pixels in each 3 x 3 neighborhood and from the pixel
-    /// itself.
-    fn counted(&self, keep: impl Fn(u8, u8) -> bool) -> Mask {
+    /// Returns the pixels for which `keep` holds, given the number of set pixels in their 3 x 3 neighborhood.
+    fn by_count(&self, keep: impl Fn(u8) -> bool) -> Mask {
         let (w, h) = (self.width(), self.height());
         let mut result = Mask::new(self.rect);
         if w == 0 {
@@ -179,13 +152,11 @@ impl Mask {
                 *sum += right;
             }
         }
-        let bits = self.bits.chunks_exact(w);
-        for (y, (kept, bits)) in result.bits.chunks_exact_mut(w).zip(bits).enumerate() {
-            let around = rows[y * w..][..3 * w].split_at(w);
-            let (above, (here, below)) = (around.0, around.1.split_at(w));
-            let sums = above.iter().zip(here).zip(below);
-            for ((kept, bit), ((a, b), c)) in kept.iter_mut().zip(bits).zip(sums) {
-                *kept = u8::from(keep(a + b + c, *bit));
+        for (y, kept) in result.bits.chunks_exact_mut(w).enumerate() {
+            let (above, rest) = rows[y * w..].split_at(w);
+            let (here, below) = rest.split_at(w);
+            for (kept, ((a, b), c)) in kept.iter_mut().zip(above.iter().zip(here).zip(below)) {
+                *kept = u8::from(keep(a + b + c));
             }
         }
         result
@@ -237,14 +208,5 @@ mod tests {
             let deeper = depth.iter().map(|&depth| u8::from(depth > n));
             assert!(deeper.eq(eroded.bits.iter().copied()), "{n}");
         }
-    }
-
-    #[test]
-    fn opening_removes_what_is_thinner_than_three() {
-        let thin = mask(&["........", ".###....", ".######.", ".###....", "........"]);
-        assert_eq!(
-            thin.opened(),
-            mask(&["........", ".###....", ".###....", ".###....", "........"])
-        );
     }
 }

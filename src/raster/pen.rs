@@ -4,7 +4,7 @@
 use super::Frame;
 use crate::geometry::Rect;
 
-/// Coverage of the strokes since the last call of `ink`, for frames of one size.
+/// Coverage of the strokes since the last call of `draw`, for frames of one size.
 #[derive(Clone, Debug)]
 pub struct Pen {
     width: usize,
@@ -52,27 +52,26 @@ impl Pen {
     /// Adds text in a 5 x 7 dot font, with the upper left corner at `at` and dots `dot_px` wide. The font has
     /// the digits, the point and the letter s; other characters are blank.
     pub fn text(&mut self, text: &str, at: [f64; 2], dot_px: f64) {
-        for (n, glyph) in text.chars().map(rows_of).enumerate() {
-            for (row, bits) in glyph.into_iter().enumerate() {
-                for column in (0..5).filter(|column| bits >> (4 - column) & 1 == 1) {
+        let half = dot_px / 2.0;
+        for (n, character) in text.chars().enumerate() {
+            for (row, dots) in glyph_of(character).split_whitespace().enumerate() {
+                for (column, _) in dots.match_indices('1') {
                     let center = [
-                        at[0] + (n as f64 * 6.0 + f64::from(column) + 0.5) * dot_px,
+                        at[0] + (n as f64 * 6.0 + column as f64 + 0.5) * dot_px,
                         at[1] + (row as f64 + 0.5) * dot_px,
                     ];
-                    let half = dot_px / 2.0;
-                    let [least, most] = [-half, half].map(|d| [center[0] + d, center[1] + d]);
-                    let inside = |p: [f64; 2]| {
+                    let [least, most] = [-half, half].map(|d| center.map(|c| c + d));
+                    self.cover(least, most, |p| {
                         let off = (p[0] - center[0]).abs().max((p[1] - center[1]).abs());
                         (half + 0.5 - off).clamp(0.0, 1.0)
-                    };
-                    self.cover(least, most, inside);
+                    });
                 }
             }
         }
     }
 
     /// Draws the strokes onto the frame in one color and clears them. Panics if the frame has another size.
-    pub fn ink(&mut self, frame: &mut Frame, rgb: [u8; 3]) {
+    pub fn draw(&mut self, frame: &mut Frame, rgb: [u8; 3]) {
         assert_eq!(
             (frame.width as usize, frame.height as usize),
             (self.width, self.height),
@@ -107,41 +106,23 @@ impl Pen {
         self.touched = Rect::default();
     }
 
-    /// Raises the coverage of each pixel between two corners to `of` its center.
-    fn cover(&mut self, least: [f64; 2], most: [f64; 2], of: impl Fn([f64; 2]) -> f64) {
-        let (w, h) = (self.width as u32, self.height as u32);
+    /// Raises the coverage of each pixel between two corners to `coverage_at` its center.
+    fn cover(&mut self, least: [f64; 2], most: [f64; 2], coverage_at: impl Fn([f64; 2]) -> f64) {
         if [least, most].concat().iter().any(|c| !c.is_finite()) {
             return;
         }
-        let rect = Rect::clipped(
-            least[0].floor() as i64,
-            least[1].floor() as i64,
-            most[0].ceil() as i64 + 1,
-            most[1].ceil() as i64 + 1,
-            w,
-            h,
-        );
+        let [left, top] = least.map(|c| c.floor() as i64);
+        let [right, bottom] = most.map(|c| c.ceil() as i64 + 1);
+        let (w, h) = (self.width as u32, self.height as u32);
+        let rect = Rect::clipped(left, top, right, bottom, w, h);
         for y in rect.y..rect.bottom() {
             for x in rect.x..rect.right() {
-                let covered = (255.0 * of([f64::from(x) + 0.5, f64::from(y) + 0.5])).round() as u8;
-                let at = &mut self.coverage[y as usize * self.width + x as usize];
-                *at = covered.max(*at);
+                let coverage = coverage_at([f64::from(x) + 0.5, f64::from(y) + 0.5]);
+                let old = &mut self.coverage[y as usize * self.width + x as usize];
+                *old = ((255.0 * coverage).round() as u8).max(*old);
             }
         }
-        self.touched = match (self.touched.is_empty(), rect.is_empty()) {
-            (_, true) => self.touched,
-            (true, false) => rect,
-            (false, false) => {
-                let t = self.touched;
-                let (x, y) = (t.x.min(rect.x), t.y.min(rect.y));
-                Rect {
-                    x,
-                    y,
-                    w: t.right().max(rect.right()) - x,
-                    h: t.bottom().max(rect.bottom()) - y,
-                }
-            }
-        };
+        self.touched = self.touched.union(&rect);
     }
 }
 
@@ -149,42 +130,22 @@ fn mixed(old: u8, new: u8, alpha: u32) -> u8 {
     ((u32::from(old) * (255 - alpha) + u32::from(new) * alpha + 127) / 255) as u8
 }
 
-/// Returns the seven rows of a character, five dots each; the leftmost dot is the highest bit.
-fn rows_of(figure: char) -> [u8; 7] {
-    match figure {
-        '0' => [
-            0b01110, 0b10001, 0b10011, 0b10101, 0b11001, 0b10001, 0b01110,
-        ],
-        '1' => [
-            0b00100, 0b01100, 0b00100, 0b00100, 0b00100, 0b00100, 0b01110,
-        ],
-        '2' => [
-            0b01110, 0b10001, 0b00001, 0b00110, 0b01000, 0b10000, 0b11111,
-        ],
-        '3' => [
-            0b11110, 0b00001, 0b00001, 0b01110, 0b00001, 0b00001, 0b11110,
-        ],
-        '4' => [
-            0b00010, 0b00110, 0b01010, 0b10010, 0b11111, 0b00010, 0b00010,
-        ],
-        '5' => [
-            0b11111, 0b10000, 0b11110, 0b00001, 0b00001, 0b10001, 0b01110,
-        ],
-        '6' => [
-            0b00110, 0b01000, 0b10000, 0b11110, 0b10001, 0b10001, 0b01110,
-        ],
-        '7' => [
-            0b11111, 0b00001, 0b00010, 0b00100, 0b01000, 0b01000, 0b01000,
-        ],
-        '8' => [
-            0b01110, 0b10001, 0b10001, 0b01110, 0b10001, 0b10001, 0b01110,
-        ],
-        '9' => [
-            0b01110, 0b10001, 0b10001, 0b01111, 0b00001, 0b00010, 0b01100,
-        ],
-        '.' => [0, 0, 0, 0, 0, 0b01100, 0b01100],
-        's' => [0, 0, 0b01111, 0b10000, 0b01110, 0b00001, 0b11110],
-        _ => [0; 7],
+/// Returns the seven rows of a character, from the top, with five dots each.
+fn glyph_of(character: char) -> &'static str {
+    match character {
+        '0' => "01110 10001 10011 10101 11001 10001 01110",
+        '1' => "00100 01100 00100 00100 00100 00100 01110",
+        '2' => "01110 10001 00001 00110 01000 10000 11111",
+        '3' => "11110 00001 00001 01110 00001 00001 11110",
+        '4' => "00010 00110 01010 10010 11111 00010 00010",
+        '5' => "11111 10000 11110 00001 00001 10001 01110",
+        '6' => "00110 01000 10000 11110 10001 10001 01110",
+        '7' => "11111 00001 00010 00100 01000 01000 01000",
+        '8' => "01110 10001 10001 01110 10001 10001 01110",
+        '9' => "01110 10001 10001 01111 00001 00010 01100",
+        '.' => "00000 00000 00000 00000 00000 01100 01100",
+        's' => "00000 00000 01111 10000 01110 00001 11110",
+        _ => "",
     }
 }
 
@@ -200,10 +161,10 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_inked_where_it_lies_and_nowhere_else() {
+    fn line_changes_only_the_pixels_along_it() {
         let (mut frame, mut pen) = (gray(), Pen::new(33, 21));
         pen.line([4.0, 10.5], [20.0, 10.5], 1.0, 1.0);
-        pen.ink(&mut frame, [255, 0, 0]);
+        pen.draw(&mut frame, [255, 0, 0]);
         let [r, g, b] = frame.to_rgb().pixel(12, 10);
         assert!(r > 200 && g < 60 && b < 60, "{r} {g} {b}");
         let old = gray();
@@ -211,31 +172,31 @@ mod tests {
             let row = 33 * y..33 * (y + 1);
             assert_eq!(frame.luma()[row.clone()], old.luma()[row]);
         }
-        // The first ink cleared the pen.
-        let inked = frame.clone();
-        pen.ink(&mut frame, [0, 255, 0]);
-        assert_eq!(frame, inked);
+        // The first call cleared the pen.
+        let drawn = frame.clone();
+        pen.draw(&mut frame, [0, 255, 0]);
+        assert_eq!(frame, drawn);
     }
 
     #[test]
-    fn lines_that_cross_do_not_darken_each_other_and_may_leave_the_frame() {
+    fn crossing_lines_do_not_darken_each_other_and_are_clipped() {
         let (mut once, mut twice, mut pen) = (gray(), gray(), Pen::new(33, 21));
         pen.line([-50.0, 5.0], [90.0, 5.0], 2.0, 0.5);
-        pen.ink(&mut once, [0; 3]);
+        pen.draw(&mut once, [0; 3]);
         for _ in 0..2 {
             pen.line([-50.0, 5.0], [90.0, 5.0], 2.0, 0.5);
         }
         pen.line([f64::NAN, 5.0], [90.0, 5.0], 2.0, 0.5);
-        pen.ink(&mut twice, [0; 3]);
+        pen.draw(&mut twice, [0; 3]);
         assert_eq!(once, twice);
     }
 
     #[test]
-    fn every_figure_is_drawn_differently() {
+    fn every_character_is_drawn_differently() {
         let drawn = |text: &str| {
             let (mut frame, mut pen) = (gray(), Pen::new(33, 21));
             pen.text(text, [2.0, 2.0], 2.0);
-            pen.ink(&mut frame, [255; 3]);
+            pen.draw(&mut frame, [255; 3]);
             frame
         };
         let all: Vec<Frame> = "0123456789.s "

@@ -9,10 +9,9 @@ pub fn resized(image: &RgbImage, width: u32, height: u32) -> RgbImage {
     if (image.width, image.height) == (width, height) {
         return image.clone();
     }
-    let (rows, columns) = (image.height as usize, image.width as usize);
     // Each pass transposes: the first resizes the rows, the second the columns.
-    let across = resampled(&image.pixels, (columns, rows), width as usize);
-    let pixels = resampled(&across, (rows, width as usize), height as usize);
+    let across = resampled_rows(&image.pixels, image.width as usize, width as usize);
+    let pixels = resampled_rows(&across, image.height as usize, height as usize);
     RgbImage {
         width,
         height,
@@ -21,7 +20,8 @@ pub fn resized(image: &RgbImage, width: u32, height: u32) -> RgbImage {
 }
 
 /// Resizes rows of `length` pixels to `n` pixels and transposes the result.
-fn resampled(pixels: &[u8], (length, n_rows): (usize, usize), n: usize) -> Vec<u8> {
+fn resampled_rows(pixels: &[u8], length: usize, n: usize) -> Vec<u8> {
+    let n_rows = pixels.len() / (3 * length);
     let mut out = vec![0; n * n_rows * 3];
     for (to, taps) in taps(length, n).iter().enumerate() {
         for row in 0..n_rows {
@@ -50,7 +50,7 @@ fn taps(length: usize, n: usize) -> Vec<Vec<(usize, f32)>> {
             let center = (to as f64 + 0.5) * step - 0.5;
             let first = (center - 2.0 * width).ceil() as i64;
             let end = (center + 2.0 * width).floor() as i64;
-            let weights = (first..=end).map(|from| curve((from as f64 - center) / width));
+            let weights = (first..=end).map(|from| catmull_rom((from as f64 - center) / width));
             let sum: f64 = weights.clone().sum();
             let from = (first..=end).map(|from| from.clamp(0, last) as usize);
             from.zip(weights.map(|w| (w / sum) as f32)).collect()
@@ -59,7 +59,7 @@ fn taps(length: usize, n: usize) -> Vec<Vec<(usize, f32)>> {
 }
 
 /// Returns the value of the Catmull-Rom kernel at a distance in pixels.
-fn curve(distance: f64) -> f64 {
+fn catmull_rom(distance: f64) -> f64 {
     let d = distance.abs();
     if d < 1.0 {
         1.0 + d * d * (1.5 * d - 2.5)
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ramp_stays_a_ramp_larger_and_smaller() {
+    fn ramp_stays_a_ramp_when_enlarged_or_shrunk() {
         let image = ramp(40, 30);
         for (width, height) in [(80, 60), (20, 15), (40, 30)] {
             let other = resized(&image, width, height);
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fine_checkerboard_shrinks_to_gray() {
+    fn fine_checkerboard_shrinks_to_gray() {
         let mut image = RgbImage::new(64, 64);
         for k in 0..64 * 64 {
             let value = if (k % 64 + k / 64) % 2 == 0 { 200 } else { 100 };

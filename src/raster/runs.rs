@@ -32,11 +32,8 @@ impl Component {
     /// Returns the component as a mask over `rect`, clipped to it.
     pub fn mask(&self, rect: Rect) -> Mask {
         let mut mask = Mask::new(rect);
-        for run in self
-            .runs
-            .iter()
-            .filter(|run| run.y >= rect.y && run.y < rect.bottom())
-        {
+        let rows = rect.y..rect.bottom();
+        for run in self.runs.iter().filter(|run| rows.contains(&run.y)) {
             let (x0, x1) = (run.x0.max(rect.x), run.x1.min(rect.right()));
             if x0 < x1 {
                 let row = (run.y - rect.y) as usize * rect.w as usize;
@@ -89,7 +86,7 @@ pub fn components(mask: &Mask) -> Vec<Component> {
     let mut slots: Vec<Option<usize>> = vec![None; runs.len()];
     let mut found: Vec<Component> = Vec::new();
     for (idx, run) in runs.iter().enumerate() {
-        let root = find(&mut parents, idx);
+        let root = root_of(&mut parents, idx);
         let slot = *slots[root].get_or_insert_with(|| {
             found.push(Component {
                 runs: Vec::new(),
@@ -101,12 +98,8 @@ pub fn components(mask: &Mask) -> Vec<Component> {
         let component = &mut found[slot];
         component.runs.push(*run);
         component.area += u64::from(run.x1 - run.x0);
-        component.rect = component.rect.union(&Rect {
-            x: run.x0,
-            y: run.y,
-            w: run.x1 - run.x0,
-            h: 1,
-        });
+        let row = Rect::new(run.x0, run.y, run.x1 - run.x0, 1);
+        component.rect = component.rect.union(&row);
     }
     found
 }
@@ -116,20 +109,15 @@ fn label(mask: &Mask) -> (Vec<Run>, Vec<usize>) {
     let mut runs: Vec<Run> = Vec::new();
     let mut parents: Vec<usize> = Vec::new();
     let mut above = 0..0;
-    for (row, y) in mask
-        .bits
-        .chunks_exact(mask.width().max(1))
-        .zip(mask.rect.y..)
-    {
+    let rows = mask.bits.chunks_exact(mask.width().max(1));
+    for (row, y) in rows.zip(mask.rect.y..) {
         let first = runs.len();
         let mut candidate = above.start;
         let mut x = 0;
         while let Some(start) = row[x..].iter().position(|&bit| bit != 0) {
             let x0 = x + start;
-            let x1 = row[x0..]
-                .iter()
-                .position(|&bit| bit == 0)
-                .map_or(row.len(), |n| x0 + n);
+            let n = row[x0..].iter().take_while(|&&bit| bit != 0).count();
+            let x1 = x0 + n;
             let run = Run {
                 y,
                 x0: mask.rect.x + x0 as u32,
@@ -157,11 +145,11 @@ fn label(mask: &Mask) -> (Vec<Run>, Vec<usize>) {
 
 /// Unites two runs. The smaller index becomes the root, which keeps components in image order.
 fn join(parents: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (find(parents, a), find(parents, b));
+    let (a, b) = (root_of(parents, a), root_of(parents, b));
     parents[a.max(b)] = a.min(b);
 }
 
-fn find(parents: &mut [usize], mut idx: usize) -> usize {
+fn root_of(parents: &mut [usize], mut idx: usize) -> usize {
     while parents[idx] != idx {
         parents[idx] = parents[parents[idx]];
         idx = parents[idx];
@@ -205,8 +193,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn components_are_those_of_a_flood_fill(w in 1u32..12, h in 1u32..12, seed: u64) {
-            let rect = Rect { x: 3, y: 5, w, h };
+        fn components_equal_those_of_a_flood_fill(w in 1u32..12, h in 1u32..12, seed: u64) {
+            let rect = Rect::new(3, 5, w, h);
             let bit = |k| u8::from(crate::random::bits(seed, &[k]).is_multiple_of(2));
             let mask = Mask { rect, bits: (0..rect.area()).map(bit).collect() };
             let ours: Vec<Vec<(u32, u32)>> = components(&mask).iter().map(|component| {

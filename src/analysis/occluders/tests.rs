@@ -59,7 +59,7 @@ fn center_px(frame_idx: usize) -> [f64; 2] {
 /// Level of the disc: a pattern of spots that moves with it.
 fn coat(u: f64, v: f64) -> f64 {
     let [u, v] = [u, v].map(|at| (at + 100.0) as u64 / 4);
-    60.0 + 24.0 * random::unit(5, &[u, v])
+    60.0 + 24.0 * random::uniform(5, &[u, v])
 }
 
 impl Film {

@@ -8,7 +8,7 @@
 use crate::analysis::Params;
 use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
-use crate::library::{Animal, Poses, Raw};
+use crate::library::{Animal, Poses, RawPose};
 
 /// Writes the raw heading of every pose. With a camera and the animal's size, also the raw position and
 /// direction.
@@ -19,9 +19,9 @@ pub fn measure_alone(poses: &mut Poses, params: &Params) {
         if !pose.detected() {
             continue;
         }
-        let mut raw = Raw {
+        let mut raw = RawPose {
             heading_rad: pose.heading_rad,
-            ..Raw::default()
+            ..RawPose::default()
         };
         let sizes = pose.length_px.zip(pose.height_px);
         // A silhouette cut by the border shows only a part of its height.

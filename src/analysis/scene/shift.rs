@@ -284,7 +284,7 @@ mod tests {
     fn scene(dx: f64, dy: f64, gain: f64, noise_key: u64) -> Frame {
         let mut frame = Frame::new(320, 240, ColorSpec::default());
         let blotch = |k: u64| {
-            let unit = |c: u64| random::unit(4, &[k, c]);
+            let unit = |c: u64| random::uniform(4, &[k, c]);
             let radius_px = 1.5 + 5.0 * unit(2);
             (
                 unit(0) * 320.0,

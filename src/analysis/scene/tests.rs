@@ -88,7 +88,7 @@ impl<F: Fn(usize) -> Picture> FrameStream for Reel<'_, F> {
 fn drawn(picture: &Picture, noise_key: u64) -> Frame {
     let mut frame = Frame::new(WIDTH, HEIGHT, ColorSpec::default());
     frame.planes.fill(128);
-    let stone = |x: i64, y: i64| 130.0 + 60.0 * random::unit(6, &[x as u64, y as u64]);
+    let stone = |x: i64, y: i64| 130.0 + 60.0 * random::uniform(6, &[x as u64, y as u64]);
     let wall = |x: f64, y: f64| {
         let (x, y) = (x / 6.0 + 1000.0, y / 6.0 + 1000.0);
         let (fx, fy) = (x.fract(), y.fract());
@@ -153,8 +153,8 @@ fn footage_in_which_nothing_moves_is_refused() {
 fn footage_of_a_trembling_camera_is_refused() {
     let (code, sentence) = refusal(40, |k| Picture {
         camera_px: [
-            random::unit(1, &[k as u64]) * 6.0,
-            random::unit(2, &[k as u64]) * 6.0,
+            random::uniform(1, &[k as u64]) * 6.0,
+            random::uniform(2, &[k as u64]) * 6.0,
         ],
         ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
     });

@@ -10,7 +10,7 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::error::Error;
-use super::motion::{Motion, Posture, bank_rad, rotation_of, same_side, slerp};
+use super::motion::{Motion, Posture, bank_rad, nearest_sign, rotation_of, slerp};
 use super::params::Params;
 use super::spine::{N_JOINTS, Swimming, effort_at, joint_angles_of_midline_rad, tail_beat_hz};
 use crate::geometry::Camera;
@@ -20,22 +20,22 @@ use crate::library::{Animal, Pose, Poses, View};
 /// in no frame.
 pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
     params.check().map_err(Error::InvalidParams)?;
-    let stage = Stage::of(poses, params)?;
-    let measured = place_all(poses, &stage, params);
-    let bridged = bridge(&measured, (params.bridge_s * poses.fps).round() as usize);
-    let smooth = smoothed(&bridged, params.smooth_s * poses.fps);
+    let setup = Setup::new(poses, params)?;
+    let measured = place_all(poses, &setup, params);
+    let filled = fill_gaps(&measured, (params.bridge_s * poses.fps).round() as usize);
+    let smooth = smoothed(&filled, params.smooth_s * poses.fps);
     Ok(Motion {
         fps: poses.fps,
         image_size_px: poses.image_size_px,
-        camera: stage.camera,
-        size: stage.size,
+        camera: setup.camera,
+        size: setup.size,
         palette: params.palette,
-        frames: swim(&smooth, poses, &stage, params),
+        frames: swim(&smooth, poses, &setup, params),
     })
 }
 
 /// Values that are the same for all frames.
-struct Stage {
+struct Setup {
     fps: f64,
     view: View,
     camera: Camera,
@@ -46,16 +46,14 @@ struct Stage {
     length_px: f64,
 }
 
-impl Stage {
-    fn of(poses: &Poses, params: &Params) -> Result<Stage, Error> {
+impl Setup {
+    fn new(poses: &Poses, params: &Params) -> Result<Setup, Error> {
+        let n_frames = poses.frames.len();
+        if !poses.frames.iter().any(Pose::detected) {
+            return Err(Error::NothingMoves { n_frames });
+        }
         let mut lengths_px: Vec<f64> = poses.frames.iter().filter_map(|p| p.length_px).collect();
         lengths_px.sort_by(f64::total_cmp);
-        let found = poses.frames.iter().any(Pose::detected);
-        if !found {
-            return Err(Error::NothingMoves {
-                n_frames: poses.frames.len(),
-            });
-        }
         let [width, height] = poses.image_size_px.map(f64::from);
         // The 90th percentile: foreshortening makes many measured lengths too short, and few are too long.
         let rank = lengths_px.len() * 9 / 10;
@@ -67,7 +65,7 @@ impl Stage {
             center_px: [0.5 * width, 0.5 * height],
             medium_index: 1.0,
         });
-        Ok(Stage {
+        Ok(Setup {
             fps: poses.fps,
             view: poses.view,
             z_apparent_m: size.length_m * camera.focal_px() / length_px,
@@ -89,49 +87,47 @@ struct Placement {
     joint_angles_rad: Option<[f64; N_JOINTS]>,
 }
 
-fn place_all(poses: &Poses, stage: &Stage, params: &Params) -> Vec<Option<Placement>> {
-    let headings = match stage.view {
-        View::Side => headings_in_image(&poses.frames, stage, params),
+fn place_all(poses: &Poses, setup: &Setup, params: &Params) -> Vec<Option<Placement>> {
+    let headings = match setup.view {
+        View::Side => headings_in_image(&poses.frames, setup, params),
         View::Top => Vec::new(),
     };
     let place = |(k, pose): (usize, &Pose)| {
-        let position_m = position_of(pose, stage)?;
-        let rotation = match (stage.view, pose.forward) {
+        let position_m = position_of(pose, setup)?;
+        let rotation = match (setup.view, pose.forward) {
             (View::Top, _) => seen_from_above(pose.heading_rad?),
             (View::Side, Some(forward)) => upright_along(DVec3::from(forward)),
             (View::Side, None) => upright_along(toward_camera(headings[k]?)),
         };
-        let midline = pose.midline_px.as_ref().filter(|_| stage.view == View::Top);
+        let midline = pose.midline_px.as_ref().filter(|_| setup.view == View::Top);
+        let joint_angles_rad =
+            midline.and_then(|m| joint_angles_of_midline_rad(m, pose.heading_rad?));
         Some(Placement {
             position_m,
             rotation,
-            joint_angles_rad: midline
-                .and_then(|m| joint_angles_of_midline_rad(m, pose.heading_rad?)),
+            joint_angles_rad,
         })
     };
     poses.frames.iter().enumerate().map(place).collect()
 }
 
-fn position_of(pose: &Pose, stage: &Stage) -> Option<DVec3> {
-    let by_centroid = |px| stage.camera.point_in_camera(px, stage.z_apparent_m);
+fn position_of(pose: &Pose, setup: &Setup) -> Option<DVec3> {
+    let by_centroid = |px| setup.camera.point_in_camera(px, setup.z_apparent_m);
     let point = pose.position_m.or(pose.centroid_px.map(by_centroid))?;
     Some(DVec3::from(point))
 }
 
 /// Returns the headings as vectors in the image, smoothed over time. A vector is shorter where the fish is
 /// foreshortened. When the fish turns around, the vectors pass through zero without a jump.
-fn headings_in_image(frames: &[Pose], stage: &Stage, params: &Params) -> Vec<Option<DVec2>> {
-    let vectors: Vec<Option<DVec2>> = frames
-        .iter()
-        .map(|pose| {
-            let heading = pose.heading_rad?;
-            let seen = pose
-                .length_px
-                .map_or(1.0, |l| (1.1 * l / stage.length_px).min(1.0));
-            Some(seen * DVec2::new(libm::cos(heading), libm::sin(heading)))
-        })
-        .collect();
-    let sigma_frames = params.smooth_s.max(LEAST_TURN_S) * stage.fps;
+fn headings_in_image(frames: &[Pose], setup: &Setup, params: &Params) -> Vec<Option<DVec2>> {
+    let vector = |pose: &Pose| {
+        let heading = pose.heading_rad?;
+        let share = |length_px: f64| (1.1 * length_px / setup.length_px).min(1.0);
+        let seen = pose.length_px.map_or(1.0, share);
+        Some(seen * DVec2::new(libm::cos(heading), libm::sin(heading)))
+    };
+    let vectors: Vec<Option<DVec2>> = frames.iter().map(vector).collect();
+    let sigma_frames = params.smooth_s.max(MIN_HEADING_SMOOTHING_S) * setup.fps;
     (0..frames.len())
         .map(|k| vectors[k].map(|_| weighted_mean(&vectors, k, sigma_frames)))
         .collect()
@@ -139,7 +135,7 @@ fn headings_in_image(frames: &[Pose], stage: &Stage, params: &Params) -> Vec<Opt
 
 /// Least smoothing of headings that are known only in the image: standard deviation in seconds. A fish
 /// takes about three times as long to turn around.
-const LEAST_TURN_S: f64 = 0.08;
+const MIN_HEADING_SMOOTHING_S: f64 = 0.08;
 
 fn weighted_mean(values: &[Option<DVec2>], middle: usize, sigma_frames: f64) -> DVec2 {
     let (mut sum, mut total) = (DVec2::ZERO, 0.0);
@@ -176,24 +172,23 @@ fn seen_from_above(heading_rad: f64) -> DQuat {
 }
 
 /// Fills gaps of at most `longest` frames between two known frames by interpolation.
-fn bridge(measured: &[Option<Placement>], longest: usize) -> Vec<Option<Placement>> {
-    let mut bridged = measured.to_vec();
-    let known: Vec<usize> = (0..measured.len())
-        .filter(|&k| measured[k].is_some())
-        .collect();
+fn fill_gaps(measured: &[Option<Placement>], longest: usize) -> Vec<Option<Placement>> {
+    let mut filled = measured.to_vec();
+    let known = (0..)
+        .zip(measured)
+        .filter_map(|(k, placement)| Some((k, (*placement)?)));
+    let known: Vec<(usize, Placement)> = known.collect();
     for pair in known.windows(2) {
-        let (from, to) = (pair[0], pair[1]);
-        let (Some(a), Some(b)) = (measured[from], measured[to]) else {
-            continue;
-        };
+        let [(from, a), (to, b)] = [pair[0], pair[1]];
         if to - from - 1 > longest {
             continue;
         }
-        for (k, slot) in bridged.iter_mut().enumerate().take(to).skip(from + 1) {
-            *slot = Some(between(&a, &b, (k - from) as f64 / (to - from) as f64));
+        for k in from + 1..to {
+            let share = (k - from) as f64 / (to - from) as f64;
+            filled[k] = Some(between(&a, &b, share));
         }
     }
-    bridged
+    filled
 }
 
 fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
@@ -211,8 +206,8 @@ fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
 fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<Placement>> {
     let around = |k: usize| {
         let middle = placements[k]?;
-        let (mut position, mut turn, mut total) =
-            (DVec3::ZERO, DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), 0.0);
+        let (mut position, mut total) = (DVec3::ZERO, 0.0);
+        let mut turn = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
         let unbroken = |other: usize| {
             let (lo, hi) = (other.min(k), other.max(k));
             placements[lo..=hi].iter().all(Option::is_some)
@@ -222,7 +217,7 @@ fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<P
                 continue;
             };
             position += weight * near.position_m;
-            turn += same_side(middle.rotation, near.rotation) * weight;
+            turn += nearest_sign(middle.rotation, near.rotation) * weight;
             total += weight;
         }
         Some(Placement {
@@ -248,11 +243,10 @@ fn window(n: usize, middle: usize, sigma_frames: f64) -> impl Iterator<Item = (u
 fn swim(
     placements: &[Option<Placement>],
     poses: &Poses,
-    stage: &Stage,
+    setup: &Setup,
     params: &Params,
 ) -> Vec<Posture> {
-    let mut phase_turns = 0.0;
-    let mut speed_bl_per_s = 0.0;
+    let (mut phase_turns, mut speed_bl_per_s) = (0.0, 0.0);
     let first = placements.iter().flatten().next();
     let mut last = first.map_or(Posture::at(DVec3::Z, DQuat::IDENTITY), |p| {
         Posture::at(p.position_m, p.rotation)
@@ -264,31 +258,31 @@ fn swim(
             frames.push(last);
             continue;
         };
-        let moving = Moving::around(placements, k, stage.fps);
-        let new_speed = moving.speed_m_per_s.max(0.0) / stage.size.length_m;
+        let moving = Kinematics::at(placements, k, setup.fps);
+        let new_speed = moving.speed_m_per_s.max(0.0) / setup.size.length_m;
         // A low-pass of 0.2 s: measured speeds are noisier than the motion of the tail.
-        speed_bl_per_s += (new_speed - speed_bl_per_s) * (5.0 / stage.fps).min(1.0);
+        speed_bl_per_s += (new_speed - speed_bl_per_s) * (5.0 / setup.fps).min(1.0);
         // Where no tail beat was measured, its frequency follows from the speed.
-        let beat_hz = poses
-            .tail_beat_hz(k)
-            .unwrap_or(tail_beat_hz(speed_bl_per_s));
-        phase_turns += beat_hz.min(0.45 * stage.fps) / stage.fps;
+        let measured_hz = poses.tail_beat_hz(k);
+        let beat_hz = measured_hz.unwrap_or(tail_beat_hz(speed_bl_per_s));
+        phase_turns += beat_hz.min(0.45 * setup.fps) / setup.fps;
         let swimming = Swimming {
             phase_turns,
             effort: effort_at(speed_bl_per_s),
             turn_rad_per_s: moving.turn_rad_per_s,
         };
-        let roll = match stage.view {
+        let roll = match setup.view {
             View::Side => bank_rad(moving.turn_rad_per_s, moving.speed_m_per_s, params.bank_rad),
             View::Top => 0.0,
         };
         let rotation = here.rotation * rotation_of(0.0, 0.0, roll);
         last = Posture {
             position_m: here.position_m,
-            rotation: same_side(last.rotation, rotation),
-            joint_angles_rad: match params.swim {
-                true => here.joint_angles_rad.unwrap_or(swimming.joint_angles_rad()),
-                false => [0.0; N_JOINTS],
+            rotation: nearest_sign(last.rotation, rotation),
+            joint_angles_rad: if params.swim {
+                here.joint_angles_rad.unwrap_or(swimming.joint_angles_rad())
+            } else {
+                [0.0; N_JOINTS]
             },
             visible: true,
         };
@@ -298,39 +292,32 @@ fn swim(
 }
 
 /// Speed and turn rate of the fish in one frame.
-struct Moving {
+#[derive(Default)]
+struct Kinematics {
     /// Speed along its own direction, in metres a second.
     speed_m_per_s: f64,
     /// Turn rate to its left, in radians a second.
     turn_rad_per_s: f64,
 }
 
-impl Moving {
+impl Kinematics {
     /// Returns the motion between the known neighboring frames; zero if there are none.
-    fn around(placements: &[Option<Placement>], k: usize, fps: f64) -> Moving {
+    fn at(placements: &[Option<Placement>], k: usize, fps: f64) -> Kinematics {
         let known = |k: usize| placements.get(k).copied().flatten();
-        let (before, after) = (
-            known(k.wrapping_sub(1)).or(known(k)),
-            known(k + 1).or(known(k)),
-        );
-        let n_steps = [k.wrapping_sub(1), k + 1]
-            .into_iter()
-            .filter(|&n| known(n).is_some())
-            .count();
-        match (before, known(k), after) {
-            (Some(a), Some(here), Some(b)) if n_steps > 0 => {
-                let per_s = fps / n_steps as f64;
-                let turned = (b.rotation * DVec3::X - a.rotation * DVec3::X) * per_s;
-                let step = (b.position_m - a.position_m) * per_s;
-                Moving {
-                    speed_m_per_s: step.dot(here.rotation * DVec3::X),
-                    turn_rad_per_s: turned.dot(here.rotation * DVec3::Z),
-                }
-            }
-            _ => Moving {
-                speed_m_per_s: 0.0,
-                turn_rad_per_s: 0.0,
-            },
+        let [before, here, after] = [k.wrapping_sub(1), k, k + 1].map(known);
+        let n_steps = [before, after].iter().flatten().count();
+        let (Some(a), Some(here), Some(b)) = (before.or(here), here, after.or(here)) else {
+            return Kinematics::default();
+        };
+        if n_steps == 0 {
+            return Kinematics::default();
+        }
+        let per_s = fps / n_steps as f64;
+        let turned = (b.rotation * DVec3::X - a.rotation * DVec3::X) * per_s;
+        let step = (b.position_m - a.position_m) * per_s;
+        Kinematics {
+            speed_m_per_s: step.dot(here.rotation * DVec3::X),
+            turn_rad_per_s: turned.dot(here.rotation * DVec3::Z),
         }
     }
 }

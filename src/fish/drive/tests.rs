@@ -49,7 +49,7 @@ fn uncalibrated(view: View) -> Poses {
 }
 
 #[test]
-fn driven_by_the_truth_it_lies_where_the_sample_fish_lay() {
+fn motion_from_true_poses_equals_the_sample_motion() {
     let (film, poses) = truth(150);
     let motion = drive(&poses, &Params::default()).expect("it was seen");
     for (k, (got, want)) in motion.frames.iter().zip(&film.motion().frames).enumerate() {
@@ -66,7 +66,7 @@ fn driven_by_the_truth_it_lies_where_the_sample_fish_lay() {
 }
 
 #[test]
-fn without_smoothing_and_bank_the_measured_values_come_through_unchanged() {
+fn measured_values_are_unchanged_without_smoothing_and_roll() {
     let (_, poses) = truth(30);
     let motion = drive(&poses, &Params::papers()).expect("it was seen");
     for (got, pose) in motion.frames.iter().zip(&poses.frames) {
@@ -78,7 +78,7 @@ fn without_smoothing_and_bank_the_measured_values_come_through_unchanged() {
 }
 
 #[test]
-fn quaternions_never_change_sides() {
+fn successive_quaternions_keep_their_sign() {
     let (_, poses) = truth(600);
     let motion = drive(&poses, &Params::default()).expect("it was seen");
     for pair in motion.frames.windows(2) {
@@ -88,7 +88,7 @@ fn quaternions_never_change_sides() {
 }
 
 #[test]
-fn short_gaps_are_bridged_and_long_ones_hide_the_fish() {
+fn short_gaps_are_filled_and_long_gaps_hide_the_fish() {
     let (film, mut poses) = truth(120);
     for k in (20..30).chain(60..90) {
         poses.frames[k] = Pose::default();
@@ -104,7 +104,7 @@ fn short_gaps_are_bridged_and_long_ones_hide_the_fish() {
 }
 
 #[test]
-fn without_a_camera_it_is_seen_where_the_animal_was_and_as_long() {
+fn uncalibrated_fish_has_the_filmed_position_and_length() {
     let poses = uncalibrated(View::Side);
     let motion = drive(&poses, &Params::default()).expect("it was seen");
     for (posture, pose) in motion.frames.iter().zip(&poses.frames) {
@@ -119,7 +119,7 @@ fn without_a_camera_it_is_seen_where_the_animal_was_and_as_long() {
 }
 
 #[test]
-fn turning_about_it_passes_by_the_camera_upright() {
+fn uncalibrated_turns_pass_the_camera_upright() {
     let motion = drive(&uncalibrated(View::Side), &Params::default()).expect("it was seen");
     let facing_camera = motion.frames.iter().any(|p| p.forward().z < -0.8);
     assert!(facing_camera, "it does not flip from one side to the other");
@@ -133,7 +133,7 @@ fn turning_about_it_passes_by_the_camera_upright() {
 }
 
 #[test]
-fn seen_from_above_it_shows_its_back() {
+fn top_view_shows_the_back() {
     let motion = drive(&uncalibrated(View::Top), &Params::default()).expect("it was seen");
     for posture in &motion.frames {
         assert!(
@@ -145,7 +145,7 @@ fn seen_from_above_it_shows_its_back() {
 }
 
 #[test]
-fn a_midline_bends_it() {
+fn midline_bends_the_spine() {
     let mut poses = uncalibrated(View::Top);
     for pose in &mut poses.frames[..60] {
         let [x, y] = pose.centroid_px.expect("seen");
@@ -166,7 +166,7 @@ fn a_midline_bends_it() {
 }
 
 #[test]
-fn an_animal_that_was_never_found_drives_nothing() {
+fn undetected_animal_is_refused() {
     let mut poses = uncalibrated(View::Side);
     poses.frames.fill(Pose::default());
     let refused = drive(&poses, &Params::default());

@@ -4,8 +4,6 @@
 //! 3 samples per pixel for soft edges. The body is drawn first, with a depth buffer. The translucent fins
 //! follow, from far to near (docs/explanation/algorithms.md, "Virtual fish").
 
-use glam::DVec3;
-
 use super::light::{Surface, shade};
 use super::mesh::{Mesh, Vertex};
 use super::motion::Posture;
@@ -13,7 +11,7 @@ use super::params::Palette;
 use super::spine::{joint_at_rest_m, joint_frames};
 use crate::geometry::{Camera, Rect};
 use crate::library::Animal;
-use crate::raster::{RgbImage, RgbaImage};
+use crate::raster::RgbImage;
 
 /// Number of samples along each side of a pixel. Free choice.
 const SAMPLES: usize = 3;
@@ -49,18 +47,19 @@ impl Renderer {
 
     /// Draws one posture as the camera sees it. An invisible posture gives an empty box.
     pub fn draw(&self, camera: &Camera, image_size_px: [u32; 2], posture: &Posture) -> Drawing {
-        let points = match posture.visible {
-            true => self.project(camera, posture),
-            false => Vec::new(),
+        let points = if posture.visible {
+            self.project(camera, posture)
+        } else {
+            Vec::new()
         };
         let rect = bounds(&points, image_size_px);
         let mut samples = Samples::new(rect);
         if !rect.is_empty() {
             for triangle in &self.mesh.body {
-                samples.fill(&points, triangle, Samples::cover);
+                samples.fill(&points, triangle, Samples::write_opaque);
             }
             for triangle in far_to_near(&self.mesh.fins, &points) {
-                samples.fill(&points, &triangle, Samples::glaze);
+                samples.fill(&points, &triangle, Samples::blend_over);
             }
         }
         samples.average()
@@ -72,30 +71,24 @@ impl Renderer {
         let length_m = self.mesh.size.length_m;
         let joints = joint_frames(length_m, &posture.joint_angles_rad);
         let place = |vertex: &Vertex| {
-            let (at, normal) = (DVec3::from(vertex.position_m), DVec3::from(vertex.normal));
-            let moved = |k: usize| {
-                let j = usize::from(vertex.joints[k]);
+            let moved = vertex.joints.joints.map(|joint| {
+                let j = usize::from(joint);
                 let (pivot, turn) = joints[j];
-                (
-                    pivot + turn * (at - joint_at_rest_m(length_m, j)),
-                    turn * normal,
-                )
-            };
-            let ((at_a, normal_a), (at_b, normal_b)) = (moved(0), moved(1));
-            let share = f64::from(vertex.share);
-            let at = posture.position_m + posture.rotation * at_a.lerp(at_b, share);
-            let normal = posture.rotation * normal_a.lerp(normal_b, share).normalize();
+                let from_joint = vertex.position_m - joint_at_rest_m(length_m, j);
+                [pivot + turn * from_joint, turn * vertex.normal]
+            });
+            let share = f64::from(vertex.joints.second_weight);
+            let [at, normal] = [0, 1].map(|k| moved[0][k].lerp(moved[1][k], share));
+            let at = posture.position_m + posture.rotation * at;
+            let normal = posture.rotation * normal.normalize();
             let [x, y] = camera.image_from_camera([at.x, at.y, at.z.max(NEAREST_M)]);
             Point {
                 x: (x * SAMPLES as f64) as f32,
                 y: (y * SAMPLES as f64) as f32,
                 z: at.z as f32,
                 surface: Surface {
-                    normal: [normal.x as f32, normal.y as f32, normal.z as f32],
-                    color: vertex.color,
-                    shine: vertex.shine,
-                    grain: vertex.grain,
-                    grain_depth: vertex.grain_depth,
+                    normal: normal.as_vec3(),
+                    material: vertex.material,
                 },
             }
         };
@@ -124,24 +117,6 @@ impl Drawing {
             }
         }
     }
-
-    /// Returns the box as a straight-alpha image.
-    pub fn to_rgba(&self) -> RgbaImage {
-        let straight = |&[r, g, b, a]: &[f32; 4]| {
-            let scale = if a > 0.0 { 255.0 / a } else { 0.0 };
-            [
-                byte(r * scale),
-                byte(g * scale),
-                byte(b * scale),
-                byte(a * 255.0),
-            ]
-        };
-        RgbaImage {
-            width: self.rect.w,
-            height: self.rect.h,
-            pixels: self.pixels.iter().flat_map(straight).collect(),
-        }
-    }
 }
 
 /// Vertex projected into the image.
@@ -167,14 +142,9 @@ fn bounds(points: &[Point], [width, height]: [u32; 2]) -> Rect {
         return Rect::default();
     }
     let pixel = |v: f32| (v / SAMPLES as f32).floor() as i64;
-    Rect::clipped(
-        pixel(lo[0]) - 1,
-        pixel(lo[1]) - 1,
-        pixel(hi[0]) + 2,
-        pixel(hi[1]) + 2,
-        width,
-        height,
-    )
+    let [left, top] = lo.map(|v| pixel(v) - 1);
+    let [right, bottom] = hi.map(|v| pixel(v) + 2);
+    Rect::clipped(left, top, right, bottom, width, height)
 }
 
 /// Returns the triangles from far to near. Ties keep their order.
@@ -206,18 +176,15 @@ impl Samples {
         }
     }
 
-    /// Calls `put` for every sample whose middle lies in the triangle and in front of the depth buffer.
+    /// Calls `write` for every sample whose middle lies in the triangle and in front of the depth buffer.
     fn fill(
         &mut self,
         points: &[Point],
         triangle: &[u32; 3],
-        put: fn(&mut Samples, usize, f32, Surface),
+        write: fn(&mut Samples, usize, f32, Surface),
     ) {
         let [a, b, c] = triangle.map(|v| &points[v as usize]);
-        let origin = [
-            (self.rect.x as usize * SAMPLES) as f32 + 0.0,
-            (self.rect.y as usize * SAMPLES) as f32,
-        ];
+        let origin = [self.rect.x, self.rect.y].map(|px| (px as usize * SAMPLES) as f32);
         let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
         if area == 0.0 {
             return;
@@ -242,27 +209,23 @@ impl Samples {
                 let at = row * self.width + column;
                 let z = u * a.z + v * b.z + w * c.z;
                 if z < self.depth[at] {
-                    put(
-                        self,
-                        at,
-                        z,
-                        Surface::between([&a.surface, &b.surface, &c.surface], [u, v, w]),
-                    );
+                    let corners = [&a.surface, &b.surface, &c.surface];
+                    write(self, at, z, Surface::interpolate(corners, [u, v, w]));
                 }
             }
         }
     }
 
     /// Writes an opaque sample, which hides everything behind it.
-    fn cover(&mut self, at: usize, z: f32, surface: Surface) {
+    fn write_opaque(&mut self, at: usize, z: f32, surface: Surface) {
         let [r, g, b] = shade(&surface);
         self.depth[at] = z;
         self.color[at] = [r, g, b, 1.0];
     }
 
     /// Blends a translucent sample over the present color.
-    fn glaze(&mut self, at: usize, _z: f32, surface: Surface) {
-        let alpha = surface.color[3];
+    fn blend_over(&mut self, at: usize, _z: f32, surface: Surface) {
+        let alpha = surface.material.color[3];
         let [r, g, b] = shade(&surface);
         let under = self.color[at];
         let over = [r * alpha, g * alpha, b * alpha, alpha];
@@ -274,10 +237,8 @@ impl Samples {
         let mut pixels = vec![[0.0f32; 4]; self.rect.area() as usize];
         for (row, samples) in self.color.chunks_exact(self.width.max(1)).enumerate() {
             let start = row / SAMPLES * self.rect.w as usize;
-            for (pixel, group) in pixels[start..]
-                .iter_mut()
-                .zip(samples.chunks_exact(SAMPLES))
-            {
+            let groups = samples.chunks_exact(SAMPLES);
+            for (pixel, group) in pixels[start..].iter_mut().zip(groups) {
                 for (k, sum) in pixel.iter_mut().enumerate() {
                     *sum += group.iter().map(|sample| sample[k]).sum::<f32>();
                 }

@@ -49,7 +49,7 @@ fn silhouette(drawing: &Drawing) -> ([f64; 4], [f64; 2]) {
 }
 
 #[test]
-fn at_the_pane_it_is_as_long_and_as_tall_in_pixels_as_the_camera_says() {
+fn size_at_the_pane_follows_from_the_camera() {
     let ([left, top, right, bottom], centroid) = silhouette(&draw(0.0, 0.0));
     assert!((right - left - 100.0).abs() < 3.5, "{}", right - left);
     assert!((bottom - top - 48.0).abs() < 2.0, "{}", bottom - top);
@@ -57,7 +57,7 @@ fn at_the_pane_it_is_as_long_and_as_tall_in_pixels_as_the_camera_says() {
 }
 
 #[test]
-fn it_is_bounded_by_its_box_and_stays_the_same_when_drawn_again() {
+fn box_contains_the_fish_and_drawing_is_repeatable() {
     let drawing = draw(0.7, 0.2);
     let ([left, top, right, bottom], _) = silhouette(&drawing);
     let rect = drawing.rect;
@@ -67,7 +67,7 @@ fn it_is_bounded_by_its_box_and_stays_the_same_when_drawn_again() {
 }
 
 #[test]
-fn its_back_is_above_its_belly_whether_it_swims_left_or_right() {
+fn back_is_above_belly_in_both_directions() {
     for yaw in [0.0, std::f64::consts::PI] {
         let drawing = draw(yaw, 0.0);
         let column = drawing.rect.w / 2;
@@ -81,7 +81,7 @@ fn its_back_is_above_its_belly_whether_it_swims_left_or_right() {
 }
 
 #[test]
-fn its_edges_are_soft() {
+fn edges_are_antialiased() {
     let drawing = draw(0.3, 0.1);
     let partly = drawing
         .pixels
@@ -93,22 +93,22 @@ fn its_edges_are_soft() {
 }
 
 #[test]
-fn out_of_sight_or_unseen_it_covers_nothing() {
+fn invisible_and_out_of_view_fish_cover_nothing() {
     let renderer = Renderer::new(SIZE, Palette::Silver);
     let upright = rotation_of(0.0, 0.0, 0.0);
     let behind = Posture::at(DVec3::new(0.0, 0.0, -0.5), upright);
-    let aside = Posture::at(DVec3::new(2.0, 0.0, 0.7), upright);
-    let unseen = Posture {
+    let beside = Posture::at(DVec3::new(2.0, 0.0, 0.7), upright);
+    let invisible = Posture {
         visible: false,
         ..Posture::at(DVec3::new(0.0, 0.0, 0.7), upright)
     };
-    for posture in [behind, aside, unseen] {
+    for posture in [behind, beside, invisible] {
         assert!(renderer.draw(&camera(), IMAGE_PX, &posture).rect.is_empty());
     }
 }
 
 #[test]
-fn seen_from_the_side_its_middle_is_where_it_was_put() {
+fn middle_seen_from_the_side_is_at_the_position() {
     for yaw in [0.0, std::f64::consts::PI] {
         let (_, [x, y]) = silhouette(&draw(yaw, 0.0));
         assert!((x - 160.0).hypot(y - 120.0) < 1.0, "{x} {y}");

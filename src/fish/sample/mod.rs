@@ -14,7 +14,7 @@ use super::params::{Palette, Params};
 use super::render::Drawing;
 use super::scenery::tank_scene;
 use super::spine::{Swimming, effort_at};
-use super::swimmer::{PANE_Z_M, Stroke, wander};
+use super::swimmer::{self, PANE_Z_M, SwimmerState};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use crate::geometry::{Camera, Rect};
 use crate::library::{Animal, Pose, Poses, View};
@@ -57,7 +57,7 @@ impl Default for SampleParams {
 /// Sample film.
 pub struct SampleFilm {
     params: SampleParams,
-    strokes: Vec<Stroke>,
+    states: Vec<SwimmerState>,
     film: Film,
     noise: Vec<i8>,
 }
@@ -70,7 +70,7 @@ impl SampleFilm {
     pub fn new(params: SampleParams) -> Result<SampleFilm, Error> {
         check(&params)?;
         let size = Params::default().size(None);
-        let strokes = wander(params.seed, params.n_frames, params.fps, size.length_m);
+        let states = swimmer::simulate(params.seed, params.n_frames, params.fps, size.length_m);
         let (width, height) = (params.width, params.height);
         let motion = Motion {
             fps: params.fps,
@@ -83,13 +83,13 @@ impl SampleFilm {
             },
             size,
             palette: params.palette,
-            frames: strokes.iter().map(|s| posture(s, size)).collect(),
+            frames: states.iter().map(|s| posture(s, size)).collect(),
         };
         let scene = tank_scene(width, height, params.seed);
         Ok(SampleFilm {
             film: Film::new(motion, scene),
             noise: noise_table(params.seed, params.noise, width),
-            strokes,
+            states,
             params,
         })
     }
@@ -137,8 +137,8 @@ impl SampleFilm {
 
     /// Returns the exact pose of one frame. Panics beyond the last frame.
     pub fn true_pose(&self, frame_idx: usize) -> Pose {
-        let stroke = &self.strokes[frame_idx];
-        let (position, forward) = (stroke.position_m, stroke.forward());
+        let state = &self.states[frame_idx];
+        let (position, forward) = (state.position_m, state.forward());
         // Direction in which the image of the fish moves when the fish moves along `forward`.
         let toward = forward * position.z - position * forward.z;
         Pose {
@@ -149,8 +149,8 @@ impl SampleFilm {
             heading_rad: Some(libm::atan2(toward.y, toward.x)),
             position_m: Some(position.to_array()),
             forward: Some(forward.to_array()),
-            yaw_rad: Some(stroke.yaw_rad),
-            pitch_rad: Some(stroke.pitch_rad),
+            yaw_rad: Some(state.yaw_rad),
+            pitch_rad: Some(state.pitch_rad),
             gamma_rad: Some(libm::asin(forward.z.abs().min(1.0))),
             ..silhouette(&self.film.draw(frame_idx), &self.params)
         }
@@ -217,10 +217,8 @@ impl FrameStream for SampleStream<'_> {
         if at == 0 {
             let batch = self.next..(self.next + BATCH).min(n_frames);
             self.ready.resize(BATCH, Frame::default());
-            self.ready
-                .par_iter_mut()
-                .zip(batch)
-                .for_each(|(frame, k)| self.film.render(k, frame));
+            let frames = self.ready.par_iter_mut().zip(batch);
+            frames.for_each(|(frame, k)| self.film.render(k, frame));
         }
         frame.clone_from(&self.ready[at]);
         let time_s = self.next as f64 / self.film.params.fps;
@@ -230,11 +228,12 @@ impl FrameStream for SampleStream<'_> {
 }
 
 fn check(params: &SampleParams) -> Result<(), Error> {
-    let within = |name: &str, value: f64, lo: f64, hi: f64| match (lo..=hi).contains(&value) {
-        true => Ok(()),
-        false => Err(Error::InvalidParams(format!(
-            "{name} must lie in {lo}..={hi}: {value}"
-        ))),
+    let within = |name: &str, value: f64, lo: f64, hi: f64| {
+        let message = || format!("{name} must lie in {lo}..={hi}: {value}");
+        let is_within = (lo..=hi).contains(&value);
+        is_within
+            .then_some(())
+            .ok_or_else(|| Error::InvalidParams(message()))
     };
     within("frames", params.n_frames as f64, 1.0, 1e6)?;
     within("fps", params.fps, 1.0, 240.0)?;
@@ -243,21 +242,19 @@ fn check(params: &SampleParams) -> Result<(), Error> {
     within("noise", params.noise, 0.0, 20.0)
 }
 
-fn posture(stroke: &Stroke, size: Animal) -> Posture {
-    let speed_bl_per_s = stroke.speed_m_per_s / size.length_m;
+fn posture(state: &SwimmerState, size: Animal) -> Posture {
+    let speed_bl_per_s = state.speed_m_per_s / size.length_m;
     let swimming = Swimming {
-        phase_turns: stroke.phase_turns,
+        phase_turns: state.phase_turns,
         effort: effort_at(speed_bl_per_s),
-        turn_rad_per_s: stroke.turn_rad_per_s,
+        turn_rad_per_s: state.turn_rad_per_s,
     };
     let limit_rad = Params::default().bank_rad;
-    let roll = bank_rad(stroke.turn_rad_per_s, stroke.speed_m_per_s, limit_rad);
+    let roll = bank_rad(state.turn_rad_per_s, state.speed_m_per_s, limit_rad);
+    let rotation = rotation_of(state.yaw_rad, state.pitch_rad, roll);
     Posture {
         joint_angles_rad: swimming.joint_angles_rad(),
-        ..Posture::at(
-            stroke.position_m,
-            rotation_of(stroke.yaw_rad, stroke.pitch_rad, roll),
-        )
+        ..Posture::at(state.position_m, rotation)
     }
 }
 
@@ -266,16 +263,11 @@ fn posture(stroke: &Stroke, size: Animal) -> Posture {
 fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
     let rect = drawing.rect;
     let (mut n, mut sum) = (0u64, [0u64; 2]);
-    let mut edges = [u32::MAX, u32::MAX, 0, 0];
+    let mut bounds = Rect::default();
     for y in 0..rect.h {
         for x in (0..rect.w).filter(|&x| drawing.alpha(x, y) > 0.5) {
             let (px, py) = (rect.x + x, rect.y + y);
-            edges = [
-                edges[0].min(px),
-                edges[1].min(py),
-                edges[2].max(px + 1),
-                edges[3].max(py + 1),
-            ];
+            bounds = bounds.union(&Rect::new(px, py, 1, 1));
             sum = [sum[0] + u64::from(px), sum[1] + u64::from(py)];
             n += 1;
         }
@@ -283,16 +275,11 @@ fn silhouette(drawing: &Drawing, params: &SampleParams) -> Pose {
     if n == 0 {
         return Pose::default();
     }
-    let [x, y, right, bottom] = edges;
+    let reaches_end = bounds.right() == params.width || bounds.bottom() == params.height;
     Pose {
-        cut: x == 0 || y == 0 || right == params.width || bottom == params.height,
+        cut: bounds.x == 0 || bounds.y == 0 || reaches_end,
         centroid_px: Some(sum.map(|s| s as f64 / n as f64 + 0.5)),
-        box_px: Some(Rect {
-            x,
-            y,
-            w: right - x,
-            h: bottom - y,
-        }),
+        box_px: Some(bounds),
         area_px: Some(n as f64),
         ..Pose::default()
     }

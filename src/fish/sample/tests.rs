@@ -23,7 +23,7 @@ fn read_all(film: &SampleFilm) -> Vec<(f64, Frame)> {
 }
 
 #[test]
-fn it_has_as_many_frames_as_asked_for_at_its_rate() {
+fn film_has_the_requested_frames_and_rate() {
     let film = small(20);
     let frames = read_all(&film);
     assert_eq!(frames.len(), 20);
@@ -35,7 +35,7 @@ fn it_has_as_many_frames_as_asked_for_at_its_rate() {
 }
 
 #[test]
-fn reading_again_or_making_it_again_gives_the_same_bytes_and_another_seed_others() {
+fn equal_seeds_give_equal_bytes_and_other_seeds_differ() {
     let film = small(5);
     let first = read_all(&film);
     assert_eq!(first, read_all(&film));
@@ -48,7 +48,7 @@ fn reading_again_or_making_it_again_gives_the_same_bytes_and_another_seed_others
 }
 
 #[test]
-fn the_true_centroid_is_where_the_frame_differs_from_the_background() {
+fn true_centroid_is_where_the_frame_differs_from_the_background() {
     let film = small(40);
     for k in [0, 13, 39] {
         let mut frame = Frame::default();
@@ -74,7 +74,7 @@ fn the_true_centroid_is_where_the_frame_differs_from_the_background() {
 }
 
 #[test]
-fn the_true_heading_points_from_the_tail_to_the_head() {
+fn true_heading_points_from_tail_to_head() {
     let film = small(300);
     let motion = film.motion();
     for k in (0..300).step_by(17) {
@@ -89,7 +89,7 @@ fn the_true_heading_points_from_the_tail_to_the_head() {
 }
 
 #[test]
-fn noise_has_the_strength_asked_for() {
+fn noise_has_the_requested_standard_deviation() {
     let film = small(1);
     let (mut noisy, mut clean) = (Frame::default(), Frame::default());
     film.render(0, &mut noisy);

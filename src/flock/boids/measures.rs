@@ -1,7 +1,7 @@
 //! Collective order of a flock: polarization, milling, distances and groups
 //! (docs/explanation/algorithms.md, "Boids"; Tunstrom et al. 2013).
 
-use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, scaled, unit};
+use super::vector::{Vec3, add_scaled, cross, dot, minus, norm, plus, scaled, unit};
 
 /// Distance within which another boid is a neighbor, body lengths (docs/explanation/algorithms.md, "Boids").
 const NEIGHBOR_BL: f64 = 3.0;
@@ -36,35 +36,29 @@ pub fn order(positions: &[Vec3], velocities: &[Vec3], up: Vec3, overlap_bl: f64)
     let center = scaled(1.0 / n, sum(positions.iter().copied()));
     let spins = (positions.iter().zip(velocities))
         .map(|(&p, &v)| cross(unit(level(v)), unit(level(minus(p, center)))));
-    let row = Row::of(positions);
-    let nearest_bl: Vec<f64> = row.nearest_bl2().into_iter().map(f64::sqrt).collect();
+    let sorted = SortedByX::new(positions);
+    let nearest_bl = sorted.nearest_bl();
     let n_with_neighbor = nearest_bl.iter().filter(|&&bl| bl <= NEIGHBOR_BL).count();
     Order {
         polarization: polarization(velocities),
         milling: norm(sum(spins)) / n,
-        nearest_bl: match positions.len() {
-            0 | 1 => 0.0,
-            _ => nearest_bl.iter().sum::<f64>() / n,
-        },
+        nearest_bl: mean_nearest_bl(&nearest_bl),
         neighbor_share: n_with_neighbor as f64 / n,
         n_groups: n_groups(positions, GROUP_BL),
         n_outside: 0,
-        n_overlaps: row.pairs_nearer(overlap_bl).count() as u32,
+        n_overlaps: sorted.pairs_within(overlap_bl).count() as u32,
     }
 }
 
 /// Returns the mean distance to the nearest neighbor, body lengths; 0 for a single boid.
 pub fn nearest_bl(positions: &[Vec3]) -> f64 {
-    match positions.len() {
+    mean_nearest_bl(&SortedByX::new(positions).nearest_bl())
+}
+
+fn mean_nearest_bl(nearest_bl: &[f64]) -> f64 {
+    match nearest_bl.len() {
         0 | 1 => 0.0,
-        n => {
-            Row::of(positions)
-                .nearest_bl2()
-                .into_iter()
-                .map(f64::sqrt)
-                .sum::<f64>()
-                / n as f64
-        }
+        n => nearest_bl.iter().sum::<f64>() / n as f64,
     }
 }
 
@@ -74,29 +68,29 @@ pub fn polarization(velocities: &[Vec3]) -> f64 {
 }
 
 fn sum(vectors: impl Iterator<Item = Vec3>) -> Vec3 {
-    vectors.fold([0.0; 3], |sum, v| add_scaled(sum, 1.0, v))
+    vectors.fold([0.0; 3], plus)
 }
 
 /// Returns the pairs of ids nearer to each other than `bl`, the smaller id first.
-pub fn pairs_nearer(positions: &[Vec3], bl: f64) -> Vec<[usize; 2]> {
-    Row::of(positions).pairs_nearer(bl).collect()
+pub fn pairs_within(positions: &[Vec3], bl: f64) -> Vec<[usize; 2]> {
+    SortedByX::new(positions).pairs_within(bl).collect()
 }
 
 /// Positions sorted along x. Boids that are far apart along x are not compared.
-struct Row<'a> {
+struct SortedByX<'a> {
     positions: &'a [Vec3],
     by_x: Vec<usize>,
 }
 
-impl Row<'_> {
-    fn of(positions: &[Vec3]) -> Row<'_> {
+impl SortedByX<'_> {
+    fn new(positions: &[Vec3]) -> SortedByX<'_> {
         let mut by_x: Vec<usize> = (0..positions.len()).collect();
         by_x.sort_unstable_by(|&a, &b| positions[a][0].total_cmp(&positions[b][0]));
-        Row { positions, by_x }
+        SortedByX { positions, by_x }
     }
 
-    /// Returns the squared distance of each boid to its nearest neighbor; infinite for a single boid.
-    fn nearest_bl2(&self) -> Vec<f64> {
+    /// Returns the distance of each boid to its nearest neighbor; infinite for a single boid.
+    fn nearest_bl(&self) -> Vec<f64> {
         let (positions, by_x) = (self.positions, &self.by_x);
         let mut nearest_bl2 = vec![f64::INFINITY; positions.len()];
         for (rank, &id) in by_x.iter().enumerate() {
@@ -109,20 +103,20 @@ impl Row<'_> {
             (by_x[rank + 1..].iter()).try_for_each(&mut look_at);
             (by_x[..rank].iter().rev()).try_for_each(look_at);
         }
-        nearest_bl2
+        nearest_bl2.into_iter().map(f64::sqrt).collect()
     }
 
     /// Returns the pairs nearer to each other than `bl`.
-    fn pairs_nearer(&self, bl: f64) -> impl Iterator<Item = [usize; 2]> {
-        let Row { positions, by_x } = self;
+    fn pairs_within(&self, bl: f64) -> impl Iterator<Item = [usize; 2]> {
+        let SortedByX { positions, by_x } = self;
         let offset = |one: usize, other: usize| minus(positions[other], positions[one]);
         (0..by_x.len()).flat_map(move |rank| {
             let one = by_x[rank];
             let after = by_x[rank + 1..].iter().copied();
-            after
-                .take_while(move |&other| offset(one, other)[0] < bl)
-                .filter(move |&other| dot(offset(one, other), offset(one, other)) < bl * bl)
-                .map(move |other| [one.min(other), one.max(other)])
+            let near_along_x = after.take_while(move |&other| offset(one, other)[0] < bl);
+            let square_bl2 = move |other| dot(offset(one, other), offset(one, other));
+            let near = near_along_x.filter(move |&other| square_bl2(other) < bl * bl);
+            near.map(move |other| [one.min(other), one.max(other)])
         })
     }
 }
@@ -173,7 +167,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_nearest_is_the_nearest_of_all(
+        fn distances_and_overlaps_equal_brute_force(
             positions in prop::collection::vec(prop::array::uniform3(-3i8..3).prop_map(|p| p.map(|c| 0.25 * f64::from(c))), 2..40),
         ) {
             let nearest = |id: usize| {
@@ -191,7 +185,7 @@ mod tests {
         }
 
         #[test]
-        fn groups_are_what_no_chain_connects(
+        fn groups_equal_single_linkage_by_search(
             positions in prop::collection::vec(prop::array::uniform3(-9.0..9.0f64), 1..60),
             flat in any::<bool>(),
         ) {
@@ -214,17 +208,15 @@ mod tests {
     }
 
     #[test]
-    fn a_column_is_polarized_and_a_ring_mills() {
+    fn column_is_polarized_and_ring_mills() {
         let ring: Vec<Vec3> = (0..8)
             .map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4)
             .map(|a| [libm::cos(a), libm::sin(a), 0.0])
             .collect();
         let same: Vec<Vec3> = vec![[0.3, 0.1, 0.0]; 8];
         let around: Vec<Vec3> = ring.iter().map(|p| [-p[1], p[0], 0.0]).collect();
-        let (column, mill) = (
-            order(&ring, &same, [0.0, 0.0, 1.0], 0.5),
-            order(&ring, &around, [0.0, 0.0, 1.0], 0.5),
-        );
+        let order = |velocities| order(&ring, velocities, [0.0, 0.0, 1.0], 0.5);
+        let (column, mill) = (order(&same), order(&around));
         assert!((column.polarization - 1.0).abs() < 1e-12 && column.milling < 1e-12);
         assert!((mill.milling - 1.0).abs() < 1e-12 && mill.polarization < 1e-12);
         let chord = 2.0 * libm::sin(std::f64::consts::FRAC_PI_8);

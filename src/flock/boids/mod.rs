@@ -6,36 +6,36 @@
 //! several if a step would be long. All numbers are the same for any number of threads.
 
 pub mod calibration;
-mod gait;
 pub mod grid;
 pub mod habitat;
+mod imposed;
 pub mod leadership;
 pub mod measures;
 pub mod nearest;
 mod overlap;
 pub mod params;
-mod room;
 pub mod rules;
 mod step;
 pub mod tank;
 pub mod vector;
 mod walls;
+mod workspace;
 
-use std::convert::Infallible;
+use std::f64::consts::PI;
 
 use self::calibration::Calibration;
-pub use self::gait::{Gait, Meeting};
-use self::habitat::{Habitat, Hunter};
-use self::room::Room;
+use self::habitat::{Habitat, PredatorState};
+pub use self::imposed::{ImposedMotion, TargetStates};
 use self::tank::Tank;
-use self::vector::{Vec3, scaled};
+use self::vector::{CosSin, Vec3, scaled};
+use self::workspace::Workspace;
 use super::lens::Lens;
 use super::params::Params;
 use crate::random;
 
 /// Greatest distance covered in one step, body lengths (docs/explanation/algorithms.md, "Boids").
-const LONGEST_STEP_BL: f64 = 0.2;
-/// Distance below which boids are pushed apart after each step, body lengths, if the tank has room.
+const MAX_STEP_BL: f64 = 0.2;
+/// Distance below which boids are pushed apart after each step, body lengths, if the tank is large enough.
 const OVERLAP_BL: f64 = 0.5;
 /// Distance that boids swim before the first frame while the flock forms, body lengths. Free choice.
 const WARM_UP_BL: f64 = 10.0;
@@ -43,12 +43,12 @@ const WARM_UP_BL: f64 = 10.0;
 const WARM_UP_S: [f64; 2] = [10.0, 60.0];
 /// Polarization at which a school has formed. A slow school in front of a wall may take a whole short video
 /// to turn, and swims in two directions until then. Free choice.
-const FORMED: f64 = 0.9;
+const FORMED_POLARIZATION: f64 = 0.9;
 /// Boids per unit of parallel work. Free choice.
 const CHUNK: usize = 64;
 
-/// Purposes of random numbers, as words of their keys.
-mod draw {
+/// Purposes of random numbers: the first words of their keys.
+mod random_key {
     pub(super) const START: u64 = 1;
     pub(super) const WANDER: u64 = 2;
     pub(super) const LEAD: u64 = 3;
@@ -66,50 +66,38 @@ pub struct Boids<'a> {
     habitat: Habitat<'a>,
     step_s: f64,
     n_substeps: u32,
-    n_frames_before: usize,
+    n_warm_up_frames: usize,
     step_idx: u64,
     /// Time of the video, seconds; negative before its start.
     time_s: f64,
     positions: Vec<Vec3>,
     velocities: Vec<Vec3>,
     /// Imposed speed and turn rate, by id. If empty, the rules choose both.
-    gaits: Vec<Gait>,
-    room: Room,
-    hunter: Option<Hunter>,
-    meeting: Option<Meeting>,
+    imposed: Vec<ImposedMotion>,
+    workspace: Workspace,
+    predator: Option<PredatorState>,
+    targets: Option<TargetStates>,
 }
 
 impl<'a> Boids<'a> {
-    /// Returns boids that have formed a flock.
-    pub fn new(
-        params: &'a Params,
-        calibration: &'a Calibration,
-        place: (&'a Lens, &'a Tank),
-        fps: f64,
-    ) -> Self {
-        let mut boids = Boids::at_random(params, calibration, place, fps);
-        let Ok(()) = boids.form(|| Ok::<(), Infallible>(()));
-        boids
-    }
-
     /// Returns boids at random positions that have not formed a flock yet. The stronger the alignment, the
     /// more similar their first headings.
     pub fn at_random(
         params: &'a Params,
         calibration: &'a Calibration,
-        (lens, tank): (&'a Lens, &'a Tank),
+        lens: &'a Lens,
+        tank: &'a Tank,
         fps: f64,
     ) -> Self {
-        let longest_s = LONGEST_STEP_BL / calibration.speed_limits_bl_per_s[1];
-        let n_substeps = (1.0 / (fps * longest_s)).ceil().clamp(1.0, 1000.0) as u32;
+        let max_step_s = MAX_STEP_BL / calibration.speed_limits_bl_per_s[1];
+        let n_substeps = (1.0 / (fps * max_step_s)).ceil().clamp(1.0, 1000.0) as u32;
         let n = params.most_individuals() as usize;
-        let closeness = tank.closeness(n);
-        let n_frames_before = n_frames_before(calibration, fps);
-        let n_steps = n_frames_before as f64 * f64::from(n_substeps);
+        let n_warm_up_frames = n_warm_up_frames(calibration, fps);
+        let n_steps = n_warm_up_frames as f64 * f64::from(n_substeps);
         let step_s = 1.0 / (fps * f64::from(n_substeps));
         let mut boids = Boids {
             params: Params {
-                rules: params.rules.closer(closeness),
+                rules: params.rules.closer(tank.radius_scale(n)),
                 ..params.clone()
             },
             habitat: Habitat::new(params, lens, tank),
@@ -118,53 +106,53 @@ impl<'a> Boids<'a> {
             tank,
             step_s,
             n_substeps,
-            n_frames_before,
+            n_warm_up_frames,
             step_idx: 0,
             time_s: -n_steps * step_s,
             positions: vec![[0.0; 3]; n],
             velocities: vec![[0.0; 3]; n],
-            gaits: Vec::new(),
-            room: Room::of(n),
-            hunter: None,
-            meeting: None,
+            imposed: Vec::new(),
+            workspace: Workspace::new(n),
+            predator: None,
+            targets: None,
         };
-        boids.start();
+        boids.start_at_random();
         boids
     }
 
     /// Returns the number of frames before the video in which a flock forms. A school may take up to twice as
     /// many.
-    pub fn n_frames_before(&self) -> usize {
-        self.n_frames_before
+    pub fn n_warm_up_frames(&self) -> usize {
+        self.n_warm_up_frames
     }
 
-    /// Simulates until the flock has formed. `go_on` is called before each frame; its error ends the
+    /// Simulates until the flock has formed. `before_frame` is called before each frame; its error ends the
     /// simulation.
-    pub fn form<E>(&mut self, mut go_on: impl FnMut() -> Result<(), E>) -> Result<(), E> {
-        for _ in 0..self.n_frames_before {
-            go_on()?;
+    pub fn form<E>(&mut self, mut before_frame: impl FnMut() -> Result<(), E>) -> Result<(), E> {
+        for _ in 0..self.n_warm_up_frames {
+            before_frame()?;
             self.advance();
         }
-        let mut n_left = self.n_frames_before;
+        let mut n_left = self.n_warm_up_frames;
         while n_left > 0 && !self.has_formed() {
-            go_on()?;
-            self.set_back(1);
+            before_frame()?;
+            self.delay_start(1);
             self.advance();
             n_left -= 1;
         }
-        self.hunter = self.habitat.hunter();
+        self.predator = self.habitat.initial_predator();
         Ok(())
     }
 
     fn has_formed(&self) -> bool {
         let rules = &self.params.rules;
         let is_school = rules.alignment > 0.0 && rules.zones.is_none();
-        !is_school || measures::polarization(&self.velocities) >= FORMED
+        !is_school || measures::polarization(&self.velocities) >= FORMED_POLARIZATION
     }
 
     /// Returns the position of the predator, if there is one.
     pub fn predator(&self) -> Option<Vec3> {
-        Some(self.hunter?.position)
+        Some(self.predator?.position)
     }
 
     /// Returns the positions, by id, body lengths.
@@ -178,21 +166,26 @@ impl<'a> Boids<'a> {
     }
 
     /// Delays the start of the video by `n_frames`.
-    pub fn set_back(&mut self, n_frames: usize) {
+    pub fn delay_start(&mut self, n_frames: usize) {
         self.time_s -= n_frames as f64 * f64::from(self.n_substeps) * self.step_s;
     }
 
     /// Sets the positions and velocities to steer toward, besides the rules, from the next step on.
-    pub fn meet(&mut self, meeting: Meeting) {
-        self.meeting = Some(meeting);
+    pub fn steer_toward(&mut self, targets: TargetStates) {
+        self.targets = Some(targets);
     }
 
     /// Sets positions and velocities, by id, and the position of the predator.
-    pub fn show(&mut self, positions: Vec<Vec3>, velocities: Vec<Vec3>, hunter: Option<Vec3>) {
+    pub fn set_states(
+        &mut self,
+        positions: Vec<Vec3>,
+        velocities: Vec<Vec3>,
+        predator: Option<Vec3>,
+    ) {
         (self.positions, self.velocities) = (positions, velocities);
-        self.swim_from_here();
-        if let (Some(hunter), Some(position)) = (&mut self.hunter, hunter) {
-            hunter.position = position;
+        self.load_states();
+        if let (Some(state), Some(position)) = (&mut self.predator, predator) {
+            state.position = position;
         }
     }
 
@@ -200,7 +193,7 @@ impl<'a> Boids<'a> {
     pub fn order(&self) -> measures::Order {
         let up = self.tank.up();
         let is_outside =
-            |&&place: &&Vec3| !(self.tank.holds(place) && self.habitat.is_clear(place));
+            |&&position: &&Vec3| !(self.tank.contains(position) && self.habitat.is_clear(position));
         measures::Order {
             n_outside: self.positions.iter().filter(is_outside).count() as u32,
             ..measures::order(&self.positions, &self.velocities, up, self.overlap_bl)
@@ -213,14 +206,14 @@ impl<'a> Boids<'a> {
     }
 
     /// Returns the greatest speed of the calibration, body lengths per second.
-    pub fn fastest_bl_per_s(&self) -> f64 {
+    pub fn max_speed_bl_per_s(&self) -> f64 {
         self.calibration.speed_limits_bl_per_s[1]
     }
 
     /// Returns a position moved into the tank and out of obstacles.
-    pub fn inside(&self, mut place: Vec3) -> Vec3 {
-        self.habitat.keep_out(&mut place, &mut [0.0; 3]);
-        place
+    pub fn confined(&self, mut position: Vec3) -> Vec3 {
+        self.habitat.confine(&mut position, &mut [0.0; 3]);
+        position
     }
 
     /// Returns the depth of the front of the tank, body lengths from the camera.
@@ -235,17 +228,16 @@ impl<'a> Boids<'a> {
         }
     }
 
-    fn start(&mut self) {
+    fn start_at_random(&mut self) {
         let [least, greatest] = self.tank.corners;
         // Boids that align start aligned, because a school takes long to form.
-        let course =
-            std::f64::consts::PI * (2.0 * random::unit(self.params.seed, &[draw::COURSE])).floor();
-        let spread = std::f64::consts::PI / (1.0 + 4.0 * self.params.rules.alignment);
+        let half_turns = (2.0 * random::uniform(self.params.seed, &[random_key::COURSE])).floor();
+        let course = PI * half_turns;
+        let spread = PI / (1.0 + 4.0 * self.params.rules.alignment);
         for id in 0..self.positions.len() {
-            let key = |word| [draw::START, id as u64, word];
-            let at = |word| random::unit(self.params.seed, &key(word));
-            let angle = course + spread * (2.0 * at(3) - 1.0);
-            let (cos, sin) = (libm::cos(angle), libm::sin(angle));
+            let key = |word| [random_key::START, id as u64, word];
+            let at = |word| random::uniform(self.params.seed, &key(word));
+            let CosSin { cos, sin } = CosSin::new(course + spread * (2.0 * at(3) - 1.0));
             let direction = if self.tank.is_flat() {
                 [cos, sin, 0.0]
             } else {
@@ -256,21 +248,21 @@ impl<'a> Boids<'a> {
             });
             self.velocities[id] = scaled(self.calibration.cruise_bl_per_s, direction);
             self.habitat
-                .keep_out(&mut self.positions[id], &mut self.velocities[id]);
+                .confine(&mut self.positions[id], &mut self.velocities[id]);
         }
-        self.swim_from_here();
+        self.load_states();
     }
 }
 
 /// Returns the number of frames in which a flock forms.
-fn n_frames_before(calibration: &Calibration, fps: f64) -> usize {
+fn n_warm_up_frames(calibration: &Calibration, fps: f64) -> usize {
     let [least_s, most_s] = WARM_UP_S;
     let warm_up_s = (WARM_UP_BL / calibration.cruise_bl_per_s).clamp(least_s, most_s);
     (warm_up_s * fps).ceil() as usize
 }
 
 #[cfg(test)]
-mod bits;
+mod digests;
 #[cfg(test)]
 mod presets;
 #[cfg(test)]

@@ -1,11 +1,28 @@
 //! Tests of the presets: order in wide and narrow tanks, of fast and slow animals.
 
+use std::convert::Infallible;
+
 use super::calibration::Slopes;
 use super::measures::Order;
 use super::params::Zones;
 use super::vector::{add_scaled, cross, minus, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
+
+impl<'a> Boids<'a> {
+    /// Returns boids that have formed a flock.
+    pub(super) fn new(
+        params: &'a Params,
+        calibration: &'a Calibration,
+        lens: &'a Lens,
+        tank: &'a Tank,
+        fps: f64,
+    ) -> Self {
+        let mut boids = Boids::at_random(params, calibration, lens, tank, fps);
+        let Ok(()) = boids.form(|| Ok::<(), Infallible>(()));
+        boids
+    }
+}
 
 fn preset(name: &str) -> Params {
     Params::preset(name).expect("a known preset")
@@ -15,7 +32,7 @@ fn preset(name: &str) -> Params {
 /// lengths per second.
 const ANIMALS: [(f64, [f64; 2]); 2] = [(1.0, [0.5, 1.5]), (0.2, [0.05, 0.8])];
 
-/// Sizes of tanks, body lengths: one in top view, and three in side view with less and less room.
+/// Sizes of tanks, body lengths: one in top view, and three in side view of decreasing size.
 const TANKS: [[f64; 3]; 4] = [
     [12.0, 9.0, 0.0],
     [16.0, 6.0, 5.0],
@@ -47,7 +64,7 @@ fn order(
         ..preset(name)
     };
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], greatest));
-    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+    let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);
     let (mut mean, n_frames) = (Order::default(), 450);
     for _ in 0..n_frames {
         boids.advance();
@@ -84,7 +101,7 @@ fn exceptions_of(
 }
 
 #[test]
-fn a_school_is_polarized() {
+fn school_is_polarized() {
     let is_polarized = |order: &Order| order.polarization > 0.65;
     let none = exceptions_of(&ANIMALS[..1], &TANKS, ("school", 20), is_polarized);
     assert!(none.is_empty(), "{none:#?}");
@@ -93,7 +110,7 @@ fn a_school_is_polarized() {
 /// A slow school takes long to turn in a corner and points in all directions meanwhile, sometimes for all
 /// 15 s.
 #[test]
-fn a_school_of_slow_animals_is_polarized_in_the_mean() {
+fn slow_school_is_polarized_on_average() {
     for tank in TANKS {
         let of_seed = |seed| order(("school", 20, seed), ANIMALS[1], tank).polarization;
         let orders: Vec<f64> = (1..=6).map(of_seed).collect();
@@ -103,7 +120,7 @@ fn a_school_of_slow_animals_is_polarized_in_the_mean() {
 }
 
 #[test]
-fn a_crowd_in_a_deep_tank_is_polarized() {
+fn large_school_in_a_deep_tank_is_polarized() {
     let deep = [[12.0, 8.0, 12.0], [9.0, 7.0, 14.0]];
     let is_polarized = |order: &Order| order.polarization > 0.65;
     let none = exceptions_of(&ANIMALS, &deep, ("school", 200), is_polarized);
@@ -111,7 +128,7 @@ fn a_crowd_in_a_deep_tank_is_polarized() {
 }
 
 #[test]
-fn a_swarm_has_no_course() {
+fn swarm_is_neither_polarized_nor_milling() {
     let none = exceptions("swarm", 20, |order| {
         order.polarization < 0.35 && order.milling < 0.35
     });
@@ -119,7 +136,7 @@ fn a_swarm_has_no_course() {
 }
 
 #[test]
-fn a_mill_turns_about_its_middle_and_is_as_full_all_the_way_round() {
+fn mill_circles_without_polarization() {
     let none = exceptions("mill", 12, |order| {
         order.polarization < 0.35 && order.milling > 0.65
     });
@@ -127,7 +144,7 @@ fn a_mill_turns_about_its_middle_and_is_as_full_all_the_way_round() {
 }
 
 /// Boids in open water, with the parameters of Couzin et al.: 3 units per second, 40 degrees per second.
-fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
+fn open_water(orientation_bl: f64) -> (Params, Calibration, Tank) {
     let mut params = Params {
         count: Some(100),
         ..preset("zonal")
@@ -152,16 +169,16 @@ fn at_sea(orientation_bl: f64) -> (Params, Calibration, Tank) {
 /// Returns polarization and rotation about the axis of the group, mean over the second half of `n_frames`.
 /// The boids start in a small cube.
 fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
-    let (params, calibration, tank) = at_sea(orientation_bl);
+    let (params, calibration, tank) = open_water(orientation_bl);
     let lens = Lens::flat(40.0);
-    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 10.0);
-    let heap = (0..u64::from(params.most_individuals())).map(|id| {
-        let draw = |word| 2.0 * random::unit(7, &[id, word]) - 1.0;
+    let mut boids = Boids::new(&params, &calibration, &lens, &tank, 10.0);
+    let cube = (0..u64::from(params.most_individuals())).map(|id| {
+        let draw = |word| 2.0 * random::uniform(7, &[id, word]) - 1.0;
         let position = [0, 1, 2].map(|axis| 5.0 * draw(axis));
         (position, scaled(3.0, unit([3, 4, 5].map(draw))))
     });
-    let (positions, velocities) = heap.unzip();
-    boids.show(positions, velocities, None);
+    let (positions, velocities) = cube.unzip();
+    boids.set_states(positions, velocities, None);
     let (mut polarization, mut rotation) = (0.0, 0.0);
     for frame in 0..n_frames {
         boids.advance();
@@ -184,7 +201,7 @@ fn group(orientation_bl: f64, n_frames: u32) -> (f64, f64) {
 }
 
 #[test]
-fn wider_zones_of_orientation_make_a_swarm_then_a_torus_then_a_school_as_couzin_found() {
+fn wider_orientation_zones_give_swarm_torus_and_school() {
     let [swarm, torus, school] = [0.0, 2.0, 10.0].map(|width| group(width, 2000));
     assert!(swarm.0 < 0.35 && swarm.1 < 0.35, "{swarm:?}");
     assert!(torus.0 < 0.35 && torus.1 > 0.6, "{torus:?}");

@@ -1,5 +1,7 @@
 //! Tests of boids: walls, limits, and equal numbers for any number of threads. `presets` tests their order.
 
+use std::convert::Infallible;
+
 use super::calibration::Slopes;
 use super::vector::{angle_between, norm, unit};
 use super::*;
@@ -18,7 +20,7 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
         [15.5, 11.5, if view == View::Side { 3.0 } else { 0.0 }],
     );
     let lens = Lens::of(&library, params);
-    let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
+    let mut boids = Boids::new(params, &calibration, &lens, &tank, 30.0);
     let (mut positions, mut velocities) = (Vec::new(), Vec::new());
     for _ in 0..n_frames {
         boids.advance();
@@ -30,7 +32,7 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
 
 fn calibrated(library: &Library, params: &Params) -> Calibration {
     let lens = Lens::of(library, params);
-    Calibration::of(library, &motion_of(library, &lens), lens.is_flat())
+    Calibration::from_library(library, &motion_of(library, &lens), lens.is_flat())
 }
 
 fn preset(name: &str) -> Params {
@@ -38,7 +40,7 @@ fn preset(name: &str) -> Params {
 }
 
 #[test]
-fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
+fn boids_stay_in_the_tank_within_the_greatest_speed() {
     for name in Params::PRESETS {
         let params = Params {
             count: Some(60),
@@ -46,7 +48,10 @@ fn nobody_leaves_the_tank_or_swims_faster_than_the_animal() {
         };
         let (positions, velocities) = swim(View::Side, &params, 200);
         let tank = Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 3.0]);
-        assert!(positions.iter().flatten().all(|&p| tank.holds(p)), "{name}");
+        assert!(
+            positions.iter().flatten().all(|&p| tank.contains(p)),
+            "{name}"
+        );
         let fastest = velocities
             .iter()
             .flatten()
@@ -65,7 +70,7 @@ fn violations(name: &str, count: u32, greatest: Vec3) -> (u32, u32) {
     let library = synthetic::library(View::Side);
     let calibration = calibrated(&library, &params);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], greatest));
-    let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+    let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);
     (0..200).fold((0, 0), |(n_outside, n_overlaps), _| {
         boids.advance();
         let order = boids.order();
@@ -74,7 +79,7 @@ fn violations(name: &str, count: u32, greatest: Vec3) -> (u32, u32) {
 }
 
 #[test]
-fn nobody_lies_upon_another_and_where_there_is_room_they_keep_half_a_length() {
+fn boids_never_overlap_and_keep_half_a_length_in_large_tanks() {
     let tanks = [[15.0, 11.0, 0.0], [15.0, 11.0, 3.0], [4.0, 3.0, 0.0]];
     for (name, tank) in Params::PRESETS
         .into_iter()
@@ -87,7 +92,7 @@ fn nobody_lies_upon_another_and_where_there_is_room_they_keep_half_a_length() {
 }
 
 #[test]
-fn nobody_turns_faster_than_the_animal_not_even_at_a_wall_or_in_a_crowd() {
+fn turn_rates_stay_within_the_limit_at_walls_and_in_full_tanks() {
     let (lens, fps) = (Lens::flat(40.0), 30.0);
     let calibration = Calibration {
         turn_rad_per_s: 1.6,
@@ -102,7 +107,7 @@ fn nobody_turns_faster_than_the_animal_not_even_at_a_wall_or_in_a_crowd() {
             ..preset(name)
         };
         let tank = Tank::new([0.0; 3], tank);
-        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), fps);
+        let mut boids = Boids::at_random(&params, &calibration, &lens, &tank, fps);
         for t in 0..300 {
             let before = boids.velocities().to_vec();
             boids.advance();
@@ -118,7 +123,7 @@ fn nobody_turns_faster_than_the_animal_not_even_at_a_wall_or_in_a_crowd() {
 }
 
 #[test]
-fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
+fn slopes_in_space_stay_within_the_measured_limits() {
     let library = synthetic::library(View::Side);
     let params = preset("swarm");
     let calibration = calibrated(&library, &params);
@@ -134,8 +139,7 @@ fn in_side_view_nobody_points_more_steeply_than_the_library_shows() {
 }
 
 #[test]
-fn in_side_view_nobody_is_seen_more_steeply_than_most_frames_unless_it_would_have_to_be_steeper_in_space()
- {
+fn slopes_in_the_image_stay_within_the_limits_where_those_in_space_allow_it() {
     let library = synthetic::library(View::Side);
     let params = preset("swarm");
     let (calibration, lens) = (calibrated(&library, &params), Lens::of(&library, &params));
@@ -170,15 +174,15 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
 }
 
 #[test]
-fn who_align_take_longer_to_form_while_they_are_of_two_courses_and_the_film_begins_no_later() {
+fn opposed_boids_form_longer_and_the_video_starts_at_the_same_time() {
     let (mut params, calibration) = alone(None);
     params.count = Some(2);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [30.0, 30.0, 0.0]));
     let formed = |courses: [f64; 2]| {
-        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        let mut boids = Boids::at_random(&params, &calibration, &lens, &tank, 30.0);
         let places = vec![[14.0, 15.0, 0.0], [16.0, 15.0, 0.0]];
-        boids.show(places, courses.map(|x| [x, 0.0, 0.0]).to_vec(), None);
-        boids.n_frames_before = 5;
+        boids.set_states(places, courses.map(|x| [x, 0.0, 0.0]).to_vec(), None);
+        boids.n_warm_up_frames = 5;
         let mut n_frames = 0;
         let Ok(()) = boids.form(|| {
             n_frames += 1;
@@ -193,7 +197,7 @@ fn who_align_take_longer_to_form_while_they_are_of_two_courses_and_the_film_begi
 
 /// At the edges of the image, lines of sight run along the walls.
 #[test]
-fn a_slow_school_is_polarized_behind_a_camera_too() {
+fn slow_school_is_polarized_in_perspective_too() {
     let library = synthetic::library(View::Side);
     let calibration = Calibration {
         cruise_bl_per_s: 0.2,
@@ -208,8 +212,8 @@ fn a_slow_school_is_polarized_behind_a_camera_too() {
             ..preset("school")
         };
         let lens = Lens::of(&library, &params);
-        let tank = Tank::of(&library, &lens, &motion_of(&library, &lens), &params);
-        let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
+        let tank = Tank::from_library(&library, &lens, &motion_of(&library, &lens), &params);
+        let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);
         let orders = (0..400).map(|_| {
             boids.advance();
             boids.order().polarization
@@ -222,13 +226,13 @@ fn a_slow_school_is_polarized_behind_a_camera_too() {
 }
 
 #[test]
-fn who_heads_for_a_wall_turns_aside_and_does_not_dawdle_before_it() {
+fn boids_turn_at_walls_without_slowing_down() {
     let (params, calibration) = alone(None);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
     // Head-on, and obliquely from either side.
     for y_speed in [0.0, 0.5, -0.5] {
-        let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
-        boids.show(vec![[9.0, 4.5, 0.0]], vec![unit([1.0, y_speed, 0.0])], None);
+        let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);
+        boids.set_states(vec![[9.0, 4.5, 0.0]], vec![unit([1.0, y_speed, 0.0])], None);
         let mut slowest = f64::INFINITY;
         for _ in 0..150 {
             boids.advance();
@@ -245,7 +249,7 @@ fn who_heads_for_a_wall_turns_aside_and_does_not_dawdle_before_it() {
 }
 
 #[test]
-fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
+fn boids_return_to_the_usual_slope() {
     let slopes = Slopes {
         limits: [1.5, 1.5],
         usual: -0.2,
@@ -255,8 +259,8 @@ fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
     let (params, calibration) = alone(Some(slopes));
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [60.0, 60.0, 60.0]));
     for steep in [1.4, -1.4, 0.0] {
-        let mut boids = Boids::new(&params, &calibration, (&lens, &tank), 30.0);
-        boids.show(vec![[30.0; 3]], vec![unit([1.0, steep, 0.2])], None);
+        let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);
+        boids.set_states(vec![[30.0; 3]], vec![unit([1.0, steep, 0.2])], None);
         (0..90).for_each(|_| boids.advance());
         let slope = |v: Vec3| v[1] / v[0].hypot(v[2]);
         let mut seen = Vec::new();
@@ -270,7 +274,7 @@ fn boids_swim_as_steeply_as_the_animal_mostly_does_not_as_it_may() {
 }
 
 #[test]
-fn any_number_of_threads_gives_the_same_numbers() {
+fn results_do_not_depend_on_the_number_of_threads() {
     let params = Params {
         count: Some(300),
         ..preset("school")
@@ -288,17 +292,10 @@ fn any_number_of_threads_gives_the_same_numbers() {
 }
 
 #[test]
-fn another_seed_gives_another_flock() {
+fn seeds_change_the_flock() {
     let seeded = |seed| {
-        swim(
-            View::Top,
-            &Params {
-                seed,
-                ..preset("school")
-            },
-            2,
-        )
-        .0
+        let school = preset("school");
+        swim(View::Top, &Params { seed, ..school }, 2).0
     };
     assert_ne!(seeded(1), seeded(2));
     assert_eq!(seeded(1), seeded(1));
@@ -312,7 +309,7 @@ fn with(params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Option<Vec3>>)
         Lens::flat(40.0),
         Tank::new([0.5, 0.5, 0.0], [15.5, 11.5, 0.0]),
     );
-    let mut boids = Boids::new(params, &calibration, (&lens, &tank), 30.0);
+    let mut boids = Boids::new(params, &calibration, &lens, &tank, 30.0);
     let frame = |_| {
         boids.advance();
         (boids.positions().to_vec(), boids.predator())
@@ -321,7 +318,7 @@ fn with(params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Option<Vec3>>)
 }
 
 #[test]
-fn nobody_swims_through_an_obstacle() {
+fn boids_stay_out_of_obstacles() {
     let obstacles = vec![
         Obstacle::Circle {
             center_px: [200.0, 200.0],
@@ -345,7 +342,7 @@ fn nobody_swims_through_an_obstacle() {
 }
 
 #[test]
-fn a_flock_comes_to_its_goal_and_leaves_it_when_the_time_is_over() {
+fn flock_reaches_its_goal_and_leaves_after_its_time() {
     let at = |at_px, from_s, until_s| Goal {
         at_px,
         depth_bl: None,
@@ -379,7 +376,7 @@ fn a_flock_comes_to_its_goal_and_leaves_it_when_the_time_is_over() {
 }
 
 #[test]
-fn a_flock_keeps_away_from_a_predator() {
+fn flock_keeps_away_from_a_predator() {
     let hunted = Params {
         predator: Some(Predator::default()),
         ..preset("school")

@@ -1,4 +1,4 @@
-//! Vectors of three numbers: positions, velocities and wishes of boids. In a flat tank the third number
+//! Vectors of three numbers: positions, velocities and accelerations of boids. In a flat tank the third number
 //! stays 0.
 
 /// x right, y down, z away from the camera.
@@ -63,10 +63,30 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
     ]
 }
 
-/// Returns `to`, turned toward `from` until the angle between them is at most the one with this (cos, sin).
-/// The length of `to` is kept. Opposite directions turn toward `aside`.
+/// Cosine and sine of an angle.
+#[derive(Clone, Copy, Debug)]
+pub struct CosSin {
+    /// Cosine.
+    pub cos: f64,
+    /// Sine.
+    pub sin: f64,
+}
+
+impl CosSin {
+    /// Returns cosine and sine of an angle, the same on every machine.
+    pub fn new(angle_rad: f64) -> CosSin {
+        CosSin {
+            cos: libm::cos(angle_rad),
+            sin: libm::sin(angle_rad),
+        }
+    }
+}
+
+/// Returns `to`, turned toward `from` until the angle between them is at most `limit`. The length of `to` is
+/// kept. Opposite directions turn toward `sideways`.
 #[inline]
-pub fn turned_at_most(from: Vec3, to: Vec3, (cos, sin): (f64, f64), aside: Vec3) -> Vec3 {
+pub fn turned_at_most(from: Vec3, to: Vec3, limit: CosSin, sideways: Vec3) -> Vec3 {
+    let CosSin { cos, sin } = limit;
     let (speed, u, course) = (norm(to), unit(from), unit(to));
     let along = dot(course, u);
     if along >= cos || norm(u) == 0.0 {
@@ -74,7 +94,7 @@ pub fn turned_at_most(from: Vec3, to: Vec3, (cos, sin): (f64, f64), aside: Vec3)
     }
     let mut across = add_scaled(course, -along, u);
     if norm(across) < 1e-6 {
-        across = add_scaled(aside, -dot(aside, u), u);
+        across = add_scaled(sideways, -dot(sideways, u), u);
     }
     scaled(speed, add_scaled(scaled(cos, u), sin, unit(across)))
 }
@@ -84,18 +104,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn turns_are_cut_to_the_limit_and_keep_the_speed() {
-        let limit = 0.2f64;
-        let cos_sin = (libm::cos(limit), libm::sin(limit));
-        let turned = turned_at_most([1.0, 0.0, 0.0], [0.0, 2.0, 0.0], cos_sin, [0.0, 1.0, 0.0]);
-        assert!((norm(turned) - 2.0).abs() < 1e-12);
-        assert!((libm::atan2(turned[1], turned[0]) - limit).abs() < 1e-12);
-        let about = turned_at_most([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], cos_sin, [0.0, 0.0, 1.0]);
-        assert!((about[2] - libm::sin(limit)).abs() < 1e-12);
+    fn turns_are_limited_and_keep_the_speed() {
+        let (limit, right) = (0.2, [1.0, 0.0, 0.0]);
+        let turned = |to, sideways| turned_at_most(right, to, CosSin::new(limit), sideways);
+        let down = [0.0, 1.0, 0.0];
+        let aside = turned([0.0, 2.0, 0.0], down);
+        assert!((norm(aside) - 2.0).abs() < 1e-12);
+        assert!((libm::atan2(aside[1], aside[0]) - limit).abs() < 1e-12);
+        let reversed = turned([-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        assert!((reversed[2] - libm::sin(limit)).abs() < 1e-12);
         let small = [1.0, 0.1, 0.0];
-        assert_eq!(
-            turned_at_most([1.0, 0.0, 0.0], small, cos_sin, [0.0, 1.0, 0.0]),
-            small
-        );
+        assert_eq!(turned(small, down), small);
     }
 }

@@ -43,8 +43,8 @@ impl Backdrop {
             Background::Plate => {
                 canvas.pixels.fill(opaque([0; 3]));
                 let rect = view.rect();
-                let plate = Canvas::of_rgb(&resized(plate, rect.w, rect.h));
-                canvas.put(&plate, rect);
+                let plate = Canvas::from_rgb(&resized(plate, rect.w, rect.h));
+                canvas.copy_box(&plate, rect);
             }
         }
         let mut front = occluders.map(|occluders| Front::of(occluders, view));
@@ -85,7 +85,7 @@ impl Backdrop {
             }
             Form::Straight => {
                 backdrop.rgba = vec![0; whole.area() as usize * 4];
-                shown.straight_into(whole, &mut backdrop.rgba);
+                shown.write_straight(whole, &mut backdrop.rgba);
             }
         }
         backdrop
@@ -124,7 +124,7 @@ pub(super) fn filling(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
         let at = (y * large.width as usize + left as usize) * 3;
         row.copy_from_slice(&large.pixels[at..at + n]);
     }
-    Canvas::of_rgb(&middle)
+    Canvas::from_rgb(&middle)
 }
 
 /// Returns the mean color of a picture.

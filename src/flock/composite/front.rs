@@ -21,7 +21,7 @@ impl Front {
     pub(super) fn of(occluders: &RgbaImage, view: &View) -> Front {
         let share = |pixel: &[u8]| [pixel[3]; 3];
         let rect = view.rect();
-        let at_size = |image: RgbImage| Canvas::of_rgb(&resized(&image, rect.w, rect.h));
+        let at_size = |image: RgbImage| Canvas::from_rgb(&resized(&image, rect.w, rect.h));
         let mut shown = at_size(mapped(occluders, premultiplied));
         let shares = at_size(mapped(occluders, share));
         for (pixel, share) in shown.pixels.iter_mut().zip(&shares.pixels) {
@@ -30,7 +30,7 @@ impl Front {
         }
         let [width, height] = view.size_px;
         let mut canvas = Canvas::new(width, height);
-        canvas.put(&shown, rect);
+        canvas.copy_box(&shown, rect);
         Front { canvas }
     }
 
@@ -56,7 +56,7 @@ impl Front {
 
     /// Draws the occluders over a box of a canvas of the film's size.
     pub(super) fn draw(&self, on: &mut Canvas, rect: Rect) {
-        on.over_box(&self.canvas, rect);
+        on.draw_box_over(&self.canvas, rect);
     }
 
     /// Returns the share of each pixel that the occluders leave visible, in 16384ths.
@@ -100,7 +100,7 @@ mod tests {
         }
         for side in [16, 8, 11, 24, 33] {
             let view = View::fitted([16, 16], [side, side]);
-            let wanted = Canvas::of_rgb(&resized(&plate, side, side));
+            let wanted = Canvas::from_rgb(&resized(&plate, side, side));
             let (mut front, mut shown) = (Front::of(&occluders, &view), wanted.clone());
             front.take_off(&mut shown);
             front.draw(&mut shown, Rect::of_size(side, side));

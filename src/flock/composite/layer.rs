@@ -10,9 +10,9 @@ use crate::cpu::Level;
 use crate::flock::individual::{Fade, Individual};
 use crate::geometry::Rect;
 use crate::library::Sprites;
-use crate::raster::blend::{haze, mix};
-use crate::raster::canvas::{Canvas, Cover};
-use crate::raster::resample::{Placement, Quad, Resampled, Room};
+use crate::raster::blend::{cross_fade, haze};
+use crate::raster::canvas::{Canvas, Coverage};
+use crate::raster::resample::{Placement, Quad, Resampled, Viewport};
 
 /// Inputs of drawing that are the same for all individuals.
 #[derive(Clone, Copy)]
@@ -54,9 +54,9 @@ pub(super) struct Painter {
 
 impl Painter {
     /// Draws an individual into `layer`, in pixels of the film. Parts that `nearer` hides may be left out.
-    pub(super) fn paint(&mut self, stage: &Stage, who: &Appearance, nearer: Option<&Cover>) {
+    pub(super) fn paint(&mut self, stage: &Stage, who: &Appearance, nearer: Option<&Coverage>) {
         let is_bent = who.fade.is_some() && stage.cut == Cut::Morph;
-        let room = Room {
+        let room = Viewport {
             size: stage.view.size_px,
             // Morphing needs whole sprites.
             nearer: nearer.filter(|_| !is_bent),
@@ -79,18 +79,18 @@ impl Painter {
         stage: &Stage,
         who: &Appearance,
         canvas: &mut Canvas,
-        cover: &mut Cover,
+        cover: &mut Coverage,
     ) -> Rect {
         if who.fade.is_some() || stage.haze.is_some() {
             self.paint(stage, who, Some(cover));
-            canvas.under(&self.layer, cover, stage.cpu);
+            canvas.draw_layer_under(&self.layer, cover, stage.cpu);
             return self.layer.rect;
         }
         // Without fade and haze the sprite needs no intermediate layer.
         let (place, t) = (placement(stage, who), who.frame_idx);
         let frame = who.individual.source_frame[t];
         let sprite = (stage.stock).take(stage.sprites, frame, place.scale, &mut self.packed);
-        canvas.draw_under(&sprite, &place, cover, stage.cpu)
+        canvas.draw_sprite_under(&sprite, &place, cover, stage.cpu)
     }
 
     /// Returns the alpha of the layer drawn last, for the ground truth. May overwrite `layer`.
@@ -128,7 +128,7 @@ impl Painter {
         let shift = place
             .center_px
             .map(|px| i64::from(room) - px.floor() as i64);
-        let room = Room { size, nearer: None };
+        let room = Viewport { size, nearer: None };
         self.paint_shifted(stage, who, room, shift.map(|px| px as f64));
         Whole::of(&self.layer.alpha(), self.layer.rect, shift)
     }
@@ -140,7 +140,7 @@ impl Painter {
         rect.is_empty() || clipped_before || rect.right() == width || rect.bottom() == height
     }
 
-    fn paint_shifted(&mut self, stage: &Stage, who: &Appearance, room: Room, shift: [f64; 2]) {
+    fn paint_shifted(&mut self, stage: &Stage, who: &Appearance, room: Viewport, shift: [f64; 2]) {
         let (individual, t) = (who.individual, who.frame_idx);
         let mut place = placement(stage, who);
         place.center_px = std::array::from_fn(|k| place.center_px[k] + shift[k]);
@@ -160,7 +160,7 @@ impl Painter {
         if stage.cut == Cut::Morph {
             bend(&mut self.layer, &mut self.second, fade.weight[k]);
         }
-        mix(
+        cross_fade(
             &mut self.layer,
             &self.second,
             fade.weight[k],

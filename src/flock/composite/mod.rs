@@ -37,7 +37,7 @@ use super::individual::{Fade, Individual};
 use super::{Flock, Library};
 use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::canvas::{Cover, opaque};
+use crate::raster::canvas::{Coverage, opaque};
 use crate::raster::{Canvas, ColorSpec, Frame, RgbImage, RgbaImage};
 
 /// Draws the frames of a flock. Frames can be drawn in any order and from any thread.
@@ -85,7 +85,7 @@ struct Desk {
     /// Sprites drawn so far, over a transparent background.
     canvas: Canvas,
     /// Which parts of the canvas have been drawn on.
-    cover: Cover,
+    cover: Coverage,
     /// Boxes of the sprites. In a transparent film color is spread beyond their edges.
     boxes: Vec<Rect>,
     painter: Painter,
@@ -216,17 +216,17 @@ impl<'a> Compositor<'a> {
         let own = (!shot.behind.planes.is_empty())
             .then(|| backdrop::filling(&shot.behind.to_rgb(), self.view.size_px));
         if own.is_some() {
-            desk.cover.touch_all();
+            desk.cover.mark_all_drawn();
         }
         let behind = own.as_ref().unwrap_or(&self.backdrop.canvas);
-        for rect in desk.cover.take() {
-            desk.canvas.under_box(behind, rect, self.cpu);
+        for rect in desk.cover.take_drawn_boxes() {
+            desk.canvas.draw_box_under(behind, rect, self.cpu);
             if let Some(front) = self.front(shot) {
                 front.draw(&mut desk.canvas, rect);
             }
             match self.form {
                 Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect, self.cpu),
-                Form::Straight => desk.canvas.straight_into(rect, &mut shot.rgba),
+                Form::Straight => desk.canvas.write_straight(rect, &mut shot.rgba),
             }
             desk.canvas.clear_box(rect);
         }
@@ -264,7 +264,7 @@ impl<'a> Compositor<'a> {
             .pop();
         spare.unwrap_or_else(|| Desk {
             canvas: Canvas::new(self.view.size_px[0], self.view.size_px[1]),
-            cover: Cover::none(self.view.size_px),
+            cover: Coverage::new(self.view.size_px),
             boxes: Vec::new(),
             painter: Painter::default(),
             shade: Shade::default(),
@@ -333,7 +333,7 @@ impl Desk {
     /// Draws the painter's layer under the content of the canvas.
     fn put(&mut self, cpu: Level) {
         let layer = &self.painter.layer;
-        self.canvas.under(layer, &mut self.cover, cpu);
+        self.canvas.draw_layer_under(layer, &mut self.cover, cpu);
         if !layer.rect.is_empty() {
             self.boxes.push(layer.rect);
         }

@@ -35,15 +35,15 @@ impl Stock {
         scale: f64,
         packed: &mut Vec<u8>,
     ) -> Arc<Premultiplied> {
-        let key = (frame, Premultiplied::level_for(scale));
+        let key = (frame, Premultiplied::mip_level(scale));
         let kept = self.with(|shelf| shelf.sprites.get(&key).cloned());
         kept.unwrap_or_else(|| {
             let sprite = match sprites.matte(frame as usize) {
                 Some(matte) => {
                     sprites.read_matte(&matte, packed);
-                    Premultiplied::of(packed, matte.size, matte.center_px, scale)
+                    Premultiplied::new(packed, matte.size, matte.center_px, scale)
                 }
-                None => Premultiplied::of(&[], [0; 2], [0.0; 2], scale),
+                None => Premultiplied::new(&[], [0; 2], [0.0; 2], scale),
             };
             let sprite = Arc::new(sprite);
             self.with(|shelf| shelf.keep(key, &sprite));

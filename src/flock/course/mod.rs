@@ -36,7 +36,7 @@ pub(super) fn simulate(
     n_frames: u32,
     progress: &dyn Progress,
 ) -> Result<Course, Error> {
-    let mut step = steps(boids.n_frames_before() + n_frames as usize, progress);
+    let mut step = steps(boids.n_warm_up_frames() + n_frames as usize, progress);
     boids.form(&mut step)?;
     let mut course = Course::new(&boids, lens);
     for t in 0..n_frames {
@@ -59,9 +59,9 @@ pub(super) fn simulate_loop(
 ) -> Result<Course, Error> {
     let n_lead = seam::n_meeting_frames(n_frames, fps);
     let n_frames = n_frames as usize;
-    let mut step = steps(boids.n_frames_before() + n_lead + n_frames, progress);
+    let mut step = steps(boids.n_warm_up_frames() + n_lead + n_frames, progress);
     boids.form(&mut step)?;
-    boids.set_back(n_lead);
+    boids.delay_start(n_lead);
     let mut lead = Vec::with_capacity(n_lead);
     for _ in 0..n_lead {
         step()?;
@@ -78,20 +78,20 @@ pub(super) fn simulate_loop(
             heirs = seam::heirs(&moments[t], &lead);
         }
         if left <= n_lead {
-            boids.meet(seam::meeting(&lead, &heirs, left));
+            boids.steer_toward(seam::meeting(&lead, &heirs, left));
         }
         boids.advance();
     }
     seam::close(&mut moments, &lead, &heirs, fps);
     let limits = Limits {
         apart_bl: boids.overlap_bl(),
-        fastest_bl_per_s: boids.fastest_bl_per_s(),
+        fastest_bl_per_s: boids.max_speed_bl_per_s(),
         fps,
     };
-    go_aside(&mut moments, limits, |place| boids.inside(place));
+    go_aside(&mut moments, limits, |place| boids.confined(place));
     let mut course = Course::new(&boids, lens);
     for moment in moments {
-        boids.show(moment.positions, moment.velocities, moment.hunter);
+        boids.set_states(moment.positions, moment.velocities, moment.hunter);
         course.record(&boids, lens);
     }
     course.heirs = Some(heirs);
@@ -168,7 +168,7 @@ fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
 
 /// Appends the current position, direction and speed of a boid to its track.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
-    let (place, velocity) = (boids.positions()[id], boids.motion(id));
+    let (place, velocity) = (boids.positions()[id], boids.actual_velocity(id));
     track.position_px.push(seen(place, lens, boids));
     if let Some(forward) = &mut track.forward {
         forward.push(unit(boids.velocities()[id]).map(|part| rounded(part, 5)));

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::seam::{Moment, slope, smooth};
-use crate::flock::boids::measures::pairs_nearer;
+use crate::flock::boids::measures::pairs_within;
 use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus, norm, scaled, unit};
 
 /// Times in which a boid moves aside, and in which it comes back, seconds. The shortest is taken that is not
@@ -70,7 +70,7 @@ pub(super) fn go_aside(moments: &mut [Moment], limits: Limits, inside: impl Fn(V
 /// Returns all encounters, ordered by ids and frames.
 fn encounters(moments: &[Moment], apart_bl: f64) -> Vec<Encounter> {
     let near = |t: usize| {
-        let pairs = pairs_nearer(&moments[t].positions, apart_bl);
+        let pairs = pairs_within(&moments[t].positions, apart_bl);
         pairs.into_iter().map(move |ids| (ids, t))
     };
     let all = (0..moments.len()).into_par_iter().flat_map_iter(near);
@@ -192,7 +192,7 @@ mod tests {
     }
 
     fn n_too_near(moments: &[Moment]) -> usize {
-        let pairs = |moment: &Moment| pairs_nearer(&moment.positions, 0.5).len();
+        let pairs = |moment: &Moment| pairs_within(&moment.positions, 0.5).len();
         moments.iter().map(pairs).sum()
     }
 

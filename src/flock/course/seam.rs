@@ -6,7 +6,7 @@
 //! the positions of its heir in the lead, within the usual limits. The remaining difference is blended away.
 
 use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus};
-use crate::flock::boids::{Boids, Meeting};
+use crate::flock::boids::{Boids, TargetStates};
 
 /// Length of the lead, seconds, at most four fifths of the video. Free choice.
 const MEETING_S: f64 = 8.0;
@@ -83,13 +83,13 @@ fn least_pairs(n: usize, square: impl Fn(usize, usize) -> f64) -> Vec<u32> {
 
 /// Returns the positions and velocities to reach, `left` frames before the end of the video. The first frame
 /// follows the last moment of `lead`.
-pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> Meeting {
+pub(super) fn meeting(lead: &[Moment], heirs: &[u32], left: usize) -> TargetStates {
     let moment = &lead[lead.len() - left];
     let n_frames = lead.len() as f64;
-    Meeting {
+    TargetStates {
         // Full weight after a third of the lead.
-        share: smooth(3.0 * (n_frames - left as f64) / n_frames),
-        places: (heirs.iter())
+        weight: smooth(3.0 * (n_frames - left as f64) / n_frames),
+        states: (heirs.iter())
             .map(|&heir| {
                 let heir = heir as usize;
                 (moment.positions[heir], moment.velocities[heir])

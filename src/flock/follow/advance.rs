@@ -326,9 +326,9 @@ impl Stage<'_> {
     /// Returns `place`, or the point at which the line from the boid to it leaves the tank.
     fn kept_in(&self, place: [f64; 2], goal: [f64; 2], depth_bl: f64) -> [f64; 2] {
         let [from, to] = [goal, place].map(|px| self.lens.place_bl(px, depth_bl));
-        match self.tank.holds(to) {
+        match self.tank.contains(to) {
             true => place,
-            false => self.lens.picture_px(self.tank.on_the_way(from, to)),
+            false => self.lens.picture_px(self.tank.clip_segment(from, to)),
         }
     }
 }
@@ -355,8 +355,8 @@ mod tests {
             let (library, params) = (synthetic::library(view), Params::default());
             let lens = Lens::of(&library, &params);
             let motion = motion_of(&library, &lens);
-            let tank = Tank::of(&library, &lens, &motion, &params);
-            let calibration = Calibration::of(&library, &motion, lens.is_flat());
+            let tank = Tank::from_library(&library, &lens, &motion, &params);
+            let calibration = Calibration::from_library(&library, &motion, lens.is_flat());
             let stage = Stage {
                 library: &library,
                 motion: &motion,
@@ -365,7 +365,7 @@ mod tests {
                 tank: &tank,
                 calibration: &calibration,
             };
-            let [x, y] = lens.picture_px(tank.middle);
+            let [x, y] = lens.picture_px(tank.center);
             let shown: Vec<(u32, bool)> = (100..130).map(|frame| (frame, false)).collect();
             let boid = BoidTrack {
                 position_px: vec![[x + 60.0, y + 20.0, 0.0]; shown.len()],

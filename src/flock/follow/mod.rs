@@ -55,7 +55,7 @@ pub(super) fn play(
 ) -> Result<(Course, Vec<Plan>, Vec<Placed>), Error> {
     let (params, fps) = (stage.params, stage.library.poses.fps);
     let n_frames = params.frames as usize;
-    let mut step = steps(boids.n_frames_before() + n_frames, progress);
+    let mut step = steps(boids.n_warm_up_frames() + n_frames, progress);
     boids.form(&mut step)?;
     let n = boids.positions().len();
     let natural = Natural::new(model, stage.motion, params.seed);
@@ -74,7 +74,7 @@ pub(super) fn play(
         for t in first..end {
             step()?;
             let gait = |states: &Vec<u32>| natural.gait(states[t - first]);
-            boids.go_as(states.iter().map(gait).collect());
+            boids.impose_motion(states.iter().map(gait).collect());
             if t > 0 {
                 boids.advance();
             }
@@ -173,12 +173,12 @@ impl Flock {
                 continue;
             };
             let place = stage.lens.place_bl(centroid_px, positions[id][2]);
-            positions[id] = boids.inside(place);
+            positions[id] = boids.confined(place);
             if stage.library.poses.view == View::Top {
                 let direction = [libm::cos(heading_rad), libm::sin(heading_rad), 0.0];
                 velocities[id] = scaled(norm(velocities[id]), direction);
             }
         }
-        boids.show(positions, velocities, boids.predator());
+        boids.set_states(positions, velocities, boids.predator());
     }
 }

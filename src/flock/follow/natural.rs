@@ -4,7 +4,7 @@
 //! A boid takes its speeds from this continuation. Its speeds are thus those of the footage, in the order of
 //! the footage. A rest lasts as long as the animal rested.
 
-use crate::flock::boids::Gait;
+use crate::flock::boids::ImposedMotion;
 use crate::flock::motion::FrameMotion;
 use crate::flock::plan::Model;
 use crate::random;
@@ -29,7 +29,7 @@ pub(super) struct Natural<'a> {
     /// Target state and cost, turns, of each jump, by source state.
     jumps: Vec<Vec<(u32, u32)>>,
     /// Speed and turn rate, by state.
-    gaits: Vec<Gait>,
+    gaits: Vec<ImposedMotion>,
 }
 
 impl<'a> Natural<'a> {
@@ -43,11 +43,11 @@ impl<'a> Natural<'a> {
         }
         let gait = |state| {
             let Some((frame, mirrored)) = trellis.shown(state) else {
-                return Gait::default();
+                return ImposedMotion::default();
             };
             let moved = &motion[frame as usize];
             let side = if mirrored { -1.0 } else { 1.0 };
-            Gait {
+            ImposedMotion {
                 speed_bl_per_s: moved.speed_in_space(),
                 turn_rad_per_s: side * moved.turn_rad_per_s,
             }
@@ -71,7 +71,7 @@ impl<'a> Natural<'a> {
             })
             .collect();
         let drawn = (0..N_DRAWN).filter_map(|k| {
-            let at = random::unit(self.seed, &[draw::BEGIN, id as u64, k]);
+            let at = random::uniform(self.seed, &[draw::BEGIN, id as u64, k]);
             goes_on.get((at * goes_on.len() as f64) as usize).copied()
         });
         drawn.min_by_key(|&state| cost(state as usize))
@@ -111,7 +111,7 @@ impl<'a> Natural<'a> {
         let least = jumps.iter().map(|jump| jump.1).min()?;
         let share = |cost: u32| libm::exp(-f64::from(cost - least) / RARER_TURNS);
         let sum: f64 = jumps.iter().map(|jump| share(jump.1)).sum();
-        let mut left = sum * random::unit(self.seed, &key);
+        let mut left = sum * random::uniform(self.seed, &key);
         let chosen = jumps.iter().find(|jump| {
             left -= share(jump.1);
             left < 0.0
@@ -120,7 +120,7 @@ impl<'a> Natural<'a> {
     }
 
     /// Returns speed and turn rate of the animal in a state.
-    pub(super) fn gait(&self, state: u32) -> Gait {
+    pub(super) fn gait(&self, state: u32) -> ImposedMotion {
         self.gaits[state as usize]
     }
 }

@@ -197,7 +197,7 @@ impl Stage<'_> {
 
     /// Returns the random size of an individual relative to the filmed animal.
     pub(super) fn size(&self, id: usize) -> f64 {
-        let spread = 2.0 * random::unit(self.params.seed, &[SIZE, id as u64]) - 1.0;
+        let spread = 2.0 * random::uniform(self.params.seed, &[SIZE, id as u64]) - 1.0;
         rounded(1.0 + self.params.variation * spread, 3)
     }
 
@@ -316,6 +316,6 @@ impl Stage<'_> {
         let share = (LEASH_BL * self.lens.px_per_bl(depth_bl) / distance.max(1e-9)).min(1.0);
         let leashed = [0, 1].map(|axis| goal[axis] + share * off[axis]);
         let [from, to] = [goal, leashed].map(|px| self.lens.place_bl(px, depth_bl));
-        self.lens.picture_px(self.tank.on_the_way(from, to))
+        self.lens.picture_px(self.tank.clip_segment(from, to))
     }
 }

@@ -56,10 +56,20 @@ fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
     };
     let weights: Vec<[f32; 4]> = fish.vertices.iter().map(weights).collect();
     let joints: Vec<[u8; 4]> = fish.vertices.iter().map(joints).collect();
-    let colors: Vec<[u16; 4]> = fish.vertices.iter().map(|v| linear(v.color)).collect();
+    let colors: Vec<[u16; 4]> = fish
+        .vertices
+        .iter()
+        .map(|v| linear(v.material.color))
+        .collect();
     let attributes = [
-        (Semantic::Positions, packer.positions(&of(|v| v.position_m))),
-        (Semantic::Normals, packer.vectors(&of(|v| v.normal))),
+        (
+            Semantic::Positions,
+            packer.positions(&of(|v| v.position_m.to_array())),
+        ),
+        (
+            Semantic::Normals,
+            packer.vectors(&of(|v| v.normal.to_array())),
+        ),
         (Semantic::Colors(0), packer.colors(&colors)),
         (Semantic::Joints(0), packer.joints(&joints)),
         (Semantic::Weights(0), packer.weights(&weights)),
@@ -300,16 +310,14 @@ fn turned(rotation: glam::DQuat) -> [f32; 4] {
 }
 
 fn joints(vertex: &Vertex) -> [u8; 4] {
-    let second = if vertex.share > 0.0 {
-        vertex.joints[1]
-    } else {
-        0
-    };
-    [vertex.joints[0], second, 0, 0]
+    let [first, second] = vertex.joints.joints;
+    let has_weight = vertex.joints.second_weight > 0.0;
+    [first, if has_weight { second } else { 0 }, 0, 0]
 }
 
 fn weights(vertex: &Vertex) -> [f32; 4] {
-    [1.0 - vertex.share, vertex.share, 0.0, 0.0]
+    let second = vertex.joints.second_weight;
+    [1.0 - second, second, 0.0, 0.0]
 }
 
 /// Converts encoded sRGB to the linear values of glTF's vertex colors; alpha is unchanged.

@@ -162,7 +162,7 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
         poses,
         background,
         occluders,
-        sprites: Sprites::of(
+        sprites: Sprites::new(
             summary.sprite_size_px,
             mattes,
             summary.sprite_scale,

@@ -3,10 +3,10 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2; // AVX2 kernels
-mod cover; // dirty tiles and opaque pixels
+mod coverage; // dirty tiles and opaque pixels
 mod planes; // conversion to encoder planes
 
-pub use cover::Cover;
+pub use coverage::Coverage;
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ impl Canvas {
     }
 
     /// Converts an RGB image to an opaque canvas.
-    pub fn of_rgb(image: &RgbImage) -> Canvas {
+    pub fn from_rgb(image: &RgbImage) -> Canvas {
         let pixels = image.pixels.chunks_exact(3);
         Canvas {
             width: image.width,
@@ -47,7 +47,7 @@ impl Canvas {
     }
 
     /// Copies a canvas of the box's size into the box.
-    pub fn put(&mut self, from: &Canvas, rect: Rect) {
+    pub fn copy_box(&mut self, from: &Canvas, rect: Rect) {
         let from_rows = from.pixels.chunks_exact(from.width.max(1) as usize);
         for (row, from) in self.rows(rect).zip(from_rows) {
             self.pixels[row].copy_from_slice(from);
@@ -63,42 +63,42 @@ impl Canvas {
 
     /// Draws a layer under the existing pixels, where they are not opaque. Layers are therefore drawn front
     /// to back.
-    pub fn under(&mut self, layer: &Resampled, cover: &mut Cover, cpu: Level) {
-        let mut below = Below::of(self, cover, cpu);
+    pub fn draw_layer_under(&mut self, layer: &Resampled, coverage: &mut Coverage, cpu: Level) {
+        let mut surface = UnderSurface::new(self, coverage, cpu);
         for ([x, y], pixels) in layer.shown() {
             let to = x + pixels.len() as u32;
-            let mut open = below.next_open(y, x..to);
+            let mut open = surface.next_visible(y, x..to);
             while !open.is_empty() {
                 let run = (open.start - x) as usize..(open.end - x) as usize;
-                below.put(y, open.clone(), &pixels[run]);
-                open = below.next_open(y, open.end..to);
+                surface.draw_pixels(y, open.clone(), &pixels[run]);
+                open = surface.next_visible(y, open.end..to);
             }
         }
     }
 
     /// Draws a placed sprite under the existing pixels, without an intermediate layer. Returns its bounding
     /// box.
-    pub fn draw_under(
+    pub fn draw_sprite_under(
         &mut self,
         sprite: &Premultiplied,
         place: &Placement,
-        cover: &mut Cover,
+        coverage: &mut Coverage,
         cpu: Level,
     ) -> Rect {
         let size = [self.width, self.height];
-        let mut below = Below::of(self, cover, cpu);
-        draw_on(&mut below, size, sprite, place, cpu)
+        let mut surface = UnderSurface::new(self, coverage, cpu);
+        draw_on(&mut surface, size, sprite, place, cpu)
     }
 
     /// Draws a box of another canvas of the same size under the existing pixels.
-    pub fn under_box(&mut self, below: &Canvas, rect: Rect, cpu: Level) {
+    pub fn draw_box_under(&mut self, below: &Canvas, rect: Rect, cpu: Level) {
         for row in self.rows(rect) {
             put_under(&mut self.pixels[row.clone()], &below.pixels[row], cpu);
         }
     }
 
     /// Draws a box of another canvas of the same size over the existing pixels.
-    pub fn over_box(&mut self, above: &Canvas, rect: Rect) {
+    pub fn draw_box_over(&mut self, above: &Canvas, rect: Rect) {
         for row in self.rows(rect) {
             let here = self.pixels[row.clone()].iter_mut();
             for (below, above) in here.zip(&above.pixels[row]) {
@@ -111,7 +111,7 @@ impl Canvas {
 
     /// Writes the box as straight-alpha RGBA into a picture of the canvas's size. A pixel with alpha 0 keeps
     /// the color that it has in the picture.
-    pub fn straight_into(&self, rect: Rect, rgba: &mut [u8]) {
+    pub fn write_straight(&self, rect: Rect, rgba: &mut [u8]) {
         for row in self.rows(rect) {
             let out = &mut rgba[row.start * 4..row.end * 4];
             for (out, pixel) in out.chunks_exact_mut(4).zip(&self.pixels[row]) {
@@ -140,42 +140,42 @@ impl Canvas {
 }
 
 /// Surface that draws below everything already on a canvas.
-struct Below<'a> {
+struct UnderSurface<'a> {
     canvas: &'a mut Canvas,
-    cover: &'a mut Cover,
+    coverage: &'a mut Coverage,
     /// Buffer for a run of pixels.
     row: Vec<Quad>,
     cpu: Level,
 }
 
-impl<'a> Below<'a> {
-    fn of(canvas: &'a mut Canvas, cover: &'a mut Cover, cpu: Level) -> Below<'a> {
-        Below {
+impl<'a> UnderSurface<'a> {
+    fn new(canvas: &'a mut Canvas, coverage: &'a mut Coverage, cpu: Level) -> UnderSurface<'a> {
+        UnderSurface {
             canvas,
-            cover,
+            coverage,
             row: Vec::new(),
             cpu,
         }
     }
 
-    /// Draws pixels under the columns of row `y` and updates the cover.
+    /// Draws pixels under the columns of row `y` and updates the coverage.
     #[inline(always)]
-    fn put(&mut self, y: u32, columns: Range<u32>, pixels: &[Quad]) {
+    fn draw_pixels(&mut self, y: u32, columns: Range<u32>, pixels: &[Quad]) {
         let drawn = self.canvas.row_mut(y);
         let above = &mut drawn[columns.start as usize..columns.end as usize];
         put_under(above, pixels, self.cpu);
-        self.cover.add_run(y, columns, drawn);
+        self.coverage.add_run(y, columns, drawn);
     }
 }
 
-impl Surface for Below<'_> {
+impl Surface for UnderSurface<'_> {
     #[inline(always)]
-    fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
-        self.cover.next_open(y, within)
+    fn next_visible(&self, y: u32, within: Range<u32>) -> Range<u32> {
+        self.coverage.next_visible(y, within)
     }
 
     #[inline(always)]
-    fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad])) {
+    fn draw_run(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad])) {
         let n = columns.len();
         let mut row = std::mem::take(&mut self.row);
         if row.len() < n {
@@ -184,26 +184,26 @@ impl Surface for Below<'_> {
         let above = &self.canvas.row_mut(y)[columns.start as usize..columns.end as usize];
         prefetch(above, self.cpu);
         draw(&mut row[..n]);
-        self.put(y, columns, &row[..n]);
+        self.draw_pixels(y, columns, &row[..n]);
         self.row = row;
     }
 }
 
 /// Converts an opaque color.
 pub fn opaque(rgb: [u8; 3]) -> Quad {
-    let [r, g, b] = rgb.map(|value| FULL[usize::from(value)]);
+    let [r, g, b] = rgb.map(|value| QUAD_LEVELS[usize::from(value)]);
     [r, g, b, ONE]
 }
 
 /// The 8-bit values scaled to 0..=16384.
-static FULL: [i16; 256] = {
-    let mut full = [0; 256];
+static QUAD_LEVELS: [i16; 256] = {
+    let mut levels = [0; 256];
     let mut value = 0;
     while value < 256 {
-        full[value] = ((value * ONE as usize + 127) / 255) as i16;
+        levels[value] = ((value * ONE as usize + 127) / 255) as i16;
         value += 1;
     }
-    full
+    levels
 };
 
 /// Converts a pixel to 8-bit straight alpha. A pixel with alpha 0 becomes all zero.
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn opaque_covers_half_halves_and_clear_leaves() {
+    fn opaque_hides_half_mixes_and_transparent_shows() {
         let rect = Rect::of_size(1, 1);
         let [r, g, b, _] = opaque([50, 25, 0]);
         for (pixel, want) in [
@@ -291,45 +291,43 @@ mod tests {
         ] {
             for cpu in Level::available() {
                 let mut canvas = Canvas::new(1, 1);
-                let mut cover = Cover::none([1, 1]);
-                canvas.under(&layer(rect, pixel), &mut cover, cpu);
+                let mut coverage = Coverage::new([1, 1]);
+                canvas.draw_layer_under(&layer(rect, pixel), &mut coverage, cpu);
                 let mut shown = canvas.clone();
                 let mut behind = Canvas::new(1, 1);
                 behind.pixels[0] = opaque([100; 3]);
-                shown.under_box(&behind, rect, cpu);
+                shown.draw_box_under(&behind, rect, cpu);
                 assert_eq!(straight(shown.pixels[0]), want, "{}", cpu.name());
-                canvas.under(&layer(rect, opaque([100; 3])), &mut cover, cpu);
+                canvas.draw_layer_under(&layer(rect, opaque([100; 3])), &mut coverage, cpu);
                 assert_eq!(straight(canvas.pixels[0]), want, "{}", cpu.name());
             }
         }
     }
 
     #[test]
-    fn drawn_on_nothing_a_sprite_keeps_its_alpha_and_its_color() {
+    fn sprite_on_an_empty_canvas_keeps_alpha_and_color() {
         let mut canvas = Canvas::new(2, 1);
         let [r, g, b, a] = opaque([200, 100, 40]);
         let quarter = layer(Rect::of_size(1, 1), [r / 4, g / 4, b / 4, a / 4]);
-        canvas.under(&quarter, &mut Cover::none([2, 1]), Level::detect());
+        canvas.draw_layer_under(&quarter, &mut Coverage::new([2, 1]), Level::detect());
         let mut rgba = vec![9; 8];
-        canvas.straight_into(Rect::of_size(2, 1), &mut rgba);
+        canvas.write_straight(Rect::of_size(2, 1), &mut rgba);
         assert_eq!(rgba, [200, 100, 40, 64, 9, 9, 9, 0]);
     }
 
     proptest! {
         #[test]
-        fn every_opaque_color_comes_back_and_has_the_planes_of_its_rgb(
+        fn opaque_colors_survive_and_have_the_planes_of_their_rgb(
             rgb in prop::array::uniform3(any::<u8>()),
         ) {
             let [r, g, b] = rgb;
             prop_assert_eq!(straight(opaque(rgb)), [r, g, b, 255]);
             let mut image = RgbImage::new(3, 3);
             image.pixels = rgb.repeat(9);
-            let (mut ours, mut known) = (
-                Frame::new(3, 3, ColorSpec::default()),
-                Frame::new(3, 3, ColorSpec::default()),
-            );
+            let mut ours = Frame::new(3, 3, ColorSpec::default());
+            let mut known = ours.clone();
             let whole = Rect::of_size(3, 3);
-            ours.draw_canvas(&Canvas::of_rgb(&image), whole, Level::Scalar);
+            ours.draw_canvas(&Canvas::from_rgb(&image), whole, Level::Scalar);
             known.draw_rgb(&image, whole);
             for (a, b) in ours.planes.iter().zip(&known.planes) {
                 prop_assert!(a.abs_diff(*b) <= 1, "{:?} {:?}", ours.planes, known.planes);
@@ -337,8 +335,8 @@ mod tests {
         }
     }
 
-    /// Returns a canvas of random colors and alphas, and a layer over part of it.
-    fn anything(seed: u32, width: u32, height: u32) -> Canvas {
+    /// Returns a canvas of random colors and alphas.
+    fn random_canvas(seed: u32, width: u32, height: u32) -> Canvas {
         let mut state = seed;
         let mut next = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -358,17 +356,17 @@ mod tests {
     }
 
     #[test]
-    fn every_instruction_set_draws_and_develops_the_same() {
+    fn every_instruction_set_draws_and_converts_the_same() {
         for (seed, width, height) in [(1, 37, 21), (2, 64, 16), (3, 5, 7), (4, 23, 2)] {
-            let base = anything(seed, width, height);
+            let base = random_canvas(seed, width, height);
             let rect = Rect::clipped(1, 1, i64::from(width) - 1, i64::from(height), width, height);
             let mut sprite = layer(rect, [0; 4]);
-            let other = anything(seed + 9, rect.w, rect.h);
+            let other = random_canvas(seed + 9, rect.w, rect.h);
             sprite.pixels = other.pixels;
             let with = |cpu: Level| {
                 let mut canvas = base.clone();
-                canvas.under(&sprite, &mut Cover::none([width, height]), cpu);
-                canvas.under_box(&anything(seed + 5, width, height), rect, cpu);
+                canvas.draw_layer_under(&sprite, &mut Coverage::new([width, height]), cpu);
+                canvas.draw_box_under(&random_canvas(seed + 5, width, height), rect, cpu);
                 let mut frame = Frame::new(width, height, ColorSpec::default());
                 frame.draw_canvas(&canvas, rect, cpu);
                 (canvas, frame)

@@ -14,11 +14,8 @@ impl Frame {
     ///
     /// Panics if the sizes of canvas and frame differ.
     pub fn draw_canvas(&mut self, canvas: &Canvas, rect: Rect, cpu: Level) {
-        assert_eq!(
-            (canvas.width, canvas.height),
-            (self.width, self.height),
-            "sizes differ"
-        );
+        let sizes = [(canvas.width, canvas.height), (self.width, self.height)];
+        assert_eq!(sizes[0], sizes[1], "sizes differ");
         if rect.is_empty() {
             return;
         }
@@ -34,12 +31,8 @@ impl Frame {
             let lines = [2 * by, (2 * by + 1).min(height - 1)];
             let rows = lines.map(|y| &canvas.pixels[y * width + left..y * width + right]);
             for (row, y) in rows.iter().zip(lines) {
-                luma_row(
-                    &from,
-                    row,
-                    &mut luma[y * width + left..y * width + right],
-                    cpu,
-                );
+                let luma = &mut luma[y * width + left..y * width + right];
+                luma_row(&from, row, luma, cpu);
             }
             let out = by * chroma_width + x0..by * chroma_width + x1;
             let planes = [&mut u_plane[out.clone()], &mut v_plane[out]];
@@ -61,7 +54,7 @@ fn luma_row(from: &FromQuads, row: &[Quad], luma: &mut [u8], cpu: Level) {
         _ => 0,
     };
     for (luma, pixel) in luma.iter_mut().zip(row).skip(n_done) {
-        *luma = from.luma(*pixel);
+        *luma = from.luma([pixel[0], pixel[1], pixel[2]]);
     }
 }
 

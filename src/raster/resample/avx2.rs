@@ -5,17 +5,17 @@
 
 use std::arch::x86_64::*;
 
-use super::catmull_rom::{HALF_PLACE, TWICE, WIDE};
+use super::catmull_rom::{HALF_PHASE, PAIRED_WEIGHTS, WIDE_WEIGHTS};
 use super::map::Map;
 use super::{ONE, Premultiplied, Quad, Surface, draw_rows_with};
 use crate::geometry::Rect;
 
 /// Draws all rows of a sprite.
 #[target_feature(enable = "avx2")]
-pub(super) fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map)) {
+pub(super) fn draw_rows(surface: &mut impl Surface, rect: Rect, map: &Map) {
     let interpolate = |sprite: &_, row: &mut _, start, step| interpolate(sprite, row, start, step);
     let prefetch = |sprite: &_, start, step, n| prefetch(sprite, start, step, n);
-    draw_rows_with(surface, rect, from, (interpolate, prefetch));
+    draw_rows_with(surface, rect, map, interpolate, prefetch);
 }
 
 /// Prefetches the last row of taps of positions that are interpolated soon.
@@ -39,23 +39,23 @@ fn prefetch(sprite: &Premultiplied, start: [i32; 2], step: [i32; 2], n: usize) {
 #[target_feature(enable = "avx2")]
 fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
     // The first tap of a position is one pixel to the left and above.
-    let first = start.map(|at| at + HALF_PLACE - (1 << 16));
+    let first = start.map(|at| at + HALF_PHASE - (1 << 16));
     let n_steps = row.len() as i64 - 1;
     let last = [0, 1].map(|k| i64::from(first[k]) + i64::from(step[k]) * n_steps);
-    assert!(sprite.holds_taps(first.map(i64::from)) && sprite.holds_taps(last));
+    assert!(sprite.contains_taps(first.map(i64::from)) && sprite.contains_taps(last));
     let (pixels, stride) = (sprite.pixels.as_ptr(), sprite.stride());
-    let numbers = _mm_setr_epi32(0, 1, 2, 3);
+    let lane = _mm_setr_epi32(0, 1, 2, 3);
     let [mut u, mut v] = [0, 1].map(|k| {
-        let ahead = _mm_mullo_epi32(_mm_set1_epi32(step[k]), numbers);
+        let ahead = _mm_mullo_epi32(_mm_set1_epi32(step[k]), lane);
         _mm_add_epi32(_mm_set1_epi32(first[k]), ahead)
     });
     let four_on = step.map(|step| _mm_set1_epi32(step.wrapping_mul(4)));
     let (fours, rest) = row.as_chunks_mut::<4>();
     for four in fours {
-        let places = Places::of(u, v, stride);
+        let positions = Positions::new(u, v, stride);
         // SAFETY: all four positions lie between the first and the last, whose taps the sprite holds.
         let taps = unsafe {
-            let tap = |k| places.weighted(k, pixels, stride);
+            let tap = |k| positions.weighted(k, pixels, stride);
             [tap(0), tap(1), tap(2), tap(3)]
         };
         store(four, summed(taps));
@@ -65,11 +65,11 @@ fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: 
     if rest.is_empty() {
         return;
     }
-    let places = Places::of(u, v, stride);
+    let positions = Positions::new(u, v, stride);
     let mut taps = [_mm256_setzero_si256(); 4];
     for (k, taps) in taps[..rest.len()].iter_mut().enumerate() {
         // SAFETY: as above; positions after the last are not read.
-        *taps = unsafe { places.weighted(k, pixels, stride) };
+        *taps = unsafe { positions.weighted(k, pixels, stride) };
     }
     let mut four = [[0; 4]; 4];
     store(&mut four, summed(taps));
@@ -78,7 +78,7 @@ fn interpolate(sprite: &Premultiplied, row: &mut [Quad], start: [i32; 2], step: 
 
 impl Premultiplied {
     /// Returns whether the sprite holds all 16 taps of a position, given by its first tap.
-    fn holds_taps(&self, [u, v]: [i64; 2]) -> bool {
+    fn contains_taps(&self, [u, v]: [i64; 2]) -> bool {
         let (stride, n_rows) = (self.stride(), self.spans.len());
         let is_held = |first: i64, n: usize| first >= 0 && (first >> 16) + 4 <= n as i64;
         is_held(u, stride) && is_held(v, n_rows) && stride * n_rows <= self.pixels.len()
@@ -86,7 +86,7 @@ impl Premultiplied {
 }
 
 /// Four positions in a sprite, each given by its first tap.
-struct Places {
+struct Positions {
     /// Index of the first tap among the pixels.
     first: [i32; 4],
     /// Index of the interpolation position, in the lowest byte.
@@ -94,22 +94,22 @@ struct Places {
     down: [i32; 4],
 }
 
-impl Places {
+impl Positions {
     #[inline]
     #[target_feature(enable = "avx2")]
-    fn of(u: __m128i, v: __m128i, stride: usize) -> Places {
+    fn new(u: __m128i, v: __m128i, stride: usize) -> Positions {
         let [x, y] = [_mm_srai_epi32::<16>(u), _mm_srai_epi32::<16>(v)];
         let above = _mm_mullo_epi32(y, _mm_set1_epi32(stride as i32));
-        let numbers = |values: __m128i| {
-            let mut numbers = [0; 4];
-            // SAFETY: `numbers` is an owned buffer of 16 bytes.
-            unsafe { _mm_storeu_si128(numbers.as_mut_ptr().cast(), values) };
-            numbers
+        let lanes_of = |values: __m128i| {
+            let mut lanes = [0; 4];
+            // SAFETY: `lanes` is an owned buffer of 16 bytes.
+            unsafe { _mm_storeu_si128(lanes.as_mut_ptr().cast(), values) };
+            lanes
         };
-        Places {
-            first: numbers(_mm_add_epi32(above, x)),
-            across: numbers(_mm_srai_epi32::<8>(u)),
-            down: numbers(_mm_srai_epi32::<8>(v)),
+        Positions {
+            first: lanes_of(_mm_add_epi32(above, x)),
+            across: lanes_of(_mm_srai_epi32::<8>(u)),
+            down: lanes_of(_mm_srai_epi32::<8>(v)),
         }
     }
 
@@ -121,7 +121,7 @@ impl Places {
     #[inline]
     #[target_feature(enable = "avx2")]
     unsafe fn weighted(&self, k: usize, pixels: *const Quad, stride: usize) -> __m256i {
-        let down = &TWICE[usize::from(self.down[k] as u8)];
+        let down = &PAIRED_WEIGHTS[usize::from(self.down[k] as u8)];
         // SAFETY: the caller guarantees the first tap.
         let first = unsafe { pixels.add(self.first[k] as usize) };
         let tap = |row: usize| {
@@ -133,7 +133,7 @@ impl Places {
             _mm256_add_epi16(tap(0), tap(1)),
             _mm256_add_epi16(tap(2), tap(3)),
         );
-        let across = WIDE[usize::from(self.across[k] as u8)].as_ptr();
+        let across = WIDE_WEIGHTS[usize::from(self.across[k] as u8)].as_ptr();
         // SAFETY: sixteen weights are 32 readable bytes.
         let across = unsafe { _mm256_loadu_si256(across.cast()) };
         _mm256_mulhrs_epi16(column, across)

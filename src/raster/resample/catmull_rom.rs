@@ -5,25 +5,25 @@
 use super::{ONE, Premultiplied, Quad};
 
 /// Number of interpolation positions between two pixels.
-pub(super) const PLACES: usize = 256;
+pub(super) const N_PHASES: usize = 256;
 /// Half an interpolation position, in 1/65536 of a pixel. Added before truncation, so that positions round to
 /// the nearest.
-pub(super) const HALF_PLACE: i32 = (1 << 16) / (2 * PLACES as i32);
+pub(super) const HALF_PHASE: i32 = (1 << 16) / (2 * N_PHASES as i32);
 
 /// The weights of the four taps at each position; their sum is 32767.
-pub(super) static WEIGHTS: [[i16; 4]; PLACES] = all_weights();
+pub(super) static WEIGHTS: [[i16; 4]; N_PHASES] = all_weights();
 /// Weights as above, each repeated for the four values of a pixel.
-pub(super) static WIDE: [[i16; 16]; PLACES] = widened();
+pub(super) static WIDE_WEIGHTS: [[i16; 16]; N_PHASES] = wide_weights();
 /// Weights as above, each stored twice in 32 bits, ready for a broadcast to a vector register.
 #[cfg(target_arch = "x86_64")]
-pub(super) static TWICE: [[i32; 4]; PLACES] = doubled();
+pub(super) static PAIRED_WEIGHTS: [[i32; 4]; N_PHASES] = paired_weights();
 
 impl Premultiplied {
     /// Interpolates a row of pixels, the first at `start`, the next ones at intervals of `step`, in 1/65536
     /// of a pixel of the padded sprite. All positions must lie within `REACH` of the sprite. Defines the
     /// result of the vector kernels.
     pub(super) fn interpolate(&self, row: &mut [Quad], start: [i32; 2], step: [i32; 2]) {
-        let [mut u, mut v] = start.map(|at| at + HALF_PLACE);
+        let [mut u, mut v] = start.map(|at| at + HALF_PHASE);
         let stride = self.stride();
         let taps = self.pixels.as_flattened();
         for pixel in row {
@@ -31,8 +31,8 @@ impl Premultiplied {
             let first = 4 * ((y - 1) * stride + x - 1);
             *pixel = blend(
                 std::array::from_fn(|row| &taps[first + 4 * row * stride..][..16]),
-                &WIDE[(u >> 8) as usize % PLACES],
-                &WEIGHTS[(v >> 8) as usize % PLACES],
+                &WIDE_WEIGHTS[(u >> 8) as usize % N_PHASES],
+                &WEIGHTS[(v >> 8) as usize % N_PHASES],
             );
             u += step[0];
             v += step[1];
@@ -71,10 +71,10 @@ pub(in crate::raster) fn scaled(value: i16, weight: i16) -> i16 {
     ((((i32::from(value) * i32::from(weight)) >> 14) + 1) >> 1) as i16
 }
 
-const fn all_weights() -> [[i16; 4]; PLACES] {
-    let mut all = [[0; 4]; PLACES];
+const fn all_weights() -> [[i16; 4]; N_PHASES] {
+    let mut all = [[0; 4]; N_PHASES];
     let mut place = 0;
-    while place < PLACES {
+    while place < N_PHASES {
         all[place] = weights(place as i64);
         place += 1;
     }
@@ -105,11 +105,11 @@ const fn weights(f: i64) -> [i16; 4] {
     rounded
 }
 
-const fn widened() -> [[i16; 16]; PLACES] {
+const fn wide_weights() -> [[i16; 16]; N_PHASES] {
     let narrow = all_weights();
-    let mut wide = [[0; 16]; PLACES];
+    let mut wide = [[0; 16]; N_PHASES];
     let mut place = 0;
-    while place < PLACES {
+    while place < N_PHASES {
         let mut k = 0;
         while k < 16 {
             wide[place][k] = narrow[place][k / 4];
@@ -121,11 +121,11 @@ const fn widened() -> [[i16; 16]; PLACES] {
 }
 
 #[cfg(target_arch = "x86_64")]
-const fn doubled() -> [[i32; 4]; PLACES] {
+const fn paired_weights() -> [[i32; 4]; N_PHASES] {
     let narrow = all_weights();
-    let mut twice = [[0; 4]; PLACES];
+    let mut twice = [[0; 4]; N_PHASES];
     let mut place = 0;
-    while place < PLACES {
+    while place < N_PHASES {
         let mut tap = 0;
         while tap < 4 {
             let weight = narrow[place][tap];

@@ -1,13 +1,16 @@
 //! Affine map from the picture to a sprite: mirroring, rotation, scale and position
 //! (docs/explanation/algorithms.md, "Compositing").
 
+use std::ops::Range;
+
 use super::Placement;
 use super::premultiplied::{PAD, Premultiplied, REACH};
 use super::step::Step;
 use crate::geometry::Rect;
 
-/// Maps picture coordinates to coordinates in the padded sprite, whose first pixel is (0, 0).
-pub(super) struct Map {
+/// Maps picture coordinates to coordinates in a padded sprite, whose first pixel is (0, 0).
+pub(super) struct Map<'a> {
+    pub(super) sprite: &'a Premultiplied,
     origin: [f64; 2],
     pub(super) per_column: [f64; 2],
     per_row: [f64; 2],
@@ -17,14 +20,12 @@ pub(super) struct Map {
     place: Placement,
 }
 
-impl Map {
-    pub(super) fn new(sprite: &Premultiplied, place: &Placement) -> Map {
+impl<'a> Map<'a> {
+    pub(super) fn new(sprite: &'a Premultiplied, place: &Placement) -> Map<'a> {
         // Size of a pixel of this mipmap level in sprite pixels.
         let unit = f64::from(1u32 << sprite.level);
-        let (cos, sin) = (
-            libm::cos(place.rotation_rad) / (place.scale * unit),
-            libm::sin(place.rotation_rad) / (place.scale * unit),
-        );
+        let cos = libm::cos(place.rotation_rad) / (place.scale * unit);
+        let sin = libm::sin(place.rotation_rad) / (place.scale * unit);
         let flip = if place.mirrored { -1.0 } else { 1.0 };
         let (per_column, per_row) = ([flip * cos, -sin], [flip * sin, cos]);
         let [x, y] = place.center_px;
@@ -34,6 +35,7 @@ impl Map {
             middle + PAD as f64 - per_column[k] * x - per_row[k] * y
         });
         Map {
+            sprite,
             origin,
             per_column,
             per_row,
@@ -43,12 +45,12 @@ impl Map {
     }
 
     /// Returns the step of a picture row through the sprite.
-    pub(super) fn way(&self) -> Step {
-        Step::of(self.per_column.map(fixed))
+    pub(super) fn step(&self) -> Step {
+        Step::new(self.per_column.map(fixed))
     }
 
     /// Returns the displacement in the sprite for `n` picture rows, in 1/65536 of a sprite pixel.
-    pub(super) fn rows_on(&self, n: f64) -> [i32; 2] {
+    pub(super) fn offset_of_rows(&self, n: f64) -> [i32; 2] {
         self.per_row.map(|step| fixed(n * step))
     }
 
@@ -58,11 +60,12 @@ impl Map {
     }
 
     /// Returns the box of the picture that the sprite may touch.
-    pub(super) fn covered(&self, sprite: &Premultiplied, [w, h]: [u32; 2]) -> Rect {
-        let unit = f64::from(1u32 << sprite.level);
+    pub(super) fn bounding_box(&self, [w, h]: [u32; 2]) -> Rect {
+        let sprite = self.sprite;
         if sprite.is_empty() {
             return Rect::default();
         }
+        let unit = f64::from(1u32 << sprite.level);
         let [width, height] = sprite.size.map(|side| side as f64);
         let [middle_x, middle_y] = sprite.middle_px;
         let reach = REACH as f64;
@@ -85,32 +88,25 @@ impl Map {
     fn forward(&self, u: f64, v: f64) -> [f64; 2] {
         let place = &self.place;
         let u = if place.mirrored { -u } else { u };
-        let (cos, sin) = (
-            libm::cos(place.rotation_rad) * place.scale,
-            libm::sin(place.rotation_rad) * place.scale,
-        );
+        let cos = libm::cos(place.rotation_rad) * place.scale;
+        let sin = libm::sin(place.rotation_rad) * place.scale;
         [
             place.center_px[0] + cos * u - sin * v,
             place.center_px[1] + sin * u + cos * v,
         ]
     }
 
-    /// Returns the columns `from..to`, of a picture row of `n` columns, that map into the sprite. `start` is
+    /// Returns those of `n` columns of a picture row that map into the sprite; empty if none does. `start` is
     /// the position of the first column in the sprite.
-    pub(super) fn columns_within(
-        &self,
-        sprite: &Premultiplied,
-        n: usize,
-        start: [f64; 2],
-    ) -> (usize, usize) {
+    pub(super) fn columns_within(&self, n: usize, start: [f64; 2]) -> Range<usize> {
         let (mut from, mut to) = (0.0f64, n as f64);
         for axis in 0..2 {
-            let extent = sprite.size[axis] as f64;
+            let extent = self.sprite.size[axis] as f64;
             let (low, high) = ((PAD - REACH) as f64, (PAD + REACH) as f64 + extent - 1.0);
             let step = self.per_column[axis];
             if step.abs() < 1e-12 {
                 if start[axis] <= low || start[axis] >= high {
-                    return (0, 0);
+                    return 0..0;
                 }
                 continue;
             }
@@ -119,9 +115,9 @@ impl Map {
             to = to.min(a.max(b).ceil());
         }
         if from < to {
-            (from as usize, to as usize)
+            from as usize..to as usize
         } else {
-            (0, 0)
+            0..0
         }
     }
 }

@@ -20,7 +20,7 @@ pub(super) use catmull_rom::scaled;
 pub use premultiplied::{Premultiplied, bounds_of};
 
 use self::map::{Map, fixed};
-use super::canvas::Cover;
+use super::canvas::Coverage;
 use crate::cpu::Level;
 use crate::geometry::Rect;
 
@@ -49,11 +49,11 @@ pub struct Placement {
 
 /// The picture into which a sprite is drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Room<'a> {
+pub struct Viewport<'a> {
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
     /// Coverage by nearer objects, in a picture of that size. Opaque parts hide the sprite and are skipped.
-    pub nearer: Option<&'a Cover>,
+    pub nearer: Option<&'a Coverage>,
 }
 
 /// A drawn sprite: premultiplied pixels of a box of the picture.
@@ -69,22 +69,23 @@ pub struct Resampled {
 }
 
 impl Resampled {
-    /// Draws a placed sprite, clipped to the room, into this layer, whose memory is reused. The sprite must
+    /// Draws a placed sprite, clipped to the viewport, into this layer, whose memory is reused. The sprite must
     /// have been prepared for the placement's scale.
-    pub fn draw(&mut self, sprite: &Premultiplied, place: &Placement, room: Room, cpu: Level) {
+    pub fn draw(
+        &mut self,
+        sprite: &Premultiplied,
+        place: &Placement,
+        viewport: Viewport,
+        cpu: Level,
+    ) {
         let map = Map::new(sprite, place);
-        let rect = map.covered(sprite, room.size);
+        let rect = map.bounding_box(viewport.size);
         self.begin(rect);
-        let nearer = room.nearer;
-        draw_rows(
-            &mut Layer {
-                layer: self,
-                nearer,
-            },
-            rect,
-            (sprite, &map),
-            cpu,
-        );
+        let mut layer = Layer {
+            layer: self,
+            nearer: viewport.nearer,
+        };
+        draw_rows(&mut layer, rect, &map, cpu);
     }
 
     /// Starts an empty layer with the given box. The pixels are unspecified.
@@ -128,29 +129,29 @@ impl Resampled {
 /// The target on which rows of a placed sprite are drawn.
 pub(super) trait Surface {
     /// Returns the first columns of `within`, in row `y`, that are not hidden; empty if there are none.
-    fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32>;
+    fn next_visible(&self, y: u32, within: Range<u32>) -> Range<u32>;
 
     /// Stores the pixels that `draw` writes for a run of columns of row `y`.
-    fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad]));
+    fn draw_run(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad]));
 }
 
 /// A layer that has been started with `begin`.
 struct Layer<'a> {
     layer: &'a mut Resampled,
-    nearer: Option<&'a Cover>,
+    nearer: Option<&'a Coverage>,
 }
 
 impl Surface for Layer<'_> {
     #[inline(always)]
-    fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
+    fn next_visible(&self, y: u32, within: Range<u32>) -> Range<u32> {
         match self.nearer {
-            Some(nearer) => nearer.next_open(y, within),
+            Some(nearer) => nearer.next_visible(y, within),
             None => within,
         }
     }
 
     #[inline(always)]
-    fn take(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad])) {
+    fn draw_run(&mut self, y: u32, columns: Range<u32>, draw: impl FnOnce(&mut [Quad])) {
         let Resampled { rect, pixels, runs } = self.layer;
         let first = ((y - rect.y) * rect.w + columns.start - rect.x) as usize;
         draw(&mut pixels[first..first + columns.len()]);
@@ -168,27 +169,25 @@ pub(super) fn draw_on(
     cpu: Level,
 ) -> Rect {
     let map = Map::new(sprite, place);
-    let rect = map.covered(sprite, size);
-    draw_rows(surface, rect, (sprite, &map), cpu);
+    let rect = map.bounding_box(size);
+    draw_rows(surface, rect, &map, cpu);
     rect
 }
 
-fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map), cpu: Level) {
+fn draw_rows(surface: &mut impl Surface, rect: Rect, map: &Map, cpu: Level) {
     match cpu {
         #[cfg(target_arch = "x86_64")]
         Level::Avx2 | Level::Avx512 if is_x86_feature_detected!("avx2") => {
             #[expect(unsafe_code, reason = "a kernel for AVX2")]
             // SAFETY: the match guard checked AVX2, the only feature that the callee requires.
             unsafe {
-                avx2::draw_rows(surface, rect, from);
+                avx2::draw_rows(surface, rect, map);
             }
         }
-        _ => draw_rows_with(
-            surface,
-            rect,
-            from,
-            (Premultiplied::interpolate, |_, _, _, _| {}),
-        ),
+        _ => {
+            let no_prefetch = |_: &_, _, _, _| {};
+            draw_rows_with(surface, rect, map, Premultiplied::interpolate, no_prefetch);
+        }
     }
 }
 
@@ -197,39 +196,41 @@ fn draw_rows(surface: &mut impl Surface, rect: Rect, from: (&Premultiplied, &Map
 fn draw_rows_with(
     surface: &mut impl Surface,
     rect: Rect,
-    (sprite, map): (&Premultiplied, &Map),
-    (interpolate, prefetch): (
-        impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
-        impl Fn(&Premultiplied, [i32; 2], [i32; 2], usize),
-    ),
+    map: &Map,
+    interpolate: impl Fn(&Premultiplied, &mut [Quad], [i32; 2], [i32; 2]),
+    prefetch: impl Fn(&Premultiplied, [i32; 2], [i32; 2], usize),
 ) {
-    let (left, width, way) = (rect.x, rect.w as usize, map.way());
-    let ahead = map.rows_on(f64::from(ROWS_AHEAD));
+    let (sprite, step) = (map.sprite, map.step());
+    let (left, width) = (rect.x, rect.w as usize);
+    let ahead = map.offset_of_rows(f64::from(ROWS_AHEAD));
     let source = |y: u32| map.source(f64::from(left) + 0.5, f64::from(y) + 0.5);
     for y in rect.y..rect.bottom().min(rect.y + ROWS_AHEAD) {
-        prefetch(sprite, source(y).map(fixed), way.step, width);
+        prefetch(sprite, source(y).map(fixed), step.per_column, width);
     }
     for y in rect.y..rect.bottom() {
         let open = |surface: &_, from: usize, to: usize| {
-            Surface::next_open(surface, y, left + from as u32..left + to as u32)
+            Surface::next_visible(surface, y, left + from as u32..left + to as u32)
         };
         if open(surface, 0, width).is_empty() {
             continue;
         }
         let start = source(y);
-        let (from, to) = map.columns_within(sprite, width, start);
+        let columns = map.columns_within(width, start);
+        let from = columns.start;
         let first: [f64; 2] = std::array::from_fn(|k| start[k] + map.per_column[k] * from as f64);
         let first = first.map(fixed);
-        let seen = sprite.seen(first, &way, to - from);
-        let to = from + seen.end;
-        let soon = way.along(first, seen.start as i32);
+        let visible = sprite.visible_steps(first, &step, columns.len());
+        let to = from + visible.end;
+        let soon = step.position_after(first, visible.start as i32);
         let soon = [soon[0] + ahead[0], soon[1] + ahead[1]];
-        prefetch(sprite, soon, way.step, seen.len());
-        let mut run = open(surface, from + seen.start, to);
+        prefetch(sprite, soon, step.per_column, visible.len());
+        let mut run = open(surface, from + visible.start, to);
         while !run.is_empty() {
             let [start, end] = [run.start, run.end].map(|x| (x - left) as usize);
-            let place = way.along(first, (start - from) as i32);
-            surface.take(y, run, |row| interpolate(sprite, row, place, way.step));
+            let position = step.position_after(first, (start - from) as i32);
+            surface.draw_run(y, run, |row| {
+                interpolate(sprite, row, position, step.per_column);
+            });
             run = open(surface, end, to);
         }
     }

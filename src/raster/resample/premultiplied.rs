@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::catmull_rom::HALF_PLACE;
+use super::catmull_rom::HALF_PHASE;
 use super::step::Step;
 use super::{ONE, Quad};
 use crate::geometry::Rect;
@@ -15,9 +15,9 @@ pub(super) const PAD: usize = 4;
 /// that far. In two dimensions their product would leave a ghost of at most 1/64 of a pixel.
 pub(super) const REACH: usize = 1;
 /// Scale below which a sprite is halved. Free choice.
-const LEAST_SCALE: f64 = 0.6;
+const MIN_SCALE: f64 = 0.6;
 /// Maximum number of halvings. The sprite is then a dot.
-const MOST_HALVED: u32 = 8;
+const MAX_HALVINGS: u32 = 8;
 
 /// A premultiplied sprite.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ pub struct Premultiplied {
 impl Premultiplied {
     /// Prepares a straight-alpha RGBA sprite of `size` pixels for drawing at `scale`. `middle_px` is the
     /// point to be placed, from the upper left corner; it may lie between pixels.
-    pub fn of(rgba: &[u8], size: [u32; 2], middle_px: [f64; 2], scale: f64) -> Premultiplied {
+    pub fn new(rgba: &[u8], size: [u32; 2], middle_px: [f64; 2], scale: f64) -> Premultiplied {
         let mut sprite = Premultiplied {
             middle_px,
             size: size.map(|side| side as usize),
@@ -46,16 +46,16 @@ impl Premultiplied {
         };
         sprite.fill(rgba);
         if !sprite.is_empty() {
-            (0..Premultiplied::level_for(scale)).for_each(|_| sprite.halve());
+            (0..Premultiplied::mip_level(scale)).for_each(|_| sprite.halve());
         }
-        sprite.find_spans();
+        sprite.measure_spans();
         sprite
     }
 
     /// Returns the number of halvings for drawing at `scale`.
-    pub fn level_for(scale: f64) -> u32 {
+    pub fn mip_level(scale: f64) -> u32 {
         let mut level = 0;
-        while level < MOST_HALVED && scale * f64::from(1u32 << level) < LEAST_SCALE {
+        while level < MAX_HALVINGS && scale * f64::from(1u32 << level) < MIN_SCALE {
             level += 1;
         }
         level
@@ -64,38 +64,36 @@ impl Premultiplied {
     /// Returns the range of steps between the first and the last position next to a pixel with alpha, out of
     /// `n` steps from `start`. The range is empty if there is no such position.
     #[inline(always)]
-    pub(super) fn seen(&self, start: [i32; 2], way: &Step, n: usize) -> Range<usize> {
-        let first = self.n_blank(start, way, n);
-        let last = way.along(start, n as i32 - 1);
-        let n_after = self.n_blank(last, &way.back(), n - first);
+    pub(super) fn visible_steps(&self, start: [i32; 2], step: &Step, n: usize) -> Range<usize> {
+        let first = self.n_transparent(start, step, n);
+        let last = step.position_after(start, n as i32 - 1);
+        let n_after = self.n_transparent(last, &step.reversed(), n - first);
         first..n - n_after
     }
 
     /// Returns the number of steps, at most `n`, before a position next to a pixel with alpha. The search
     /// skips from one sprite row to the next, and in each row to the start of its span.
     #[inline(always)]
-    fn n_blank(&self, start: [i32; 2], way: &Step, n: usize) -> usize {
+    fn n_transparent(&self, start: [i32; 2], step: &Step, n: usize) -> usize {
         let mut at = 0;
         while at < n {
-            let [u, v] = way.along(start, at as i32).map(|place| place + HALF_PLACE);
+            let [u, v] = step
+                .position_after(start, at as i32)
+                .map(|place| place + HALF_PHASE);
             let [from, to] = self.spans[(v >> 16) as usize];
             if u > from && u < to {
                 break;
             }
             let in_row = v as u32 & 0xffff;
-            let [row_left, before_span] = [
-                if way.step[1] > 0 {
-                    0xffff - in_row
-                } else {
-                    in_row
-                },
-                (if way.step[0] > 0 { from - u } else { u - to }) as u32,
-            ];
-            let n_in_row = way.n_beyond(row_left, 1);
+            let [across, down] = step.per_column;
+            let row_left = if down > 0 { 0xffff - in_row } else { in_row };
+            let before_span = if across > 0 { from - u } else { u - to };
+            let n_in_row = step.n_steps_beyond(row_left, 1);
             // Past the span, the rest of this row is empty.
-            at += match before_span as i32 >= 0 {
-                true => n_in_row.min(way.n_beyond(before_span, 0)),
-                false => n_in_row,
+            at += if before_span >= 0 {
+                n_in_row.min(step.n_steps_beyond(before_span as u32, 0))
+            } else {
+                n_in_row
             };
         }
         at.min(n)
@@ -159,7 +157,7 @@ impl Premultiplied {
         }
     }
 
-    fn find_spans(&mut self) {
+    fn measure_spans(&mut self) {
         let stride = self.stride();
         let n_rows = self.pixels.len() / stride;
         self.spans.clear();
@@ -191,32 +189,22 @@ fn premultiplied(pixel: &[u8]) -> Quad {
     let alpha = u32::from(pixel[3]);
     let one = ONE as u32;
     let color = |k: usize| ((u32::from(pixel[k]) * alpha * one + 32512) / 65025) as i16;
-    [
-        color(0),
-        color(1),
-        color(2),
-        ((alpha * one + 127) / 255) as i16,
-    ]
+    let alpha = ((alpha * one + 127) / 255) as i16;
+    [color(0), color(1), color(2), alpha]
 }
 
 /// Returns the bounding box of the pixels with alpha in a straight-alpha RGBA sprite of `width` columns;
 /// empty if there are none.
 pub fn bounds_of(rgba: &[u8], width: u32) -> Rect {
-    let mut bounds = [usize::MAX, usize::MAX, 0, 0];
-    for (y, row) in rgba.chunks_exact(width.max(1) as usize * 4).enumerate() {
-        let opaque = |pixel: &[u8]| pixel[3] > 0;
-        let first = row.chunks_exact(4).position(opaque);
-        let last = row.chunks_exact(4).rposition(opaque);
+    let mut bounds = Rect::default();
+    for (y, row) in (0..).zip(rgba.chunks_exact(width.max(1) as usize * 4)) {
+        let shows = |pixel: &[u8]| pixel[3] > 0;
+        let first = row.chunks_exact(4).position(shows);
+        let last = row.chunks_exact(4).rposition(shows);
         if let (Some(first), Some(last)) = (first, last) {
-            bounds[0] = bounds[0].min(first);
-            bounds[1] = bounds[1].min(y);
-            bounds[2] = bounds[2].max(last + 1);
-            bounds[3] = y + 1;
+            let run = Rect::from_edges(first as u32, y, last as u32 + 1, y + 1);
+            bounds = bounds.union(&run);
         }
     }
-    let [left, top, right, bottom] = bounds.map(|edge| edge as i64);
-    match bounds[2] {
-        0 => Rect::default(),
-        _ => Rect::clipped(left, top, right, bottom, u32::MAX, u32::MAX),
-    }
+    bounds
 }

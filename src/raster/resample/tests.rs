@@ -28,14 +28,14 @@ fn cut(rgba: &[u8], [width, height]: [u32; 2], scale: f64) -> Premultiplied {
     let shown: Vec<u8> = rows.copied().collect();
     let middle = |side: u32, from: u32| f64::from(side) / 2.0 - f64::from(from);
     let middle_px = [middle(width, bounds.x), middle(height, bounds.y)];
-    Premultiplied::of(&shown, [bounds.w, bounds.h], middle_px, scale)
+    Premultiplied::new(&shown, [bounds.w, bounds.h], middle_px, scale)
 }
 
 fn drawn_with(rgba: &[u8], (w, h): (u32, u32), place: &Placement, cpu: Level) -> Resampled {
     let sprite = cut(rgba, [w, h], place.scale);
     let mut resampled = Resampled::default();
     let size = [40, 30];
-    resampled.draw(&sprite, place, Room { size, nearer: None }, cpu);
+    resampled.draw(&sprite, place, Viewport { size, nearer: None }, cpu);
     resampled
 }
 
@@ -58,7 +58,7 @@ fn pixel(resampled: &Resampled, x: u32, y: u32) -> [u8; 4] {
 }
 
 #[test]
-fn on_whole_pixels_every_pixel_comes_out_as_it_is() {
+fn whole_pixel_placement_copies_every_pixel() {
     let rgba = checkered(6, 4);
     let plain = drawn(&rgba, (6, 4), &place([13.0, 12.0]));
     let mirrored = Placement {
@@ -77,7 +77,7 @@ fn on_whole_pixels_every_pixel_comes_out_as_it_is() {
 }
 
 #[test]
-fn a_quarter_turn_clockwise_leads_right_to_down() {
+fn quarter_turn_clockwise_moves_right_to_down() {
     let mut rgba = vec![0; 8 * 8 * 4];
     // One opaque pixel to the right of the middle.
     rgba[(4 * 8 + 7) * 4..][..4].copy_from_slice(&[200, 100, 50, 255]);
@@ -102,7 +102,7 @@ fn square() -> Vec<u8> {
 }
 
 #[test]
-fn between_pixels_turned_and_scaled_the_amount_of_alpha_is_kept() {
+fn total_alpha_is_kept_at_any_position_rotation_and_scale() {
     for (center, rotation_rad, scale) in [
         ([20.5, 15.25], 0.0, 1.0),
         ([20.1, 15.7], 0.6, 1.0),
@@ -116,10 +116,8 @@ fn between_pixels_turned_and_scaled_the_amount_of_alpha_is_kept() {
             scale,
             ..place(center)
         };
-        let (sum, want) = (
-            alpha_sum(&drawn(&square(), (12, 12), &turned)),
-            36.0 * scale * scale,
-        );
+        let sum = alpha_sum(&drawn(&square(), (12, 12), &turned));
+        let want = 36.0 * scale * scale;
         assert!(
             (sum - want).abs() < 0.05 * want + 0.5,
             "{scale}: {sum} {want}"
@@ -147,7 +145,7 @@ fn no_edge_is_darker_than_its_sprite_at_any_scale() {
 }
 
 #[test]
-fn a_fine_pattern_far_away_is_even() {
+fn fine_pattern_shrinks_to_an_even_gray() {
     let rgba: Vec<u8> = (0..32 * 32)
         .flat_map(|k| {
             [if (k % 32 + k / 32) % 2 == 0 { 230 } else { 30 }; 3]
@@ -166,7 +164,7 @@ fn a_fine_pattern_far_away_is_even() {
 }
 
 #[test]
-fn what_lies_outside_the_picture_is_not_drawn() {
+fn sprites_are_clipped_to_the_picture() {
     let rgba = checkered(6, 4);
     assert!(drawn(&rgba, (6, 4), &place([-30.0, 5.0])).rect.is_empty());
     let corner = drawn(&rgba, (6, 4), &place([0.0, 0.0]));
@@ -174,7 +172,7 @@ fn what_lies_outside_the_picture_is_not_drawn() {
 }
 
 #[test]
-fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
+fn hidden_pixels_are_skipped_and_others_unchanged() {
     let turned = Placement {
         rotation_rad: 0.4,
         ..place([20.0, 14.0])
@@ -185,22 +183,22 @@ fn what_is_hidden_is_not_drawn_and_the_rest_is_as_it_was() {
         let hides = k / 8 % 2 == 1 || k % 3 == 2;
         pixel[3] = if hides { ONE } else { ONE - ONE / 256 };
     }
-    let mut nearer = Cover::none([40, 30]);
+    let mut nearer = Coverage::new([40, 30]);
     let mut everywhere = Resampled {
         rect: Rect::of_size(40, 30),
         pixels: canvas.pixels.clone(),
         runs: Vec::new(),
     };
     everywhere.show_whole();
-    Canvas::new(40, 30).under(&everywhere, &mut nearer, Level::Scalar);
-    let sprite = Premultiplied::of(&square(), [12, 12], [6.0; 2], 1.0);
+    Canvas::new(40, 30).draw_layer_under(&everywhere, &mut nearer, Level::Scalar);
+    let sprite = Premultiplied::new(&square(), [12, 12], [6.0; 2], 1.0);
     for cpu in Level::available() {
         let (mut all, mut rest) = (Resampled::default(), Resampled::default());
         let size = [40, 30];
-        let room = Room { size, nearer: None };
-        all.draw(&sprite, &turned, room, cpu);
+        let viewport = Viewport { size, nearer: None };
+        all.draw(&sprite, &turned, viewport, cpu);
         let nearer = Some(&nearer);
-        rest.draw(&sprite, &turned, Room { nearer, ..room }, cpu);
+        rest.draw(&sprite, &turned, Viewport { nearer, ..viewport }, cpu);
         assert_eq!(all.rect, rest.rect);
         let mut n_hidden = 0;
         let rect = all.rect;
@@ -232,7 +230,7 @@ fn every_instruction_set_gives_the_same_pixels() {
 }
 
 #[test]
-fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
+fn visible_steps_span_the_first_to_the_last_visible_position() {
     // A bow shape: rows differ in start and end, and some are empty.
     let mut rgba = vec![0; 40 * 30 * 4];
     for k in 0..40 * 30 {
@@ -248,27 +246,31 @@ fn what_is_seen_lies_from_the_first_place_to_the_last_that_finds_anything() {
         let random = |salt| (crate::random::bits(salt, &[k]) % (1 << 22)) as i32;
         let start = [random(1), random(2)].map(|at| at % (30 << 16) + (4 << 16));
         let step = [random(3), random(4) / 4].map(|step| (step - (1 << 20)) >> (k % 20));
-        let way = step::Step::of(step);
-        let n = (0..60).take_while(|&k| within(way.along(start, k))).count();
-        let finds = |k: &usize| {
-            let [u, v] = way
-                .along(start, *k as i32)
-                .map(|at| at + catmull_rom::HALF_PLACE);
+        let step = step::Step::new(step);
+        let n = (0..60)
+            .take_while(|&k| within(step.position_after(start, k)))
+            .count();
+        let is_visible = |k: &usize| {
+            let at = step.position_after(start, *k as i32);
+            let [u, v] = at.map(|at| at + catmull_rom::HALF_PHASE);
             let [from, to] = sprite.spans[(v >> 16) as usize];
             from < u && u < to
         };
-        let seen = sprite.seen(start, &way, n);
-        match (0..n).find(finds) {
-            Some(first) => assert_eq!(Some(seen), (0..n).rfind(finds).map(|last| first..last + 1)),
-            None => assert!(seen.is_empty()),
+        let visible = sprite.visible_steps(start, &step, n);
+        match (0..n).find(is_visible) {
+            Some(first) => assert_eq!(
+                Some(visible),
+                (0..n).rfind(is_visible).map(|last| first..last + 1)
+            ),
+            None => assert!(visible.is_empty()),
         }
-        n_empty += usize::from(n > 1 && (0..n).find(finds).is_none());
+        n_empty += usize::from(n > 1 && (0..n).find(is_visible).is_none());
     }
     assert!(n_empty > 50, "{n_empty}");
 }
 
 #[test]
-fn what_lies_beside_a_pixel_that_shows_is_drawn() {
+fn positions_beside_a_visible_pixel_are_drawn() {
     // An eighth of all pixels, many of them isolated.
     let mut rgba = checkered(14, 9);
     for (k, pixel) in rgba.chunks_exact_mut(4).enumerate() {

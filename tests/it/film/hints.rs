@@ -134,7 +134,7 @@ fn what_blinks_in_an_ignored_box_is_not_told_of() {
 #[test]
 fn a_part_of_a_film_is_a_film_of_its_own() {
     let film = Staged::plain();
-    let part = Part::of(&film, Some(1.0), Some(3.0));
+    let part = Part::new(&film, Some(1.0), Some(3.0));
     assert_eq!(part.format().n_frames_hint, 60);
     let (mut whole, mut of_part) = (film.open().unwrap(), part.open().unwrap());
     let (mut expected, mut found) = (Frame::default(), Frame::default());
@@ -155,7 +155,7 @@ fn a_part_of_a_film_is_a_film_of_its_own() {
     };
     part.spread(16, &mut visit).unwrap();
     assert_eq!(n_spread, 16);
-    let beyond = Part::of(&film, Some(100.0), None);
+    let beyond = Part::new(&film, Some(100.0), None);
     assert_eq!(beyond.format().n_frames_hint, 0);
     assert_eq!(beyond.open().unwrap().next_frame(&mut found).unwrap(), None);
 }

@@ -31,7 +31,7 @@ fn measured(labels: &Value) -> Option<Result<Library, Error>> {
     let clip = footage()?.join(labels["clip"].as_str().expect("a name"));
     let video = Video::open(&clip, &Limits::default()).expect("a film");
     let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
-    let part = Part::of(&video, None, Some(SECONDS));
+    let part = Part::new(&video, None, Some(SECONDS));
     let params = Params::default();
     Some(analyze(
         &part,

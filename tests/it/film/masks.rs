@@ -55,7 +55,7 @@ fn masks(fish: &Film, is_empty: bool) -> Staged {
 }
 
 fn analyzed(film: &Staged, masks: &Staged, is_mixed: bool) -> Result<Library, Error> {
-    let masked = Masked::of(film, masks, is_mixed)?;
+    let masked = Masked::new(film, masks, is_mixed)?;
     let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
     let params = Params::default();
     analyze(&masked, None, &params, Level::detect(), &scratch, &Silent)
@@ -77,22 +77,30 @@ fn before_a_scene_that_moves_masks_tell_the_animal() {
     assert!(worst < 1.0, "{worst} px off");
 }
 
+/// Converts a premultiplied color, 0..=1, to 8 bits and straight alpha.
+fn straight([r, g, b, a]: [f32; 4]) -> [u8; 4] {
+    let scale = if a > 0.0 { 1.0 / a } else { 0.0 };
+    [r * scale, g * scale, b * scale, a].map(|value| (255.0 * value + 0.5) as u8)
+}
+
 /// Returns the mean color error of half-transparent pixels against the fish alone, levels of 255.
 fn color_error(fish: &Film, library: &Library) -> f64 {
     let (mut off, mut n) = (0.0, 0.0);
     let mut rgba = Vec::new();
     for k in (0..N_FRAMES).step_by(10) {
         let drawing = fish.draw(k);
-        let (rect, drawn) = (drawing.rect, drawing.to_rgba());
+        let rect = drawing.rect;
         let matte = library.sprites.matte(k).expect("it is shown");
         library.sprites.read_matte(&matte, &mut rgba);
         let centroid = library.poses.frames[k].centroid_px.expect("it is shown");
         let [left, top] = [0, 1].map(|c| (centroid[c] - matte.center_px[c]).round() as u32);
         for (at, rgba) in rgba.chunks_exact(4).enumerate() {
             let [x, y] = [at as u32 % matte.size[0], at as u32 / matte.size[0]];
-            let truth = match rect.contains(left + x, top + y) {
-                true => drawn.pixel(left + x - rect.x, top + y - rect.y),
-                false => [0; 4],
+            let truth = if rect.contains(left + x, top + y) {
+                let at = (top + y - rect.y) * rect.w + left + x - rect.x;
+                straight(drawing.pixels[at as usize])
+            } else {
+                [0; 4]
             };
             assert!(rgba[3].abs_diff(truth[3]) < 8, "{rgba:?} {truth:?}");
             if (90..200).contains(&rgba[3]) {
@@ -137,6 +145,6 @@ fn masks_of_another_number_or_size_or_without_an_animal_are_refused() {
     let more = (0..N_FRAMES).chain(0..3).collect();
     assert_eq!(code(&Staged::in_order(more)), Code::MasksDiffer);
     assert_eq!(code(&masks(&fish, true)), Code::MasksEmpty);
-    let part = flockreel::footage::Part::of(&masks_of, None, None);
-    assert!(Masked::of(&film, &part, true).is_ok());
+    let part = flockreel::footage::Part::new(&masks_of, None, None);
+    assert!(Masked::new(&film, &part, true).is_ok());
 }

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use flockreel::jobs::clock::now_ms;
-use flockreel::random::unit;
+use flockreel::random::uniform;
 use flockreel::store::Store;
 use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::read::JobRow;
@@ -142,7 +142,7 @@ async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed()
         jobs.push(start_job(&server).await);
     }
     for kill in 0..3 {
-        tokio::time::sleep(Duration::from_secs_f64(0.1 + 0.9 * unit(6, &[kill]))).await;
+        tokio::time::sleep(Duration::from_secs_f64(0.1 + 0.9 * uniform(6, &[kill]))).await;
         server.kill();
         server = Server::start_at(&place);
     }

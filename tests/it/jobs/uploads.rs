@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use flockreel::jobs::clock::now_ms;
-use flockreel::random::unit;
+use flockreel::random::uniform;
 use flockreel::store::Store;
 use serde_json::Value;
 use tokio::sync::Mutex;
@@ -88,7 +88,7 @@ async fn an_accepted_upload_survives_every_kill() {
                 ))
             })
             .collect();
-        tokio::time::sleep(longest.mul_f64(unit(SEED, &[kill]))).await;
+        tokio::time::sleep(longest.mul_f64(uniform(SEED, &[kill]))).await;
         server.kill();
         for upload in uploads {
             upload.await.unwrap();

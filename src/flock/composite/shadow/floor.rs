@@ -49,7 +49,7 @@ impl Floor {
     /// Returns the floor: half a body height below the lowest position of any individual in any frame.
     pub(super) fn of(library: &Library, flock: &Flock) -> Floor {
         let lens = Lens::of(library, &flock.params);
-        let tank = Tank::of(library, &lens, &motion_of(library, &lens), &flock.params);
+        let tank = Tank::from_library(library, &lens, &motion_of(library, &lens), &flock.params);
         let mut floor = Floor {
             lens,
             front_bl: tank.corners[0][2],

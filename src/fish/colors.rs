@@ -5,7 +5,7 @@
 use super::params::Palette;
 
 /// Colors of one fish.
-pub(super) struct Coat {
+pub(super) struct Colors {
     back: Rgb,
     flank: Rgb,
     belly: Rgb,
@@ -16,11 +16,11 @@ pub(super) struct Coat {
 
 type Rgb = [f32; 3];
 
-impl Coat {
+impl Colors {
     /// Returns the colors of a palette.
-    pub(super) fn of(palette: Palette) -> Coat {
+    pub(super) fn new(palette: Palette) -> Colors {
         match palette {
-            Palette::Goldfish => Coat {
+            Palette::Goldfish => Colors {
                 back: [0.78, 0.24, 0.03],
                 flank: [0.97, 0.46, 0.07],
                 belly: [1.0, 0.86, 0.62],
@@ -28,7 +28,7 @@ impl Coat {
                 fin_edge: [1.0, 0.76, 0.42],
                 iris: [0.88, 0.70, 0.30],
             },
-            Palette::Silver => Coat {
+            Palette::Silver => Colors {
                 back: [0.30, 0.37, 0.40],
                 flank: [0.66, 0.72, 0.73],
                 belly: [0.94, 0.95, 0.93],
@@ -36,7 +36,7 @@ impl Coat {
                 fin_edge: [0.80, 0.83, 0.80],
                 iris: [0.85, 0.84, 0.70],
             },
-            Palette::Bronze => Coat {
+            Palette::Bronze => Colors {
                 back: [0.10, 0.09, 0.10],
                 flank: [0.24, 0.19, 0.16],
                 belly: [0.62, 0.48, 0.32],
@@ -56,11 +56,8 @@ impl Coat {
         // Cheeks are smooth and slightly paler. The edge of the gill cover is a dark crescent.
         let s = s as f32;
         let cheek = 1.0 - smoothstep(0.14, 0.19, s);
-        color = mix(
-            color,
-            mix(self.flank, self.belly, 0.35),
-            0.35 * cheek * (1.0 - up.abs()),
-        );
+        let pale = mix(self.flank, self.belly, 0.35);
+        color = mix(color, pale, 0.35 * cheek * (1.0 - up.abs()));
         let (along, across) = ((s - 0.125) / 0.085, (up + 0.12) / 0.92);
         let radius = (along * along + across * across).sqrt();
         let crescent = bump((radius - 1.0) / 0.075) * smoothstep(0.05, 0.5, along);
@@ -85,12 +82,9 @@ impl Coat {
     pub(super) fn eye(&self, out: f64, up: f64) -> [f32; 4] {
         let out = out as f32;
         let iris = self.iris.map(|c| c * (1.0 + 0.15 * up as f32));
-        let rim = mix(
-            self.back.map(|c| 0.45 * c),
-            iris,
-            smoothstep(0.18, 0.42, out),
-        );
-        let color = mix(rim, [0.03, 0.03, 0.04], smoothstep(0.72, 0.80, out));
+        let rim = self.back.map(|c| 0.45 * c);
+        let color = mix(rim, iris, smoothstep(0.18, 0.42, out));
+        let color = mix(color, [0.03, 0.03, 0.04], smoothstep(0.72, 0.80, out));
         [color[0], color[1], color[2], 1.0]
     }
 }

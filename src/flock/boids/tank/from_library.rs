@@ -1,8 +1,10 @@
 //! Tank of a library: the area in which the animal was seen, as far as it is wholly in the image
 //! (docs/explanation/algorithms.md, "Boids").
 
+use std::f64::consts::TAU;
+
 use super::floor::Floor;
-use super::{Tank, Wall};
+use super::{Line, Tank, Wall};
 use crate::flock::boids::vector::norm;
 use crate::flock::lens::Lens;
 use crate::flock::motion::FrameMotion;
@@ -14,24 +16,29 @@ use crate::order::{median, percentile};
 const N_SIDES: usize = 16;
 /// Share of the image up to which the tank of a large flock grows in side view. In top view it grows as far
 /// as the floor. Free choice.
-const MOST_OF_TANK: f64 = 0.7;
+const MAX_IMAGE_SHARE: f64 = 0.7;
 /// Distance by which the tank grows at a time, body lengths. Free choice.
-const FARTHER_BL: f64 = 0.25;
+const GROWTH_BL: f64 = 0.25;
 /// Distance between a body and a wall, body lengths. Free choice.
 const CLEARANCE_BL: f64 = 0.05;
 /// Least and greatest depth of a tank without a requested depth, body lengths. Free choice.
-const DEPTHS_BL: [f64; 2] = [1.0, 6.0];
+const DEPTH_LIMITS_BL: [f64; 2] = [1.0, 6.0];
 /// Share of frames, and of bodies, that the seen region leaves out at either end. Free choice.
-const OUTLIERS: f64 = 0.01;
+const OUTLIER_SHARE: f64 = 0.01;
 
 impl Tank {
     /// Returns the tank of a library: the area and the range of depths in which the animal was seen. If the
-    /// flock lacks room, the area grows, but only as far as the animal is wholly in the image.
-    pub fn of(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Params) -> Tank {
+    /// flock lacks space, the area grows, but only as far as the animal is wholly in the image.
+    pub fn from_library(
+        library: &Library,
+        lens: &Lens,
+        motion: &[FrameMotion],
+        params: &Params,
+    ) -> Tank {
         let [w, h] = library.poses.image_size_px.map(f64::from);
-        let site = Site {
+        let geometry = Geometry {
             lens,
-            body: Body::of(library, lens.length_px),
+            body: Body::new(library, lens.length_px),
             size_px: [w, h],
             depths_bl: depths(library, lens, motion, params),
         };
@@ -39,16 +46,16 @@ impl Tank {
             TankExtent::Seen => seen_lines(library),
             TankExtent::Picture => Vec::new(),
         };
-        let floor = (library.poses.view == View::Top).then(|| Floor::of(&library.background));
-        let farther_px = FARTHER_BL * lens.length_px;
+        let floor = (library.poses.view == View::Top).then(|| Floor::new(&library.background));
+        let growth_px = GROWTH_BL * lens.length_px;
         loop {
-            let tank = site.tank(&lines);
-            if lines.is_empty() || tank.has_room_beside(params.most_individuals() as usize) {
+            let tank = geometry.tank(&lines);
+            if lines.is_empty() || tank.fits_in_plane(params.most_individuals() as usize) {
                 return tank;
             }
             let moved = match &floor {
-                Some(floor) => floor.widen(&mut lines, farther_px),
-                None => widen(&mut lines, farther_px, MOST_OF_TANK * w * h),
+                Some(floor) => floor.widen(&mut lines, growth_px),
+                None => widen(&mut lines, growth_px, MAX_IMAGE_SHARE * w * h),
             };
             if !moved {
                 return tank;
@@ -57,50 +64,51 @@ impl Tank {
     }
 }
 
-/// Moves all lines outward by `by_px`. Does nothing and returns false if they enclose at least `most_px2`.
-fn widen(lines: &mut [Line], by_px: f64, most_px2: f64) -> bool {
-    if area(lines) >= most_px2 {
+/// Moves all lines outward by `by_px`. Does nothing and returns false if they enclose at least
+/// `max_area_px2`.
+fn widen(lines: &mut [Line], by_px: f64, max_area_px2: f64) -> bool {
+    if area_px2(lines) >= max_area_px2 {
         return false;
     }
-    lines.iter_mut().for_each(|line| line.1 += by_px);
+    lines.iter_mut().for_each(|line| line.offset_px += by_px);
     true
 }
 
-/// Unit vector in the image, and the greatest offset along it from the corner of the image, pixels.
-pub(super) type Line = ([f64; 2], f64);
-
 /// Inputs that all tanks of one library share.
-struct Site<'a> {
+struct Geometry<'a> {
     lens: &'a Lens,
     body: Body,
     size_px: [f64; 2],
     depths_bl: [f64; 2],
 }
 
-impl Site<'_> {
+impl Geometry<'_> {
     /// Returns the tank in which bodies stay within the image and within these lines.
     fn tank(&self, lines: &[Line]) -> Tank {
         let [w, h] = self.size_px;
-        let picture = [
+        let edges = [
             ([1.0, 0.0], w),
             ([0.0, 1.0], h),
             ([-1.0, 0.0], 0.0),
             ([0.0, -1.0], 0.0),
         ];
-        let walls = self.walls(&picture).chain(self.walls(lines)).collect();
-        let places = self
-            .depths_bl
-            .map(|z| [[0.0, 0.0], [w, h]].map(|px| self.lens.place_bl(px, z)));
-        let extreme = |axis: usize, of: fn(f64, f64) -> f64| {
-            places
-                .iter()
-                .flatten()
-                .map(|p| p[axis])
-                .reduce(of)
-                .unwrap_or(0.0)
-        };
-        let corners = [f64::min, f64::max].map(|of| std::array::from_fn(|axis| extreme(axis, of)));
-        Tank::within(corners, walls)
+        let edges = edges.map(|(outward, offset_px)| Line { outward, offset_px });
+        let walls = self.walls(&edges).chain(self.walls(lines)).collect();
+        let [near, far] = self.depths_bl;
+        let places = [
+            ([0.0, 0.0], near),
+            ([w, h], near),
+            ([0.0, 0.0], far),
+            ([w, h], far),
+        ]
+        .map(|(px, depth_bl)| self.lens.place_bl(px, depth_bl));
+        let corners = [f64::min, f64::max].map(|extreme| {
+            let [first, rest @ ..] = places;
+            rest.iter().fold(first, |corner, place| {
+                std::array::from_fn(|axis| extreme(corner[axis], place[axis]))
+            })
+        });
+        Tank::cut_box(corners, walls)
     }
 
     /// Returns the walls for lines, moved inward by the margin of a body, but by at most a third of the
@@ -108,8 +116,8 @@ impl Site<'_> {
     fn walls(&self, lines: &[Line]) -> impl Iterator<Item = Wall> {
         let px_per_bl = self.lens.px_per_bl(self.depths_bl[0]);
         (0..lines.len()).map(move |k| {
-            let (outward, offset_px) = lines[k];
-            let opposite_px = lines[(k + lines.len() / 2) % lines.len()].1;
+            let Line { outward, offset_px } = lines[k];
+            let opposite_px = lines[(k + lines.len() / 2) % lines.len()].offset_px;
             let across_bl = (offset_px + opposite_px) / px_per_bl;
             let margin_bl = self.body.margin_bl(outward).min(across_bl / 3.0);
             self.lens.wall(outward, offset_px, margin_bl)
@@ -124,13 +132,9 @@ struct Body {
 }
 
 impl Body {
-    fn of(library: &Library, length_px: f64) -> Body {
-        let heights = library
-            .poses
-            .frames
-            .iter()
-            .filter_map(|pose| pose.height_px);
-        let median_px = median(heights).unwrap_or(length_px);
+    fn new(library: &Library, length_px: f64) -> Body {
+        let poses = library.poses.frames.iter();
+        let median_px = median(poses.filter_map(|pose| pose.height_px)).unwrap_or(length_px);
         Body {
             view: library.poses.view,
             half_height_bl: 0.5 * (median_px / length_px).min(1.0),
@@ -153,17 +157,13 @@ fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Param
     if lens.is_flat() {
         return [0.0; 2];
     }
-    let seen = || {
-        let shown = library.playback.component.iter();
-        shown
-            .map(|&frame| motion[frame as usize].depth_bl)
-            .collect::<Vec<f64>>()
-    };
-    let at = |share: f64| percentile(&mut seen(), share).unwrap_or(0.0);
-    let (near, far) = (at(OUTLIERS), at(1.0 - OUTLIERS));
-    let depth = params
-        .depth_bl
-        .unwrap_or((far - near).clamp(DEPTHS_BL[0], DEPTHS_BL[1]));
+    let frames = library.playback.component.iter();
+    let depths = frames.map(|&frame| motion[frame as usize].depth_bl);
+    let mut depths: Vec<f64> = depths.collect();
+    let mut at = |share| percentile(&mut depths, share).unwrap_or(0.0);
+    let (near, far) = (at(OUTLIER_SHARE), at(1.0 - OUTLIER_SHARE));
+    let [min_depth, max_depth] = DEPTH_LIMITS_BL;
+    let depth = (params.depth_bl).unwrap_or((far - near).clamp(min_depth, max_depth));
     // The front is never so near that a body has more than 1.5 times its usual size.
     let least = lens.depth_at_bl(1.5 * lens.length_px);
     let nearest = (0.5 * (near + far - depth)).max(least);
@@ -172,21 +172,15 @@ fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Param
 
 /// Returns the outer polygon of the bodies seen; empty if there are none.
 fn seen_lines(library: &Library) -> Vec<Line> {
-    (0..N_SIDES)
-        .filter_map(|k| {
-            let angle = std::f64::consts::TAU * k as f64 / N_SIDES as f64;
-            let outward = [libm::cos(angle), libm::sin(angle)];
-            let bodies = library
-                .poses
-                .frames
-                .iter()
-                .filter_map(|pose| reach_px(pose, outward));
-            Some((
-                outward,
-                percentile(&mut bodies.collect::<Vec<f64>>(), 1.0 - OUTLIERS)?,
-            ))
-        })
-        .collect()
+    let line = |k| {
+        let angle = TAU * k as f64 / N_SIDES as f64;
+        let outward = [libm::cos(angle), libm::sin(angle)];
+        let poses = library.poses.frames.iter();
+        let mut reaches_px: Vec<f64> = poses.filter_map(|pose| reach_px(pose, outward)).collect();
+        let offset_px = percentile(&mut reaches_px, 1.0 - OUTLIER_SHARE)?;
+        Some(Line { outward, offset_px })
+    };
+    (0..N_SIDES).filter_map(line).collect()
 }
 
 /// Returns how far a body reaches in a direction, pixels. The body is an ellipse of its length and height.
@@ -200,21 +194,20 @@ fn reach_px(pose: &Pose, outward: [f64; 2]) -> Option<f64> {
 }
 
 /// Returns the area within lines of ascending angle, square pixels.
-fn area(lines: &[Line]) -> f64 {
+fn area_px2(lines: &[Line]) -> f64 {
+    let n = lines.len();
     let corner = |k: usize| {
-        let (a, b) = (&lines[k], &lines[(k + 1) % lines.len()]);
-        let cross = a.0[0] * b.0[1] - a.0[1] * b.0[0];
-        [
-            (a.1 * b.0[1] - b.1 * a.0[1]) / cross,
-            (b.1 * a.0[0] - a.1 * b.0[0]) / cross,
-        ]
+        let [(a, a_px), (b, b_px)] =
+            [k, k + 1].map(|k| (lines[k % n].outward, lines[k % n].offset_px));
+        let cross = a[0] * b[1] - a[1] * b[0];
+        let [x, y] = [a_px * b[1] - b_px * a[1], b_px * a[0] - a_px * b[0]];
+        [x / cross, y / cross]
     };
-    (0..lines.len())
-        .map(|k| {
-            let (p, q) = (corner(k), corner((k + 1) % lines.len()));
-            0.5 * (p[0] * q[1] - q[0] * p[1])
-        })
-        .sum()
+    let triangle = |k: usize| {
+        let (p, q) = (corner(k), corner(k + 1));
+        0.5 * (p[0] * q[1] - q[0] * p[1])
+    };
+    (0..n).map(triangle).sum()
 }
 
 #[cfg(test)]
@@ -222,8 +215,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_square_of_walls_has_the_area_of_a_square() {
-        let lines = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]].map(|u| (u, 2.0));
-        assert!((area(&lines) - 16.0).abs() < 1e-12);
+    fn area_of_four_lines_is_that_of_their_square() {
+        let directions = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+        let lines = directions.map(|outward| Line {
+            outward,
+            offset_px: 2.0,
+        });
+        assert!((area_px2(&lines) - 16.0).abs() < 1e-12);
     }
 }

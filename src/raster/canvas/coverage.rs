@@ -20,7 +20,7 @@ const BLOCK: usize = 8;
 
 /// The drawn tiles and opaque blocks of a canvas.
 #[derive(Clone, Debug)]
-pub struct Cover {
+pub struct Coverage {
     size: [u32; 2],
     /// For each tile, row by row: whether anything was drawn there.
     touched: Vec<bool>,
@@ -29,11 +29,11 @@ pub struct Cover {
     opaque: Vec<u64>,
 }
 
-impl Cover {
+impl Coverage {
     /// Returns the record of an empty canvas of `size` pixels.
-    pub fn none(size: [u32; 2]) -> Cover {
+    pub fn new(size: [u32; 2]) -> Coverage {
         let [width, height] = size.map(|side| side as usize);
-        Cover {
+        Coverage {
             size,
             touched: vec![false; width.div_ceil(TILE) * height.div_ceil(TILE)],
             opaque: vec![0; words_of(width) * height],
@@ -41,7 +41,7 @@ impl Cover {
     }
 
     /// Marks every tile as drawn on.
-    pub fn touch_all(&mut self) {
+    pub fn mark_all_drawn(&mut self) {
         self.touched.fill(true);
     }
 
@@ -67,7 +67,7 @@ impl Cover {
     /// Returns the first columns of `within`, in row `y`, that may not be opaque; empty if there are none.
     /// The columns skipped are opaque.
     #[inline]
-    pub fn next_open(&self, y: u32, within: Range<u32>) -> Range<u32> {
+    pub fn next_visible(&self, y: u32, within: Range<u32>) -> Range<u32> {
         let n_words = words_of(self.size[0] as usize);
         let row = &self.opaque[y as usize * n_words..][..n_words];
         let columns = |block: u32| (block * BLOCK as u32).clamp(within.start, within.end);
@@ -77,7 +77,7 @@ impl Cover {
     }
 
     /// Yields disjoint boxes that contain everything drawn, and resets the record.
-    pub fn take(&mut self) -> impl Iterator<Item = Rect> {
+    pub fn take_drawn_boxes(&mut self) -> impl Iterator<Item = Rect> {
         self.opaque.fill(0);
         let [width, height] = self.size;
         let lines = self
@@ -131,36 +131,32 @@ mod tests {
     use crate::raster::resample::Resampled;
     use crate::raster::{Canvas, RgbImage};
 
-    fn rect(x: u32, y: u32, w: u32, h: u32) -> Rect {
-        Rect { x, y, w, h }
-    }
-
     #[test]
-    fn every_tile_that_a_layer_shows_on_is_taken_once() {
-        let (mut cover, mut canvas) = (Cover::none([50, 40]), Canvas::new(50, 40));
+    fn every_tile_drawn_on_is_taken_once() {
+        let (mut coverage, mut canvas) = (Coverage::new([50, 40]), Canvas::new(50, 40));
         let mut layer = Resampled {
-            rect: rect(10, 15, 8, 3),
+            rect: Rect::new(10, 15, 8, 3),
             pixels: vec![[1; 4]; 24],
             // Up to the edge of a tile, and across one.
             runs: vec![[15, 10, 16], [17, 15, 18]],
         };
-        canvas.under(&layer, &mut cover, Level::Scalar);
-        canvas.under(&layer, &mut cover, Level::Scalar);
-        let boxes: Vec<Rect> = cover.take().collect();
-        assert_eq!(boxes, [rect(0, 0, 16, 16), rect(0, 16, 32, 16)]);
-        assert_eq!(cover.take().count(), 0);
+        canvas.draw_layer_under(&layer, &mut coverage, Level::Scalar);
+        canvas.draw_layer_under(&layer, &mut coverage, Level::Scalar);
+        let boxes: Vec<Rect> = coverage.take_drawn_boxes().collect();
+        assert_eq!(boxes, [Rect::new(0, 0, 16, 16), Rect::new(0, 16, 32, 16)]);
+        assert_eq!(coverage.take_drawn_boxes().count(), 0);
         layer.rect.x = 42;
         layer.show_whole();
-        canvas.under(&layer, &mut cover, Level::Scalar);
-        let boxes: Vec<Rect> = cover.take().collect();
-        assert_eq!(boxes, [rect(32, 0, 18, 16), rect(32, 16, 18, 16)]);
-        cover.touch_all();
-        assert_eq!(cover.take().count(), 3);
+        canvas.draw_layer_under(&layer, &mut coverage, Level::Scalar);
+        let boxes: Vec<Rect> = coverage.take_drawn_boxes().collect();
+        assert_eq!(boxes, [Rect::new(32, 0, 18, 16), Rect::new(32, 16, 18, 16)]);
+        coverage.mark_all_drawn();
+        assert_eq!(coverage.take_drawn_boxes().count(), 3);
     }
 
     #[test]
-    fn what_is_open_lies_between_what_lets_nothing_through() {
-        let (mut cover, mut canvas) = (Cover::none([200, 2]), Canvas::new(200, 2));
+    fn visible_columns_lie_between_opaque_blocks() {
+        let (mut coverage, mut canvas) = (Coverage::new([200, 2]), Canvas::new(200, 2));
         for (columns, alpha) in [
             (0..3, ONE),
             (14..25, ONE),
@@ -170,13 +166,13 @@ mod tests {
         ] {
             let n = columns.len();
             let layer = Resampled {
-                rect: rect(columns.start, 1, n as u32, 1),
+                rect: Rect::new(columns.start, 1, n as u32, 1),
                 pixels: vec![[0, 0, 0, alpha]; n],
                 runs: vec![[1, columns.start, columns.end]],
             };
-            canvas.under(&layer, &mut cover, Level::Scalar);
+            canvas.draw_layer_under(&layer, &mut coverage, Level::Scalar);
         }
-        let open = |y, within: Range<u32>| cover.next_open(y, within);
+        let open = |y, within: Range<u32>| coverage.next_visible(y, within);
         // Only whole blocks count: 16..24 and 136..200.
         assert_eq!(open(1, 0..200), 0..16);
         assert_eq!(open(1, 3..10), 3..10);
@@ -184,26 +180,26 @@ mod tests {
         assert_eq!(open(1, 50..130), 50..130);
         assert!(open(1, 140..200).is_empty() && open(1, 17..23).is_empty());
         assert_eq!(open(0, 0..200), 0..200);
-        assert!(cover.take().count() > 0);
-        assert_eq!(cover.next_open(1, 0..200), 0..200);
+        assert!(coverage.take_drawn_boxes().count() > 0);
+        assert_eq!(coverage.next_visible(1, 0..200), 0..200);
     }
 
     #[test]
-    fn what_is_left_out_is_less_than_half_a_level() {
+    fn skipped_contributions_are_below_half_a_level() {
         let row = |pixel| Resampled {
-            rect: rect(0, 0, 8, 1),
+            rect: Rect::new(0, 0, 8, 1),
             pixels: vec![pixel; 8],
             runs: vec![[0, 0, 8]],
         };
         let behind = |alpha: i16, color| {
-            let (mut cover, mut canvas) = (Cover::none([8, 1]), Canvas::new(8, 1));
+            let (mut coverage, mut canvas) = (Coverage::new([8, 1]), Canvas::new(8, 1));
             for pixel in [[0, 0, 0, alpha], [color, color, color, ONE]] {
-                canvas.under(&row(pixel), &mut cover, Level::Scalar);
+                canvas.draw_layer_under(&row(pixel), &mut coverage, Level::Scalar);
             }
             // Black behind everything.
-            canvas.under_box(
-                &Canvas::of_rgb(&RgbImage::new(8, 1)),
-                rect(0, 0, 8, 1),
+            canvas.draw_box_under(
+                &Canvas::from_rgb(&RgbImage::new(8, 1)),
+                Rect::new(0, 0, 8, 1),
                 Level::Scalar,
             );
             canvas.pixels[0]

@@ -67,7 +67,7 @@ const SLOPES: Slopes = Slopes {
 };
 
 /// Digest of a school with goals, obstacles, a predator and positions to meet.
-const DIGEST_OF_A_FULL_TANK: u64 = 0xeecb_40e3_b462_3b35;
+const DIGEST_OF_ALL_FEATURES: u64 = 0xeecb_40e3_b462_3b35;
 
 fn calibration(slopes: Option<Slopes>) -> Calibration {
     Calibration {
@@ -101,19 +101,15 @@ fn presets_keep_their_digests() {
         };
         let found = [(0.0, None), (3.0, None), (3.0, Some(SLOPES))].map(|(depth_bl, slopes)| {
             let (calibration, (lens, tank)) = (calibration(slopes), place(depth_bl));
-            digest(Boids::at_random(
-                &params,
-                &calibration,
-                (&lens, &tank),
-                30.0,
-            ))
+            let boids = Boids::at_random(&params, &calibration, &lens, &tank, 30.0);
+            digest(boids)
         });
         assert_eq!(found, expected, "{name}");
     }
 }
 
 #[test]
-fn a_full_tank_keeps_its_digest() {
+fn tank_with_all_features_keeps_its_digest() {
     let (center_px, radius_px, box_px) = ([200.0, 300.0], 60.0, [500.0, 100.0, 80.0, 200.0]);
     let params = Params {
         count: Some(75),
@@ -135,12 +131,12 @@ fn a_full_tank_keeps_its_digest() {
         ..Params::default()
     };
     let (calibration, (lens, tank)) = (calibration(Some(SLOPES)), place(3.0));
-    let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
-    boids.hunter = boids.habitat.hunter();
-    let places = boids.positions.iter().rev().copied();
-    boids.meet(Meeting {
-        share: 0.5,
-        places: places.zip(boids.velocities.clone()).collect(),
+    let mut boids = Boids::at_random(&params, &calibration, &lens, &tank, 30.0);
+    boids.predator = boids.habitat.initial_predator();
+    let positions = boids.positions.iter().rev().copied();
+    boids.steer_toward(TargetStates {
+        weight: 0.5,
+        states: positions.zip(boids.velocities.clone()).collect(),
     });
-    assert_eq!(digest(boids), DIGEST_OF_A_FULL_TANK);
+    assert_eq!(digest(boids), DIGEST_OF_ALL_FEATURES);
 }

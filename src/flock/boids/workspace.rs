@@ -4,7 +4,7 @@ use super::grid::{Boid, Grid};
 
 /// State of a boid that other boids do not perceive.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Inner {
+pub(super) struct InternalState {
     /// Wandering turn rate, radians per second, and wanted slope in standard deviations from the usual one.
     pub(super) wander: [f64; 2],
     /// Remaining time of its lead, seconds; 0 if it does not lead.
@@ -18,46 +18,47 @@ pub(super) struct Inner {
     pub(super) is_blocked: bool,
 }
 
-/// Boids and their inner states.
+/// Boids and their internal states.
 #[derive(Default)]
-pub(super) struct Crowd {
+pub(super) struct Population {
     pub(super) boids: Vec<Boid>,
-    pub(super) inners: Vec<Inner>,
+    pub(super) internals: Vec<InternalState>,
 }
 
 /// All boids, in the order of the cells of the previous step. Boids that are near each other are near in
 /// memory.
 #[derive(Default)]
-pub(super) struct Room {
-    pub(super) now: Crowd,
-    /// Index of each boid in `now`, by id.
-    pub(super) places: Vec<u32>,
+pub(super) struct Workspace {
+    pub(super) current: Population,
+    /// Index of each boid in `current`, by id.
+    pub(super) index_by_id: Vec<u32>,
     /// Boids after the step, in the order of their cells before it.
-    pub(super) next: Crowd,
+    pub(super) next: Population,
     pub(super) grid: Grid,
 }
 
-impl Room {
-    /// Returns the state of boids before their first step, in order of id.
-    pub(super) fn of(n: usize) -> Room {
-        let boid = |id| Boid {
+impl Workspace {
+    /// Returns the state of `n` boids before their first step, in order of id.
+    pub(super) fn new(n: usize) -> Workspace {
+        let ids: Vec<u32> = (0..n as u32).collect();
+        let boid = |&id: &u32| Boid {
             id,
             ..Boid::default()
         };
-        Room {
-            now: Crowd {
-                boids: (0..n as u32).map(boid).collect(),
-                inners: vec![Inner::default(); n],
+        Workspace {
+            current: Population {
+                boids: ids.iter().map(boid).collect(),
+                internals: vec![InternalState::default(); n],
             },
-            places: (0..n as u32).collect(),
-            ..Room::default()
+            index_by_id: ids,
+            ..Workspace::default()
         }
     }
 }
 
-impl Default for Inner {
-    fn default() -> Inner {
-        Inner {
+impl Default for InternalState {
+    fn default() -> InternalState {
+        InternalState {
             wander: [0.0; 2],
             leads_for_s: 0.0,
             sight_bl: f64::INFINITY,
