@@ -6,7 +6,6 @@
 //! loops.
 
 mod added;
-pub mod certificate;
 pub mod circle;
 pub mod cost;
 pub mod crowd;

@@ -111,20 +111,6 @@ impl Film<'_> {
         costs
     }
 
-    /// Returns `[t][state]`: the least cost of a path to each state that may jump from there, in turns. The
-    /// certificate checks these values.
-    pub fn potentials(&self, rows: &mut impl Rows) -> Vec<Vec<u32>> {
-        let mut column = Column::new(self, Way::Ahead, self.n_frames);
-        let mut columns = Vec::with_capacity(self.n_frames);
-        while column.n_left() > 0 {
-            column.advance_untraced(self, rows);
-            for lane in column.lanes() {
-                columns.push(column.values(lane).collect());
-            }
-        }
-        columns
-    }
-
     fn segment_blocks(&self) -> usize {
         let n_blocks = self.n_frames.div_ceil(2 * block::width(self.dwell)).max(1);
         if Trace::block_bytes(self, Way::Ahead) * n_blocks <= TRACE_BUDGET_BYTES {
