@@ -59,12 +59,12 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
         if ends.is_some_and(|ends| path.last() != Some(&ends.next)) {
             return u32::MAX;
         }
-        let settled = Settled::new(planner.places.len());
+        let final_plans = FinalPlans::new(planner.places.len());
         let path = viterbi::Path {
             states: path.clone(),
             cost: 0,
         };
-        return planner.cost_among(0, wanted, &settled, &path);
+        return planner.cost_among(0, wanted, &final_plans, &path);
     }
     let trellis = &planner.model.trellis;
     let states = 0..trellis.n_states() as u32;
@@ -118,8 +118,8 @@ fn plan_is_the_cheapest_and_the_jump_back_cost_reduces_repeats() {
         let planner = Planner::new(&model, &boids);
         let wanted = planner.model.weights.wanted(&boids[0], planner.model.fps);
         let least = least_by_brute_force(&planner, &wanted, &mut Vec::new());
-        let told = (aware.individuals[0].cost.total * Turns::PER_RAD).round() as u32;
-        assert_eq!(told, least, "seed {seed}");
+        let stored = (aware.individuals[0].cost.total * Turns::PER_RAD).round() as u32;
+        assert_eq!(stored, least, "seed {seed}");
         n_again += aware.stats.repeats_per_100_frames;
         n_again_for_nothing += unaware.stats.repeats_per_100_frames;
     }
@@ -154,14 +154,14 @@ fn loop_plan_is_the_cheapest_that_leads_to_its_continuation() {
         for (frame, side) in [own, (200, false)] {
             let first = planner.model.trellis.state(frame, side);
             let first = first.expect("a frame of the component");
-            planner.ends = vec![Ends { first, next: first }];
-            let mut settled = Settled::new(planner.places.len());
-            let found = planner.paths(&wanted, &mut settled, &Silent).unwrap();
+            planner.ends = vec![LoopEnds { first, next: first }];
+            let mut final_plans = FinalPlans::new(planner.places.len());
+            let found = planner.paths(&wanted, &mut final_plans, &Silent).unwrap();
             let least = least_by_brute_force(&planner, &wanted[0], &mut Vec::new());
             assert_eq!(found[0].cost, least, "seed {seed}");
             if (frame, side) == own {
-                let told = (one.cost.total * Turns::PER_RAD).round() as u32;
-                assert_eq!(told, least, "seed {seed}");
+                let stored = (one.cost.total * Turns::PER_RAD).round() as u32;
+                assert_eq!(stored, least, "seed {seed}");
             }
         }
     }

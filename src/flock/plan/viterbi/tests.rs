@@ -28,10 +28,10 @@ impl Case {
         self.costs[(t * 31 + state * 7) % self.costs.len()]
     }
 
-    fn film<'a>(&self, trellis: &'a Trellis, cpu: Level) -> Film<'a> {
-        static SHELF: LazyLock<Shelf> = LazyLock::new(Shelf::default);
-        Film {
-            shelf: &SHELF,
+    fn search<'a>(&self, trellis: &'a Trellis, cpu: Level) -> PathSearch<'a> {
+        static SHELF: LazyLock<TracePool> = LazyLock::new(TracePool::default);
+        PathSearch {
+            trace_pool: &SHELF,
             trellis,
             n_frames: self.n_frames,
             dwell: self.dwell,
@@ -39,7 +39,7 @@ impl Case {
         }
     }
 
-    fn rows(&self) -> impl Rows + Clone + Send + Sync {
+    fn state_costs(&self) -> impl StateCosts + Clone + Send + Sync {
         |t: usize, state: usize| self.cost(t, state)
     }
 
@@ -49,8 +49,8 @@ impl Case {
 
     fn plan_at(&self, cpu: Level, segment: usize) -> Option<Path> {
         let trellis = self.trellis();
-        let film = self.film(&trellis, cpu);
-        film.cheapest_path_by_segments(&self.rows(), segment)
+        let search = self.search(&trellis, cpu);
+        search.cheapest_path_by_segments(&self.state_costs(), segment)
     }
 
     /// Returns the least cost of a plan by the oracle of `flock::check`.
@@ -75,9 +75,9 @@ impl Case {
             Some(_) => self.cost(t, state).into(),
             None => NEVER,
         };
-        let rows = (0..self.n_frames).map(|t| (0..n_states).map(|s| cost(t, s)).collect());
+        let state_costs = (0..self.n_frames).map(|t| (0..n_states).map(|s| cost(t, s)).collect());
         let starts: Vec<_> = (0..n_states).map(|state| (state, self.dwell)).collect();
-        let least = graph.least_cost(self.dwell, &starts, rows);
+        let least = graph.least_cost(self.dwell, &starts, state_costs);
         (least < NEVER).then_some(least)
     }
 
@@ -176,7 +176,7 @@ proptest! {
     #[test]
     fn costs_from_a_state_are_those_of_the_cheapest_path_that_begins_with_it(case in case(7, 9)) {
         let trellis = case.trellis();
-        let costs = case.film(&trellis, Level::detect()).costs_from(&mut case.rows());
+        let costs = case.search(&trellis, Level::detect()).costs_from(&mut case.state_costs());
         for (state, &found) in costs.iter().enumerate() {
             let is_shown = trellis.shown(state).is_some();
             let least = is_shown.then(|| case.cheapest_from(&trellis, 0, state, 1)).flatten();
@@ -186,7 +186,7 @@ proptest! {
     }
 
     #[test]
-    fn no_path_of_a_small_graph_is_cheaper(case in case(7, 9)) {
+    fn path_of_a_small_graph_is_the_cheapest(case in case(7, 9)) {
         let found = case.plan().map(|path| u64::from(path.cost));
         prop_assert_eq!(found, case.by_brute_force());
     }
@@ -203,7 +203,7 @@ proptest! {
 
 proptest! {
     #[test]
-    fn segments_and_instruction_sets_change_nothing(
+    fn path_is_equal_for_all_segments_and_instruction_sets(
         case in prop_oneof![case(8, 9), case(40, 200), long_case()], segment in 1usize..4
     ) {
         let whole = case.plan();
@@ -211,13 +211,13 @@ proptest! {
             prop_assert_eq!(&case.plan_at(cpu, segment), &whole);
         }
         let trellis = case.trellis();
-        let film = case.film(&trellis, Level::detect());
+        let search = case.search(&trellis, Level::detect());
         let cost = whole.map(|path| path.cost);
-        prop_assert_eq!(film.least_cost(&mut case.rows()), cost);
+        prop_assert_eq!(search.least_cost(&mut case.state_costs()), cost);
     }
 
     #[test]
-    fn another_jump_never_raises_the_cost(
+    fn additional_jump_never_raises_the_cost(
         case in case(8, 9), from in 0u32..8, to in 0u32..8, cost in 0u64..60
     ) {
         prop_assume!(to != from + 1);
