@@ -64,7 +64,7 @@ mod tests {
     use crate::progress::Silent;
 
     #[test]
-    fn too_many_and_too_short_a_loop_are_told() {
+    fn advice_names_too_many_animals_and_too_short_a_loop() {
         let library = synthetic::library(View::Top);
         let params = Params {
             count: Some(3),
@@ -75,12 +75,12 @@ mod tests {
         let mut flock = plan_flock(&library, &params, &Silent).expect("a good library");
         flock.stats.room_for = 2;
         flock.stats.heading_error_p90_rad = 1.0;
-        let told: Vec<_> = Advice::all(&flock)
+        let advice: Vec<_> = Advice::all(&flock)
             .iter()
             .map(|a| (a.code(), a.to_string()))
             .collect();
-        let [("little_room", room), ("short_loop", short)] = &told[..] else {
-            panic!("{told:?}");
+        let [("little_room", room), ("short_loop", short)] = &advice[..] else {
+            panic!("{advice:?}");
         };
         assert!(room.contains("room for about 2 of the 3 animals"), "{room}");
         assert!(

@@ -16,14 +16,14 @@ use crate::geometry::rounded;
 use crate::library::Library;
 
 /// Largest number of corrections of the separation radii. Free choice.
-const N_ROUNDS: usize = 5;
+const MAX_ROUNDS: usize = 5;
 /// Least improvement of a correction, in the logarithm of measured over requested spacing. A smaller
 /// improvement ends the corrections. Free choice.
-const NEAR_ENOUGH: f64 = 0.03;
+const MIN_IMPROVEMENT: f64 = 0.03;
 /// Largest factor by which the separation radii grow or shrink. Free choice.
-const MOST_CHANGE: f64 = 8.0;
+const MAX_FACTOR: f64 = 8.0;
 /// Separation radius in the image before the first correction, in requested spacings. Free choice.
-const IN_PICTURE: f64 = 1.5;
+const START_RADIUS: f64 = 1.5;
 /// Length of the trial on which the spacing is measured, seconds. A loop is measured in full. Free choice.
 const TRIAL_S: f64 = 4.0;
 
@@ -33,7 +33,7 @@ const TRIAL_S: f64 = 4.0;
 /// Each round makes a trial flock with `spacing_of`, which returns its spacing in body lengths. The radii are
 /// then multiplied by requested over measured spacing. The best round counts. Without a requested spacing, or
 /// for a single animal, the parameters are returned unchanged.
-pub(super) fn spaced(
+pub(super) fn with_spacing(
     params: &Params,
     fps: f64,
     spacing_of: impl Fn(&Params) -> Result<f64, Error>,
@@ -41,16 +41,17 @@ pub(super) fn spaced(
     let Some(wanted_bl) = params.spacing_bl.filter(|_| params.most_individuals() > 1) else {
         return Ok(params.clone());
     };
-    let trial_frames = match params.is_loop {
-        true => params.frames,
-        false => params.frames.min((TRIAL_S * fps).ceil() as u32),
+    let trial_frames = if params.is_loop {
+        params.frames
+    } else {
+        params.frames.min((TRIAL_S * fps).ceil() as u32)
     };
     let mut share = 1.0;
     let mut best = (params.rules.clone(), f64::INFINITY);
-    for _ in 0..N_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let mut rules = params.rules.clone();
         rules.separation_bl *= share;
-        rules.picture_separation_bl = IN_PICTURE * wanted_bl * share;
+        rules.picture_separation_bl = START_RADIUS * wanted_bl * share;
         if let Some(zones) = &mut rules.zones {
             zones.repulsion_bl *= share;
         }
@@ -60,11 +61,11 @@ pub(super) fn spaced(
             ..params.clone()
         };
         let off = libm::log(spacing_of(&trial)?.max(1e-3) / wanted_bl);
-        if off.abs() > best.1 - NEAR_ENOUGH {
+        if off.abs() > best.1 - MIN_IMPROVEMENT {
             break;
         }
         best = (rules, off.abs());
-        share = (share * libm::exp(-off)).clamp(1.0 / MOST_CHANGE, MOST_CHANGE);
+        share = (share * libm::exp(-off)).clamp(1.0 / MAX_FACTOR, MAX_FACTOR);
     }
     Ok(Params {
         rules: best.0,
@@ -99,36 +100,29 @@ pub(super) struct Crowding {
 }
 
 /// Distance between centroids below which two animals cross, body lengths. Free choice.
-const CROSSED_BL: f64 = 0.5;
+const CROSSING_BL: f64 = 0.5;
 /// Interval at which the visible share is measured, frames. Free choice.
-const LOOK_EVERY: usize = 5;
+const VISIBILITY_INTERVAL: usize = 5;
 
 /// Returns crossings and visibility of a flock of the animal of `library`. `length_px` is its body length.
 pub(super) fn crowding(individuals: &[Individual], library: &Library, length_px: f64) -> Crowding {
     let n_frames = individuals.first().map_or(0, |one| one.centroid_px.len());
     let crossed = |t: usize| -> HashSet<(usize, usize)> {
         let places: Vec<[f64; 2]> = individuals.iter().map(|one| one.centroid_px[t]).collect();
-        pairs_within(&places, CROSSED_BL * length_px)
-            .into_iter()
-            .collect()
+        let pairs = pairs_within(&places, CROSSING_BL * length_px);
+        pairs.into_iter().collect()
     };
     let n_crossings: usize = (1..n_frames)
         .into_par_iter()
         .map(|t| crossed(t).difference(&crossed(t - 1)).count())
         .sum();
-    let looked_at: Vec<usize> = (0..n_frames).step_by(LOOK_EVERY).collect();
-    let visible: f64 = looked_at
-        .par_iter()
-        .map(|&t| {
-            let bodies: Vec<Body> = individuals
-                .iter()
-                .map(|one| Body::of(one, t, library))
-                .collect();
-            visible_share(&bodies)
-        })
-        .collect::<Vec<_>>()
-        .iter()
-        .sum();
+    let looked_at: Vec<usize> = (0..n_frames).step_by(VISIBILITY_INTERVAL).collect();
+    let visible_share = |&t: &usize| {
+        let bodies = individuals.iter().map(|one| Body::new(one, t, library));
+        visible_share(&bodies.collect::<Vec<_>>())
+    };
+    let visible: Vec<f64> = looked_at.par_iter().map(visible_share).collect();
+    let visible: f64 = visible.iter().sum();
     let minutes = n_frames as f64 / library.poses.fps / 60.0;
     Crowding {
         crossings_per_min: rounded(n_crossings as f64 / minutes.max(1e-9), 4),
@@ -165,7 +159,7 @@ struct Body {
 }
 
 impl Body {
-    fn of(one: &Individual, t: usize, library: &Library) -> Body {
+    fn new(one: &Individual, t: usize, library: &Library) -> Body {
         let pose = &library.poses.frames[one.source_frame[t] as usize];
         let half_length = pose.length_px.unwrap_or(1.0).max(1.0) / 2.0;
         let half_height = pose.area_px.unwrap_or(1.0).max(1.0) / (PI * half_length);
@@ -209,11 +203,10 @@ fn visible_share(bodies: &[Body]) -> f64 {
         );
         [radius * libm::cos(angle), radius * libm::sin(angle)]
     };
-    let reach_px = 2.0
-        * bodies
-            .iter()
-            .map(|body| body.half_px[0].max(body.half_px[1]))
-            .fold(0.0, f64::max);
+    let lengths = bodies
+        .iter()
+        .map(|body| body.half_px[0].max(body.half_px[1]));
+    let reach_px = 2.0 * lengths.fold(0.0, f64::max);
     let centers: Vec<[f64; 2]> = bodies.iter().map(|body| body.center_px).collect();
     let mut nearer: Vec<Vec<&Body>> = vec![Vec::new(); bodies.len()];
     for (a, b) in pairs_within(&centers, reach_px) {
@@ -242,7 +235,7 @@ mod tests {
     use crate::progress::Silent;
 
     #[test]
-    fn flocks_are_as_dense_as_wanted_where_there_is_room() {
+    fn requested_spacing_is_reached_where_there_is_room() {
         let library = synthetic::library(View::Side);
         let stats = |spacing_bl, count| {
             let params = Params {
@@ -271,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_bodies_half_over_each_other_the_farther_is_half_seen() {
+    fn body_half_covered_by_a_nearer_one_is_half_visible() {
         let body = |x, depth| Body {
             center_px: [x, 0.0],
             cos_sin: [1.0, 0.0],
@@ -286,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_are_those_of_all_comparisons() {
+    fn pairs_equal_those_of_all_comparisons() {
         let places: Vec<[f64; 2]> = (0..60)
             .map(|k| [f64::from(k * 37 % 101), f64::from(k * 53 % 97)])
             .collect();

@@ -13,13 +13,13 @@ use crate::library::{Library, Poses, View};
 use crate::order::median;
 
 /// Focal length of the default camera, image widths: a field of view of 53 degrees across. Free choice.
-const USUAL_FOCAL_WIDTHS: f64 = 1.0;
+const DEFAULT_FOCAL_WIDTHS: f64 = 1.0;
 /// Span of the median over silhouette heights, seconds. The median removes the opening and closing of fins.
 /// Free choice.
 const HEIGHT_SPAN_S: f64 = 0.5;
 /// Time over which motion across the image and in depth are compared, seconds. Free choice. Posture changes
 /// within this time.
-const MOVED_IN_S: f64 = 0.5;
+const MOTION_SPAN_S: f64 = 0.5;
 
 /// Projection from the tank to the image. Positions are in body lengths. Their origin is the corner of the
 /// image for a flat lens, else the camera.
@@ -55,8 +55,8 @@ impl Lens {
             .zip(poses.animal)
             .filter(|_| poses.frames.iter().any(|pose| pose.position_m.is_some()));
         let pinhole = || match known {
-            Some((camera, animal)) => Pinhole::given(&camera, animal.length_m),
-            None => Pinhole::usual(poses.image_size_px.map(f64::from)),
+            Some((camera, animal)) => Pinhole::from_camera(&camera, animal.length_m),
+            None => Pinhole::default_for(poses.image_size_px.map(f64::from)),
         };
         Lens {
             length_px,
@@ -191,7 +191,7 @@ impl Lens {
 }
 
 impl Pinhole {
-    fn given(camera: &Camera, length_m: f64) -> Pinhole {
+    fn from_camera(camera: &Camera, length_m: f64) -> Pinhole {
         Pinhole {
             focal_px: camera.focal_px(),
             center_px: camera.center_px,
@@ -201,9 +201,9 @@ impl Pinhole {
         }
     }
 
-    fn usual(size_px: [f64; 2]) -> Pinhole {
+    fn default_for(size_px: [f64; 2]) -> Pinhole {
         Pinhole {
-            focal_px: USUAL_FOCAL_WIDTHS * size_px[0],
+            focal_px: DEFAULT_FOCAL_WIDTHS * size_px[0],
             center_px: size_px.map(|side| side / 2.0),
             pane_bl: 0.0,
             medium_index: 1.0,
@@ -259,7 +259,7 @@ pub fn depths_bl(library: &Library, lens: &Lens) -> Vec<f64> {
 /// The animal is assumed to move as much in depth as across the image. If the height changes by more, the
 /// rest is posture, as in a bird that crouches and stretches on its perch.
 fn share_of_depth(poses: &Poses, nearness: &[Option<f64>], lens: &Lens) -> f64 {
-    let span = ((MOVED_IN_S * poses.fps).round() as usize).max(1);
+    let span = ((MOTION_SPAN_S * poses.fps).round() as usize).max(1);
     let depth_bl = lens.depth_at_bl(lens.length_px);
     let moved = |frame: usize| {
         let [from, to] = [frame, frame + span]
@@ -292,13 +292,13 @@ mod tests {
         };
         Lens {
             length_px: 90.0,
-            camera: Some(Pinhole::given(&camera, 0.1)),
+            camera: Some(Pinhole::from_camera(&camera, 0.1)),
         }
     }
 
     proptest! {
         #[test]
-        fn who_is_inside_a_wall_is_seen_inside_its_line(
+        fn places_inside_a_wall_are_seen_inside_its_line(
             x in -6.0..6.0f64, y in -6.0..6.0f64, z in 7.0..14.0f64,
             turn in 0.0..std::f64::consts::TAU, offset_px in 0.0..600.0f64, n in 1.0..1.5f64,
         ) {
@@ -313,7 +313,7 @@ mod tests {
         }
 
         #[test]
-        fn the_velocity_in_the_picture_is_the_rate_of_the_place_in_it(
+        fn image_velocity_is_the_rate_of_the_image_position(
             x in -4.0..4.0f64, y in -4.0..4.0f64, z in 7.0..14.0f64,
             v in prop::array::uniform3(-2.0..2.0f64), n in 1.0..1.5f64,
         ) {
@@ -331,7 +331,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn who_sinks_as_it_should_is_seen_level_or_at_45_degrees(
+        fn vertical_speeds_give_level_or_diagonal_motion_in_the_image(
             x in -4.0..4.0f64, y in -4.0..4.0f64, z in 7.0..14.0f64,
             v in prop::array::uniform3(-2.0..2.0f64), n in 1.0..1.5f64,
         ) {
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn the_depth_of_a_size_has_that_size() {
+    fn depth_of_a_size_has_that_size() {
         for lens in [lens(1.0), lens(4.0 / 3.0)] {
             let depth = lens.depth_at_bl(60.0);
             assert!((lens.px_per_bl(depth) - 60.0).abs() < 1e-9);
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn an_animal_that_stretches_where_it_stands_does_not_come_nearer() {
+    fn animal_that_stretches_in_place_keeps_its_depth() {
         let mut library = crate::flock::synthetic::library(View::Side);
         let lens = Lens::of(&library, &Params::default());
         let fps = library.poses.fps;

@@ -6,7 +6,7 @@
 
 pub mod advice;
 pub mod boids;
-pub mod check;
+pub(crate) mod check;
 pub mod composite;
 mod course;
 mod density;
@@ -36,13 +36,13 @@ use self::boids::Boids;
 use self::boids::calibration::Calibration;
 use self::boids::tank::Tank;
 use self::course::Course;
-use self::follow::company::CLEAR_BL;
-use self::follow::perches::Perches;
+use self::follow::avoidance::CLEARANCE_BL;
+use self::follow::resting_places::RestingPlaces;
 use self::individual::MotionState;
 use self::lens::Lens;
 use self::motion::motion_of;
 use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
-use self::placement::{Placed, Stage};
+use self::placement::{Placed, Placer};
 use self::plan::{Model, Plan, Planner};
 use crate::geometry::rounded;
 use crate::library::Library;
@@ -106,20 +106,20 @@ pub fn plan_flock(
         return Err(Error::NoTransitions);
     }
     let lens = Lens::of(library, params);
-    let mut params = told(params, &lens);
+    let mut params = resolved(params, &lens);
     let motion = motion_of(library, &lens);
-    let tank = Tank::from_library(library, &lens, &motion, &params);
-    let perches = Perches::of(library, &motion, &lens);
-    let to_rest = perches.room_for(CLEAR_BL * lens.length_px);
-    let room_for = tank.capacity().min(to_rest.unwrap_or(u32::MAX));
+    let tank = Tank::of(library, &lens, &motion, &params);
+    let resting_places = RestingPlaces::new(library, &motion, &lens);
+    let n_resting = resting_places.capacity(CLEARANCE_BL * lens.length_px);
+    let room_for = tank.room_for().min(n_resting.unwrap_or(u32::MAX));
     params.count = params.count.or(Some(room_for.clamp(2, MOST_BY_DEFAULT)));
     let params = &params;
     let calibration = Calibration::from_library(library, &motion, lens.is_flat()).in_tank(&tank);
     let fps = library.poses.fps;
     let model = Model::new(library, &motion, params);
     let play = |params: &Params, progress: &dyn Progress| {
-        let boids = Boids::at_random(params, &calibration, &lens, &tank, fps);
-        let stage = Stage {
+        let boids = Boids::at_random(params, &calibration, (&lens, &tank), fps);
+        let placer = Placer {
             library,
             motion: &motion,
             params,
@@ -128,20 +128,21 @@ pub fn plan_flock(
             calibration: &calibration,
         };
         match params.position {
-            Position::Film => follow::play(boids, (&model, &stage), progress),
+            Position::Film => follow::play(boids, &model, &placer, progress),
             Position::Leash | Position::Boid | Position::Papers => {
-                whole(boids, (&model, &stage), progress)
+                play_whole(boids, &model, &placer, progress)
             }
         }
     };
-    let spaced = density::spaced(params, fps, |params| {
-        let (.., placed) = play(params, &CancelOnly(progress))?;
-        let places_px = placed.iter().map(|one| &one.centroid_px[..]);
+    let spaced = density::with_spacing(params, fps, |params| {
+        let played = play(params, &Quiet(progress))?;
+        let places_px = played.placed.iter().map(|one| &one.centroid_px[..]);
         Ok(density::spacing_bl(places_px, lens.length_px))
     })?;
-    let (course, plans, placed) = play(&spaced, progress)?;
+    let mut played = play(&spaced, progress)?;
     let states = motion::states(library, &motion);
-    let individuals = individuals(&model, &course, (&plans, &states), placed);
+    let individuals = individuals(&model, &mut played, &states);
+    let course = played.course;
     Ok(Flock {
         fps,
         image_size_px: library.poses.image_size_px,
@@ -149,7 +150,7 @@ pub fn plan_flock(
         space: Space::of(&lens, &tank),
         stats: Stats {
             room_for,
-            ..measured(&individuals, &course.orders, (library, params), &tank)
+            ..measured(&individuals, &course.orders, library, params, &tank)
         },
         orders: course.orders,
         params: params.clone(),
@@ -162,7 +163,8 @@ pub fn plan_flock(
 fn measured(
     individuals: &[Individual],
     orders: &[Order],
-    (library, params): (&Library, &Params),
+    library: &Library,
+    params: &Params,
     tank: &Tank,
 ) -> Stats {
     let length_px = Lens::of(library, params).length_px;
@@ -177,40 +179,50 @@ fn measured(
     }
 }
 
-/// Simulates the whole video, then plans and places it. Returns tracks, plans and placements by id.
-fn whole(
+/// Simulation, plans and placements of a flock. Lists have one entry per individual, by id.
+struct Played {
+    course: Course,
+    plans: Vec<Plan>,
+    placed: Vec<Placed>,
+}
+
+/// Simulates the whole video, then plans and places it.
+fn play_whole(
     boids: Boids,
-    (model, stage): (&Model, &Stage),
+    model: &Model,
+    placer: &Placer,
     progress: &dyn Progress,
-) -> Result<(Course, Vec<Plan>, Vec<Placed>), Error> {
-    let n_frames = stage.params.frames;
-    let course = match stage.params.is_loop {
-        true => {
-            let length = (n_frames, stage.library.poses.fps);
-            course::simulate_loop(boids, stage.lens, length, progress)?
-        }
-        false => course::simulate(boids, stage.lens, n_frames, progress)?,
+) -> Result<Played, Error> {
+    let (n_frames, fps) = (placer.params.frames, placer.library.poses.fps);
+    let course = if placer.params.is_loop {
+        course::simulate_loop(boids, placer.lens, n_frames, fps, progress)?
+    } else {
+        course::simulate(boids, placer.lens, n_frames, progress)?
     };
     progress.report("planning", 0.0);
     let planner = Planner::new(model, &course.tracks);
-    let plans = match &course.heirs {
-        Some(heirs) => planner.plan_loop(heirs, progress)?,
+    let plans = match &course.continuations {
+        Some(continuations) => planner.plan_loop(continuations, progress)?,
         None => planner.plan(progress)?,
     };
     let shown: Vec<_> = plans.iter().map(|plan| model.shown(&plan.states)).collect();
-    let placed = stage.placed(&shown, &course.tracks, course.heirs.as_deref());
-    Ok((course, plans, placed))
+    let placed = placer.placed(&shown, &course.tracks, course.continuations.as_deref());
+    Ok(Played {
+        course,
+        plans,
+        placed,
+    })
 }
 
 /// Returns the parameters with options replaced that do not apply. A loop has one body size and uses `leash`
 /// instead of `film`. Without depth, headings are matched instead of directions.
-fn told(params: &Params, lens: &Lens) -> Params {
+fn resolved(params: &Params, lens: &Lens) -> Params {
     let mut params = params.clone();
     if params.is_loop && params.position == Position::Film {
         params.position = Position::Leash;
     }
     if params.is_loop {
-        params.variation = 0.0; // each goes on as its heir
+        params.variation = 0.0; // each individual continues as another
     }
     if lens.is_flat() && params.matching.by == MatchBy::Direction {
         params.matching.by = MatchBy::Heading;
@@ -218,23 +230,22 @@ fn told(params: &Params, lens: &Lens) -> Params {
     params
 }
 
-fn individuals(
-    model: &Model,
-    course: &Course,
-    (plans, states): (&[Plan], &[MotionState]),
-    placed: Vec<Placed>,
-) -> Vec<Individual> {
+/// Returns the individuals of a flock. Takes the placements out of `played`.
+fn individuals(model: &Model, played: &mut Played, states: &[MotionState]) -> Vec<Individual> {
+    let course = &played.course;
+    let placed = std::mem::take(&mut played.placed);
     (0u32..)
         .zip(placed)
-        .zip(course.tracks.iter().zip(plans))
+        .zip(course.tracks.iter().zip(&played.plans))
         .map(|((id, placed), (boid, plan))| {
             let shown = model.shown(&plan.states);
+            let continuations = course.continuations.as_ref();
             Individual {
                 id,
                 source_frame: shown.iter().map(|shown| shown.0).collect(),
                 mirrored: shown.iter().map(|shown| shown.1).collect(),
                 rotation_rad: placed.rotation_rad,
-                continues_as: course.heirs.as_ref().map(|heirs| heirs[id as usize]),
+                continues_as: continuations.map(|all| all[id as usize]),
                 fades: placed.fades,
                 centroid_px: placed.centroid_px,
                 heading_rad: placed.heading_rad,
@@ -244,7 +255,7 @@ fn individuals(
                 state: (shown.iter().map(|shown| states[shown.0 as usize])).collect(),
                 depth_m: placed.depth_m,
                 boid: boid.clone(),
-                cost: plan.cost.told(),
+                cost: plan.cost.in_radians(),
             }
         })
         .collect()

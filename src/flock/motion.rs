@@ -9,10 +9,10 @@ use crate::library::{Library, Pose, View};
 use crate::order::median;
 
 /// Least share of the direction in the image plane for which a speed in space is given. Free choice.
-const LEAST_LEVEL: f64 = 0.7;
+const MIN_LEVEL_FOR_PACE: f64 = 0.7;
 /// Least share of the direction in the image plane by which a speed in the image is divided. Free choice. An
 /// animal seen head-on also moves sideways, so the quotient would otherwise grow without bound.
-const LEAST_SEEN: f64 = 0.5;
+const MIN_LEVEL: f64 = 0.5;
 /// Time before and after a frame over which directions are compared, seconds. Free choice.
 const TURN_SPAN_S: f64 = 0.1;
 
@@ -51,11 +51,11 @@ pub struct FrameMotion {
 
 impl FrameMotion {
     /// Returns the speed in space, body lengths per second. It is the speed in the image over the share of
-    /// the direction in the image plane, which counts as at least `LEAST_SEEN`.
+    /// the direction in the image plane, which counts as at least `MIN_LEVEL`.
     pub fn speed_in_space(&self) -> f64 {
         let [x, y, _] = self.forward;
         let level = x.hypot(y);
-        self.nearer * self.speed_bl_per_s / level.clamp(LEAST_SEEN, 1.0)
+        self.nearer * self.speed_bl_per_s / level.clamp(MIN_LEVEL, 1.0)
     }
 }
 
@@ -82,7 +82,7 @@ pub fn motion_of(library: &Library, lens: &Lens) -> Vec<FrameMotion> {
                 pace_bl_per_s: moved.and_then(|moved| {
                     let [x, y, _] = forwards[frame]?;
                     let level = x.hypot(y);
-                    (level > LEAST_LEVEL).then_some(moved.speed_bl_per_s * nearer / level)
+                    (level > MIN_LEVEL_FOR_PACE).then_some(moved.speed_bl_per_s * nearer / level)
                 }),
                 swing_rad_per_s: swing(frame),
                 ..moved.unwrap_or_else(|| FrameMotion {

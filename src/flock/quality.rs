@@ -94,59 +94,30 @@ pub fn measure(
     let slips = individuals.iter().flat_map(|i| slips(i, least_step_px));
     let mean = |of: fn(&Order) -> f64| orders.iter().map(of).sum::<f64>() / orders.len() as f64;
     let sum = |of: fn(&Order) -> u32| orders.iter().map(|order| u64::from(of(order))).sum();
-    let stats = Stats {
-        heading_error_median_rad: quantile(headings.clone(), 0.5),
-        heading_error_p90_rad: quantile(headings, 0.9),
-        jumps_per_100_frames: jumps_per_100_frames(individuals),
-        repeats_per_100_frames: repeats_per_100_frames(individuals, fps),
-        path_deviation_p95_bl: quantile(deviations, 0.95) / length_px,
-        slip_median_rad: quantile(slips.collect(), 0.5),
-        clone_share: clone_share(individuals, CLONE_BL * length_px, CLONE_S * fps),
+    let r = |value| rounded(value, 4);
+    Stats {
+        heading_error_median_rad: r(quantile(headings.clone(), 0.5)),
+        heading_error_p90_rad: r(quantile(headings, 0.9)),
+        jumps_per_100_frames: r(jumps_per_100_frames(individuals)),
+        repeats_per_100_frames: r(repeats_per_100_frames(individuals, fps)),
+        path_deviation_p95_bl: r(quantile(deviations, 0.95) / length_px),
+        slip_median_rad: r(quantile(slips.collect(), 0.5)),
+        clone_share: r(clone_share(
+            individuals,
+            CLONE_BL * length_px,
+            CLONE_S * fps,
+        )),
         distinct_looks: distinct_looks(&library.playback.component, CLONE_S * fps)
             * if params.mirror { 2 } else { 1 },
-        room_for: 0,
-        variety: variety(individuals, library),
-        polarization: mean(|order| order.polarization),
-        milling: mean(|order| order.milling),
-        nearest_neighbor_bl: mean(|order| order.nearest_bl),
-        spacing_bl: 0.0,
-        crossings_per_min: 0.0,
-        visible_share: 0.0,
-        neighbor_share: mean(|order| order.neighbor_share),
-        groups: mean(|order| f64::from(order.n_groups)),
-        overlap_bl: 0.0,
+        variety: r(variety(individuals, library)),
+        polarization: r(mean(|order| order.polarization)),
+        milling: r(mean(|order| order.milling)),
+        nearest_neighbor_bl: r(mean(|order| order.nearest_bl)),
+        neighbor_share: r(mean(|order| order.neighbor_share)),
+        groups: r(mean(|order| f64::from(order.n_groups))),
         wall_violations: sum(|order| order.n_outside),
         overlap_violations: sum(|order| order.n_overlaps),
-    };
-    stats.rounded()
-}
-
-impl Stats {
-    fn rounded(self) -> Stats {
-        let r = |value| rounded(value, 4);
-        Stats {
-            heading_error_median_rad: r(self.heading_error_median_rad),
-            heading_error_p90_rad: r(self.heading_error_p90_rad),
-            jumps_per_100_frames: r(self.jumps_per_100_frames),
-            repeats_per_100_frames: r(self.repeats_per_100_frames),
-            path_deviation_p95_bl: r(self.path_deviation_p95_bl),
-            slip_median_rad: r(self.slip_median_rad),
-            clone_share: r(self.clone_share),
-            distinct_looks: self.distinct_looks,
-            room_for: self.room_for,
-            variety: r(self.variety),
-            polarization: r(self.polarization),
-            milling: r(self.milling),
-            nearest_neighbor_bl: r(self.nearest_neighbor_bl),
-            spacing_bl: r(self.spacing_bl),
-            crossings_per_min: r(self.crossings_per_min),
-            visible_share: r(self.visible_share),
-            neighbor_share: r(self.neighbor_share),
-            groups: r(self.groups),
-            overlap_bl: r(self.overlap_bl),
-            wall_violations: self.wall_violations,
-            overlap_violations: self.overlap_violations,
-        }
+        ..Stats::default()
     }
 }
 
@@ -278,7 +249,7 @@ mod tests {
     use super::distinct_looks;
 
     #[test]
-    fn looks_differ_when_their_frames_lie_far_enough_apart() {
+    fn distinct_looks_are_far_enough_apart() {
         let component: Vec<u32> = (10..37).chain(40..42).collect();
         assert_eq!(distinct_looks(&component, 9.0), 4, "10, 19, 28 and 40");
         assert_eq!(distinct_looks(&component, 1.0), 29);

@@ -7,25 +7,25 @@
 /// Time constant of the filter, seconds. An oscillation whose period is 2 pi times this is halved. Derived
 /// from a one-sided low-pass with a time constant of 0.1 s (docs/explanation/algorithms.md, "Placement"),
 /// which halves the same oscillation.
-const HALVED_S: f64 = 0.1 / 1.732_050_807_568_877_2;
+const TIME_CONSTANT_S: f64 = 0.1 / 1.732_050_807_568_877_2;
 
 /// Returns the weight of steps from frame to frame against distances from the wanted rotation.
 pub(super) fn stiffness(fps: f64) -> f64 {
-    let falls_by = libm::exp(-1.0 / (HALVED_S * fps));
-    falls_by / ((1.0 - falls_by) * (1.0 - falls_by))
+    let decay = libm::exp(-1.0 / (TIME_CONSTANT_S * fps));
+    decay / ((1.0 - decay) * (1.0 - decay))
 }
 
 /// Returns the smoothed rotations of successive frames, radians. `before` is the rotation of the frame before
 /// the first one.
-pub(super) fn settled(wanted_rad: &[f64], before: Option<f64>, stiffness: f64) -> Vec<f64> {
+pub(super) fn smoothed(wanted_rad: &[f64], before: Option<f64>, stiffness: f64) -> Vec<f64> {
     let n = wanted_rad.len();
     // Thomas algorithm: the coefficient of the next unknown in each equation, and the right side.
     let mut next = Vec::with_capacity(n);
-    let mut settled: Vec<f64> = Vec::with_capacity(n);
+    let mut smoothed: Vec<f64> = Vec::with_capacity(n);
     for (t, &wanted) in wanted_rad.iter().enumerate() {
         let last = match t {
             0 => before.map(|before| (0.0, before)),
-            t => Some((next[t - 1], settled[t - 1])),
+            t => Some((next[t - 1], smoothed[t - 1])),
         };
         let (ahead, right) = (if t + 1 < n { stiffness } else { 0.0 }, wanted);
         let (diagonal, right) = match last {
@@ -36,12 +36,12 @@ pub(super) fn settled(wanted_rad: &[f64], before: Option<f64>, stiffness: f64) -
             ),
         };
         next.push(ahead / diagonal);
-        settled.push(right / diagonal);
+        smoothed.push(right / diagonal);
     }
     for t in (1..n).rev() {
-        settled[t - 1] += next[t - 1] * settled[t];
+        smoothed[t - 1] += next[t - 1] * smoothed[t];
     }
-    settled
+    smoothed
 }
 
 #[cfg(test)]
@@ -49,16 +49,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_wanted_all_the_while_is_kept_and_an_end_before_draws_the_first_frames() {
-        let still = settled(&[0.1; 20], None, stiffness(30.0));
+    fn constant_rotation_is_kept_and_the_frame_before_draws_the_first_frames() {
+        let still = smoothed(&[0.1; 20], None, stiffness(30.0));
         assert!(still.iter().all(|r| (r - 0.1).abs() < 1e-12), "{still:?}");
-        let drawn = settled(&[0.1; 20], Some(-0.1), stiffness(30.0));
+        let drawn = smoothed(&[0.1; 20], Some(-0.1), stiffness(30.0));
         assert!(drawn.is_sorted() && drawn[0] < 0.08, "{drawn:?}");
         assert!(drawn[0] > -0.1 && drawn[19] > 0.0999, "{drawn:?}");
     }
 
     #[test]
-    fn it_is_the_least_of_what_it_minimizes() {
+    fn result_minimizes_the_cost() {
         let wanted: Vec<f64> = (0..30).map(|t| libm::sin(f64::from(t * t))).collect();
         let (before, stiffness) = (0.3, 2.5);
         let cost = |r: &[f64]| {
@@ -67,7 +67,7 @@ mod tests {
             let steps: f64 = earlier.zip(r).map(|(a, b)| (a - b) * (a - b)).sum();
             off + stiffness * steps
         };
-        let found = settled(&wanted, Some(before), stiffness);
+        let found = smoothed(&wanted, Some(before), stiffness);
         for t in 0..30 {
             for by in [-1e-3, 1e-3] {
                 let mut other = found.clone();
@@ -78,9 +78,9 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_is_followed_without_delay() {
+    fn turn_is_followed_without_delay() {
         let turning: Vec<f64> = (0..90).map(|t| f64::from(t) * 0.01).collect();
-        let found = settled(&turning, None, stiffness(30.0));
+        let found = smoothed(&turning, None, stiffness(30.0));
         for t in 20..70 {
             assert!(
                 (found[t] - turning[t]).abs() < 1e-4,
@@ -91,11 +91,11 @@ mod tests {
     }
 
     #[test]
-    fn half_is_left_of_an_oscillation_of_the_period_named() {
+    fn oscillation_of_the_time_constant_is_halved() {
         let fps = 240.0;
-        let wave = |t: usize| libm::sin(t as f64 / (HALVED_S * fps));
+        let wave = |t: usize| libm::sin(t as f64 / (TIME_CONSTANT_S * fps));
         let wanted: Vec<f64> = (0..2000).map(wave).collect();
-        let found = settled(&wanted, None, stiffness(fps));
+        let found = smoothed(&wanted, None, stiffness(fps));
         let highest = found[500..1500].iter().fold(0.0, |a: f64, b| a.max(*b));
         assert!((highest - 0.5).abs() < 0.01, "{highest}");
     }

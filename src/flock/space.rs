@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn places_behind_a_pane_in_water_are_where_the_lens_has_them() {
+    fn file_geometry_agrees_with_the_lens_behind_a_pane() {
         let camera = Pinhole {
             focal_px: 700.0,
             center_px: [310.0, 250.0],
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_file_tells_is_enough_to_reckon_order_distances_and_walls_anew() {
+    fn order_distances_and_walls_can_be_recomputed_from_a_file() {
         for view in [View::Top, View::Side] {
             let params = Params {
                 count: Some(9),
@@ -97,7 +97,7 @@ mod tests {
                 ..Params::default()
             };
             let flock = plan_flock(&synthetic::library(view), &params, &Silent).unwrap();
-            for (t, told) in flock.orders.iter().enumerate() {
+            for (t, stored) in flock.orders.iter().enumerate() {
                 let boids = || flock.individuals.iter().map(|one| &one.boid);
                 let places: Vec<Vec3> = boids()
                     .map(|boid| place_bl(&flock.space, boid.position_px[t]))
@@ -113,14 +113,17 @@ mod tests {
                     .collect();
                 let up = flock.space.up;
                 let found = measures::order(&places, &courses, up, flock.stats.overlap_bl - 0.01);
-                for (found, told) in [
-                    (found.polarization, told.polarization),
-                    (found.milling, told.milling),
-                    (found.nearest_bl, told.nearest_bl),
+                for (found, stored) in [
+                    (found.polarization, stored.polarization),
+                    (found.milling, stored.milling),
+                    (found.nearest_bl, stored.nearest_bl),
                 ] {
-                    assert!((found - told).abs() < 2e-3, "{view:?} {t}: {found} {told}");
+                    assert!(
+                        (found - stored).abs() < 2e-3,
+                        "{view:?} {t}: {found} {stored}"
+                    );
                 }
-                assert_eq!((found.n_groups, found.n_overlaps), (told.n_groups, 0));
+                assert_eq!((found.n_groups, found.n_overlaps), (stored.n_groups, 0));
                 let beyond = places.iter().map(|&place| beyond_bl(&flock.space, place));
                 assert!(beyond.fold(f64::NEG_INFINITY, f64::max) < 1e-3);
             }

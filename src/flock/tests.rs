@@ -20,7 +20,7 @@ fn planned(view: View, name: &str) -> Flock {
 }
 
 #[test]
-fn a_school_follows_its_boids_without_clones() {
+fn school_follows_its_boids_without_clones() {
     let side = planned(View::Side, "school").stats;
     assert!(side.heading_error_median_rad < 0.15, "{side:?}");
     assert!(side.jumps_per_100_frames < 8.0, "{side:?}");
@@ -47,7 +47,7 @@ fn individuals_differ_in_size() {
 }
 
 #[test]
-fn nobody_glides() {
+fn individuals_do_not_slip() {
     for view in [View::Side, View::Top] {
         let library = synthetic::library(view);
         let flock = planned(view, "school");
@@ -75,20 +75,20 @@ fn nobody_glides() {
 }
 
 #[test]
-fn a_flock_tells_its_order_frame_by_frame_and_in_the_mean() {
+fn order_is_reported_by_frame_and_as_mean() {
     for (view, name) in [(View::Side, "school"), (View::Top, "mill")] {
         let flock = planned(view, name);
         let (orders, stats) = (&flock.orders, flock.stats);
         assert_eq!(orders.len(), 150);
         let mean = |of: fn(&Order) -> f64| orders.iter().map(of).sum::<f64>() / 150.0;
-        for (told, found) in [
+        for (stored, found) in [
             (stats.polarization, mean(|order| order.polarization)),
             (stats.milling, mean(|order| order.milling)),
             (stats.nearest_neighbor_bl, mean(|order| order.nearest_bl)),
             (stats.neighbor_share, mean(|order| order.neighbor_share)),
             (stats.groups, mean(|order| f64::from(order.n_groups))),
         ] {
-            assert!((told - found).abs() < 5e-5 + 1e-9, "{told} {found}");
+            assert!((stored - found).abs() < 5e-5 + 1e-9, "{stored} {found}");
         }
         assert!(
             stats.groups >= 1.0 && stats.neighbor_share > 0.5,
@@ -100,7 +100,7 @@ fn a_flock_tells_its_order_frame_by_frame_and_in_the_mean() {
 }
 
 #[test]
-fn a_flock_tells_how_many_the_tank_has_room_for() {
+fn stats_report_the_capacity_of_the_tank() {
     let room_for = |view, count| {
         let params = Params {
             count: Some(count),
@@ -119,7 +119,7 @@ fn a_flock_tells_how_many_the_tank_has_room_for() {
 }
 
 #[test]
-fn in_side_view_nobody_is_rotated_beyond_the_budget() {
+fn side_view_rotations_stay_within_rho() {
     let flock = planned(View::Side, "swarm");
     let rho = flock.params.matching.rho_deg.to_radians();
     let rotations = flock.individuals.iter().flat_map(|i| &i.rotation_rad);
@@ -127,7 +127,7 @@ fn in_side_view_nobody_is_rotated_beyond_the_budget() {
 }
 
 #[test]
-fn everybody_stays_in_the_picture() {
+fn all_individuals_stay_in_the_image() {
     for (view, tank, margin_bl) in [
         (View::Side, TankExtent::Picture, 0.5),
         (View::Top, TankExtent::Picture, 0.5),
@@ -149,7 +149,7 @@ fn everybody_stays_in_the_picture() {
 }
 
 #[test]
-fn a_crowd_goes_farther_than_the_animal_did_but_not_over_a_wall() {
+fn tank_grows_for_a_large_flock_but_not_over_a_wall() {
     let params = Params {
         count: Some(60),
         frames: 100,
@@ -183,7 +183,7 @@ fn a_crowd_goes_farther_than_the_animal_did_but_not_over_a_wall() {
 }
 
 #[test]
-fn the_papers_mirror_nothing_rotate_nothing_and_fade_nothing() {
+fn preset_papers_neither_mirrors_nor_rotates_nor_fades() {
     for individual in planned(View::Side, "papers").individuals {
         assert!(individual.mirrored.iter().all(|&m| !m));
         assert!(individual.rotation_rad.iter().all(|&r| r == 0.0));
@@ -192,7 +192,7 @@ fn the_papers_mirror_nothing_rotate_nothing_and_fade_nothing() {
 }
 
 #[test]
-fn the_same_seed_gives_the_same_flock_and_another_another() {
+fn equal_seeds_give_equal_flocks() {
     let library = synthetic::library(View::Side);
     let with_seed = |seed| {
         let params = Params {
@@ -206,7 +206,7 @@ fn the_same_seed_gives_the_same_flock_and_another_another() {
 }
 
 #[test]
-fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
+fn last_frame_of_a_loop_leads_into_the_first() {
     for (view, name, n_frames) in [
         (View::Side, "school", 150),
         (View::Side, "swarm", 90),
@@ -226,12 +226,12 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
             f64::max(widest, wrap_rad(pair[1] - pair[0]).abs())
         });
         for one in &flock.individuals {
-            let heir = &flock.individuals[one.continues_as.expect("a loop") as usize];
+            let continuation = &flock.individuals[one.continues_as.expect("a loop") as usize];
             let step = |of: fn(&Individual, &Individual, usize, usize) -> f64| {
-                let inside = [one, heir]
+                let inside = [one, continuation]
                     .into_iter()
                     .flat_map(|one| (0..last).map(move |t| of(one, one, t, t + 1)));
-                (inside.fold(0.0, f64::max), of(one, heir, last, 0))
+                (inside.fold(0.0, f64::max), of(one, continuation, last, 0))
             };
             let moved = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
             let (inside, across) = step(|a, b, t, u| {
@@ -250,12 +250,12 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
                 (a[0] - b[0]).hypot(a[1] - b[1])
             });
             assert!(shown.1 <= shown.0 + seam_px, "{name} {} {shown:?}", one.id);
-            assert!(moved(one.centroid_px[last], heir.centroid_px[0]) < 0.2 * LENGTH_PX);
+            assert!(moved(one.centroid_px[last], continuation.centroid_px[0]) < 0.2 * LENGTH_PX);
             // The rotation changes no more at the seam than elsewhere.
-            let turn = wrap_rad(one.rotation_rad[last] - heir.rotation_rad[0]).abs();
+            let turn = wrap_rad(one.rotation_rad[last] - continuation.rotation_rad[0]).abs();
             assert!(turn <= widest_rad + 0.002, "{name} {} {turn}", one.id);
             let state = |one: &Individual, t: usize| (one.source_frame[t], one.mirrored[t]);
-            let (from, to) = (state(one, last), state(heir, 0));
+            let (from, to) = (state(one, last), state(continuation, 0));
             let is_step = to == (from.0 + 1, from.1)
                 || (library.playback.jumps.iter())
                     .any(|j| (j.from, j.to, j.mirrored) == (from.0, to.0, from.1 != to.1));
@@ -266,7 +266,7 @@ fn the_last_frame_of_a_loop_plays_into_the_first_for_everyone() {
 }
 
 #[test]
-fn whoever_is_drawn_back_for_a_loop_is_still_followed() {
+fn individuals_follow_boids_that_are_steered_to_the_seam() {
     let library = synthetic::library(View::Side);
     let error = |is_loop| {
         let errors = (1..=4).map(|seed| {
@@ -285,7 +285,7 @@ fn whoever_is_drawn_back_for_a_loop_is_still_followed() {
 }
 
 #[test]
-fn a_loop_keeps_to_the_animals_speeds() {
+fn loop_keeps_the_speed_limits_of_the_animal() {
     let library = synthetic::library(View::Top);
     let fastest = |seed| {
         let params = Params {
@@ -299,15 +299,15 @@ fn a_loop_keeps_to_the_animals_speeds() {
     };
     let all: Vec<f64> = (1..=8).map(fastest).collect();
     let mean = all.iter().sum::<f64>() / 8.0;
-    let told = format!("the fastest seen swims 2 BL/s: {all:?}");
+    let message = format!("the fastest seen swims 2 BL/s: {all:?}");
     assert!(
         mean < 1.2 * 2.0 && all.iter().all(|&most| most < 1.5 * 2.0),
-        "{told}"
+        "{message}"
     );
 }
 
 #[test]
-fn nobody_passes_through_anybody_in_a_loop() {
+fn boids_of_a_loop_do_not_overlap() {
     let library = synthetic::library(View::Side);
     let n_overlaps = |seed| {
         let params = Params {
@@ -322,13 +322,13 @@ fn nobody_passes_through_anybody_in_a_loop() {
         assert_eq!(stats.wall_violations, 0, "seed {seed}");
         stats.overlap_violations
     };
-    // Some overlaps remain that only too fast a boid could avoid. Without `go_aside` there are 145 to 604.
+    // Some overlaps remain that only too fast a boid could avoid. Without `avoid_encounters` there are 145 to 604.
     let all: Vec<u64> = (1..=6).map(n_overlaps).collect();
     assert!(all.iter().sum::<u64>() < 225, "{all:?}");
 }
 
 #[test]
-fn who_is_not_wanted_any_more_does_not_form() {
+fn cancelled_flock_stops_while_it_forms() {
     /// Cancels at the third call.
     struct Impatient(std::sync::atomic::AtomicU32);
     impl Progress for Impatient {
@@ -354,7 +354,7 @@ fn who_is_not_wanted_any_more_does_not_form() {
 }
 
 #[test]
-fn a_loop_of_sums_of_speeds_is_refused() {
+fn loop_with_position_papers_is_refused() {
     let params = Params {
         is_loop: true,
         ..params("papers")

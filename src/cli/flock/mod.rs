@@ -67,7 +67,7 @@ pub struct Args {
 /// Plans and films a flock.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = args.params()?;
-    let behind = args.outputs.behind()?;
+    let background = args.outputs.open_background()?;
     let targets = args.outputs.targets(&params.render)?;
     media::look_for(&[Tool::Ffmpeg]);
     let library = super::read_library(&args.library, &args.outputs.output)?.library;
@@ -93,7 +93,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let film = Film {
         library: &library,
         flock: &flock,
-        backdrop: behind.backdrop(),
+        backdrop: background.backdrop(),
         progress: &progress,
     };
     let began = Instant::now();

@@ -54,13 +54,13 @@ pub(super) struct Outputs {
 }
 
 /// Background of the film, with its file opened.
-pub(super) enum Behind {
+pub(super) enum OpenedBackground {
     /// As the `render` parameters say.
-    AsAsked,
+    FromParams,
     /// A picture.
     Picture(RgbImage),
     /// A video.
-    Film(Box<Video>),
+    Video(Box<Video>),
 }
 
 impl Outputs {
@@ -110,10 +110,10 @@ impl Outputs {
     }
 
     /// Opens the picture or video that is named as background, if any.
-    pub(super) fn behind(&self) -> Result<Behind, Error> {
+    pub(super) fn open_background(&self) -> Result<OpenedBackground, Error> {
         let named = self.named_background();
         let Some(path) = self.background.as_deref().filter(|_| named.is_none()) else {
-            return Ok(Behind::AsAsked);
+            return Ok(OpenedBackground::FromParams);
         };
         let path = Path::new(path);
         if !path.is_file() {
@@ -124,9 +124,11 @@ impl Outputs {
         }
         let (limits, work) = (Limits::default(), |e| Error::work_of_media(&e));
         match ending(path).as_str() {
-            "png" | "jpg" | "jpeg" => read_image(path, &limits).map(Behind::Picture).map_err(work),
+            "png" | "jpg" | "jpeg" => read_image(path, &limits)
+                .map(OpenedBackground::Picture)
+                .map_err(work),
             _ => Video::open(path, &limits)
-                .map(|video| Behind::Film(Box::new(video)))
+                .map(|video| OpenedBackground::Video(Box::new(video)))
                 .map_err(work),
         }
     }
@@ -138,13 +140,13 @@ impl Outputs {
     }
 }
 
-impl Behind {
+impl OpenedBackground {
     /// Returns the background in the type that `Film` takes.
     pub(super) fn backdrop(&self) -> Backdrop<'_> {
         match self {
-            Behind::AsAsked => Backdrop::AsAsked,
-            Behind::Picture(picture) => Backdrop::Picture(picture),
-            Behind::Film(video) => Backdrop::Film(video.as_ref()),
+            OpenedBackground::FromParams => Backdrop::AsAsked,
+            OpenedBackground::Picture(picture) => Backdrop::Picture(picture),
+            OpenedBackground::Video(video) => Backdrop::Film(video.as_ref()),
         }
     }
 }
@@ -200,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_name_tells_the_format_and_a_flag_overrules_it() {
+    fn format_follows_from_the_name_unless_a_flag_sets_it() {
         for (words, format) in [
             ("-o a.mp4", Format::Mp4),
             ("-o a.WEBM", Format::Webm),
@@ -223,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_transparency_is_refused_when_that_is_asked_for() {
+    fn formats_without_transparency_are_refused_for_a_transparent_film() {
         for (words, is_good) in [
             ("-o a.mp4 --background transparent", false),
             ("-o a.gif --background transparent", false),

@@ -4,22 +4,23 @@
 //! The background is kept in the pixel format of the film, so that each frame starts as a copy
 //! (docs/explanation/algorithms.md, "Compositing").
 
-use super::front::Front;
+use super::occluders::Occluders;
 use super::params::Background;
 use super::view::View;
-use super::{Form, Shot};
+use super::{PixelFormat, Shot};
 use crate::cpu::Level;
 use crate::geometry::Rect;
+use crate::library::Library;
 use crate::raster::canvas::opaque;
 use crate::raster::resize::resized;
-use crate::raster::{Canvas, Frame, RgbImage, RgbaImage};
+use crate::raster::{Canvas, Frame, RgbImage};
 
 /// Background of a film, ready for drawing.
 pub(super) struct Backdrop {
     /// Canvas over which sprites are drawn.
     pub(super) canvas: Canvas,
     /// Occluders, drawn over the sprites.
-    pub(super) front: Option<Front>,
+    pub(super) occluders: Option<Occluders>,
     /// Whether the background is transparent.
     pub(super) is_clear: bool,
     frame: Frame,
@@ -27,44 +28,45 @@ pub(super) struct Backdrop {
 }
 
 impl Backdrop {
-    /// Returns the background that a parameter selects. `occluders` are used only with `Background::Plate`.
-    pub(super) fn of(
+    /// Returns the background that a parameter selects. Occluders are used only with
+    /// `Background::Plate`.
+    pub(super) fn new(
         background: Background,
-        (plate, occluders): (&RgbImage, Option<&RgbaImage>),
+        library: &Library,
         view: &View,
-        form: Form,
+        format: PixelFormat,
     ) -> Backdrop {
         let [width, height] = view.size_px;
         let mut canvas = Canvas::new(width, height);
-        let occluders = occluders.filter(|_| background == Background::Plate);
+        let occluders = (library.occluders.as_ref()).filter(|_| background == Background::Plate);
         match background {
             Background::Transparent => {}
             Background::Color(rgb) => canvas.pixels.fill(opaque(rgb)),
             Background::Plate => {
                 canvas.pixels.fill(opaque([0; 3]));
                 let rect = view.rect();
-                let plate = Canvas::from_rgb(&resized(plate, rect.w, rect.h));
-                canvas.copy_box(&plate, rect);
+                let plate = Canvas::of_rgb(&resized(&library.background, rect.w, rect.h));
+                canvas.put(&plate, rect);
             }
         }
-        let mut front = occluders.map(|occluders| Front::of(occluders, view));
+        let mut front = occluders.map(|occluders| Occluders::new(occluders, view));
         if let Some(front) = &mut front {
-            front.take_off(&mut canvas);
+            front.remove_from(&mut canvas);
         }
-        let mut backdrop = Backdrop::ready(canvas, front, form);
+        let mut backdrop = Backdrop::from_canvas(canvas, front, format);
         if background == Background::Transparent {
             backdrop.is_clear = true;
-            backdrop.hide(mean(plate));
+            backdrop.set_transparent_color(mean_color(&library.background));
         }
         backdrop
     }
 
     /// Returns a given picture as the background, scaled to fill the film and cropped to its shape.
-    pub(super) fn picture(picture: &RgbImage, size_px: [u32; 2], form: Form) -> Backdrop {
-        Backdrop::ready(filling(picture, size_px), None, form)
+    pub(super) fn picture(picture: &RgbImage, size_px: [u32; 2], format: PixelFormat) -> Backdrop {
+        Backdrop::from_canvas(scaled_to_cover(picture, size_px), None, format)
     }
 
-    fn ready(canvas: Canvas, front: Option<Front>, form: Form) -> Backdrop {
+    fn from_canvas(canvas: Canvas, front: Option<Occluders>, format: PixelFormat) -> Backdrop {
         let whole = Rect::of_size(canvas.width, canvas.height);
         let mut shown = canvas.clone();
         if let Some(front) = &front {
@@ -75,15 +77,15 @@ impl Backdrop {
             frame: Frame::default(),
             rgba: Vec::new(),
             canvas,
-            front,
+            occluders: front,
         };
-        match form {
-            Form::Planar(color) => {
+        match format {
+            PixelFormat::Planar(color) => {
                 backdrop.frame = Frame::new(whole.w, whole.h, color);
                 let cpu = Level::detect();
                 backdrop.frame.draw_canvas(&shown, whole, cpu);
             }
-            Form::Straight => {
+            PixelFormat::Straight => {
                 backdrop.rgba = vec![0; whole.area() as usize * 4];
                 shown.write_straight(whole, &mut backdrop.rgba);
             }
@@ -93,14 +95,14 @@ impl Backdrop {
 
     /// Sets the color of transparent pixels. The color is invisible, but a codec that mixes neighboring
     /// pixels lets some of it through.
-    fn hide(&mut self, rgb: [u8; 3]) {
+    fn set_transparent_color(&mut self, rgb: [u8; 3]) {
         for pixel in self.rgba.chunks_exact_mut(4) {
             pixel[..3].copy_from_slice(&rgb);
         }
     }
 
     /// Resets a shot to the background without animals.
-    pub(super) fn begin(&self, shot: &mut Shot) {
+    pub(super) fn reset(&self, shot: &mut Shot) {
         shot.frame.clone_from(&self.frame);
         shot.rgba.clone_from(&self.rgba);
     }
@@ -108,7 +110,7 @@ impl Backdrop {
 
 /// Returns a picture scaled to cover the film. If the aspect ratios differ, the middle of the picture is
 /// used.
-pub(super) fn filling(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
+pub(super) fn scaled_to_cover(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
     let scale = (f64::from(width) / f64::from(picture.width))
         .max(f64::from(height) / f64::from(picture.height));
     let side = |px: u32, least: u32| ((f64::from(px) * scale).round() as u32).max(least);
@@ -128,7 +130,7 @@ pub(super) fn filling(picture: &RgbImage, [width, height]: [u32; 2]) -> Canvas {
 }
 
 /// Returns the mean color of a picture.
-pub(super) fn mean(picture: &RgbImage) -> [u8; 3] {
+pub(super) fn mean_color(picture: &RgbImage) -> [u8; 3] {
     let mut sum = [0u64; 3];
     for pixel in picture.pixels.chunks_exact(3) {
         for (sum, &value) in sum.iter_mut().zip(pixel) {
@@ -152,9 +154,9 @@ mod tests {
                 picture.set_pixel(x, y, [(x * 6) as u8, 50, 60]);
             }
         }
-        let canvas = filling(&picture, [20, 20]);
+        let canvas = scaled_to_cover(&picture, [20, 20]);
         let at = |x: usize| straight(canvas.pixels[10 * 20 + x]);
         assert_eq!((at(0), at(19)), ([60, 50, 60, 255], [174, 50, 60, 255]));
-        assert_eq!(mean(&picture), [117, 50, 60]);
+        assert_eq!(mean_color(&picture), [117, 50, 60]);
     }
 }

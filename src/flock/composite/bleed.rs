@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn color_goes_out_on_all_sides_and_alpha_does_not() {
+    fn color_spreads_on_all_sides_and_alpha_does_not() {
         let mut rgba = [7, 7, 7, 0].repeat(21 * 21);
         let at = |x: usize, y: usize| (y * 21 + x) * 4;
         rgba[at(10, 10)..at(10, 10) + 4].copy_from_slice(&[200, 100, 50, 255]);

@@ -19,7 +19,8 @@ const AHEAD_BYTES: usize = 32 << 20;
 /// threads. `n_bytes` is the approximate size of a frame, in bytes. The first error of `prepare` or `take`
 /// ends the drawing and is returned.
 pub(super) fn draw_ahead<E: Send>(
-    (n_frames, n_bytes): (usize, usize),
+    n_frames: usize,
+    n_bytes: usize,
     prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
     draw: impl Fn(usize, &mut Shot) + Sync,
     mut take: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
@@ -42,7 +43,7 @@ pub(super) fn draw_ahead<E: Send>(
             }
             Ok(())
         });
-        let drawn = draw_all(n_frames, prepare, draw, (&used, give));
+        let drawn = draw_all(n_frames, prepare, draw, &used, give);
         let taken = taker.join();
         let taken = taken.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         taken.and(drawn)
@@ -54,7 +55,8 @@ fn draw_all<E>(
     n_frames: usize,
     mut prepare: impl FnMut(usize, &mut Shot) -> Result<(), E>,
     draw: impl Fn(usize, &mut Shot) + Sync,
-    (used, give): (&Receiver<Shot>, Sender<Shot>),
+    used: &Receiver<Shot>,
+    give: Sender<Shot>,
 ) -> Result<(), E> {
     let most = rayon::current_num_threads();
     let mut first = 0;
@@ -96,7 +98,8 @@ mod tests {
         };
         let count = || n_drawn.load(Ordering::SeqCst);
         let taken = draw_ahead(
-            (40, n_bytes),
+            40,
+            n_bytes,
             |_, _| Ok::<(), ()>(()),
             draw,
             |frame_idx, _| {
@@ -115,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_drawn_while_nobody_takes_them_as_many_as_there_is_memory_for() {
+    fn frames_are_drawn_ahead_up_to_the_memory_limit() {
         assert_eq!(drawn_when(0, 40, 1 << 10), 40);
         let n_threads = rayon::current_num_threads();
         let least = 2 * n_threads;
@@ -125,12 +128,13 @@ mod tests {
     }
 
     #[test]
-    fn who_refuses_to_prepare_or_to_take_ends_it_with_its_error() {
+    fn error_of_prepare_or_take_ends_the_drawing() {
         let refuse = |at: usize| move |frame_idx: usize| (frame_idx < at).then_some(()).ok_or(at);
         for (prepared, taken) in [(7, 99), (99, 7)] {
             let (prepare, take) = (refuse(prepared), refuse(taken));
             let ended = draw_ahead(
-                (40, 1 << 20),
+                40,
+                1 << 20,
                 |frame_idx, _| prepare(frame_idx),
                 |_, _| {},
                 |frame_idx, _| take(frame_idx),

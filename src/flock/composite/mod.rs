@@ -12,12 +12,12 @@
 mod backdrop; // the background of the film
 mod bleed; // color of transparent pixels
 mod draw_ahead; // drawing on all threads, ahead of the consumer
-mod front; // occluders in front of the animals
 mod layer; // drawing of one individual
 mod morph; // warping of two sprites at a jump
+mod occluders; // occluders in front of the animals
 pub mod params;
 mod shadow; // shadows on the floor
-mod stock; // cache of premultiplied sprites
+mod sprite_cache; // cache of premultiplied sprites
 pub mod truth; // ground truth of a frame
 mod view; // footage pixels to film pixels
 
@@ -26,41 +26,41 @@ use std::sync::{Mutex, PoisonError};
 use self::backdrop::Backdrop;
 use self::bleed::bleed;
 use self::draw_ahead::draw_ahead;
-use self::front::Front;
-use self::layer::{Appearance, Haze, Painter, Stage};
+use self::layer::{Appearance, DrawContext, Haze, Painter};
+use self::occluders::Occluders;
 use self::params::Background;
 use self::shadow::{Shade, Shadows};
-use self::stock::Stock;
+use self::sprite_cache::SpriteCache;
 use self::truth::{Drawn, FrameTruth};
 use self::view::View;
-use super::individual::{Fade, Individual};
+use super::individual::Individual;
 use super::{Flock, Library};
 use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::canvas::{Coverage, opaque};
-use crate::raster::{Canvas, ColorSpec, Frame, RgbImage, RgbaImage};
+use crate::raster::canvas::{Cover, opaque};
+use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock. Frames can be drawn in any order and from any thread.
 pub struct Compositor<'a> {
     library: &'a Library,
     flock: &'a Flock,
     view: View,
-    form: Form,
+    format: PixelFormat,
     with_truth: bool,
     backdrop: Backdrop,
     haze: Option<Haze>,
     shadows: Option<Shadows>,
-    stock: Stock,
+    sprite_cache: SpriteCache,
     cpu: Level,
     n_frames: usize,
     /// `[id][frame]`: index of the fade that is active at an output frame; `None` outside of fades.
     fade_at: Vec<Vec<Option<u32>>>,
-    desks: Mutex<Vec<Desk>>,
+    workspaces: Mutex<Vec<Workspace>>,
 }
 
 /// Pixel format of the drawn frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub enum PixelFormat {
     /// Opaque planes, as encoders take them.
     Planar(ColorSpec),
     /// Straight-alpha RGBA.
@@ -81,7 +81,7 @@ pub struct Shot {
 }
 
 /// Working memory of one drawing thread, reused from frame to frame.
-struct Desk {
+struct Workspace {
     /// Sprites drawn so far, over a transparent background.
     canvas: Canvas,
     /// Which parts of the canvas have been drawn on.
@@ -104,33 +104,34 @@ impl<'a> Compositor<'a> {
             Background::Transparent => Background::Plate,
             other => other,
         };
-        let form = Form::Planar(ColorSpec::default());
+        let format = PixelFormat::Planar(ColorSpec::default());
         Compositor {
             library,
             flock,
             view,
-            form,
+            format,
             with_truth: false,
-            backdrop: Backdrop::of(background, scene_of(library), &view, form),
+            backdrop: Backdrop::new(background, library, &view, format),
             haze: (render.haze_per_bl > 0.0).then(|| Haze {
                 left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
-                color: opaque(backdrop::mean(&library.background)),
+                color: opaque(backdrop::mean_color(&library.background)),
             }),
-            shadows: Shadows::of(library, flock),
-            stock: Stock::default(),
+            shadows: Shadows::new(library, flock),
+            sprite_cache: SpriteCache::default(),
             cpu: Level::detect(),
             n_frames: (flock.individuals.first()).map_or(0, |one| one.source_frame.len()),
             fade_at: flock.individuals.iter().map(fades_by_frame).collect(),
-            desks: Mutex::default(),
+            workspaces: Mutex::default(),
         }
     }
 
     /// Switches to straight-alpha RGBA, with the background that the parameters select, transparent
     /// included.
     pub fn straight(mut self) -> Compositor<'a> {
-        self.form = Form::Straight;
+        self.format = PixelFormat::Straight;
         let background = self.flock.params.render.background;
-        self.behind(background)
+        self.backdrop = Backdrop::new(background, self.library, &self.view, self.format);
+        self
     }
 
     /// Makes the compositor also compute the ground truth of every frame.
@@ -141,13 +142,7 @@ impl<'a> Compositor<'a> {
 
     /// Replaces the background by a picture, scaled to fill the film and cropped to its shape.
     pub fn before(mut self, picture: &RgbImage) -> Compositor<'a> {
-        self.backdrop = Backdrop::picture(picture, self.view.size_px, self.form);
-        self
-    }
-
-    fn behind(mut self, background: Background) -> Compositor<'a> {
-        let scene = scene_of(self.library);
-        self.backdrop = Backdrop::of(background, scene, &self.view, self.form);
+        self.backdrop = Backdrop::picture(picture, self.view.size_px, self.format);
         self
     }
 
@@ -169,41 +164,46 @@ impl<'a> Compositor<'a> {
 
     /// Draws one frame into `shot`, reusing its memory. Panics beyond the last frame.
     pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
-        let mut desk = self.take_desk();
-        desk.drawn.clear();
+        let mut workspace = self.take_workspace();
+        workspace.drawn.clear();
         if self.shadows.is_some() {
-            desk.shade.begin(self.view.size_px);
+            workspace.shade.begin(self.view.size_px);
         }
         let order = self.near_to_far(frame_idx);
-        for who in &order {
-            self.draw(who, &mut desk);
+        for appearance in &order {
+            self.draw(appearance, &mut workspace);
         }
         if self.shadows.is_some() {
-            desk.shade.layer(&mut desk.painter.layer);
-            desk.put(self.cpu);
+            workspace.shade.layer(&mut workspace.painter.layer);
+            workspace.draw_layer(self.cpu);
         }
         if self.with_truth {
-            let shade = self.shadows.as_ref().map(|_| desk.shade.alpha());
-            shot.truth = FrameTruth::of(&desk.drawn, shade, self.view.size_px, self.left(shot));
+            let shade = self.shadows.as_ref().map(|_| workspace.shade.alpha());
+            shot.truth = FrameTruth::new(
+                &workspace.drawn,
+                shade,
+                self.view.size_px,
+                self.unoccluded(shot),
+            );
         }
-        self.develop(&mut desk, shot);
-        self.desks
+        self.finish(&mut workspace, shot);
+        self.workspaces
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
-            .push(desk);
+            .push(workspace);
     }
 
     /// Returns the occluders in front of the animals. `None` if there are none, or if the shot has its own
     /// background.
-    fn front(&self, shot: &Shot) -> Option<&Front> {
-        let front = self.backdrop.front.as_ref();
+    fn occluders(&self, shot: &Shot) -> Option<&Occluders> {
+        let front = self.backdrop.occluders.as_ref();
         front.filter(|_| shot.behind.planes.is_empty())
     }
 
     /// Returns the share of each pixel that the occluders leave to the animals, in 16384ths.
-    fn left(&self, shot: &Shot) -> Vec<u16> {
+    fn unoccluded(&self, shot: &Shot) -> Vec<u16> {
         let [width, height] = self.view.size_px.map(|side| side as usize);
-        match self.front(shot) {
+        match self.occluders(shot) {
             Some(front) => front.left(),
             None => vec![truth::ONE as u16; width * height],
         }
@@ -211,32 +211,32 @@ impl<'a> Compositor<'a> {
 
     /// Puts the background under the canvas, converts the result to the film's pixel format, and clears the
     /// canvas.
-    fn develop(&self, desk: &mut Desk, shot: &mut Shot) {
-        self.backdrop.begin(shot);
+    fn finish(&self, workspace: &mut Workspace, shot: &mut Shot) {
+        self.backdrop.reset(shot);
         let own = (!shot.behind.planes.is_empty())
-            .then(|| backdrop::filling(&shot.behind.to_rgb(), self.view.size_px));
+            .then(|| backdrop::scaled_to_cover(&shot.behind.to_rgb(), self.view.size_px));
         if own.is_some() {
-            desk.cover.mark_all_drawn();
+            workspace.cover.touch_all();
         }
         let behind = own.as_ref().unwrap_or(&self.backdrop.canvas);
-        for rect in desk.cover.take_drawn_boxes() {
-            desk.canvas.draw_box_under(behind, rect, self.cpu);
-            if let Some(front) = self.front(shot) {
-                front.draw(&mut desk.canvas, rect);
+        for rect in workspace.cover.take() {
+            workspace.canvas.under_box(behind, rect, self.cpu);
+            if let Some(front) = self.occluders(shot) {
+                front.draw(&mut workspace.canvas, rect);
             }
-            match self.form {
-                Form::Planar(_) => shot.frame.draw_canvas(&desk.canvas, rect, self.cpu),
-                Form::Straight => desk.canvas.write_straight(rect, &mut shot.rgba),
+            match self.format {
+                PixelFormat::Planar(_) => shot.frame.draw_canvas(&workspace.canvas, rect, self.cpu),
+                PixelFormat::Straight => workspace.canvas.straight_into(rect, &mut shot.rgba),
             }
-            desk.canvas.clear_box(rect);
+            workspace.canvas.clear_box(rect);
         }
-        if self.form == Form::Straight && self.backdrop.is_clear {
-            merge_overlapping(&mut desk.boxes);
-            for &rect in &desk.boxes {
+        if self.format == PixelFormat::Straight && self.backdrop.is_clear {
+            merge_overlapping(&mut workspace.boxes);
+            for &rect in &workspace.boxes {
                 bleed(&mut shot.rgba, self.view.size_px, rect);
             }
         }
-        desk.boxes.clear();
+        workspace.boxes.clear();
     }
 
     /// Draws all frames on all threads and passes each to `sink`, in order. `prepare` is called for each
@@ -248,21 +248,21 @@ impl<'a> Compositor<'a> {
         sink: impl FnMut(usize, &Shot) -> Result<(), E> + Send,
     ) -> Result<(), E> {
         let [width, height] = self.view.size_px;
-        let n_bytes = match self.form {
-            Form::Planar(_) => Frame::n_bytes(width, height),
-            Form::Straight => 4 * width as usize * height as usize,
+        let n_bytes = match self.format {
+            PixelFormat::Planar(_) => Frame::n_bytes(width, height),
+            PixelFormat::Straight => 4 * width as usize * height as usize,
         };
         let draw = |frame_idx: usize, shot: &mut Shot| self.render(frame_idx, shot);
-        draw_ahead((self.n_frames, n_bytes), prepare, draw, sink)
+        draw_ahead(self.n_frames, n_bytes, prepare, draw, sink)
     }
 
-    fn take_desk(&self) -> Desk {
+    fn take_workspace(&self) -> Workspace {
         let spare = self
-            .desks
+            .workspaces
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .pop();
-        spare.unwrap_or_else(|| Desk {
+        spare.unwrap_or_else(|| Workspace {
             canvas: Canvas::new(self.view.size_px[0], self.view.size_px[1]),
             cover: Coverage::new(self.view.size_px),
             boxes: Vec::new(),
@@ -289,10 +289,10 @@ impl<'a> Compositor<'a> {
         order.into_iter().map(appearance).collect()
     }
 
-    fn stage(&self) -> Stage<'_> {
-        Stage {
+    fn context(&self) -> DrawContext<'_> {
+        DrawContext {
             sprites: &self.library.sprites,
-            stock: &self.stock,
+            sprite_cache: &self.sprite_cache,
             view: self.view,
             cpu: self.cpu,
             cut: self.flock.params.render.cut,
@@ -300,38 +300,45 @@ impl<'a> Compositor<'a> {
         }
     }
 
-    fn draw(&self, who: &Appearance, desk: &mut Desk) {
-        let stage = self.stage();
+    fn draw(&self, appearance: &Appearance, workspace: &mut Workspace) {
+        let context = self.context();
         let outlines = self.shadows.as_ref().is_some_and(Shadows::are_outlines);
         if self.with_truth || outlines {
             // The ground truth and outline shadows need whole sprites, hidden parts included.
-            desk.painter.paint(&stage, who, None);
-            desk.put(self.cpu);
+            workspace.painter.paint(&context, appearance, None);
+            workspace.draw_layer(self.cpu);
         }
         if let Some(shadows) = &self.shadows {
-            shadows.add(who, &desk.painter.layer, &self.view, &mut desk.shade);
+            shadows.add(
+                appearance,
+                &workspace.painter.layer,
+                &self.view,
+                &mut workspace.shade,
+            );
         }
         if self.with_truth {
-            desk.drawn.push(desk.painter.drawn(&stage, who));
+            workspace
+                .drawn
+                .push(workspace.painter.drawn(&context, appearance));
         }
         if self.with_truth || outlines {
             return;
         }
-        let Desk {
+        let Workspace {
             painter,
             canvas,
             cover,
             boxes,
             ..
-        } = desk;
-        let rect = painter.paint_under(&stage, who, canvas, cover);
+        } = workspace;
+        let rect = painter.paint_under(&context, appearance, canvas, cover);
         boxes.extend((!rect.is_empty()).then_some(rect));
     }
 }
 
-impl Desk {
+impl Workspace {
     /// Draws the painter's layer under the content of the canvas.
-    fn put(&mut self, cpu: Level) {
+    fn draw_layer(&mut self, cpu: Level) {
         let layer = &self.painter.layer;
         self.canvas.draw_layer_under(layer, &mut self.cover, cpu);
         if !layer.rect.is_empty() {
@@ -340,24 +347,14 @@ impl Desk {
     }
 }
 
-/// Returns the footage's background and its occluders.
-fn scene_of(library: &Library) -> (&RgbImage, Option<&RgbaImage>) {
-    (&library.background, library.occluders.as_ref())
-}
-
+/// Returns by frame the index of the fade that is active.
 fn fades_by_frame(individual: &Individual) -> Vec<Option<u32>> {
     let mut fade_at = vec![None; individual.source_frame.len()];
     for (idx, fade) in (0u32..).zip(&individual.fades) {
-        mark(&mut fade_at, fade, idx);
+        let start = fade.start as usize;
+        fade_at[start..start + fade.weight.len()].fill(Some(idx));
     }
     fade_at
-}
-
-fn mark(fade_at: &mut [Option<u32>], fade: &Fade, idx: u32) {
-    let start = fade.start as usize;
-    for at in &mut fade_at[start..start + fade.weight.len()] {
-        *at = Some(idx);
-    }
 }
 
 /// Merges boxes whose common bounding box is no larger than their areas together. Few pixels are then

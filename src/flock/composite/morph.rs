@@ -11,10 +11,10 @@ use crate::raster::resample::{Quad, Resampled};
 /// Side of a block, in pixels of the half-size picture. Free choice.
 const BLOCK: i32 = 6;
 /// Search range of a block along each axis, in pixels of the half-size picture. Free choice.
-const REACH: i32 = 4;
+const SEARCH_RANGE: i32 = 4;
 /// Maximum distance between the start and the end of a match forward and back, in pixels of the half-size
 /// picture. Free choice.
-const AGREE_PX: f64 = 1.5;
+const MAX_MISMATCH_PX: f64 = 1.5;
 
 /// Displacement of each block of one picture to its match in the other, in full-size pixels.
 struct Flow {
@@ -25,7 +25,7 @@ struct Flow {
 
 /// Warps `main` toward `second` by the share `weight`, and `second` toward `main` by the rest. Both then
 /// cover the same box. Does nothing if one of them is empty.
-pub(super) fn bend(main: &mut Resampled, second: &mut Resampled, weight: f64) {
+pub(super) fn warp_together(main: &mut Resampled, second: &mut Resampled, weight: f64) {
     let rect = main.rect.union(&second.rect);
     if main.rect.is_empty() || second.rect.is_empty() {
         return;
@@ -36,10 +36,10 @@ pub(super) fn bend(main: &mut Resampled, second: &mut Resampled, weight: f64) {
         Flow::between(&small_a, &small_b),
         Flow::between(&small_b, &small_a),
     );
-    let (forth_sure, back_sure) = (forth.agreeing(&back), back.agreeing(&forth));
+    let (forth_sure, back_sure) = (forth.consistent(&back), back.consistent(&forth));
     // The pixel shown at x comes from x minus its share of the displacement.
-    main.pixels = forth_sure.bent(&a, rect, weight as f32);
-    second.pixels = back_sure.bent(&b, rect, 1.0 - weight as f32);
+    main.pixels = forth_sure.warped(&a, rect, weight as f32);
+    second.pixels = back_sure.warped(&b, rect, 1.0 - weight as f32);
     for layer in [main, second] {
         layer.rect = rect;
         layer.show_whole();
@@ -89,9 +89,10 @@ impl Half {
 
     /// Returns the value at a pixel, or zero beyond the edges.
     fn at(&self, x: i32, y: i32) -> [i32; 2] {
-        match (0..self.width).contains(&x) && (0..self.height).contains(&y) {
-            true => self.values[(y * self.width + x) as usize],
-            false => [0; 2],
+        if (0..self.width).contains(&x) && (0..self.height).contains(&y) {
+            self.values[(y * self.width + x) as usize]
+        } else {
+            [0; 2]
         }
     }
 }
@@ -102,7 +103,7 @@ impl Flow {
         let mut shifts = Vec::new();
         for row in 0..rows {
             for column in 0..columns {
-                shifts.push(matched(from, to, column * BLOCK, row * BLOCK));
+                shifts.push(best_match(from, to, column * BLOCK, row * BLOCK));
             }
         }
         Flow {
@@ -113,8 +114,8 @@ impl Flow {
     }
 
     /// Returns the flow with all displacements set to zero for which the way forward and back misses the
-    /// start by more than `AGREE_PX`.
-    fn agreeing(&self, back: &Flow) -> Flow {
+    /// start by more than `MAX_MISMATCH_PX`.
+    fn consistent(&self, back: &Flow) -> Flow {
         let place = |column: i32, row: i32| (row * self.columns + column) as usize;
         let mut shifts = self.shifts.clone();
         for row in 0..self.rows {
@@ -128,7 +129,7 @@ impl Flow {
                 let [bx, by] =
                     back.shifts[place(to(column, dx, self.columns), to(row, dy, self.rows))];
                 let miss = [dx + bx, dy + by].map(|px| f64::from(px) / 2.0);
-                if (miss[0] * miss[0] + miss[1] * miss[1]).sqrt() > AGREE_PX {
+                if (miss[0] * miss[0] + miss[1] * miss[1]).sqrt() > MAX_MISMATCH_PX {
                     shifts[place(column, row)] = [0.0; 2];
                 }
             }
@@ -157,7 +158,7 @@ impl Flow {
     }
 
     /// Returns a picture moved by `share` of its flow.
-    fn bent(&self, pixels: &[Quad], rect: Rect, share: f32) -> Vec<Quad> {
+    fn warped(&self, pixels: &[Quad], rect: Rect, share: f32) -> Vec<Quad> {
         let (width, height) = (rect.w as usize, rect.h as usize);
         let mut out = Vec::with_capacity(pixels.len());
         for y in 0..height {
@@ -165,7 +166,7 @@ impl Flow {
                 let (x, y) = (x as f32, y as f32);
                 let [dx, dy] = self.at(x + 0.5, y + 0.5);
                 let (u, v) = (x - share * dx, y - share * dy);
-                out.push(between_pixels(pixels, (width, height), u, v));
+                out.push(bilinear(pixels, (width, height), u, v));
             }
         }
         out
@@ -174,10 +175,10 @@ impl Flow {
 
 /// Returns the displacement, in full-size pixels, to the most similar block of the other picture. A cost
 /// per pixel of displacement prefers near matches.
-fn matched(from: &Half, to: &Half, left: i32, top: i32) -> [f32; 2] {
+fn best_match(from: &Half, to: &Half, left: i32, top: i32) -> [f32; 2] {
     let mut best = (i32::MAX, [0, 0]);
-    for dy in -REACH..=REACH {
-        for dx in -REACH..=REACH {
+    for dy in -SEARCH_RANGE..=SEARCH_RANGE {
+        for dx in -SEARCH_RANGE..=SEARCH_RANGE {
             let mut cost = 24 * (dx.abs() + dy.abs());
             for y in top..top + BLOCK {
                 for x in left..left + BLOCK {
@@ -192,7 +193,7 @@ fn matched(from: &Half, to: &Half, left: i32, top: i32) -> [f32; 2] {
 }
 
 /// Returns the bilinear interpolation at (u, v). Pixels beyond the edges are transparent.
-fn between_pixels(pixels: &[Quad], (width, height): (usize, usize), u: f32, v: f32) -> Quad {
+fn bilinear(pixels: &[Quad], (width, height): (usize, usize), u: f32, v: f32) -> Quad {
     let (left, top) = (u.floor(), v.floor());
     let (fu, fv) = (u - left, v - top);
     let mut sum = [0.5f32; 4];
@@ -242,10 +243,10 @@ mod tests {
     }
 
     #[test]
-    fn two_sprites_a_few_pixels_apart_meet_in_the_middle() {
+    fn sprites_a_few_pixels_apart_meet_in_the_middle() {
         let (mut a, mut b) = (disc([28.0, 24.0]), disc([34.0, 22.0]));
         let (apart, middle) = (difference(&a, &b), disc([31.0, 23.0]));
-        bend(&mut a, &mut b, 0.5);
+        warp_together(&mut a, &mut b, 0.5);
         assert!(difference(&a, &b) < 0.25 * apart);
         assert!(
             difference(&a, &middle) < 0.25 * apart,
@@ -255,19 +256,19 @@ mod tests {
     }
 
     #[test]
-    fn what_weighs_nothing_is_not_bent() {
+    fn sprite_of_weight_zero_is_not_warped() {
         let (mut a, mut b) = (disc([28.0, 24.0]), disc([34.0, 22.0]));
         let before = a.clone();
-        bend(&mut a, &mut b, 0.0);
+        warp_together(&mut a, &mut b, 0.0);
         assert!(difference(&a, &before) < 1.0);
     }
 
     #[test]
-    fn what_is_unlike_is_left_to_fade() {
+    fn sprites_that_differ_only_fade() {
         let (mut a, mut b) = (disc([16.0, 24.0]), disc([48.0, 24.0]));
         let before = a.clone();
         let apart = difference(&a, &b);
-        bend(&mut a, &mut b, 0.5);
+        warp_together(&mut a, &mut b, 0.5);
         assert!(difference(&a, &before) < 0.15 * apart);
     }
 }

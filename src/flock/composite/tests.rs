@@ -3,10 +3,12 @@
 
 use super::params::Cut;
 use super::*;
+use crate::flock::Fade;
 use crate::flock::synthetic;
 use crate::flock::{Params, plan_flock};
 use crate::library::View;
 use crate::progress::Silent;
+use crate::raster::RgbaImage;
 
 /// Prepares nothing: no frame has a background of its own.
 fn unprepared<E>(_: usize, _: &mut Shot) -> Result<(), E> {
@@ -23,7 +25,7 @@ fn flock(library: &Library, name: &str) -> Flock {
 }
 
 #[test]
-fn frames_in_any_order_are_those_of_the_film() {
+fn frames_are_equal_in_any_order_of_drawing() {
     let library = synthetic::library(View::Side);
     let flock = flock(&library, "school");
     let film = Compositor::new(&library, &flock);
@@ -44,7 +46,7 @@ fn frames_in_any_order_are_those_of_the_film() {
 }
 
 #[test]
-fn the_error_of_whoever_takes_the_frames_comes_back() {
+fn error_of_the_sink_is_returned() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "school");
     let film = Compositor::new(&library, &flock);
@@ -56,7 +58,7 @@ fn the_error_of_whoever_takes_the_frames_comes_back() {
 }
 
 #[test]
-fn without_what_is_hidden_the_film_is_the_same() {
+fn skipping_hidden_parts_changes_no_pixel() {
     for (view, haze_per_bl, size_px) in
         [(View::Side, 0.0, None), (View::Top, 0.2, Some([900, 700]))]
     {
@@ -74,13 +76,13 @@ fn without_what_is_hidden_the_film_is_the_same() {
 }
 
 #[test]
-fn nothing_changes_where_nobody_is() {
+fn pixels_without_animals_equal_the_background() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "swarm");
     let film = Compositor::new(&library, &flock);
     let (mut shot, mut empty) = (Shot::default(), Shot::default());
     film.render(17, &mut shot);
-    film.backdrop.begin(&mut empty);
+    film.backdrop.reset(&mut empty);
     let (frame, plate) = (shot.frame, empty.frame);
     let half = f64::from(library.sprites.width()) / 2.0 * std::f64::consts::SQRT_2 + 3.0;
     let width = frame.width as usize;
@@ -115,7 +117,7 @@ fn behind_a_wire(row: u32) -> Library {
 }
 
 #[test]
-fn a_wire_is_before_everybody_on_the_plate_and_before_nobody_elsewhere() {
+fn occluders_are_drawn_only_with_the_filmed_background() {
     const ROW: usize = 120;
     let library = behind_a_wire(ROW as u32);
     // The flock is made from the library without the wire, so that animals swim behind the wire.
@@ -188,7 +190,7 @@ fn shots(library: &Library, flock: &Flock) -> Vec<Shot> {
 }
 
 #[test]
-fn labels_lie_on_what_is_drawn_and_what_is_drawn_opaque_has_one() {
+fn labels_match_the_drawn_pixels() {
     for view in [View::Side, View::Top] {
         let library = synthetic::library(view);
         let mut flock = flock(&library, "swarm");
@@ -207,7 +209,7 @@ fn labels_lie_on_what_is_drawn_and_what_is_drawn_opaque_has_one() {
 }
 
 #[test]
-fn the_truth_is_where_flock_json_says() {
+fn ground_truth_positions_equal_those_of_the_flock() {
     for view in [View::Side, View::Top] {
         let library = synthetic::library(view);
         let flock = flock(&library, "school");
@@ -231,7 +233,7 @@ fn the_truth_is_where_flock_json_says() {
 }
 
 #[test]
-fn an_animal_half_out_of_the_picture_is_told_whole_and_half_visible() {
+fn animal_half_outside_of_the_picture_has_its_full_extent() {
     let library = synthetic::library(View::Top);
     let mut flock = flock(&library, "school");
     flock.individuals.truncate(1);
@@ -256,7 +258,7 @@ fn an_animal_half_out_of_the_picture_is_told_whole_and_half_visible() {
 }
 
 #[test]
-fn at_another_size_the_truth_is_the_same_but_larger() {
+fn ground_truth_scales_with_the_film() {
     let library = synthetic::library(View::Side);
     let mut flock = flock(&library, "school");
     let small = shots(&library, &flock);
@@ -273,7 +275,7 @@ fn at_another_size_the_truth_is_the_same_but_larger() {
 }
 
 #[test]
-fn shadow_and_haze_change_the_picture_and_not_the_truth() {
+fn shadow_and_haze_change_the_picture_but_not_the_ground_truth() {
     for view in [View::Side, View::Top] {
         let library = synthetic::library(view);
         let mut flock = flock(&library, "school");
@@ -303,7 +305,7 @@ fn shadow_and_haze_change_the_picture_and_not_the_truth() {
 }
 
 #[test]
-fn what_is_filmed_on_nothing_gives_over_the_plate_the_film() {
+fn transparent_film_over_the_background_equals_the_film() {
     let library = synthetic::library(View::Side);
     let mut flock = flock(&library, "swarm");
     flock.params.render.background = Background::Transparent;
@@ -330,7 +332,7 @@ fn what_is_filmed_on_nothing_gives_over_the_plate_the_film() {
 }
 
 #[test]
-fn a_frame_of_another_film_lies_behind_where_it_is_given() {
+fn background_of_a_frame_is_drawn_behind_the_animals() {
     let library = synthetic::library(View::Top);
     let flock = flock(&library, "school");
     let mut behind = Frame::new(64, 48, ColorSpec::default());
@@ -354,14 +356,14 @@ fn a_frame_of_another_film_lies_behind_where_it_is_given() {
 }
 
 #[test]
-fn bending_at_jumps_moves_no_more_than_the_pixels_of_a_fade() {
+fn morph_changes_only_pixels_of_a_fade() {
     let library = synthetic::library(View::Side);
     let mut flock = flock(&library, "swarm");
     let faded = shots(&library, &flock);
     flock.params.render.cut = Cut::Morph;
-    let bent = shots(&library, &flock);
+    let warped = shots(&library, &flock);
     let mut n_other = 0;
-    for (t, (a, b)) in faded.iter().zip(&bent).enumerate() {
+    for (t, (a, b)) in faded.iter().zip(&warped).enumerate() {
         let at = t as u32;
         let during =
             |fade: &Fade| (fade.start..fade.start + fade.weight.len() as u32).contains(&at);

@@ -61,12 +61,12 @@ pub(super) struct Drawn {
     pub(super) rect: Rect,
     pub(super) alpha: Vec<u16>,
     /// Extent without clipping; `None` if the sprite lies inside the picture.
-    pub(super) whole: Option<Whole>,
+    pub(super) whole: Option<FullExtent>,
 }
 
 /// Extent of an individual without clipping at the picture's border.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Whole {
+pub(super) struct FullExtent {
     amodal_box: Option<[i64; 4]>,
     amodal_area: u32,
     alpha_sum: u64,
@@ -78,7 +78,7 @@ impl FrameTruth {
     /// `drawn` lists the individuals from near to far; their ids are 0..n, each once. `shade` is the alpha
     /// of the shadows below them, and `left` the share of each pixel that the occluders leave. Both are in
     /// 16384ths.
-    pub(super) fn of(
+    pub(super) fn new(
         drawn: &[Drawn],
         shade: Option<&[u16]>,
         size_px: [u32; 2],
@@ -93,7 +93,7 @@ impl FrameTruth {
         };
         // Each individual takes its visible share from `left`; farther individuals get the rest.
         for drawn in drawn {
-            truth.seen[drawn.id as usize] = truth.look(drawn, &mut left);
+            truth.seen[drawn.id as usize] = truth.add(drawn, &mut left);
         }
         let visible = |(&shade, &left): (&u16, &u16)| {
             ((u32::from(shade) * u32::from(left) / ONE * 255 + HALF) / ONE) as u8
@@ -103,7 +103,8 @@ impl FrameTruth {
         truth
     }
 
-    fn look(&mut self, drawn: &Drawn, left: &mut [u16]) -> Seen {
+    /// Labels the pixels of an individual, and takes its visible share from `left`.
+    fn add(&mut self, drawn: &Drawn, left: &mut [u16]) -> Seen {
         let rect = drawn.rect;
         let mut extent = Extent::default();
         let (mut visible_sum, mut visible_area) = (0, 0);
@@ -126,7 +127,7 @@ impl FrameTruth {
         }
         let whole = drawn
             .whole
-            .unwrap_or_else(|| Whole::of(&drawn.alpha, rect, [0, 0]));
+            .unwrap_or_else(|| FullExtent::new(&drawn.alpha, rect, [0, 0]));
         Seen {
             centroid_px: drawn.centroid_px,
             scale: drawn.scale,
@@ -149,10 +150,10 @@ impl FrameTruth {
     }
 }
 
-impl Whole {
+impl FullExtent {
     /// Returns the extent of the alpha over a box. The true position of the box is `rect` moved by minus
     /// `shift`.
-    pub(super) fn of(alpha: &[u16], rect: Rect, shift: [i64; 2]) -> Whole {
+    pub(super) fn new(alpha: &[u16], rect: Rect, shift: [i64; 2]) -> FullExtent {
         let mut extent = Extent::default();
         let (mut amodal_area, mut alpha_sum) = (0, 0);
         for (row, y) in alpha
@@ -167,7 +168,7 @@ impl Whole {
                 }
             }
         }
-        Whole {
+        FullExtent {
             amodal_box: extent
                 .edges
                 .map(|[x, y, right, bottom]| [x, y, right - x, bottom - y]),
@@ -213,10 +214,10 @@ mod tests {
     }
 
     #[test]
-    fn the_nearer_hides_the_farther_by_its_alpha() {
+    fn nearer_individuals_hide_farther_ones_by_their_alpha() {
         let far = layer(1, rect(0, 0, 4, 2), ONE as u16);
         let near = layer(0, rect(2, 0, 4, 2), 3 * ONE as u16 / 4);
-        let truth = FrameTruth::of(&[near, far], None, [8, 2], clear(16));
+        let truth = FrameTruth::new(&[near, far], None, [8, 2], clear(16));
         assert_eq!(truth.labels[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
         // Half of the far one is covered by three quarters.
         assert!((truth.seen[1].visibility - 0.625).abs() < 1e-4);
@@ -230,21 +231,21 @@ mod tests {
     }
 
     #[test]
-    fn of_two_halves_the_nearer_has_the_pixel() {
+    fn pixel_shared_equally_belongs_to_the_nearer() {
         let box_px = rect(0, 0, 1, 1);
         let far = layer(0, box_px, ONE as u16);
         let near = layer(1, box_px, HALF as u16);
         assert_eq!(
-            FrameTruth::of(&[near, far], None, [1, 1], clear(1)).labels,
+            FrameTruth::new(&[near, far], None, [1, 1], clear(1)).labels,
             [2]
         );
     }
 
     #[test]
-    fn whoever_is_wholly_hidden_has_no_label_but_an_extent() {
+    fn hidden_individual_has_no_label_but_an_extent() {
         let far = layer(0, rect(1, 0, 2, 1), ONE as u16);
         let near = layer(1, rect(0, 0, 4, 1), ONE as u16);
-        let hidden = &FrameTruth::of(&[near, far], None, [4, 1], clear(4)).seen[0];
+        let hidden = &FrameTruth::new(&[near, far], None, [4, 1], clear(4)).seen[0];
         assert_eq!((hidden.visible_box, hidden.visible_area), (None, 0));
         assert_eq!(
             (hidden.amodal_box, hidden.visibility),
@@ -253,10 +254,10 @@ mod tests {
     }
 
     #[test]
-    fn a_wire_before_all_has_no_label_and_takes_of_what_can_be_seen() {
+    fn occluder_has_no_label_and_reduces_visibility() {
         let bird = layer(0, rect(0, 0, 4, 1), ONE as u16);
         let left = vec![ONE as u16, 0, ONE as u16 / 4, 3 * ONE as u16 / 4];
-        let truth = FrameTruth::of(&[bird], None, [4, 1], left);
+        let truth = FrameTruth::new(&[bird], None, [4, 1], left);
         assert_eq!(truth.labels, [1, 0, 0, 1]);
         let seen = &truth.seen[0];
         assert_eq!((seen.visible_area, seen.amodal_area), (2, 4));
@@ -277,7 +278,7 @@ mod tests {
                 .zip(&layers)
                 .map(|(id, &(x, y, w, h, alpha))| layer(id, rect(x, y, w, h), alpha))
                 .collect();
-            let truth = FrameTruth::of(&drawn, None, [12, 12], clear(144));
+            let truth = FrameTruth::new(&drawn, None, [12, 12], clear(144));
             for at in 0..144u32 {
                 let (x, y) = (at % 12, at / 12);
                 let mut through = 1.0;

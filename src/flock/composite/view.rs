@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_view_keeps_its_shape_in_the_middle_of_any_film() {
+    fn picture_keeps_its_shape_in_the_middle_of_any_film() {
         let view = View::fitted([640, 480], [1920, 1080]);
         assert_eq!((view.scale, view.offset_px), (2.25, [240.0, 0.0]));
         assert_eq!(view.point([320.0, 240.0]), [960.0, 540.0]);

@@ -1,11 +1,11 @@
 //! Simulation of a flock frame by frame, recorded as in files: straight through, or as a loop
 //! (docs/explanation/algorithms.md, "Boids").
 
-mod passing;
+mod detours;
 mod seam;
 
-use self::passing::{Limits, go_aside};
-use self::seam::Moment;
+use self::detours::{Limits, avoid_encounters};
+use self::seam::Snapshot;
 use super::boids::Boids;
 use super::boids::measures::Order;
 use super::boids::vector::{Vec3, unit};
@@ -26,7 +26,7 @@ pub(super) struct Course {
     pub(super) predator_px: Vec<[f64; 3]>,
     /// In a loop, the id of the individual as which each one continues after the last frame. `None` outside
     /// loops.
-    pub(super) heirs: Option<Vec<u32>>,
+    pub(super) continuations: Option<Vec<u32>>,
 }
 
 /// Lets the boids form a flock, then simulates `n_frames` frames. Fails if the job is cancelled.
@@ -54,7 +54,8 @@ pub(super) fn simulate(
 pub(super) fn simulate_loop(
     mut boids: Boids,
     lens: &Lens,
-    (n_frames, fps): (u32, f64),
+    n_frames: u32,
+    fps: f64,
     progress: &dyn Progress,
 ) -> Result<Course, Error> {
     let n_lead = seam::n_meeting_frames(n_frames, fps);
@@ -65,36 +66,36 @@ pub(super) fn simulate_loop(
     let mut lead = Vec::with_capacity(n_lead);
     for _ in 0..n_lead {
         step()?;
-        lead.push(Moment::of(&boids));
+        lead.push(Snapshot::of(&boids));
         boids.advance();
     }
-    let mut heirs = Vec::new();
-    let mut moments = Vec::with_capacity(n_frames);
+    let mut continuations = Vec::new();
+    let mut snapshots = Vec::with_capacity(n_frames);
     for t in 0..n_frames {
         step()?;
-        moments.push(Moment::of(&boids));
+        snapshots.push(Snapshot::of(&boids));
         let left = n_frames - t;
         if left == n_lead {
-            heirs = seam::heirs(&moments[t], &lead);
+            continuations = seam::continuations(&snapshots[t], &lead);
         }
         if left <= n_lead {
-            boids.steer_toward(seam::meeting(&lead, &heirs, left));
+            boids.meet(seam::meeting(&lead, &continuations, left));
         }
         boids.advance();
     }
-    seam::close(&mut moments, &lead, &heirs, fps);
+    seam::blend_into_lead(&mut snapshots, &lead, &continuations, fps);
     let limits = Limits {
         apart_bl: boids.overlap_bl(),
         fastest_bl_per_s: boids.max_speed_bl_per_s(),
         fps,
     };
-    go_aside(&mut moments, limits, |place| boids.confined(place));
+    avoid_encounters(&mut snapshots, limits, |place| boids.inside(place));
     let mut course = Course::new(&boids, lens);
-    for moment in moments {
-        boids.set_states(moment.positions, moment.velocities, moment.hunter);
+    for snapshot in snapshots {
+        boids.show(snapshot.positions, snapshot.velocities, snapshot.predator);
         course.record(&boids, lens);
     }
-    course.heirs = Some(heirs);
+    course.continuations = Some(continuations);
     Ok(course)
 }
 
@@ -122,7 +123,7 @@ impl Course {
             tracks: vec![track; boids.positions().len()],
             orders: Vec::new(),
             predator_px: Vec::new(),
-            heirs: None,
+            continuations: None,
         }
     }
 
@@ -130,13 +131,13 @@ impl Course {
         for (id, track) in self.tracks.iter_mut().enumerate() {
             record(track, lens, boids, id);
         }
-        let predator = boids.predator().map(|place| seen(place, lens, boids));
+        let predator = boids
+            .predator()
+            .map(|place| picture_position(place, lens, boids));
         self.predator_px.extend(predator);
-        self.orders.push(as_told(boids.order()));
+        self.orders.push(rounded_order(boids.order()));
     }
-}
 
-impl Course {
     /// Appends a later simulation.
     pub(super) fn append(&mut self, later: Course) {
         for (track, later) in self.tracks.iter_mut().zip(later.tracks) {
@@ -148,19 +149,19 @@ impl Course {
 }
 
 /// Returns the order, rounded as in files.
-fn as_told(order: Order) -> Order {
-    let told = |value| rounded(value, 4);
+fn rounded_order(order: Order) -> Order {
+    let r = |value| rounded(value, 4);
     Order {
-        polarization: told(order.polarization),
-        milling: told(order.milling),
-        nearest_bl: told(order.nearest_bl),
-        neighbor_share: told(order.neighbor_share),
+        polarization: r(order.polarization),
+        milling: r(order.milling),
+        nearest_bl: r(order.nearest_bl),
+        neighbor_share: r(order.neighbor_share),
         ..order
     }
 }
 
 /// Returns the position in the image and the distance behind the front of the tank, pixels.
-fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
+fn picture_position(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
     let [x, y] = lens.picture_px(place);
     let behind_px = (place[2] - boids.front_bl()) * lens.length_px;
     [x, y, behind_px].map(|px| rounded(px, 2))
@@ -168,8 +169,8 @@ fn seen(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
 
 /// Appends the current position, direction and speed of a boid to its track.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
-    let (place, velocity) = (boids.positions()[id], boids.actual_velocity(id));
-    track.position_px.push(seen(place, lens, boids));
+    let (place, velocity) = (boids.positions()[id], boids.motion(id));
+    track.position_px.push(picture_position(place, lens, boids));
     if let Some(forward) = &mut track.forward {
         forward.push(unit(boids.velocities()[id]).map(|part| rounded(part, 5)));
     }

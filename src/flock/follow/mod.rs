@@ -6,23 +6,24 @@
 //! little toward the boid (`advance`).
 
 mod advance;
-pub(super) mod company;
+pub(super) mod avoidance;
 mod natural;
-pub(super) mod perches;
+pub(super) mod resting_places;
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use self::advance::Advanced;
-use self::natural::Natural;
-use self::perches::Perches;
-use super::Error;
+use self::advance::Trajectory;
+use self::natural::NaturalPlayback;
+use self::resting_places::RestingPlaces;
 use super::boids::Boids;
 use super::boids::vector::{norm, scaled};
 use super::course::{Course, steps};
-use super::individual::BoidTrack;
-use super::placement::{Before, Placed, Stage};
-use super::plan::segment::Standing;
+use super::placement::{Placer, PreviousFrame};
+use super::plan::segment::PlaybackStatus;
 use super::plan::{Model, Plan, Planner};
+use super::{Error, Played};
 use crate::library::View;
 use crate::progress::Progress;
 
@@ -38,147 +39,148 @@ pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -
     ends
 }
 
-/// All individuals up to the current segment, by id.
-struct Flock {
+/// Flock up to the current segment. Lists have one entry per individual, by id.
+struct Follower<'a> {
+    model: &'a Model,
+    placer: &'a Placer<'a>,
+    natural: NaturalPlayback<'a>,
+    resting_places: RestingPlaces,
     course: Course,
     plans: Vec<Plan>,
-    advanced: Vec<Advanced>,
-    standings: Vec<Standing>,
+    trajectories: Vec<Trajectory>,
+    statuses: Vec<PlaybackStatus>,
 }
 
-/// Makes a flock from boids that have not formed yet. Returns the simulation, plans and placements, by id.
-/// Fails if the job is cancelled or playback cannot continue.
+/// Makes a flock from boids that have not formed yet. Fails if the job is cancelled or playback cannot
+/// continue.
 pub(super) fn play(
     mut boids: Boids,
-    (model, stage): (&Model, &Stage),
+    model: &Model,
+    placer: &Placer,
     progress: &dyn Progress,
-) -> Result<(Course, Vec<Plan>, Vec<Placed>), Error> {
-    let (params, fps) = (stage.params, stage.library.poses.fps);
+) -> Result<Played, Error> {
+    let (params, fps) = (placer.params, placer.library.poses.fps);
     let n_frames = params.frames as usize;
     let mut step = steps(boids.n_warm_up_frames() + n_frames, progress);
     boids.form(&mut step)?;
     let n = boids.positions().len();
-    let natural = Natural::new(model, stage.motion, params.seed);
-    let mut flock = Flock {
-        course: Course::new(&boids, stage.lens),
+    let mut follower = Follower {
+        model,
+        placer,
+        natural: NaturalPlayback::new(model, placer.motion, params.seed),
+        resting_places: RestingPlaces::new(placer.library, placer.motion, placer.lens),
+        course: Course::new(&boids, placer.lens),
         plans: vec![Plan::default(); n],
-        advanced: vec![Advanced::default(); n],
-        standings: Vec::new(),
+        trajectories: vec![Trajectory::default(); n],
+        statuses: Vec::new(),
     };
-    let perches = Perches::of(stage.library, stage.motion, stage.lens);
     let ends = segments(n_frames, params.matching.segment_frames, fps);
     for segment in ends.windows(2) {
         let (first, end) = (segment[0], segment[1]);
-        let states = flock.natural_states(&boids, (model, &natural, stage), segment)?;
-        let mut course = Course::new(&boids, stage.lens);
+        let states = follower.natural_states(&boids, first..end)?;
+        let mut course = Course::new(&boids, placer.lens);
         for t in first..end {
             step()?;
-            let gait = |states: &Vec<u32>| natural.gait(states[t - first]);
-            boids.impose_motion(states.iter().map(gait).collect());
+            let gait = |states: &Vec<u32>| follower.natural.gait(states[t - first]);
+            boids.go_as(states.iter().map(gait).collect());
             if t > 0 {
                 boids.advance();
             }
-            course.record(&boids, stage.lens);
+            course.record(&boids, placer.lens);
         }
         let is_last = end == n_frames;
-        let planner = Planner::of_segment(model, &course.tracks, &flock.standings, is_last);
+        let planner = Planner::for_segment(model, &course.tracks, &follower.statuses, is_last);
         let plans = planner.plan(progress)?;
-        flock.go_on((model, stage, &perches), &course.tracks, plans);
-        flock.course.append(course);
-        flock.draw_back(&mut boids, stage);
+        follower.append(course, plans);
+        follower.move_to_animals(&mut boids);
     }
-    let placed = (flock.advanced.into_par_iter().zip(&flock.plans))
-        .zip(&flock.course.tracks)
-        .enumerate()
-        .map(|(id, ((one, plan), boid))| {
-            let shown = model.shown(&plan.states);
-            stage.with_fades(
-                (&shown, stage.size(id)),
-                boid,
-                (one.heading_rad, one.centroid_px),
-            )
-        })
-        .collect();
-    Ok((flock.course, flock.plans, placed))
+    Ok(follower.finish())
 }
 
-impl Flock {
+impl Follower<'_> {
     /// Returns the states of the natural continuation of each individual over a segment.
-    fn natural_states(
-        &self,
-        boids: &Boids,
-        (model, natural, stage): (&Model, &Natural, &Stage),
-        segment: &[usize],
-    ) -> Result<Vec<Vec<u32>>, Error> {
-        let n_frames = segment[1] - segment[0];
-        let mut moment = Course::new(boids, stage.lens);
-        moment.record(boids, stage.lens);
-        let begun = |id: usize| {
-            let cost = |state| model.heading_cost(&moment.tracks[id], state);
-            let begun = natural.beginning(id, cost).ok_or(Error::NoTransitions)?;
-            let key = [id as u64, 0];
-            let mut states = natural.states((begun, 0), n_frames - 1, key);
-            states.insert(0, begun);
-            Ok(states)
+    fn natural_states(&self, boids: &Boids, frames: Range<usize>) -> Result<Vec<Vec<u32>>, Error> {
+        let mut moment = Course::new(boids, self.placer.lens);
+        moment.record(boids, self.placer.lens);
+        let states = |id: usize| {
+            let key = [id as u64, frames.start as u64];
+            let Some(status) = self.statuses.get(id) else {
+                let cost = |state| self.model.heading_cost(&moment.tracks[id], state);
+                let first = self.natural.first_state(id, cost);
+                let first = first.ok_or(Error::NoTransitions)?;
+                let mut states = self.natural.states(first, 0, frames.len() - 1, key);
+                states.insert(0, first);
+                return Ok(states);
+            };
+            let state = status.state.ok_or(Error::NoTransitions)?;
+            Ok((self.natural).states(state, status.n_forced, frames.len(), key))
         };
-        let goes_on = |id: usize| {
-            let standing = &self.standings[id];
-            let state = standing.state.ok_or(Error::NoTransitions)?;
-            let key = [id as u64, segment[0] as u64];
-            Ok(natural.states((state, standing.held), n_frames, key))
-        };
-        let all = (0..self.plans.len()).into_par_iter();
-        match self.standings.is_empty() {
-            true => all.map(begun).collect(),
-            false => all.map(goes_on).collect(),
-        }
+        let ids = (0..self.plans.len()).into_par_iter();
+        ids.map(states).collect()
     }
 
-    /// Appends the plans of a segment and places their frames.
-    fn go_on(
-        &mut self,
-        (model, stage, perches): (&Model, &Stage, &Perches),
-        boids: &[BoidTrack],
-        plans: Vec<Plan>,
-    ) {
-        self.standings.resize(plans.len(), Standing::default());
+    /// Appends the boids and plans of a segment, and places the frames of the plans.
+    fn append(&mut self, course: Course, plans: Vec<Plan>) {
+        let model = self.model;
+        self.statuses.resize(plans.len(), PlaybackStatus::default());
         let shown: Vec<Vec<(u32, bool)>> =
             plans.iter().map(|plan| model.shown(&plan.states)).collect();
-        let before: Vec<Option<Before>> = (self.plans.iter().zip(&self.advanced))
-            .map(|(plan, one)| {
+        let before: Option<Vec<PreviousFrame>> = (self.plans.iter().zip(&self.trajectories))
+            .map(|(plan, trajectory)| {
                 let &state = plan.states.last()?;
-                Some(Before {
+                Some(PreviousFrame {
                     state: model.trellis.shown(state as usize)?,
-                    heading_rad: *one.heading_rad.last()?,
-                    centroid_px: *one.centroid_px.last()?,
+                    heading_rad: *trajectory.heading_rad.last()?,
+                    centroid_px: *trajectory.centroid_px.last()?,
                 })
             })
             .collect();
-        let advanced = stage.advance(&shown, boids, &before, perches);
-        for (id, (plan, advanced)) in plans.into_iter().zip(advanced).enumerate() {
-            self.standings[id].go_on(&plan.states, model.dwell);
-            self.advanced[id].append(advanced);
+        let (tracks, resting_places) = (&course.tracks, &self.resting_places);
+        let later = (self.placer).advance(&shown, tracks, before.as_deref(), resting_places);
+        for (id, (plan, later)) in plans.into_iter().zip(later).enumerate() {
+            self.statuses[id].update(&plan.states, model.dwell);
+            self.trajectories[id].append(later);
             self.plans[id].append(plan);
         }
+        self.course.append(course);
     }
 
     /// Moves each boid to the position of its animal. In top view the boid also takes the heading of its
     /// animal. In side view it keeps its own, since the animal can show only filmed headings.
-    fn draw_back(&self, boids: &mut Boids, stage: &Stage) {
+    fn move_to_animals(&self, boids: &mut Boids) {
         let mut positions = boids.positions().to_vec();
         let mut velocities = boids.velocities().to_vec();
-        for (id, one) in self.advanced.iter().enumerate() {
-            let ends = one.centroid_px.last().zip(one.heading_rad.last());
+        for (id, trajectory) in self.trajectories.iter().enumerate() {
+            let ends = (trajectory.centroid_px.last()).zip(trajectory.heading_rad.last());
             let Some((&centroid_px, &heading_rad)) = ends else {
                 continue;
             };
-            let place = stage.lens.place_bl(centroid_px, positions[id][2]);
-            positions[id] = boids.confined(place);
-            if stage.library.poses.view == View::Top {
+            let place = self.placer.lens.place_bl(centroid_px, positions[id][2]);
+            positions[id] = boids.inside(place);
+            if self.placer.library.poses.view == View::Top {
                 let direction = [libm::cos(heading_rad), libm::sin(heading_rad), 0.0];
                 velocities[id] = scaled(norm(velocities[id]), direction);
             }
         }
         boids.set_states(positions, velocities, boids.predator());
+    }
+
+    /// Returns the whole flock with its placement.
+    fn finish(self) -> Played {
+        let (model, placer) = (self.model, self.placer);
+        let placed = (self.trajectories.into_par_iter().zip(&self.plans))
+            .zip(&self.course.tracks)
+            .enumerate()
+            .map(|(id, ((one, plan), boid))| {
+                let shown = model.shown(&plan.states);
+                let size = placer.size(id);
+                placer.with_fades(&shown, size, boid, one.heading_rad, one.centroid_px)
+            })
+            .collect();
+        Played {
+            course: self.course,
+            plans: self.plans,
+            placed,
+        }
     }
 }

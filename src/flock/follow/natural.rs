@@ -11,19 +11,19 @@ use crate::random;
 
 /// Number of random states, of which an individual starts with the cheapest. Free choice. More states give a
 /// heading nearer to that of the boid, but distort the shares of rest and motion.
-const N_DRAWN: u64 = 24;
+const N_START_CANDIDATES: u64 = 24;
 /// Additional cost at which a jump is e times as rare, turns. Free choice: a quarter of the default cost of a
 /// jump at D = epsilon.
 const RARER_TURNS: f64 = 3000.0;
 
 /// Purposes of random numbers, as words of their keys.
 mod draw {
-    pub(super) const BEGIN: u64 = 21;
+    pub(super) const START: u64 = 21;
     pub(super) const JUMP: u64 = 22;
 }
 
 /// Natural continuations from all states of a trellis.
-pub(super) struct Natural<'a> {
+pub(super) struct NaturalPlayback<'a> {
     model: &'a Model,
     seed: u64,
     /// Target state and cost, turns, of each jump, by source state.
@@ -32,8 +32,8 @@ pub(super) struct Natural<'a> {
     gaits: Vec<ImposedMotion>,
 }
 
-impl<'a> Natural<'a> {
-    pub(super) fn new(model: &'a Model, motion: &[FrameMotion], seed: u64) -> Natural<'a> {
+impl<'a> NaturalPlayback<'a> {
+    pub(super) fn new(model: &'a Model, motion: &[FrameMotion], seed: u64) -> NaturalPlayback<'a> {
         let trellis = &model.trellis;
         let mut jumps = vec![Vec::new(); trellis.n_states()];
         for (k, &target) in trellis.targets().iter().enumerate() {
@@ -52,7 +52,7 @@ impl<'a> Natural<'a> {
                 turn_rad_per_s: side * moved.turn_rad_per_s,
             }
         };
-        Natural {
+        NaturalPlayback {
             model,
             seed,
             jumps,
@@ -63,42 +63,39 @@ impl<'a> Natural<'a> {
     /// Returns the first state of individual `id`: the one with the least `cost` among some random states.
     /// Random states show rest and motion in the shares of the footage. Returns `None` if playback cannot
     /// continue from any state.
-    pub(super) fn beginning(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
+    pub(super) fn first_state(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
         let goes_on: Vec<u32> = (0..self.jumps.len() as u32)
-            .filter(|&state| {
-                self.model.future[state as usize].is_some()
-                    && self.model.trellis.shown(state as usize).is_some()
-            })
+            .filter(|&state| self.model.is_endless(state))
             .collect();
-        let drawn = (0..N_DRAWN).filter_map(|k| {
-            let at = random::uniform(self.seed, &[draw::BEGIN, id as u64, k]);
+        let drawn = (0..N_START_CANDIDATES).filter_map(|k| {
+            let at = random::unit(self.seed, &[draw::START, id as u64, k]);
             goes_on.get((at * goes_on.len() as f64) as usize).copied()
         });
         drawn.min_by_key(|&state| cost(state as usize))
     }
 
-    /// Returns the states of the `n` frames after `state`. No jump is made in the first `held` frames, unless
+    /// Returns the states of the `n` frames after `state`. No jump is made in the first `n_forced` frames, unless
     /// the run ends.
     pub(super) fn states(
         &self,
-        (mut state, mut held): (u32, usize),
+        mut state: u32,
+        mut n_forced: usize,
         n: usize,
         key: [u64; 2],
     ) -> Vec<u32> {
         let mut states = Vec::with_capacity(n);
         for t in 0..n as u64 {
-            let next = state as usize + 1;
+            let next = state + 1;
             let goes_on = self.model.trellis.continues(state as usize, 1)
-                && (held > 0 || self.model.future[next].is_some());
-            state = match goes_on {
-                true => state + 1,
-                false => {
-                    held = self.model.dwell;
-                    self.jump(state, [draw::JUMP, key[0], key[1], t])
-                        .unwrap_or(state)
-                }
+                && (n_forced > 0 || self.model.is_endless(next));
+            state = if goes_on {
+                next
+            } else {
+                n_forced = self.model.dwell;
+                let key = [draw::JUMP, key[0], key[1], t];
+                self.jump(state, key).unwrap_or(state)
             };
-            held = held.saturating_sub(1);
+            n_forced = n_forced.saturating_sub(1);
             states.push(state);
         }
         states

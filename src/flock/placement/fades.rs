@@ -1,42 +1,46 @@
 //! Cross-fades at jumps: a second sprite shows the continuation of the old run, or the beginning of the new one
 //! (docs/explanation/algorithms.md, "Placement").
 
-use super::{Placed, Stage, is_jump};
+use super::{Placed, Placer, is_jump};
 use crate::flock::individual::{BoidTrack, Fade};
 use crate::geometry::rounded;
 
 /// Inputs of fades: the states shown, with headings, depths and size.
-pub(super) struct Way<'a> {
+pub(super) struct FadeInputs<'a> {
     pub(super) shown: &'a [(u32, bool)],
     pub(super) heading_rad: &'a [f64],
     pub(super) depth_bl: &'a [f64],
     pub(super) size: f64,
 }
 
-impl Stage<'_> {
-    /// Returns the fades of a loop, by id. A fade across its end continues in the heir.
+impl Placer<'_> {
+    /// Returns the fades of a loop, by id. A fade across its end continues in the continuation's fades.
     pub(super) fn fades_across(
         &self,
         shown: &[&[(u32, bool)]],
         boids: &[BoidTrack],
-        heirs: &[u32],
+        continuations: &[u32],
         placed: &[Placed],
     ) -> Vec<Vec<Fade>> {
         let mut fades: Vec<Vec<Fade>> = vec![Vec::new(); shown.len()];
-        for (id, &heir) in heirs.iter().enumerate() {
-            let (heir, n_frames) = (heir as usize, shown[id].len());
+        for (id, &continuation) in continuations.iter().enumerate() {
+            let (continuation, n_frames) = (continuation as usize, shown[id].len());
             let across = self.fades(
-                &Way {
-                    shown: &[shown[id], shown[heir]].concat(),
-                    heading_rad: &[id, heir].map(|id| &placed[id].heading_rad[..]).concat(),
-                    depth_bl: &[id, heir].map(|id| self.depths_bl(&boids[id])).concat(),
+                &FadeInputs {
+                    shown: &[shown[id], shown[continuation]].concat(),
+                    heading_rad: &[id, continuation]
+                        .map(|id| &placed[id].heading_rad[..])
+                        .concat(),
+                    depth_bl: &[id, continuation]
+                        .map(|id| self.depths_bl(&boids[id]))
+                        .concat(),
                     size: 1.0,
                 },
                 n_frames,
             );
             for mut fade in across {
                 let rest = fade.split_off(n_frames);
-                fades[heir].extend(rest);
+                fades[continuation].extend(rest);
                 if !fade.weight.is_empty() {
                     fades[id].push(fade);
                 }
@@ -49,8 +53,8 @@ impl Stage<'_> {
     }
 
     /// Returns the fades at the jumps up to frame `n_frames`, the first one after the end.
-    pub(super) fn fades(&self, way: &Way, n_frames: usize) -> Vec<Fade> {
-        let shown = way.shown;
+    pub(super) fn fades(&self, inputs: &FadeInputs, n_frames: usize) -> Vec<Fade> {
+        let shown = inputs.shown;
         let jumps: Vec<usize> = (1..shown.len())
             .filter(|&t| is_jump(shown[t - 1], shown[t]))
             .collect();
@@ -63,7 +67,7 @@ impl Stage<'_> {
                 .min(before / 2)
                 .min(after / 2);
             if half > 0 {
-                let halves = self.fade(way, t, half);
+                let halves = self.fade(inputs, t, half);
                 fades.extend(halves.into_iter().flatten());
             }
         }
@@ -72,8 +76,8 @@ impl Stage<'_> {
 
     /// Returns the halves of a fade at the jump at `t`, `half` frames each: those before the new frame, and
     /// those after the old one. Returns `None` if a sprite is missing.
-    fn fade(&self, way: &Way, t: usize, half: usize) -> Option<[Fade; 2]> {
-        let (old, new) = (way.shown[t - 1], way.shown[t]);
+    fn fade(&self, inputs: &FadeInputs, t: usize, half: usize) -> Option<[Fade; 2]> {
+        let (old, new) = (inputs.shown[t - 1], inputs.shown[t]);
         let mut sides: [Fade; 2] = [(t - half, new.1), (t, old.1)].map(|(start, mirrored)| Fade {
             start: start as u32,
             source_frame: Vec::new(),
@@ -85,20 +89,21 @@ impl Stage<'_> {
         for u in t - half..t + half {
             let share = ((u + half - t) as f64 + 0.5) / (2 * half) as f64;
             let coming = share * share * (3.0 - 2.0 * share);
-            let (side, frame, mirrored, weight) = match u < t {
-                true => (0, new.0.checked_sub((t - u) as u32)?, new.1, coming),
-                false => (1, old.0 + (u - t + 1) as u32, old.1, 1.0 - coming),
+            let (side, frame, mirrored, weight) = if u < t {
+                (0, new.0.checked_sub((t - u) as u32)?, new.1, coming)
+            } else {
+                (1, old.0 + (u - t + 1) as u32, old.1, 1.0 - coming)
             };
             let sprites = &self.library.sprites;
             if frame as usize >= sprites.n_frames() || !sprites.is_present(frame as usize) {
                 return None;
             }
-            let rotation = self.rotation((frame, mirrored), way.heading_rad[u]);
+            let rotation = self.rotation((frame, mirrored), inputs.heading_rad[u]);
             sides[side].source_frame.push(frame);
             sides[side].rotation_rad.push(rounded(rotation, 5));
             sides[side]
                 .scale
-                .push(self.scale(frame, way.depth_bl[u], way.size));
+                .push(self.scale(frame, inputs.depth_bl[u], inputs.size));
             sides[side].weight.push(rounded(weight, 4));
         }
         Some(sides)

@@ -5,7 +5,7 @@ mod fades;
 
 use rayon::prelude::*;
 
-use self::fades::Way;
+use self::fades::FadeInputs;
 use super::boids::calibration::Calibration;
 use super::boids::tank::Tank;
 use super::individual::{BoidTrack, Fade};
@@ -24,16 +24,16 @@ const LEASH_S: f64 = 0.5;
 const LEASH_BL: f64 = 0.5;
 
 /// Rounds in which a loop is placed, so that its start follows from its end. Free choice.
-const N_ROUNDS: usize = 4;
+const N_LOOP_ROUNDS: usize = 4;
 
 /// Least and greatest scale of a sprite. Free choices.
-const LEAST_SCALE: f64 = 0.2;
-const GREATEST_SCALE: f64 = 1.5;
+const MIN_SCALE: f64 = 0.2;
+const MAX_SCALE: f64 = 1.5;
 /// First word of the random keys for body sizes. Boids use other words.
-const SIZE: u64 = 0x517e;
+const SIZE_KEY: u64 = 0x517e;
 
 /// Inputs of placement that all individuals share.
-pub struct Stage<'a> {
+pub struct Placer<'a> {
     /// Library whose sprites are shown.
     pub library: &'a Library,
     /// Motion of the animal at each frame of the footage.
@@ -71,7 +71,7 @@ pub struct Placed {
 
 /// Frame shown before the first one: the end of the preceding segment, or in a loop the last frame.
 #[derive(Clone, Copy)]
-pub(super) struct Before {
+pub(super) struct PreviousFrame {
     pub(super) state: (u32, bool),
     pub(super) heading_rad: f64,
     pub(super) centroid_px: [f64; 2],
@@ -82,50 +82,50 @@ pub fn is_jump(before: (u32, bool), after: (u32, bool)) -> bool {
     after != (before.0 + 1, before.1)
 }
 
-impl Stage<'_> {
-    /// Places all individuals, by id. In a loop, individual `id` continues as `heirs[id]`.
+impl Placer<'_> {
+    /// Places all individuals, by id. In a loop, individual `id` continues as `continuations[id]`.
     pub fn placed(
         &self,
         shown: &[Vec<(u32, bool)>],
         boids: &[BoidTrack],
-        heirs: Option<&[u32]>,
+        continuations: Option<&[u32]>,
     ) -> Vec<Placed> {
         let shown: Vec<&[(u32, bool)]> = shown.iter().map(Vec::as_slice).collect();
-        match heirs {
-            Some(heirs) => self.place_loop(&shown, boids, heirs),
+        match continuations {
+            Some(continuations) => self.place_loop(&shown, boids, continuations),
             None => self.place(&shown, boids),
         }
     }
 
     fn place(&self, shown: &[&[(u32, bool)]], boids: &[BoidTrack]) -> Vec<Placed> {
         (shown.par_iter().zip(boids).enumerate())
-            .map(|(id, (shown, boid))| self.place_one((shown, self.size(id)), boid, None))
+            .map(|(id, (shown, boid))| self.place_one(shown, boid, None, self.size(id)))
             .collect()
     }
 
-    /// Places a loop, by id. The last frame of each individual leads into the first of its heir.
+    /// Places a loop, by id. The last frame of each individual leads into the first of its continuation.
     fn place_loop(
         &self,
         shown: &[&[(u32, bool)]],
         boids: &[BoidTrack],
-        heirs: &[u32],
+        continuations: &[u32],
     ) -> Vec<Placed> {
         let mut placed = self.place(shown, boids);
-        for _ in 0..N_ROUNDS {
+        for _ in 0..N_LOOP_ROUNDS {
             let mut before = vec![None; shown.len()];
-            for (id, &heir) in heirs.iter().enumerate() {
+            for (id, &continuation) in continuations.iter().enumerate() {
                 let last = shown[id].len() - 1;
-                before[heir as usize] = Some(Before {
+                before[continuation as usize] = Some(PreviousFrame {
                     state: shown[id][last],
                     heading_rad: placed[id].heading_rad[last],
                     centroid_px: placed[id].centroid_px[last],
                 });
             }
             placed = (shown.par_iter().zip(boids).zip(before))
-                .map(|((shown, boid), before)| self.place_one((shown, 1.0), boid, before))
+                .map(|((shown, boid), before)| self.place_one(shown, boid, before, 1.0))
                 .collect();
         }
-        let fades = self.fades_across(shown, boids, heirs, &placed);
+        let fades = self.fades_across(shown, boids, continuations, &placed);
         for (placed, fades) in placed.iter_mut().zip(fades) {
             placed.fades = fades;
         }
@@ -139,21 +139,24 @@ impl Stage<'_> {
 
     fn place_one(
         &self,
-        (shown, size): (&[(u32, bool)], f64),
+        shown: &[(u32, bool)],
         boid: &BoidTrack,
-        before: Option<Before>,
+        before: Option<PreviousFrame>,
+        size: f64,
     ) -> Placed {
         let heading_rad = self.headings(shown, boid, before);
         let centroid_px = self.positions(&heading_rad, boid, before);
-        self.with_fades((shown, size), boid, (heading_rad, centroid_px))
+        self.with_fades(shown, size, boid, heading_rad, centroid_px)
     }
 
     /// Returns the placement of an individual with these headings and positions.
     pub(super) fn with_fades(
         &self,
-        (shown, size): (&[(u32, bool)], f64),
+        shown: &[(u32, bool)],
+        size: f64,
         boid: &BoidTrack,
-        (heading_rad, centroid_px): (Vec<f64>, Vec<[f64; 2]>),
+        heading_rad: Vec<f64>,
+        centroid_px: Vec<[f64; 2]>,
     ) -> Placed {
         let depth_bl = self.depths_bl(boid);
         let rotation_rad: Vec<f64> = shown
@@ -178,7 +181,7 @@ impl Stage<'_> {
                 .map(|&bl| Some(rounded(self.lens.metres(bl)?, 5)))
                 .collect(),
             fades: self.fades(
-                &Way {
+                &FadeInputs {
                     shown,
                     heading_rad: &heading_rad,
                     depth_bl: &depth_bl,
@@ -197,7 +200,7 @@ impl Stage<'_> {
 
     /// Returns the random size of an individual relative to the filmed animal.
     pub(super) fn size(&self, id: usize) -> f64 {
-        let spread = 2.0 * random::uniform(self.params.seed, &[SIZE, id as u64]) - 1.0;
+        let spread = 2.0 * random::unit(self.params.seed, &[SIZE_KEY, id as u64]) - 1.0;
         rounded(1.0 + self.params.variation * spread, 3)
     }
 
@@ -208,7 +211,7 @@ impl Stage<'_> {
         }
         let filmed_px = self.lens.px_per_bl(self.motion[frame as usize].depth_bl);
         let scale = size * self.lens.px_per_bl(depth_bl) / filmed_px;
-        rounded(scale.clamp(LEAST_SCALE, GREATEST_SCALE), 4)
+        rounded(scale.clamp(MIN_SCALE, MAX_SCALE), 4)
     }
 
     /// Returns the heading of a source frame on its mirror side, radians.
@@ -247,7 +250,7 @@ impl Stage<'_> {
         &self,
         shown: &[(u32, bool)],
         boid: &BoidTrack,
-        before: Option<Before>,
+        before: Option<PreviousFrame>,
     ) -> Vec<f64> {
         if self.library.poses.view == View::Top {
             return boid.heading_rad.clone();
@@ -256,9 +259,12 @@ impl Stage<'_> {
         let mut last = before.map(|before| (before.state, before.heading_rad));
         let mut headings: Vec<f64> = Vec::with_capacity(shown.len());
         for run in shown.chunk_by(|&before, &after| !is_jump(before, after)) {
-            let anchor = last.map(|(before, heading)| match is_jump(before, run[0]) {
-                true => self.rotation(run[0], heading),
-                false => wrap_rad(heading - self.source_heading(before)),
+            let anchor = last.map(|(before, heading)| {
+                if is_jump(before, run[0]) {
+                    self.rotation(run[0], heading)
+                } else {
+                    wrap_rad(heading - self.source_heading(before))
+                }
             });
             let goals = &boid.heading_rad[headings.len()..];
             let wanted: Vec<f64> = run
@@ -266,9 +272,8 @@ impl Stage<'_> {
                 .zip(goals)
                 .map(|(&state, &goal)| self.rotation(state, goal))
                 .collect();
-            let settled = rotation::settled(&wanted, anchor, stiffness);
-            let of_run = run.iter().zip(settled);
-            headings.extend(of_run.map(|(&state, rotation)| {
+            let smoothed = rotation::smoothed(&wanted, anchor, stiffness);
+            headings.extend(run.iter().zip(smoothed).map(|(&state, rotation)| {
                 rounded(wrap_rad(self.source_heading(state) + rotation), 5)
             }));
             last = run.last().copied().zip(headings.last().copied());
@@ -280,7 +285,7 @@ impl Stage<'_> {
         &self,
         heading_rad: &[f64],
         boid: &BoidTrack,
-        before: Option<Before>,
+        before: Option<PreviousFrame>,
     ) -> Vec<[f64; 2]> {
         let fps = self.library.poses.fps;
         let pull = match self.params.position {

@@ -50,9 +50,9 @@ pub struct Weights {
     jump_turns: f64,
     epsilon: u64,
     /// Cost of each frame that a jump goes back, in turns.
-    again_turns: f64,
+    repetition_turns: f64,
     /// Longest jump back that has this cost, in frames.
-    most_again: u32,
+    max_back_frames: u32,
     view: View,
     pub(super) by: MatchBy,
     /// Weight of differences along the line of sight.
@@ -82,8 +82,8 @@ impl Weights {
             },
             jump_turns: matching.wx * Turns::PER_RAD,
             epsilon: library.epsilon,
-            again_turns: matching.w_p * Turns::PER_RAD,
-            most_again: (RETURN_S * library.poses.fps).round() as u32,
+            repetition_turns: matching.w_p * Turns::PER_RAD,
+            max_back_frames: (RETURN_S * library.poses.fps).round() as u32,
             view,
             by,
             away: matching.w_d as f32,
@@ -97,18 +97,18 @@ impl Weights {
     }
 
     /// Returns the cost of a jump, in turns, below 2^16.
-    pub fn of_jump(&self, jump: &Jump) -> u32 {
+    pub fn jump_cost(&self, jump: &Jump) -> u32 {
         let share = jump.cost as f64 / self.epsilon.max(1) as f64;
         let transition = (self.jump_turns * share).round().min(65535.0) as u32;
-        (transition + self.of_return(jump)).min(65535)
+        (transition + self.repetition_cost(jump)).min(65535)
     }
 
     /// Returns the part of a jump's cost for showing frames again, in turns, below 2^16. It is 0 for jumps
     /// that change the mirror side, because mirrored frames look different.
-    pub fn of_return(&self, jump: &Jump) -> u32 {
+    pub fn repetition_cost(&self, jump: &Jump) -> u32 {
         let n_again = (jump.from + 1).saturating_sub(jump.to);
-        let is_return = !jump.mirrored && n_again <= self.most_again;
-        let turns = self.again_turns * f64::from(n_again);
+        let is_return = !jump.mirrored && n_again <= self.max_back_frames;
+        let turns = self.repetition_turns * f64::from(n_again);
         if is_return {
             turns.round().min(65535.0) as u32
         } else {
@@ -118,13 +118,13 @@ impl Weights {
 
     /// Returns the costs of showing `state` where `wanted` is asked for, in turns, without the ceiling:
     /// heading with rotation, and speed.
-    pub fn of_state(&self, wanted: Feature, state: Feature) -> [u32; 2] {
+    pub fn parts_of(&self, wanted: Feature, state: Feature) -> [u32; 2] {
         match self.by {
             MatchBy::Direction => {
                 let [beyond, within] = self.parts(wanted.turns, state.turns);
                 let chord_turns = self.chord_turns(wanted, state, u32::from(beyond));
-                let speed = self.of_speeds(wanted.log_speed, state.log_speed);
-                [self.of_parts(chord_turns, u32::from(within)), speed]
+                let speed = self.speed_cost(wanted.log_speed, state.log_speed);
+                [self.heading_cost(chord_turns, u32::from(within)), speed]
             }
             _ => self.of_gaps(
                 [wanted.turns, state.turns],
@@ -138,8 +138,8 @@ impl Weights {
     fn of_gaps(&self, turns: [u16; 2], log_speeds: [u16; 2]) -> [u32; 2] {
         let [beyond, within] = self.parts(turns[0], turns[1]);
         [
-            self.of_parts(u32::from(beyond), u32::from(within)),
-            self.of_speeds(log_speeds[0], log_speeds[1]),
+            self.heading_cost(u32::from(beyond), u32::from(within)),
+            self.speed_cost(log_speeds[0], log_speeds[1]),
         ]
     }
 
@@ -152,12 +152,12 @@ impl Weights {
     }
 
     #[inline(always)]
-    fn of_parts(&self, beyond: u32, within: u32) -> u32 {
+    fn heading_cost(&self, beyond: u32, within: u32) -> u32 {
         (self.heading * beyond + self.rotation * within) >> 8
     }
 
     #[inline(always)]
-    fn of_speeds(&self, a: u16, b: u16) -> u32 {
+    fn speed_cost(&self, a: u16, b: u16) -> u32 {
         (self.speed * u32::from(a.abs_diff(b))) >> 8
     }
 
@@ -182,7 +182,7 @@ impl Weights {
     /// Returns the sum of `of_state`, limited to values below `CEILING`.
     #[inline(always)]
     pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
-        let [heading, speed] = self.of_state(wanted, state);
+        let [heading, speed] = self.parts_of(wanted, state);
         (heading + speed).min(CEILING - 1)
     }
 
@@ -193,21 +193,27 @@ impl Weights {
         (turns.into_iter().enumerate())
             .map(|(t, turn)| {
                 let (heading, speed) = (boid.heading_rad[t], boid.speed_bl_per_s[t]);
-                self.wants(heading, turn, speed, forward(t))
+                self.feature_of(heading, turn, speed, forward(t))
             })
             .collect()
     }
 
-    fn wants(&self, heading_rad: f64, turn: f64, speed_bl_per_s: f64, forward: Vec3) -> Feature {
+    fn feature_of(
+        &self,
+        heading_rad: f64,
+        turn: f64,
+        speed_bl_per_s: f64,
+        forward: Vec3,
+    ) -> Feature {
         match self.by {
             MatchBy::Position => {
                 let along = [libm::cos(heading_rad), libm::sin(heading_rad)];
-                moving(along.map(|axis| speed_bl_per_s * axis))
+                velocity_feature(along.map(|axis| speed_bl_per_s * axis))
             }
             MatchBy::Direction => Feature {
                 turns: Turns::from_rad(libm::atan2(forward[1], forward[0])).0,
                 log_speed: log_speed(speed_bl_per_s, self.v0_bl_per_s),
-                ..self.in_space(forward)
+                ..self.depth_parts(forward)
             },
             MatchBy::Heading => Feature {
                 turns: match self.view {
@@ -221,7 +227,7 @@ impl Weights {
     }
 
     /// Returns a feature with only `level` and `away`, the foreshortening of a direction.
-    fn in_space(&self, forward: Vec3) -> Feature {
+    fn depth_parts(&self, forward: Vec3) -> Feature {
         let away = if self.is_signed {
             forward[2]
         } else {
@@ -244,7 +250,7 @@ impl Weights {
             let moved = &motion[frame as usize];
             if self.by == MatchBy::Position {
                 let [x, y] = moved.velocity_bl_per_s;
-                return moving([if mirrored { -x } else { x }, y]);
+                return velocity_feature([if mirrored { -x } else { x }, y]);
             }
             let (x, turn) = match mirrored {
                 false => (1.0, moved.turn_rad_per_s),
@@ -256,7 +262,7 @@ impl Weights {
                 (_, true) => mirrored_rad(moved.heading_rad),
             };
             let [_, y, z] = moved.forward;
-            self.wants(
+            self.feature_of(
                 heading,
                 turn,
                 moved.speed_bl_per_s,
@@ -282,7 +288,7 @@ pub fn turn_rates(heading_rad: &[f64], fps: f64) -> Vec<f64> {
 
 /// Returns a feature that holds a velocity in the picture. A body length a second counts as a radian. Each
 /// component is clamped to a quarter circle, so that differences do not wrap.
-fn moving(velocity_bl_per_s: [f64; 2]) -> Feature {
+fn velocity_feature(velocity_bl_per_s: [f64; 2]) -> Feature {
     let [x, y] = velocity_bl_per_s
         .map(|bl_per_s| (bl_per_s * Turns::PER_RAD).round().clamp(-16383.0, 16383.0) as i16);
     Feature {

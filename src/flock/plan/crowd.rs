@@ -19,19 +19,19 @@ const WIDTH_BL: f64 = 4.0;
 /// Distance from which looking alike costs nothing, in body lengths. Free choice.
 const REACH_BL: f64 = 8.0;
 /// Resolution of positions, in parts per body length. Free choice.
-const PARTS: f64 = 32.0;
+const PARTS_PER_BL: f64 = 32.0;
 /// Table entries per squared body length. Free choice.
-const STEPS: usize = 16;
+const STEPS_PER_SQUARE_BL: usize = 16;
 /// Number of table entries within reach. One more entry holds 0.
-const N_STEPS: usize = (REACH_BL * REACH_BL) as usize * STEPS;
+const N_STEPS: usize = (REACH_BL * REACH_BL) as usize * STEPS_PER_SQUARE_BL;
 /// Number of individuals that are planned one after the other, each watching all before it. Later ones are
-/// planned `ROUND` at a time and watch the rounds before. Free choice.
-const ONE_BY_ONE: usize = 64;
+/// planned `ROUND_SIZE` at a time and watch the rounds before. Free choice.
+const N_SEQUENTIAL: usize = 64;
 /// Number of individuals in a round. Free choice.
-const ROUND: usize = 16;
+const ROUND_SIZE: usize = 16;
 
 /// Number of distances computed before their costs are looked up. Free choice.
-const IN_A_ROW: usize = 32;
+const DISTANCE_BATCH: usize = 32;
 
 /// Position of a boid, in 32nds of a body length.
 pub type Place = [i32; 3];
@@ -52,15 +52,6 @@ pub struct Crowd {
     length_px: f64,
 }
 
-/// Neighbor that an individual should not look like at one frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lookalike {
-    /// State of the neighbor.
-    pub state: u32,
-    /// Cost of looking like the neighbor, in turns.
-    pub cost: u32,
-}
-
 impl Crowd {
     /// Returns the crowd cost of weight `w_c`, in radians. `length_px` is the body length in pixels.
     pub fn new(w_c: f64, fps: f64, length_px: f64) -> Crowd {
@@ -68,7 +59,7 @@ impl Crowd {
             if step == N_STEPS {
                 return 0;
             }
-            let square_bl = (step as f64 + 0.5) / STEPS as f64;
+            let square_bl = (step as f64 + 0.5) / STEPS_PER_SQUARE_BL as f64;
             let near = libm::exp(-square_bl / (2.0 * WIDTH_BL * WIDTH_BL));
             u32::from((w_c * Turns::PER_RAD * near).round() as u16)
         };
@@ -85,14 +76,14 @@ impl Crowd {
     pub fn n_watched(&self, id: usize) -> usize {
         match id {
             _ if self.costs[0] == 0 => 0,
-            0..ONE_BY_ONE => id,
-            _ => id / ROUND * ROUND,
+            0..N_SEQUENTIAL => id,
+            _ => id / ROUND_SIZE * ROUND_SIZE,
         }
     }
 
     /// Returns the position of a boid at frame `t`.
     pub fn place(&self, boid: &BoidTrack, t: usize) -> Place {
-        boid.position_px[t].map(|px| (px / self.length_px * PARTS).round() as i32)
+        boid.position_px[t].map(|px| (px / self.length_px * PARTS_PER_BL).round() as i32)
     }
 
     /// Returns the cost of an individual at `a` for looking like one at `b`, in turns.
@@ -106,17 +97,18 @@ impl Crowd {
     #[inline(always)]
     pub fn costs_at(
         &self,
-        (id, others): (usize, Range<usize>),
+        id: usize,
+        others: Range<usize>,
         places: &Places,
         moment: usize,
         costs: &mut [[u32; FRAMES]],
     ) {
         let here = places.of(id);
         let axes = places.axes.each_ref();
-        let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(IN_A_ROW));
-        for (costs, ((x, y), z)) in costs.chunks_mut(IN_A_ROW).zip(x.zip(y).zip(z)) {
+        let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(DISTANCE_BATCH));
+        for (costs, ((x, y), z)) in costs.chunks_mut(DISTANCE_BATCH).zip(x.zip(y).zip(z)) {
             // First the arithmetic of all distances, then the table.
-            let mut steps = [0; IN_A_ROW];
+            let mut steps = [0; DISTANCE_BATCH];
             for (step, ((&x, &y), &z)) in steps.iter_mut().zip(x.iter().zip(y).zip(z)) {
                 *step = self.step(here, [x, y, z]);
             }
@@ -136,40 +128,6 @@ impl Crowd {
         }
         // A squared body length has 32 x 32 squared parts and 16 table entries.
         (square as u32 >> 6).min(N_STEPS as u32)
-    }
-
-    /// Returns the neighbors that a boid should not look like at frame `t`, among the planned others:
-    /// (boid, states).
-    pub fn lookalikes<'a>(
-        &self,
-        boid: &BoidTrack,
-        others: impl Iterator<Item = (&'a BoidTrack, &'a [u32])>,
-        t: usize,
-    ) -> Vec<Lookalike> {
-        let here = self.place(boid, t);
-        others
-            .filter_map(|(other, states)| {
-                let cost = self.cost_at(here, self.place(other, t));
-                let state = states[t];
-                (cost > 0).then_some(Lookalike { state, cost })
-            })
-            .collect()
-    }
-
-    /// Returns the cost of being in `state` among `lookalikes`, in turns.
-    pub fn cost_of(&self, trellis: &Trellis, lookalikes: &[Lookalike], state: u32) -> u32 {
-        let Some((frame, side)) = trellis.shown(state as usize) else {
-            return 0;
-        };
-        lookalikes
-            .iter()
-            .filter(|other| {
-                trellis
-                    .shown(other.state as usize)
-                    .is_some_and(|shown| shown.1 == side && shown.0.abs_diff(frame) <= self.window)
-            })
-            .map(|other| other.cost)
-            .sum()
     }
 
     /// Returns for each state the states that look like it: first, and one past the last.
@@ -218,7 +176,7 @@ impl FromIterator<Place> for Places {
 
 /// Final plans, prepared for the individuals that watch them.
 #[derive(Clone, Debug)]
-pub struct Settled {
+pub struct FinalPlans {
     /// `[t][id]`: state shown.
     states: Vec<Vec<u32>>,
     /// `[t][id]`: number of steady frames from `t` on, at most `FRAMES`. While frames are steady, the range
@@ -226,10 +184,10 @@ pub struct Settled {
     n_steady: Vec<Vec<u8>>,
 }
 
-impl Settled {
+impl FinalPlans {
     /// Returns an empty set of plans for `n_frames` frames.
-    pub fn new(n_frames: usize) -> Settled {
-        Settled {
+    pub fn new(n_frames: usize) -> FinalPlans {
+        FinalPlans {
             states: vec![Vec::new(); n_frames],
             n_steady: vec![Vec::new(); n_frames],
         }

@@ -4,7 +4,7 @@
 //! `Weights::total` defines the costs. The vector code in this file returns the same integers, faster.
 
 use super::cost::{CEILING, Feature, Weights};
-use super::landings::Way;
+use super::landings::Pass;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::store;
 use super::viterbi::{Block, FRAMES};
@@ -19,22 +19,23 @@ impl Weights {
         &self,
         wanted: &[Feature; FRAMES],
         features: &[Feature],
-        (block, first): (&Block, usize),
+        block: &Block,
+        first: usize,
         out: &mut [[u32; FRAMES]],
     ) {
         let features = &features[block.states(first..first + out.len())];
-        let (pairs, rest) = match block.way {
-            Way::Ahead => features.as_chunks::<2>(),
-            Way::Back => {
+        let (pairs, rest) = match block.pass {
+            Pass::Forward => features.as_chunks::<2>(),
+            Pass::Backward => {
                 let (rest, pairs) = features.as_rchunks::<2>();
                 (pairs, rest)
             }
         };
         let (of_pairs, of_rest) = out.split_at_mut(features.len() - rest.len());
         let of_pairs = of_pairs.as_chunks_mut::<2>().0.iter_mut();
-        match block.way {
-            Way::Ahead => self.fill_pairs(block, wanted, pairs.iter().zip(of_pairs)),
-            Way::Back => self.fill_pairs(block, wanted, pairs.iter().rev().zip(of_pairs)),
+        match block.pass {
+            Pass::Forward => self.fill_pairs(block, wanted, pairs.iter().zip(of_pairs)),
+            Pass::Backward => self.fill_pairs(block, wanted, pairs.iter().rev().zip(of_pairs)),
         }
         for (out, &state) in of_rest.iter_mut().zip(rest) {
             *out = wanted.map(|wanted| self.total(wanted, state));
@@ -61,12 +62,12 @@ impl Weights {
                 #[expect(unsafe_code, reason = "vectors of AVX2")]
                 // SAFETY: the guard of this match arm checks for AVX2.
                 unsafe {
-                    fill_avx2(block.way, (weights, rho), wanted, pairs);
+                    fill_avx2(block.pass, weights, rho, wanted, pairs);
                 }
             }
             _ => {
                 for (&states, out) in pairs {
-                    let [first, second] = block.way.stations_of(states);
+                    let [first, second] = block.pass.in_station_order(states);
                     *out =
                         [first, second].map(|state| wanted.map(|wanted| self.total(wanted, state)));
                 }
@@ -85,8 +86,9 @@ impl Weights {
 #[target_feature(enable = "avx2")]
 #[inline]
 fn fill_avx2<'a>(
-    way: Way,
-    ([whole, within, speed], rho): ([i16; 3], i16),
+    pass: Pass,
+    [whole, within, speed]: [i16; 3],
+    rho: i16,
     wanted: &[Feature; FRAMES],
     pairs: impl Iterator<Item = (&'a [Feature; 2], &'a mut [[u32; FRAMES]; 2])>,
 ) {
@@ -95,7 +97,7 @@ fn fill_avx2<'a>(
     // If the compiler saw the constant, it would use three instructions in place of one.
     let spread = |byte: u8| {
         let both = |at: u8| _mm_set1_epi16(i16::from_le_bytes([at + byte, at + byte + 1]));
-        let [first, second] = way.stations_of([0, 8]).map(both);
+        let [first, second] = pass.in_station_order([0, 8]).map(both);
         std::hint::black_box(_mm256_setr_m128i(first, second))
     };
     let lanes = |of: &dyn Fn(Feature) -> u16| {
@@ -192,16 +194,16 @@ mod tests {
 
     proptest! {
         #[test]
-        fn stations_are_filled_in_with_what_the_definition_says(
+        fn filled_costs_equal_the_definition(
             all in features(41), wanted in features(FRAMES), weights in weights(),
             first in 0usize..30, n in 1usize..12,
         ) {
             let wanted: [Feature; FRAMES] = wanted.try_into().expect("as many");
-            let ways = |cpu| [(cpu, Way::Ahead), (cpu, Way::Back)];
-            for (cpu, way) in Level::available().into_iter().flat_map(ways) {
-                let block = Block { way, cpu, n_states: all.len(), times: [0; FRAMES] };
+            let passes = |cpu| [(cpu, Pass::Forward), (cpu, Pass::Backward)];
+            for (cpu, pass) in Level::available().into_iter().flat_map(passes) {
+                let block = Block { pass, cpu, n_states: all.len(), times: [0; FRAMES] };
                 let mut found = vec![[0; FRAMES]; n];
-                weights.fill(&wanted, &all, (&block, first), &mut found);
+                weights.fill(&wanted, &all, &block, first, &mut found);
                 for (station, found) in (first..).zip(found) {
                     let state = all[block.state(station)];
                     prop_assert_eq!(found, wanted.map(|wanted| weights.total(wanted, state)));

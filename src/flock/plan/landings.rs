@@ -9,35 +9,35 @@ use std::ops::Range;
 /// A station is a state numbered in that direction, so that playing on leads from each station to the next.
 /// Forward in time the stations are the states in their order, backward in the reverse order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum Pass {
     /// Forward in time.
-    Ahead,
+    Forward,
     /// Backward, from the last frame to the first.
-    Back,
+    Backward,
 }
 
-impl Way {
+impl Pass {
     /// Returns the station of a state, or the state of a station. `n_states` is the number of states.
     pub fn station(self, n_states: usize, state: usize) -> usize {
         match self {
-            Way::Ahead => state,
-            Way::Back => n_states - 1 - state,
+            Pass::Forward => state,
+            Pass::Backward => n_states - 1 - state,
         }
     }
 
     /// Converts a pair of values between the order of two consecutive states and that of their stations.
-    pub fn stations_of<T>(self, [first, second]: [T; 2]) -> [T; 2] {
+    pub fn in_station_order<T>(self, [first, second]: [T; 2]) -> [T; 2] {
         match self {
-            Way::Ahead => [first, second],
-            Way::Back => [second, first],
+            Pass::Forward => [first, second],
+            Pass::Backward => [second, first],
         }
     }
 
     /// Returns the stations of a range of states, or the states of a range of stations.
     pub fn stations(self, n_states: usize, states: Range<usize>) -> Range<usize> {
         match self {
-            Way::Ahead => states,
-            Way::Back => n_states - states.end..n_states - states.start,
+            Pass::Forward => states,
+            Pass::Backward => n_states - states.end..n_states - states.start,
         }
     }
 }
@@ -159,9 +159,9 @@ mod tests {
     }
 
     #[test]
-    fn a_way_back_turns_states_around() {
-        assert_eq!(Way::Back.station(10, 0), 9);
-        assert_eq!(Way::Back.stations(10, 2..5), 5..8);
-        assert_eq!(Way::Ahead.stations(10, 2..5), 2..5);
+    fn backward_pass_reverses_states() {
+        assert_eq!(Pass::Backward.station(10, 0), 9);
+        assert_eq!(Pass::Backward.stations(10, 2..5), 5..8);
+        assert_eq!(Pass::Forward.stations(10, 2..5), 2..5);
     }
 }

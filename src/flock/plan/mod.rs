@@ -2,35 +2,35 @@
 //!
 //! For each individual, the planner finds the sequence of real frames that follows its boid at the least
 //! cost, exactly (Okabe et al., section 5.1; docs/explanation/algorithms.md, "Planning"). `cost` and
-//! `crowd` define the costs, `viterbi` finds the cheapest path, `segment` and `circle` handle segments and
+//! `crowd` define the costs, `viterbi` finds the cheapest path, `segment` and `loops` handle segments and
 //! loops.
 
-mod added;
-pub mod certificate;
-pub mod circle;
+mod conditions;
 pub mod cost;
 pub mod crowd;
 mod fill;
+mod individual_plan;
 pub mod landings;
 #[cfg(target_arch = "x86_64")]
 mod lanes;
+pub mod loops;
+mod range_costs;
 mod round;
-mod rows;
 pub mod segment;
-mod spent;
+mod state_costs;
 pub mod trellis;
 pub mod viterbi;
 
 use rayon::prelude::*;
 
-use self::circle::Ends;
+use self::conditions::FORBIDDEN;
 use self::cost::{CEILING, Feature, Weights};
-use self::crowd::{Crowd, Places, Settled};
-use self::round::Round;
-use self::segment::{Standing, future_costs};
-pub use self::spent::{Plan, Spent};
+use self::crowd::{Crowd, FinalPlans, Places};
+pub use self::individual_plan::{CostParts, Plan};
+use self::loops::LoopEnds;
+use self::segment::{PlaybackStatus, future_costs};
 use self::trellis::Trellis;
-use self::viterbi::{Film, Path, Shelf};
+use self::viterbi::{Path, PathSearch, TracePool};
 use super::error::Error;
 use super::individual::BoidTrack;
 use super::motion::FrameMotion;
@@ -43,8 +43,8 @@ use crate::progress::Progress;
 pub struct Model {
     /// States and the steps between them.
     pub trellis: Trellis,
-    /// Future cost by state, in turns; `None` for a state from which playback cannot continue.
-    pub future: Vec<Option<u32>>,
+    /// Future cost by state, in turns; `FORBIDDEN` for a state from which playback cannot continue.
+    future: Vec<u32>,
     /// Least number of frames between two jumps.
     pub dwell: usize,
     weights: Weights,
@@ -54,7 +54,7 @@ pub struct Model {
     /// By state: the states that look like it, as first and one past the last.
     alike: Vec<[u32; 2]>,
     fps: f64,
-    shelf: Shelf,
+    trace_pool: TracePool,
 }
 
 impl Model {
@@ -66,7 +66,7 @@ impl Model {
             .map_or(library.clip_frames, |frames| frames as usize)
             .max(1);
         let playback = library.playback.without_dead_ends(params.mirror, dwell);
-        let trellis = Trellis::new(&playback, params.mirror, |jump| weights.of_jump(jump));
+        let trellis = Trellis::new(&playback, params.mirror, |jump| weights.jump_cost(jump));
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let crowd = Crowd::new(params.matching.w_c, fps, length_px);
@@ -79,7 +79,7 @@ impl Model {
             trellis,
             weights,
             fps,
-            shelf: Shelf::default(),
+            trace_pool: TracePool::default(),
         }
     }
 
@@ -91,13 +91,18 @@ impl Model {
             .collect()
     }
 
+    /// Returns whether endless playback can continue from a state.
+    pub fn is_endless(&self, state: u32) -> bool {
+        self.future[state as usize] < FORBIDDEN
+    }
+
     /// Returns the part of a jump's cost for showing frames again, in turns.
-    fn return_cost(&self, from: u32, to: u32) -> u32 {
+    fn repetition_cost(&self, from: u32, to: u32) -> u32 {
         let ends = [from, to].map(|state| self.trellis.shown(state as usize));
         let [Some((from, from_side)), Some((to, side))] = ends else {
             return 0;
         };
-        self.weights.of_return(&Jump {
+        self.weights.repetition_cost(&Jump {
             from,
             to,
             cost: 0,
@@ -108,7 +113,7 @@ impl Model {
     /// Returns the heading cost of a state at the first frame of a boid's track, in turns.
     pub fn heading_cost(&self, boid: &BoidTrack, state: usize) -> u32 {
         let wanted = self.weights.wanted(boid, self.fps)[0];
-        self.weights.of_state(wanted, self.features[state])[0]
+        self.weights.parts_of(wanted, self.features[state])[0]
     }
 }
 
@@ -120,24 +125,24 @@ pub struct Planner<'a> {
     boids: &'a [BoidTrack],
     /// State of each individual before the segment, by id; empty for the first segment. In later segments,
     /// entry 0 of `places` belongs to the last frame of the previous segment.
-    standings: &'a [Standing],
+    statuses: &'a [PlaybackStatus],
     /// Whether no segment follows.
     is_last: bool,
     /// In a loop, the ends of each plan, by id; else empty.
-    ends: Vec<Ends>,
+    ends: Vec<LoopEnds>,
 }
 
 impl<'a> Planner<'a> {
     /// Returns a planner for a whole film.
     pub fn new(model: &'a Model, boids: &'a [BoidTrack]) -> Planner<'a> {
-        Planner::of_segment(model, boids, &[], true)
+        Planner::for_segment(model, boids, &[], true)
     }
 
     /// Returns a planner for a segment. `boids` are the tracks within that segment.
-    pub fn of_segment(
+    pub fn for_segment(
         model: &'a Model,
         boids: &'a [BoidTrack],
-        standings: &'a [Standing],
+        statuses: &'a [PlaybackStatus],
         is_last: bool,
     ) -> Planner<'a> {
         let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
@@ -147,12 +152,12 @@ impl<'a> Planner<'a> {
                 .map(|boid| model.crowd.place(boid, t))
                 .collect()
         };
-        let before = (!standings.is_empty()).then_some(0);
+        let before = (!statuses.is_empty()).then_some(0);
         Planner {
             model,
             places: before.into_iter().chain(0..n_frames).map(place).collect(),
             boids,
-            standings,
+            statuses,
             is_last,
             ends: Vec::new(),
         }
@@ -160,23 +165,27 @@ impl<'a> Planner<'a> {
 
     /// Returns the number of entries of `places` before the first planned frame.
     fn n_before(&self) -> usize {
-        usize::from(!self.standings.is_empty())
+        usize::from(!self.statuses.is_empty())
     }
 
-    /// Returns the plans of all boids of a loop, by id. `heirs[id]` is the individual as which `id`
-    /// continues, so the last frame of its plan leads to the first frame of the heir's plan. Fails if no
+    /// Returns the plans of all boids of a loop, by id. `continuations[id]` is the individual as which
+    /// `id` continues, so the last frame of its plan leads to the first frame of that plan. Fails if no
     /// loop of this length closes.
-    pub fn plan_loop(mut self, heirs: &[u32], progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
+    pub fn plan_loop(
+        mut self,
+        continuations: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Plan>, Error> {
         if self.places.len() <= self.model.dwell {
             return Err(Error::LoopDoesNotClose(self.places.len()));
         }
         let wanted = self.wanted();
-        let mut settled = Settled::new(self.places.len());
-        let open = self.paths(&wanted, &mut settled, progress)?;
-        let firsts = self.firsts(&open, &wanted, heirs, progress)?;
-        let next = heirs.iter().map(|&heir| firsts[heir as usize]);
-        self.ends = (firsts.iter().zip(next))
-            .map(|(&first, next)| Ends { first, next })
+        let mut final_plans = FinalPlans::new(self.places.len());
+        let open = self.paths(&wanted, &mut final_plans, progress)?;
+        let first_states = self.first_states(&open, &wanted, continuations, progress)?;
+        let next = continuations.iter().map(|&id| first_states[id as usize]);
+        self.ends = (first_states.iter().zip(next))
+            .map(|(&first, next)| LoopEnds { first, next })
             .collect();
         self.plan(progress)
     }
@@ -197,10 +206,10 @@ impl<'a> Planner<'a> {
     /// the lower bound.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
         let wanted = self.wanted();
-        let mut settled = Settled::new(self.places.len());
+        let mut final_plans = FinalPlans::new(self.places.len());
         let (paths, bounds) = rayon::join(
-            || self.paths(&wanted, &mut settled, progress),
-            || self.round(&wanted, 0, wanted.len()).least_costs(progress),
+            || self.paths(&wanted, &mut final_plans, progress),
+            || self.least_costs(&wanted, progress),
         );
         let (paths, bounds) = (paths?, bounds?);
         Ok((paths.par_iter().enumerate())
@@ -213,7 +222,7 @@ impl<'a> Planner<'a> {
     fn paths(
         &self,
         wanted: &[Vec<Feature>],
-        settled: &mut Settled,
+        final_plans: &mut FinalPlans,
         progress: &dyn Progress,
     ) -> Result<Vec<Path>, Error> {
         let mut paths = Vec::with_capacity(wanted.len());
@@ -225,31 +234,23 @@ impl<'a> Planner<'a> {
             let n_watched = self.model.crowd.n_watched(first);
             let alike = |id: &usize| self.model.crowd.n_watched(*id) == n_watched;
             let end = first + (first..wanted.len()).take_while(alike).count();
-            let round = self.round(wanted, first, end).paths(settled)?;
+            let round = self.paths_of_round(first, &wanted[first..end], final_plans)?;
             for path in &round {
-                settled.push(self.film_of(path), &self.model.alike);
+                final_plans.push(self.states_in_film(path), &self.model.alike);
             }
             paths.extend(round);
         }
         Ok(paths)
     }
 
-    fn round<'b>(&'b self, wanted: &'b [Vec<Feature>], first: usize, end: usize) -> Round<'b> {
-        let wanted = &wanted[first..end];
-        Round {
-            planner: self,
-            first,
-            wanted,
-        }
-    }
-
-    fn film(&self) -> Film<'_> {
-        Film {
+    /// Returns the search for the paths of all individuals.
+    fn search(&self) -> PathSearch<'_> {
+        PathSearch {
             trellis: &self.model.trellis,
             n_frames: self.places.len() + usize::from(!self.ends.is_empty()),
             dwell: self.model.dwell,
             cpu: Level::detect(),
-            shelf: &self.model.shelf,
+            trace_pool: &self.model.trace_pool,
         }
     }
 
@@ -258,10 +259,10 @@ impl<'a> Planner<'a> {
     fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
         let n_before = self.n_before();
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
-        let states = &self.film_of(path)[n_before..];
+        let states = &self.states_in_film(path)[n_before..];
         for (&wanted, &state) in wanted[n_before..].iter().zip(states) {
             let feature = self.model.features[state as usize];
-            let [h, s] = self.model.weights.of_state(wanted, feature);
+            let [h, s] = self.model.weights.parts_of(wanted, feature);
             heading += u64::from(h);
             speed += u64::from(s);
             alone += self.model.weights.total(wanted, feature);
@@ -269,7 +270,7 @@ impl<'a> Planner<'a> {
         let [jumps, repetition] = self.jump_costs(path);
         Plan {
             states: states.to_vec(),
-            cost: Spent {
+            cost: CostParts {
                 heading,
                 speed,
                 transition: u64::from(jumps - repetition),
@@ -283,14 +284,25 @@ impl<'a> Planner<'a> {
 
     /// Returns the cost of a path, given the final plans of others, without the future cost of its last
     /// state, in turns.
-    fn cost_among(&self, id: usize, wanted: &[Feature], settled: &Settled, path: &Path) -> u32 {
+    fn cost_among(
+        &self,
+        id: usize,
+        wanted: &[Feature],
+        final_plans: &FinalPlans,
+        path: &Path,
+    ) -> u32 {
         let model = self.model;
         let n_watched = model.crowd.n_watched(id);
         let [mut cost, _] = self.jump_costs(path);
-        for (t, &state) in self.film_of(path).iter().enumerate().skip(self.n_before()) {
+        for (t, &state) in self
+            .states_in_film(path)
+            .iter()
+            .enumerate()
+            .skip(self.n_before())
+        {
             let places = &self.places[t];
             let of_one = |other: usize| {
-                let [first, end] = model.alike[settled.at(t)[other] as usize];
+                let [first, end] = model.alike[final_plans.at(t)[other] as usize];
                 let is_alike = (first..end).contains(&state);
                 is_alike.then(|| model.crowd.cost_at(places.of(id), places.of(other)))
             };
@@ -302,7 +314,7 @@ impl<'a> Planner<'a> {
     }
 
     /// Returns the states of a path within the film. A loop's path has one more state.
-    fn film_of<'b>(&self, path: &'b Path) -> &'b [u32] {
+    fn states_in_film<'b>(&self, path: &'b Path) -> &'b [u32] {
         &path.states[..self.places.len()]
     }
 
@@ -313,7 +325,7 @@ impl<'a> Planner<'a> {
         let jumps = steps.filter(|step| step[1] != step[0] + 1);
         let costs = jumps.map(|step| {
             let cost = self.model.trellis.jump_cost(step[0], step[1]);
-            [cost, self.model.return_cost(step[0], step[1])]
+            [cost, self.model.repetition_cost(step[0], step[1])]
         });
         costs.fold([0; 2], |sum, cost| [sum[0] + cost[0], sum[1] + cost[1]])
     }

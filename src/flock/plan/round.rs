@@ -6,91 +6,100 @@
 use rayon::prelude::*;
 
 use super::Planner;
-use super::circle::{Asked, Closed, FORBIDDEN, Then};
+use super::conditions::{ConditionedCosts, Conditions, FORBIDDEN};
 use super::cost::Feature;
-use super::crowd::Settled;
-use super::rows::{Alone, InCrowd};
-use super::segment::Begun;
-use super::viterbi::{Film, Path};
+use super::crowd::FinalPlans;
+use super::state_costs::{CrowdedCosts, OwnCosts};
+use super::viterbi::{Path, PathSearch};
 use crate::flock::error::Error;
 use crate::progress::Progress;
 
-/// Individuals of consecutive ids that are planned in parallel.
-pub(super) struct Round<'a> {
-    pub(super) planner: &'a Planner<'a>,
-    /// Id of the first individual.
-    pub(super) first: usize,
-    /// Features that each individual asks for, by frame.
-    pub(super) wanted: &'a [Vec<Feature>],
-}
-
-impl Round<'_> {
-    /// Returns the cheapest path of each individual, given the final plans. Fails if an individual has
-    /// none.
-    pub(super) fn paths(&self, settled: &Settled) -> Result<Vec<Path>, Error> {
-        let wanted = self.wanted.par_iter().enumerate();
+impl Planner<'_> {
+    /// Returns the cheapest path of each individual of a round, given the final plans. `first` is the id of
+    /// the first individual. Fails if an individual has no path.
+    pub(super) fn paths_of_round(
+        &self,
+        first: usize,
+        wanted: &[Vec<Feature>],
+        final_plans: &FinalPlans,
+    ) -> Result<Vec<Path>, Error> {
+        let wanted = wanted.par_iter().enumerate();
         wanted
-            .map(|(idx, wanted)| self.in_crowd(self.first + idx, wanted, settled))
+            .map(|(idx, wanted)| self.cheapest_path(first + idx, wanted, final_plans))
             .collect()
     }
 
     /// Returns the cost of each individual's cheapest path without crowd cost and future cost, in turns.
-    pub(super) fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
-        let planner = self.planner;
-        let open = Film {
-            n_frames: planner.places.len(),
-            ..planner.film()
+    pub(super) fn least_costs(
+        &self,
+        wanted: &[Vec<Feature>],
+        progress: &dyn Progress,
+    ) -> Result<Vec<u32>, Error> {
+        let open = PathSearch {
+            n_frames: self.places.len(),
+            ..self.search()
         };
-        let least = |(idx, wanted): (usize, &Vec<Feature>)| {
+        let least = |(id, wanted): (usize, &Vec<Feature>)| {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }
-            let rows = Alone { planner, wanted };
-            let mut rows = self.begun(self.first + idx, rows);
-            (open.least_cost(&mut rows)).ok_or(Error::NoTransitions)
+            let planner = self;
+            let mut state_costs = ConditionedCosts {
+                state_costs: OwnCosts { planner, wanted },
+                conditions: self.continued(id),
+            };
+            (open.least_cost(&mut state_costs)).ok_or(Error::NoTransitions)
         };
-        self.wanted.par_iter().enumerate().map(least).collect()
+        wanted.par_iter().enumerate().map(least).collect()
     }
 
-    /// Returns the costs with the conditions of a loop. Outside of loops they are unchanged.
-    fn closed<'b>(&self, id: usize, rows: InCrowd<'b>) -> Closed<'b, InCrowd<'b>> {
-        let ends = self.planner.ends.get(id);
-        let asked = ends.map(|ends| Asked {
-            first: Some(ends.first),
-            then: Then::Only(ends.next),
-        });
-        self.planner.closed(rows, asked)
-    }
-
-    /// Returns the costs with the condition that a plan continues from what the individual has shown
-    /// before.
-    fn begun<'b, R>(&self, id: usize, rows: R) -> Begun<'b, R> {
-        let standing = self.planner.standings.get(id);
-        Begun {
-            rows,
-            from: standing.and_then(|standing| Some((standing.state?, standing.held))),
-            n_frames: self.planner.places.len(),
-            future: None,
+    /// Returns the condition that a plan continues from what the individual has shown before. Frame 0 is then
+    /// the last frame of the segment before. Only one path leads from its state through the frames that must
+    /// be played on.
+    fn continued(&self, id: usize) -> Conditions<'_> {
+        let shown = self.statuses.get(id);
+        let Some((state, n_forced)) =
+            shown.and_then(|status| Some((status.state?, status.n_forced)))
+        else {
+            return Conditions::default();
+        };
+        let only = |t: usize| Some((t, state as usize + t));
+        let n_forced = n_forced.min(self.places.len() - 1);
+        Conditions {
+            only: [only(0), only(n_forced), None],
+            outside: Some(0),
+            added: None,
         }
     }
 
     /// Returns the cheapest path of one individual, given the final plans.
-    fn in_crowd(&self, id: usize, wanted: &[Feature], settled: &Settled) -> Result<Path, Error> {
-        let planner = self.planner;
-        let ends = planner.ends.get(id);
-        let rows = InCrowd::new(planner, settled, id, wanted);
-        let costs = Begun {
-            future: (!planner.is_last).then_some(&planner.model.future[..]),
-            ..self.begun(id, self.closed(id, rows))
+    fn cheapest_path(
+        &self,
+        id: usize,
+        wanted: &[Feature],
+        final_plans: &FinalPlans,
+    ) -> Result<Path, Error> {
+        let ends = self.ends.get(id);
+        let n_frames = self.places.len();
+        let mut conditions = match ends {
+            Some(ends) => ends.conditions(n_frames, self.model.dwell),
+            None => self.continued(id),
         };
-        let path = (planner.film().cheapest_path(&costs)).ok_or(Error::NoTransitions)?;
+        if !self.is_last {
+            conditions.added = Some((n_frames - 1, &self.model.future[..]));
+        }
+        let state_costs = ConditionedCosts {
+            state_costs: CrowdedCosts::new(self, final_plans, id, wanted),
+            conditions,
+        };
+        let path = (self.search().cheapest_path(&state_costs)).ok_or(Error::NoTransitions)?;
         let is_closed = ends.is_none_or(|ends| ends.holds(&path.states));
         match (is_closed && path.cost < FORBIDDEN, ends) {
             (true, _) => Ok(Path {
-                cost: planner.cost_among(id, wanted, settled, &path),
+                cost: self.cost_among(id, wanted, final_plans, &path),
                 states: path.states,
             }),
-            (false, Some(_)) => Err(Error::LoopDoesNotClose(planner.places.len())),
+            (false, Some(_)) => Err(Error::LoopDoesNotClose(self.places.len())),
             (false, None) => Err(Error::NoTransitions),
         }
     }

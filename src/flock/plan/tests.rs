@@ -1,12 +1,10 @@
-//! Tests of plans of whole flocks: their certificates, and their costs recomputed from the files.
+//! Tests of plans of whole flocks, against the independent check and against all paths.
 
 use super::*;
-use crate::flock::follow::segments;
+use crate::flock::check::check;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
 use crate::flock::params::{MatchBy, Position};
-use crate::flock::plan::landings::Way;
-use crate::flock::plan::viterbi::{Block, FRAMES, Rows};
 use crate::flock::synthetic;
 use crate::flock::{Flock, plan_flock};
 use crate::geometry::Turns;
@@ -31,121 +29,25 @@ fn flock(view: View, name: &str) -> (Library, Flock) {
     (library, flock)
 }
 
-/// Returns the cost J of one individual, in turns, recomputed from the contents of the files
-/// (docs/explanation/algorithms.md, "Planning").
-fn cost_from_outside(library: &Library, flock: &Flock, id: usize) -> u32 {
-    let motion = motion_of(library, &Lens::of(library, &flock.params));
-    let weights = Weights::new(&flock.params.matching, library);
-    let crowd = Crowd::new(flock.params.matching.w_c, flock.fps, flock.length_px);
-    let trellis = Trellis::new(&library.playback, flock.params.mirror, |_| 0);
-    let features = weights.features(&trellis, &motion);
-    let individual = &flock.individuals[id];
-    let boid = &individual.boid;
-    let of_segment = |segment: &[usize]| {
-        let boid = boid.part(segment[0]..segment[1]);
-        weights.wanted(&boid, flock.fps)
-    };
-    let n_frames = flock.params.frames as usize;
-    let segments = match flock.params.position {
-        Position::Film => segments(n_frames, flock.params.matching.segment_frames, flock.fps),
-        _ => vec![0, n_frames],
-    };
-    let wanted: Vec<Feature> = segments.windows(2).flat_map(of_segment).collect();
-    let state = |i: usize, t: usize| {
-        let other = &flock.individuals[i];
-        trellis
-            .state(other.source_frame[t], other.mirrored[t])
-            .expect("a frame of the component")
-    };
-    let states: Vec<Vec<u32>> = (0..crowd.n_watched(id))
-        .map(|i| (0..wanted.len()).map(|t| state(i, t)).collect())
-        .collect();
-    let mut total = 0;
-    for (t, &wanted) in wanted.iter().enumerate() {
-        let here = state(id, t);
-        total += weights.total(wanted, features[here as usize]);
-        let others = flock.individuals.iter().map(|i| &i.boid);
-        let others = others.zip(states.iter().map(Vec::as_slice));
-        let near = crowd.lookalikes(boid, others, t);
-        total += crowd.cost_of(&trellis, &near, here);
-        if t > 0 && state(id, t - 1) + 1 != here {
-            let (from, to) = (individual.source_frame[t - 1], individual.source_frame[t]);
-            let turned = individual.mirrored[t - 1] != individual.mirrored[t];
-            let jumps = library.playback.jumps.iter();
-            let mut jumps = jumps.filter(|j| (j.from, j.to, j.mirrored) == (from, to, turned));
-            let jump = jumps.next().expect("a jump of the library");
-            total += weights.of_jump(jump);
-        }
-    }
-    total
-}
-
 #[test]
-fn the_cost_recomputed_from_the_file_and_the_library_is_the_one_told() {
+fn plans_read_from_their_file_pass_the_check() {
     for (view, name) in [
         (View::Side, "school"),
         (View::Top, "swarm"),
         (View::Side, "papers"),
         (View::Side, "position"),
+        (View::Top, "position"),
     ] {
         let (library, flock) = flock(view, name);
         let bytes = crate::formats::flock_json::write(&flock);
         let flock = crate::formats::flock_json::read(&bytes).unwrap();
-        for (id, individual) in flock.individuals.iter().enumerate() {
+        check(&library, &flock, &Silent).expect(name);
+        for individual in &flock.individuals {
             let cost = individual.cost;
-            let told = (cost.total * Turns::PER_RAD).round() as u32;
-            assert_eq!(cost_from_outside(&library, &flock, id), told, "{name} {id}");
             let parts = cost.heading + cost.speed + cost.transition + cost.crowd + cost.repetition;
             assert!((parts - cost.total).abs() < 1e-5);
             assert!(cost.lower_bound <= cost.total);
         }
-    }
-}
-
-#[test]
-fn the_plans_of_a_flock_hold_their_certificates() {
-    let (library, flock) = flock(View::Side, "school");
-    let boids: Vec<BoidTrack> = flock.individuals.iter().map(|i| i.boid.clone()).collect();
-    let motion = motion_of(&library, &Lens::of(&library, &flock.params));
-    let model = Model::new(&library, &motion, &flock.params);
-    let planner = Planner::new(&model, &boids);
-    let mut settled = Settled::new(planner.places.len());
-    for (id, boid) in boids.iter().enumerate() {
-        let wanted = planner.model.weights.wanted(boid, planner.model.fps);
-        let rows = || rows::InCrowd::new(&planner, &settled, id, &wanted);
-        let film = planner.film();
-        let path = film.cheapest_path(&rows()).unwrap();
-        let columns = film.potentials(&mut rows());
-        let (mut rows, n_states) = (rows(), planner.model.trellis.n_states());
-        let costs: Vec<Vec<[u32; FRAMES]>> = (0..wanted.len())
-            .map(|t| {
-                let mut row = vec![[0; FRAMES]; n_states];
-                let frame = |lane: usize| (t + lane).saturating_sub(FRAMES - 1);
-                let (way, times) = (Way::Ahead, std::array::from_fn(frame));
-                let cpu = Level::detect();
-                rows.fill(
-                    &Block {
-                        way,
-                        cpu,
-                        n_states,
-                        times,
-                    },
-                    0,
-                    &mut row,
-                );
-                row
-            })
-            .collect();
-        let cost_at = |t: usize, state: usize| costs[t][state][FRAMES - 1];
-        let checked = certificate::check(
-            &planner.model.trellis,
-            planner.model.dwell,
-            &cost_at,
-            &columns,
-            &path,
-        );
-        assert_eq!(checked, Ok(()), "individual {id}");
-        settled.push(&path.states, &planner.model.alike);
     }
 }
 
@@ -157,12 +59,12 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
         if ends.is_some_and(|ends| path.last() != Some(&ends.next)) {
             return u32::MAX;
         }
-        let settled = Settled::new(planner.places.len());
+        let final_plans = FinalPlans::new(planner.places.len());
         let path = viterbi::Path {
             states: path.clone(),
             cost: 0,
         };
-        return planner.cost_among(0, wanted, &settled, &path);
+        return planner.cost_among(0, wanted, &final_plans, &path);
     }
     let trellis = &planner.model.trellis;
     let states = 0..trellis.n_states() as u32;
@@ -196,7 +98,7 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
 }
 
 #[test]
-fn no_plan_is_cheaper_and_jumps_back_are_dear() {
+fn plan_is_the_cheapest_and_the_jump_back_cost_reduces_repeats() {
     let library = synthetic::few_looks();
     let mut params = Params {
         count: Some(1),
@@ -216,8 +118,8 @@ fn no_plan_is_cheaper_and_jumps_back_are_dear() {
         let planner = Planner::new(&model, &boids);
         let wanted = planner.model.weights.wanted(&boids[0], planner.model.fps);
         let least = least_by_brute_force(&planner, &wanted, &mut Vec::new());
-        let told = (aware.individuals[0].cost.total * Turns::PER_RAD).round() as u32;
-        assert_eq!(told, least, "seed {seed}");
+        let stored = (aware.individuals[0].cost.total * Turns::PER_RAD).round() as u32;
+        assert_eq!(stored, least, "seed {seed}");
         n_again += aware.stats.repeats_per_100_frames;
         n_again_for_nothing += unaware.stats.repeats_per_100_frames;
     }
@@ -228,7 +130,7 @@ fn no_plan_is_cheaper_and_jumps_back_are_dear() {
 }
 
 #[test]
-fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
+fn loop_plan_is_the_cheapest_that_leads_to_its_continuation() {
     let library = synthetic::few_looks();
     for seed in 0..16 {
         let params = Params {
@@ -252,21 +154,21 @@ fn no_plan_that_plays_into_its_heirs_first_state_is_cheaper() {
         for (frame, side) in [own, (200, false)] {
             let first = planner.model.trellis.state(frame, side);
             let first = first.expect("a frame of the component");
-            planner.ends = vec![Ends { first, next: first }];
-            let mut settled = Settled::new(planner.places.len());
-            let found = planner.paths(&wanted, &mut settled, &Silent).unwrap();
+            planner.ends = vec![LoopEnds { first, next: first }];
+            let mut final_plans = FinalPlans::new(planner.places.len());
+            let found = planner.paths(&wanted, &mut final_plans, &Silent).unwrap();
             let least = least_by_brute_force(&planner, &wanted[0], &mut Vec::new());
             assert_eq!(found[0].cost, least, "seed {seed}");
             if (frame, side) == own {
-                let told = (one.cost.total * Turns::PER_RAD).round() as u32;
-                assert_eq!(told, least, "seed {seed}");
+                let stored = (one.cost.total * Turns::PER_RAD).round() as u32;
+                assert_eq!(stored, least, "seed {seed}");
             }
         }
     }
 }
 
 #[test]
-fn a_loop_closes_wherever_any_film_of_its_length_leads_back_to_where_it_began() {
+fn loop_closes_if_any_plan_of_its_length_returns() {
     let library = synthetic::few_looks();
     let plan = |count, frames, seed| {
         let params = Params {
@@ -293,7 +195,7 @@ fn a_loop_closes_wherever_any_film_of_its_length_leads_back_to_where_it_began() 
 }
 
 #[test]
-fn after_a_jump_at_least_the_dwell_is_played() {
+fn jumps_are_at_least_the_dwell_apart() {
     let (library, flock) = flock(View::Side, "swarm");
     for individual in &flock.individuals {
         let shown: Vec<(u32, bool)> = individual
@@ -314,7 +216,7 @@ fn after_a_jump_at_least_the_dwell_is_played() {
 }
 
 #[test]
-fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
+fn matching_by_position_follows_boid_velocities_better_than_by_heading() {
     let gap = |by: MatchBy| {
         let library = synthetic::library(View::Side);
         let mut params = Params {
@@ -344,7 +246,7 @@ fn matched_by_place_frames_move_more_as_the_boids_do_than_matched_by_heading() {
 }
 
 #[test]
-fn whoever_is_in_a_later_round_looks_out_for_all_rounds_before() {
+fn individuals_of_later_rounds_watch_all_rounds_before() {
     let crowd = Crowd::new(0.3, 30.0, 40.0);
     assert_eq!([0, 1, 63].map(|id| crowd.n_watched(id)), [0, 1, 63]);
     let later = [64, 79, 80, 95, 96].map(|id| crowd.n_watched(id));
@@ -354,7 +256,7 @@ fn whoever_is_in_a_later_round_looks_out_for_all_rounds_before() {
 }
 
 #[test]
-fn a_large_flock_has_the_same_plans_for_any_number_of_threads_and_its_costs_add_up() {
+fn large_flock_has_the_same_plans_for_any_number_of_threads() {
     let library = synthetic::library(View::Side);
     let params = Params {
         count: Some(90),
@@ -371,8 +273,5 @@ fn a_large_flock_has_the_same_plans_for_any_number_of_threads_and_its_costs_add_
     };
     let flock = planned(1);
     assert_eq!(flock, planned(3));
-    for id in [63, 64, 79, 80, 89] {
-        let told = (flock.individuals[id].cost.total * Turns::PER_RAD).round() as u32;
-        assert_eq!(cost_from_outside(&library, &flock, id), told, "{id}");
-    }
+    check(&library, &flock, &Silent).expect("what the planner makes holds");
 }

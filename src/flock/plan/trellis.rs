@@ -4,7 +4,7 @@
 //! and jumps are sorted by their target. A barrier state precedes each run. No step leaves a barrier, so
 //! playing on always leads from the state before.
 
-use super::landings::{Landings, Way};
+use super::landings::{Landings, Pass};
 use crate::library::{Jump, Playback};
 
 /// Frame number of a barrier.
@@ -15,22 +15,25 @@ const NO_FRAME: u32 = u32::MAX;
 pub struct Trellis {
     frames: Vec<u32>,
     mirrored: Vec<bool>,
-    barriers: Vec<u32>,
+    /// (frame, state) of each state that is not mirrored, rising.
+    unmirrored: Vec<(u32, u32)>,
+    /// Number of states that are not mirrored, barriers included. The mirrored states follow in equal order.
+    n_unmirrored: usize,
     /// Run to which each state belongs.
     runs: Vec<u32>,
     /// Number of states of its run up to each state, itself included; 0 for barriers.
-    since: Vec<u32>,
+    lengths_forward: Vec<u32>,
     /// Number of states of its run from each state on, itself included; 0 for barriers. The last state
     /// comes first.
-    until: Vec<u32>,
+    lengths_backward: Vec<u32>,
     /// States at which jumps land, rising.
     targets: Vec<u32>,
     /// `sources[first_source[k]..first_source[k + 1]]` are the jumps to target k.
     first_source: Vec<u32>,
     /// (source state, cost in turns) of each jump, by target, then by source.
     sources: Vec<(u32, u32)>,
-    ahead: Landings,
-    back: Landings,
+    forward: Landings,
+    backward: Landings,
 }
 
 impl Trellis {
@@ -40,19 +43,20 @@ impl Trellis {
         let mut trellis = Trellis {
             frames: Vec::new(),
             mirrored: Vec::new(),
-            barriers: Vec::new(),
+            unmirrored: Vec::new(),
+            n_unmirrored: 0,
             runs: Vec::new(),
-            since: Vec::new(),
-            until: Vec::new(),
+            lengths_forward: Vec::new(),
+            lengths_backward: Vec::new(),
             targets: Vec::new(),
             first_source: vec![0],
             sources: Vec::new(),
-            ahead: Landings::default(),
-            back: Landings::default(),
+            forward: Landings::default(),
+            backward: Landings::default(),
         };
         let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
         for &side in sides {
-            trellis.lay_side(&playback.component, side);
+            trellis.add_side(&playback.component, side);
         }
         trellis.count_runs();
         let mut jumps: Vec<(u32, u32, u32)> = Vec::new();
@@ -65,7 +69,7 @@ impl Trellis {
                 }
             }
         }
-        trellis.lay_jumps(jumps);
+        trellis.add_jumps(jumps);
         trellis
     }
 
@@ -82,23 +86,16 @@ impl Trellis {
 
     /// Returns the state that shows a frame on a mirror side, if there is one.
     pub fn state(&self, frame: u32, mirrored: bool) -> Option<u32> {
-        let half = match self.mirrored.last() {
-            Some(true) => self.frames.len() / 2,
-            _ => self.frames.len(),
+        let found = self
+            .unmirrored
+            .binary_search_by_key(&frame, |entry| entry.0);
+        let state = self.unmirrored[found.ok()?].1 as usize;
+        let state = if mirrored {
+            state + self.n_unmirrored
+        } else {
+            state
         };
-        let start = if mirrored { half } else { 0 };
-        if start >= self.frames.len() {
-            return None;
-        }
-        // A barrier sorts just before the frame that follows it.
-        let side = &self.frames[start..start + half];
-        let at = side.partition_point_with_barriers(frame);
-        (at < half && side[at] == frame).then_some((start + at) as u32)
-    }
-
-    /// Returns the barriers, rising.
-    pub fn barriers(&self) -> &[u32] {
-        &self.barriers
+        (state < self.n_states()).then_some(state as u32)
     }
 
     /// Returns the states at which jumps land, rising.
@@ -121,19 +118,19 @@ impl Trellis {
     }
 
     /// Returns the jumps from station to station, in one direction of time.
-    pub fn landings(&self, way: Way) -> &Landings {
-        match way {
-            Way::Ahead => &self.ahead,
-            Way::Back => &self.back,
+    pub fn landings(&self, pass: Pass) -> &Landings {
+        match pass {
+            Pass::Forward => &self.forward,
+            Pass::Backward => &self.backward,
         }
     }
 
     /// Returns for each station the number of states of its run up to it, itself included, in one direction
     /// of time; 0 for barriers.
-    pub fn gone_through(&self, way: Way) -> &[u32] {
-        match way {
-            Way::Ahead => &self.since,
-            Way::Back => &self.until,
+    pub fn run_lengths(&self, pass: Pass) -> &[u32] {
+        match pass {
+            Pass::Forward => &self.lengths_forward,
+            Pass::Backward => &self.lengths_backward,
         }
     }
 
@@ -143,19 +140,25 @@ impl Trellis {
         self.frames[state] != NO_FRAME && self.runs.get(end) == Some(&self.runs[state])
     }
 
-    fn lay_side(&mut self, component: &[u32], side: bool) {
+    fn add_side(&mut self, component: &[u32], side: bool) {
         let mut last = None;
         for &frame in component {
             if last.is_none_or(|last: u32| last + 1 != frame) {
-                self.barriers.push(self.frames.len() as u32);
+                let run = self.runs.last().map_or(0, |run| run + 1);
                 self.frames.push(NO_FRAME);
                 self.mirrored.push(side);
-                self.runs.push(self.barriers.len() as u32);
+                self.runs.push(run);
+            }
+            if !side {
+                self.unmirrored.push((frame, self.frames.len() as u32));
             }
             self.frames.push(frame);
             self.mirrored.push(side);
-            self.runs.push(self.barriers.len() as u32);
+            self.runs.extend_from_within(self.runs.len() - 1..);
             last = Some(frame);
+        }
+        if !side {
+            self.n_unmirrored = self.frames.len();
         }
     }
 
@@ -165,22 +168,22 @@ impl Trellis {
             *count
         };
         let (mut since, mut until) = (0, 0);
-        self.since = self.frames.iter().map(|&f| count(&mut since, f)).collect();
-        self.until = (self.frames.iter().rev())
+        self.lengths_forward = self.frames.iter().map(|&f| count(&mut since, f)).collect();
+        self.lengths_backward = (self.frames.iter().rev())
             .map(|&f| count(&mut until, f))
             .collect();
     }
 
-    fn lay_jumps(&mut self, mut jumps: Vec<(u32, u32, u32)>) {
+    fn add_jumps(&mut self, mut jumps: Vec<(u32, u32, u32)>) {
         jumps.sort_unstable();
         jumps.dedup_by_key(|jump| (jump.0, jump.1));
-        self.ahead = Landings::new(self.n_states(), &jumps);
-        let station = |state| Way::Back.station(self.n_states(), state as usize) as u32;
-        let mut back: Vec<_> = (jumps.iter())
+        self.forward = Landings::new(self.n_states(), &jumps);
+        let station = |state| Pass::Backward.station(self.n_states(), state as usize) as u32;
+        let mut backward: Vec<_> = (jumps.iter())
             .map(|&(to, from, cost)| (station(from), station(to), cost))
             .collect();
-        back.sort_unstable();
-        self.back = Landings::new(self.n_states(), &back);
+        backward.sort_unstable();
+        self.backward = Landings::new(self.n_states(), &backward);
         for (target, source, cost) in jumps {
             if self.targets.last() != Some(&target) {
                 self.targets.push(target);
@@ -191,32 +194,6 @@ impl Trellis {
                 *end = self.sources.len() as u32;
             }
         }
-    }
-}
-
-/// Binary search in frames that rise, except for barriers.
-trait FramesWithBarriers {
-    fn partition_point_with_barriers(&self, frame: u32) -> usize;
-}
-
-impl FramesWithBarriers for [u32] {
-    fn partition_point_with_barriers(&self, frame: u32) -> usize {
-        let (mut low, mut high) = (0, self.len());
-        while low < high {
-            let middle = low + (high - low) / 2;
-            // A barrier is never the last entry. The frame after it is compared.
-            let (judged, at) = match self[middle] {
-                NO_FRAME => (self[middle + 1], middle + 1),
-                found => (found, middle),
-            };
-            if judged < frame {
-                low = at + 1;
-            } else {
-                high = middle;
-            }
-        }
-        // If the search ends at a barrier, the frame is the entry after it.
-        low + usize::from(self.get(low) == Some(&NO_FRAME))
     }
 }
 
@@ -239,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_leads_to_its_state_and_back() {
+    fn frames_and_states_map_to_each_other() {
         let trellis = Trellis::new(&playback(), true, |jump| jump.cost as u32);
         for side in [false, true] {
             for frame in 0..20 {

@@ -23,10 +23,10 @@ const HALF_LENGTH_BL: f64 = 0.6;
 /// Half the width of a shadow, in body lengths. Free choice.
 const HALF_WIDTH_BL: f64 = 0.26;
 /// Least half height of a shadow in the picture, in body lengths. Free choice.
-const LEAST_HALF_BL: f64 = 0.1;
+const MIN_HALF_HEIGHT_BL: f64 = 0.1;
 /// Least horizontal extent of a shadow as a share of its length, for headings that are nearly vertical in
 /// the picture. Free choice.
-const LEAST_ACROSS: f64 = 0.4;
+const MIN_ACROSS: f64 = 0.4;
 
 /// Floor of the tank in side view.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ pub(super) struct Ellipse {
 
 impl Floor {
     /// Returns the floor: half a body height below the lowest position of any individual in any frame.
-    pub(super) fn of(library: &Library, flock: &Flock) -> Floor {
+    pub(super) fn new(library: &Library, flock: &Flock) -> Floor {
         let lens = Lens::of(library, &flock.params);
         let tank = Tank::from_library(library, &lens, &motion_of(library, &lens), &flock.params);
         let mut floor = Floor {
@@ -69,12 +69,12 @@ impl Floor {
     }
 
     /// Returns the shadow of an individual in one frame.
-    pub(super) fn shadow(&self, who: &Appearance, view: &View) -> Ellipse {
-        let (individual, t) = (who.individual, who.frame_idx);
+    pub(super) fn shadow(&self, appearance: &Appearance, view: &View) -> Ellipse {
+        let (individual, t) = (appearance.individual, appearance.frame_idx);
         let [x, y, depth_bl] = self.place(individual, t);
         let length = self.lens.px_per_bl(depth_bl) * view.scale;
-        let across = libm::fabs(libm::cos(individual.heading_rad[t])).max(LEAST_ACROSS);
-        let high = (HALF_WIDTH_BL * self.floor_bl / depth_bl.max(1.0)).max(LEAST_HALF_BL);
+        let across = libm::fabs(libm::cos(individual.heading_rad[t])).max(MIN_ACROSS);
+        let high = (HALF_WIDTH_BL * self.floor_bl / depth_bl.max(1.0)).max(MIN_HALF_HEIGHT_BL);
         let left = 1.0 - (self.floor_bl - y) / HEIGHT_BL;
         let center = self.lens.picture_px([x, self.floor_bl, depth_bl]);
         Ellipse {
@@ -87,9 +87,10 @@ impl Floor {
     /// Returns the position of an individual in the tank, in body lengths.
     fn place(&self, individual: &Individual, t: usize) -> [f64; 3] {
         let behind_px = individual.boid.position_px[t][2];
-        let depth_bl = match self.lens.is_flat() {
-            true => 0.0,
-            false => self.front_bl + behind_px / self.lens.length_px,
+        let depth_bl = if self.lens.is_flat() {
+            0.0
+        } else {
+            self.front_bl + behind_px / self.lens.length_px
         };
         self.lens.place_bl(individual.centroid_px[t], depth_bl)
     }
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn from_the_side_the_floor_lies_below_everybody_and_the_nearer_the_lower() {
+    fn shadows_lie_below_all_individuals_and_nearer_ones_lower() {
         let library = synthetic::library(library::View::Side);
         let params = Params {
             count: Some(12),
@@ -161,7 +162,7 @@ mod tests {
             ..Params::default()
         };
         let flock = plan_flock(&library, &params, &Silent).expect("a good library");
-        let floor = Floor::of(&library, &flock);
+        let floor = Floor::new(&library, &flock);
         let view = View::fitted(flock.image_size_px, flock.image_size_px);
         let mut shadows = Vec::new();
         for individual in &flock.individuals {

@@ -17,7 +17,7 @@ use crate::raster::resample::{ONE, Resampled};
 
 /// Shadow for top view if shadows are requested but none was measured: an animal on a floor below a lamp.
 /// Free choice.
-const USUAL: library::Shadow = library::Shadow {
+const DEFAULT_SHADOW: library::Shadow = library::Shadow {
     darkness: 0.3,
     offset_bl: [0.06, 0.06],
     blur_bl: 0.09,
@@ -40,18 +40,19 @@ enum Cast {
 
 impl Shadows {
     /// Returns the shadows of a flock; `None` if it has none.
-    pub(super) fn of(library: &Library, flock: &Flock) -> Option<Shadows> {
+    pub(super) fn new(library: &Library, flock: &Flock) -> Option<Shadows> {
         let asked = flock.params.render.shadow;
         let is_side = library.poses.view == library::View::Side;
         let measured = library.shadow.filter(|_| !is_side);
         let darkness = asked.or(measured.map(|shadow| shadow.darkness))?;
-        let shape = measured.unwrap_or(USUAL);
-        let cast = match is_side {
-            true => Cast::Floor(Floor::of(library, flock)),
-            false => Cast::Outline {
+        let shape = measured.unwrap_or(DEFAULT_SHADOW);
+        let cast = if is_side {
+            Cast::Floor(Floor::new(library, flock))
+        } else {
+            Cast::Outline {
                 offset_px: shape.offset_bl.map(|bl| bl * flock.length_px),
                 blur_px: shape.blur_bl * flock.length_px,
-            },
+            }
         };
         (darkness > 0.0).then_some(Shadows { darkness, cast })
     }
@@ -62,14 +63,20 @@ impl Shadows {
     }
 
     /// Adds the shadow of an individual to `shade`. `layer` is the drawn sprite.
-    pub(super) fn add(&self, who: &Appearance, layer: &Resampled, view: &View, shade: &mut Shade) {
+    pub(super) fn add(
+        &self,
+        appearance: &Appearance,
+        layer: &Resampled,
+        view: &View,
+        shade: &mut Shade,
+    ) {
         match &self.cast {
             Cast::Outline { offset_px, blur_px } => {
-                let scale = who.individual.scale[who.frame_idx] * view.scale;
+                let scale = appearance.individual.scale[appearance.frame_idx] * view.scale;
                 let offset = offset_px.map(|px| (px * scale).round() as i64);
                 shade.add_outline(layer, offset, blur_px * scale, self.darkness);
             }
-            Cast::Floor(floor) => floor.shadow(who, view).draw(self.darkness, shade),
+            Cast::Floor(floor) => floor.shadow(appearance, view).draw(self.darkness, shade),
         }
     }
 }
@@ -110,9 +117,10 @@ impl Shade {
 
     /// Extends the box of the shadows by `rect`.
     fn reach(&mut self, rect: Rect) {
-        self.rect = match self.rect.is_empty() {
-            true => rect,
-            false => self.rect.union(&rect),
+        self.rect = if self.rect.is_empty() {
+            rect
+        } else {
+            self.rect.union(&rect)
         };
     }
 
@@ -212,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn an_outline_is_moved_blurred_and_as_dark_as_asked() {
+    fn outline_is_moved_blurred_and_as_dark_as_requested() {
         let rect = Rect {
             x: 20,
             y: 15,
@@ -240,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_falls_outside_of_the_picture_is_left_out() {
+    fn shadow_outside_of_the_picture_is_clipped() {
         let mut shade = Shade::default();
         shade.begin([30, 30]);
         shade.add_outline(

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::cpu::Level;
-use crate::flock::plan::landings::Way;
+use crate::flock::plan::landings::Pass;
 
 /// Number of lanes of a vector, and the most frames of a block.
 pub const FRAMES: usize = 8;
@@ -13,7 +13,7 @@ pub const FRAMES: usize = 8;
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
     /// Direction of time.
-    pub way: Way,
+    pub pass: Pass,
     /// Vector instructions to use; this machine must have them.
     pub cpu: Level,
     /// Number of states of the trellis.
@@ -31,9 +31,9 @@ impl Block {
         let n_after = steps.rev().take_while(|t| t[0] == t[1]).count();
         let end = (FRAMES - n_after).max(n_before + 1);
         let (lanes, first) = (n_before..end, self.times[n_before].min(self.times[end - 1]));
-        let range = match self.way {
-            Way::Ahead => lanes,
-            Way::Back => FRAMES - lanes.end..FRAMES - lanes.start,
+        let range = match self.pass {
+            Pass::Forward => lanes,
+            Pass::Backward => FRAMES - lanes.end..FRAMES - lanes.start,
         };
         let n = range.len().min(n_frames.saturating_sub(first));
         Moments {
@@ -44,18 +44,13 @@ impl Block {
 
     /// Returns the state of a station.
     pub fn state(&self, station: usize) -> usize {
-        self.way.station(self.n_states, station)
+        self.pass.station(self.n_states, station)
     }
 
     /// Returns the states of a range of stations. Backward in time the state of the last station comes
     /// first.
     pub fn states(&self, stations: Range<usize>) -> Range<usize> {
-        self.way.stations(self.n_states, stations)
-    }
-
-    /// Returns the stations of a range of states.
-    pub fn stations(&self, states: Range<usize>) -> Range<usize> {
-        self.way.stations(self.n_states, states)
+        self.pass.stations(self.n_states, stations)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Playing on from station to station: the inner loop of the first step of the recursion
 //! (docs/explanation/algorithms.md, "Planning").
 //!
-//! `Front::go_on` defines the results. The AVX2 version returns the same integers, faster.
+//! `Front::play_on` defines the results. The AVX2 version returns the same integers, faster.
 
 use super::{FRAMES, UNREACHED};
 #[cfg(target_arch = "x86_64")]
@@ -13,7 +13,7 @@ pub(super) const NO_LEAD: i32 = UNREACHED as i32;
 /// Costs of one station at the frames of a block.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
-pub(super) struct Tally {
+pub(super) struct StationCosts {
     /// V: least cost of paths that may jump, in turns. `UNREACHED` or more if there is no path.
     pub(super) values: [u32; FRAMES],
     /// Running sum of the costs along continuous playback to this station since the film began, in turns.
@@ -21,11 +21,11 @@ pub(super) struct Tally {
 }
 
 /// Consecutive stations with their inputs and outputs.
-pub(super) struct Stretch<'a> {
+pub(super) struct Chunk<'a> {
     /// Input: the block before. Output: this block.
-    pub(super) tallies: &'a mut [Tally],
+    pub(super) station_costs: &'a mut [StationCosts],
     /// Number of stations of its run up to each station, itself included; 0 for barriers.
-    pub(super) gone_through: &'a [u32],
+    pub(super) run_lengths: &'a [u32],
     /// Leads of paths that landed `landed` frames ago and have played on to each station.
     pub(super) offers: &'a [[i32; FRAMES]],
     /// Cost of showing each station.
@@ -41,9 +41,9 @@ pub(super) struct Stretch<'a> {
 /// replaces V.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Front {
-    at: Tally,
-    /// Tally of the station before, in the last block.
-    before: Tally,
+    at: StationCosts,
+    /// Costs of the station before, in the last block.
+    before: StationCosts,
     /// All bits set in lanes that hold frames of the film.
     in_film: [u32; FRAMES],
     /// All bits set in lanes other than that of the film's first frame.
@@ -56,9 +56,9 @@ pub(super) struct Front {
     is_plain: bool,
 }
 
-impl Tally {
-    /// Tally of a station that no path reaches.
-    pub(super) const NOWHERE: Tally = Tally {
+impl StationCosts {
+    /// Costs of a station that no path reaches.
+    pub(super) const UNREACHABLE: StationCosts = StationCosts {
         values: [UNREACHED; FRAMES],
         sums: [0; FRAMES],
     };
@@ -72,8 +72,8 @@ impl Front {
         let bits = |is_set: bool| -i32::from(is_set) as u32;
         let first = opening.unwrap_or(0);
         Front {
-            at: Tally::NOWHERE,
-            before: Tally::NOWHERE,
+            at: StationCosts::UNREACHABLE,
+            before: StationCosts::UNREACHABLE,
             in_film: std::array::from_fn(|lane| bits(lane >= first)),
             goes_on: std::array::from_fn(|lane| bits(Some(lane) != opening)),
             width,
@@ -83,11 +83,11 @@ impl Front {
     }
 
     /// Processes a range of stations.
-    pub(super) fn go_on(&mut self, stretch: Stretch<'_>) {
+    pub(super) fn play_on(&mut self, chunk: Chunk<'_>) {
         let last = self.width - 1;
-        let parts = stretch.offers.iter().zip(stretch.costs).zip(stretch.wins);
-        let tallies = stretch.tallies.iter_mut().zip(stretch.gone_through);
-        for ((tally, &gone), ((offers, costs), win)) in tallies.zip(parts) {
+        let parts = chunk.offers.iter().zip(chunk.costs).zip(chunk.wins);
+        let station_costs = chunk.station_costs.iter_mut().zip(chunk.run_lengths);
+        for ((costs_here, &run_length), ((offers, costs), win)) in station_costs.zip(parts) {
             let (values, sums) = (&mut self.at.values, &mut self.at.sums);
             values.rotate_right(1);
             sums.rotate_right(1);
@@ -98,42 +98,44 @@ impl Front {
                 let cost = costs[lane] & self.in_film[lane];
                 sums[lane] = sums[lane].wrapping_add(cost);
                 values[lane] = (values[lane] & self.goes_on[lane]).wrapping_add(cost);
-                if gone > self.landed {
+                if run_length > self.landed {
                     let offer = value(offers[lane], sums[lane]);
                     *win |= u8::from(offer < values[lane]) << lane;
                     values[lane] = values[lane].min(offer);
                 }
             }
-            if gone == 0 {
+            if run_length == 0 {
                 *values = [UNREACHED; FRAMES];
             }
-            self.before = std::mem::replace(tally, self.at);
+            self.before = std::mem::replace(costs_here, self.at);
         }
     }
 
-    /// AVX2 version of `go_on`.
+    /// AVX2 version of `play_on`.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    pub(super) fn go_on_avx2<const TRACED: bool>(&mut self, stretch: Stretch<'_>) {
-        match self.is_plain {
-            true => self.go_on_lanes::<TRACED, true>(stretch),
-            false => self.go_on_lanes::<TRACED, false>(stretch),
+    pub(super) fn play_on_avx2<const TRACED: bool>(&mut self, chunk: Chunk<'_>) {
+        if self.is_plain {
+            self.play_on_lanes::<TRACED, true>(chunk);
+        } else {
+            self.play_on_lanes::<TRACED, false>(chunk);
         }
     }
 
-    /// AVX2 version of `go_on`. Without `TRACED` the output `wins` is not written.
+    /// AVX2 version of `play_on`. Without `TRACED` the output `wins` is not written.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     #[inline(never)]
-    fn go_on_lanes<const TRACED: bool, const PLAIN: bool>(&mut self, stretch: Stretch<'_>) {
+    fn play_on_lanes<const TRACED: bool, const PLAIN: bool>(&mut self, chunk: Chunk<'_>) {
         use std::arch::x86_64::*;
         let unreached = _mm256_set1_epi32(UNREACHED as i32);
         let last = _mm256_set1_epi32(self.width as i32 - 1);
         // Shifts the lanes by one. The first lane comes from the last lane of the block before.
         let next = |lanes: __m256i, before: __m256i| {
-            let before = match PLAIN {
-                true => before,
-                false => _mm256_permutevar8x32_epi32(before, last),
+            let before = if PLAIN {
+                before
+            } else {
+                _mm256_permutevar8x32_epi32(before, last)
             };
             let halves = _mm256_permute2x128_si256::<0x21>(before, lanes);
             _mm256_alignr_epi8::<12>(lanes, halves)
@@ -141,11 +143,11 @@ impl Front {
         let (in_film, goes_on) = (load(&self.in_film), load(&self.goes_on));
         let (mut values, mut sums) = (load(&self.at.values), load(&self.at.sums));
         let mut before = [load(&self.before.values), load(&self.before.sums)];
-        let parts = stretch.offers.iter().zip(stretch.costs).zip(stretch.wins);
-        let tallies = stretch.tallies.iter_mut().zip(stretch.gone_through);
-        for ((tally, &gone), ((offers, costs), win)) in tallies.zip(parts) {
+        let parts = chunk.offers.iter().zip(chunk.costs).zip(chunk.wins);
+        let station_costs = chunk.station_costs.iter_mut().zip(chunk.run_lengths);
+        for ((costs_here, &run_length), ((offers, costs), win)) in station_costs.zip(parts) {
             (values, sums) = (next(values, before[0]), next(sums, before[1]));
-            before = [load(&tally.values), load(&tally.sums)];
+            before = [load(&costs_here.values), load(&costs_here.sums)];
             let mut costs = load(costs);
             if !PLAIN {
                 costs = _mm256_and_si256(costs, in_film);
@@ -154,21 +156,21 @@ impl Front {
             sums = _mm256_add_epi32(sums, costs);
             values = _mm256_add_epi32(values, costs);
             let mut won = 0;
-            if gone > self.landed {
+            if run_length > self.landed {
                 let least = _mm256_min_epu32(values, _mm256_add_epi32(load(offers), sums));
                 if TRACED {
                     let same = _mm256_cmpeq_epi32(least, values);
                     won = !_mm256_movemask_ps(_mm256_castsi256_ps(same));
                 }
                 values = least;
-            } else if gone == 0 {
+            } else if run_length == 0 {
                 values = unreached;
             }
             if TRACED {
                 *win = won as u8;
             }
-            store(&mut tally.sums, sums);
-            store(&mut tally.values, values);
+            store(&mut costs_here.sums, sums);
+            store(&mut costs_here.values, values);
         }
         store(&mut self.at.values, values);
         store(&mut self.at.sums, sums);

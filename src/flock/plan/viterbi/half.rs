@@ -1,20 +1,20 @@
-//! One of the two halves of a plan: the recursion over its frames, and the walk back
+//! One of the two halves of a plan: the recursion over its frames, and the traceback
 //! (docs/explanation/algorithms.md, "Planning").
 //!
 //! If the trace needs more memory than the budget, it is kept for one segment at a time. Each segment is
 //! then computed again from its checkpoint.
 
 use super::column::Column;
-use super::meeting::Stand;
-use super::walk::{Trace, Walk};
-use super::{Film, Rows};
-use crate::flock::plan::landings::Way;
+use super::trace::Trace;
+use super::traceback::{PathEnd, Traceback};
+use super::{PathSearch, StateCosts};
+use crate::flock::plan::landings::Pass;
 
 /// Recursion after the last frame of the half, with its trace.
 pub(super) struct Half<'a, R> {
-    pub(super) film: &'a Film<'a>,
-    way: Way,
-    rows: R,
+    pub(super) search: &'a PathSearch<'a>,
+    pass: Pass,
+    state_costs: R,
     n_frames: usize,
     /// Number of blocks in a segment.
     segment: usize,
@@ -27,24 +27,24 @@ pub(super) struct Half<'a, R> {
     checkpoints: Vec<Column>,
 }
 
-impl<'a, R: Rows> Half<'a, R> {
+impl<'a, R: StateCosts> Half<'a, R> {
     /// Processes `n_frames` > 0 frames and keeps the trace of `segment` blocks at a time.
     pub(super) fn run(
-        film: &'a Film<'a>,
-        way: Way,
-        rows: R,
+        search: &'a PathSearch<'a>,
+        pass: Pass,
+        state_costs: R,
         n_frames: usize,
         segment: usize,
     ) -> Half<'a, R> {
-        let column = Column::new(film, way, n_frames);
+        let column = Column::new(search, pass, n_frames);
         let mut half = Half {
-            film,
-            way,
-            rows,
+            search,
+            pass,
+            state_costs,
             n_frames,
             segment,
             ends: Vec::new(),
-            trace: Trace::new(film, way, segment.min(column.n_left())),
+            trace: Trace::new(search, pass, segment.min(column.n_left())),
             column,
             checkpoints: Vec::new(),
         };
@@ -53,32 +53,33 @@ impl<'a, R: Rows> Half<'a, R> {
             if has_segments {
                 half.checkpoints.push(half.column.clone());
             }
-            half.play();
+            half.process_segment();
         }
-        half.ends = half.column.ends(film);
+        half.ends = half.column.ends(search);
         half
     }
 
     /// Returns the states of the path with the given end, by age.
-    pub(super) fn walk(mut self, end: Stand) -> Vec<u32> {
-        let mut walk = Walk::new(self.film, self.n_frames, end);
+    pub(super) fn trace_back(mut self, end: PathEnd) -> Vec<u32> {
+        let mut traceback = Traceback::new(self.search, self.n_frames, end);
         self.checkpoints.pop();
         loop {
-            walk.back(self.film, self.way, &self.trace);
+            traceback.back(self.search, self.pass, &self.trace);
             let Some(column) = self.checkpoints.pop() else {
-                return walk.finish();
+                return traceback.finish();
             };
             self.column = column;
-            self.play();
+            self.process_segment();
         }
     }
 
     /// Processes one segment.
-    fn play(&mut self) {
+    fn process_segment(&mut self) {
         self.trace.restart(self.column.clock());
         for _ in 0..self.segment.min(self.column.n_left()) {
             let steps = self.trace.next_block();
-            self.column.advance(self.film, &mut self.rows, steps);
+            self.column
+                .advance(self.search, &mut self.state_costs, steps);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The cheapest jump to each station: the inner loop of the second step of the recursion
 //! (docs/explanation/algorithms.md, "Planning").
 
-use super::front::{Tally, lead};
+use super::front::{StationCosts, lead};
 use super::offers::OffersOfBlock;
 use super::{FRAMES, UNREACHED};
 use crate::flock::plan::landings::Origin;
@@ -10,8 +10,8 @@ use crate::flock::plan::lanes::{load, store, store_half};
 
 /// Inputs and outputs of the landings of a block.
 pub(super) struct Landing<'a> {
-    /// Tallies by station plus one.
-    pub(super) tallies: &'a [Tally],
+    /// Costs by station plus one.
+    pub(super) station_costs: &'a [StationCosts],
     pub(super) offers: OffersOfBlock<'a>,
     /// Output: index of the cheapest jump, landing station after landing station.
     pub(super) ranks: std::slice::IterMut<'a, [u16; FRAMES]>,
@@ -21,7 +21,7 @@ impl Landing<'_> {
     /// Computes the landings at some stations, given the jumps to each. Without `RANKED` the index of the
     /// cheapest jump is not stored.
     #[inline(always)]
-    pub(super) fn some<const AVX2: bool, const RANKED: bool>(
+    pub(super) fn process<const AVX2: bool, const RANKED: bool>(
         &mut self,
         stations: &[u32],
         jumps: impl IntoIterator<Item = impl AsRef<[Origin]>>,
@@ -31,15 +31,15 @@ impl Landing<'_> {
             #[expect(unsafe_code, reason = "the same, for AVX2")]
             // SAFETY: callers set `AVX2` only after checking for it.
             unsafe {
-                self.some_avx2::<RANKED>(stations, jumps);
+                self.process_avx2::<RANKED>(stations, jumps);
             }
             return;
         }
-        self.each::<RANKED>(stations, jumps);
+        self.process_portable::<RANKED>(stations, jumps);
     }
 
-    /// Portable version of `some`, which defines its results.
-    fn each<const RANKED: bool>(
+    /// Portable version of `process`, which defines its results.
+    fn process_portable<const RANKED: bool>(
         &mut self,
         stations: &[u32],
         jumps: impl IntoIterator<Item = impl AsRef<[Origin]>>,
@@ -51,9 +51,9 @@ impl Landing<'_> {
                 *out = ranks.map(|rank| rank as u16);
             }
             // This entry belongs to the station before, from which playing on leads here.
-            let sums = &self.tallies[station].sums;
+            let sums = &self.station_costs[station].sums;
             let leads = std::array::from_fn(|lane| lead(landed[lane], sums[lane]));
-            self.offers.put(station, leads);
+            self.offers.store(station, leads);
         }
     }
 
@@ -64,7 +64,7 @@ impl Landing<'_> {
         let mut best = [UNREACHED; FRAMES];
         let mut ranks = [0; FRAMES];
         for (rank, jump) in (0u32..).zip(jumps) {
-            let from = &self.tallies[jump.from as usize + 1].values;
+            let from = &self.station_costs[jump.from as usize + 1].values;
             for lane in 0..FRAMES {
                 // Only unused lanes may wrap.
                 let least = from[lane].wrapping_add(jump.cost).min(best[lane]);
@@ -79,11 +79,11 @@ impl Landing<'_> {
         (best, ranks)
     }
 
-    /// AVX2 version of `each`.
+    /// AVX2 version of `process_portable`.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     #[inline(never)]
-    fn some_avx2<const RANKED: bool>(
+    fn process_avx2<const RANKED: bool>(
         &mut self,
         stations: &[u32],
         jumps: impl IntoIterator<Item = impl AsRef<[Origin]>>,
@@ -93,7 +93,7 @@ impl Landing<'_> {
         for (&station, jumps) in stations.iter().zip(jumps) {
             let (mut best, mut ranks) = (all(UNREACHED), _mm256_setzero_si256());
             for (rank, jump) in (0u32..).zip(jumps.as_ref()) {
-                let values = load(&self.tallies[jump.from as usize + 1].values);
+                let values = load(&self.station_costs[jump.from as usize + 1].values);
                 let least = _mm256_min_epu32(_mm256_add_epi32(values, all(jump.cost)), best);
                 if RANKED && rank > 0 {
                     let same = _mm256_cmpeq_epi32(least, best);
@@ -106,10 +106,10 @@ impl Landing<'_> {
                 let packed = _mm256_permute4x64_epi64::<0b1000>(packed);
                 store_half(out, _mm256_castsi256_si128(packed));
             }
-            let sums = load(&self.tallies[station as usize].sums);
+            let sums = load(&self.station_costs[station as usize].sums);
             let mut leads = [0; FRAMES];
             store(&mut leads, _mm256_sub_epi32(best, sums));
-            self.offers.put(station as usize, leads);
+            self.offers.store(station as usize, leads);
         }
     }
 }

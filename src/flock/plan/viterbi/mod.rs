@@ -18,16 +18,16 @@ mod half;
 mod landing;
 mod meeting;
 mod offers;
-mod shelf;
-mod walk;
+mod trace;
+mod trace_pool;
+mod traceback;
 
 pub use self::block::{Block, FRAMES, Moments};
 use self::column::Column;
 use self::half::Half;
-use self::meeting::Meeting;
-pub use self::shelf::Shelf;
-use self::walk::Trace;
-use super::landings::Way;
+use self::trace::Trace;
+pub use self::trace_pool::TracePool;
+use super::landings::Pass;
 use super::trellis::Trellis;
 use crate::cpu::Level;
 
@@ -50,7 +50,7 @@ pub struct Path {
 }
 
 /// Costs of showing each state, for one individual.
-pub trait Rows {
+pub trait StateCosts {
     /// Writes the costs at the frames of `block` of the stations from `first` on, in turns. The stations of
     /// a block are requested from 0 up. Costs are below 2^17, except where conditions of segments and loops
     /// add more. Barriers may have any cost.
@@ -58,7 +58,7 @@ pub trait Rows {
 }
 
 /// Costs given by a function of frame and state.
-impl<F: FnMut(usize, usize) -> u32> Rows for F {
+impl<F: FnMut(usize, usize) -> u32> StateCosts for F {
     fn fill(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         for (station, out) in (first..).zip(out) {
             *out = block.times.map(|t| self(t, block.state(station)));
@@ -66,9 +66,9 @@ impl<F: FnMut(usize, usize) -> u32> Rows for F {
     }
 }
 
-/// Film to be planned.
+/// Search for the cheapest path of a film.
 #[derive(Clone, Copy, Debug)]
-pub struct Film<'a> {
+pub struct PathSearch<'a> {
     /// States and the jumps between them.
     pub trellis: &'a Trellis,
     /// Number of frames.
@@ -77,32 +77,35 @@ pub struct Film<'a> {
     pub dwell: usize,
     /// Vector instructions to use; this machine must have them.
     pub cpu: Level,
-    /// Memory that is reused from plan to plan.
-    pub shelf: &'a Shelf,
+    /// Memory for traces, reused from path to path.
+    pub trace_pool: &'a TracePool,
 }
 
-impl Film<'_> {
+impl PathSearch<'_> {
     /// Returns the cheapest path, exactly. `None` if no path is long enough.
-    pub fn cheapest_path(&self, rows: &(impl Rows + Clone + Send + Sync)) -> Option<Path> {
-        self.cheapest_path_by_segments(rows, self.segment_blocks())
+    pub fn cheapest_path(
+        &self,
+        state_costs: &(impl StateCosts + Clone + Send + Sync),
+    ) -> Option<Path> {
+        self.cheapest_path_by_segments(state_costs, self.segment_blocks())
     }
 
     /// Returns the cost of the cheapest path, in turns. `None` if no path is long enough.
-    pub fn least_cost(&self, rows: &mut impl Rows) -> Option<u32> {
-        let mut column = Column::new(self, Way::Ahead, self.n_frames);
+    pub fn least_cost(&self, state_costs: &mut impl StateCosts) -> Option<u32> {
+        let mut column = Column::new(self, Pass::Forward, self.n_frames);
         while column.n_left() > 0 {
-            column.advance_untraced(self, rows);
+            column.advance_untraced(self, state_costs);
         }
-        let end = meeting::end(self, &column.ends(self))?;
-        Some(end.cost)
+        let (cost, _) = meeting::cheapest_end(&column.ends(self))?;
+        Some(cost)
     }
 
     /// Returns, by state, the cost of the cheapest path that begins with it as if just jumped to, in turns.
     /// `UNREACHED` if there is no such path.
-    pub fn costs_from(&self, rows: &mut impl Rows) -> Vec<u32> {
-        let mut column = Column::new(self, Way::Back, self.n_frames);
+    pub fn costs_from(&self, state_costs: &mut impl StateCosts) -> Vec<u32> {
+        let mut column = Column::new(self, Pass::Backward, self.n_frames);
         while column.n_left() > 0 {
-            column.advance_untraced(self, rows);
+            column.advance_untraced(self, state_costs);
         }
         // The first frame of the film is processed last, and stations are in reverse order of states.
         let last = column.lanes().end - 1;
@@ -111,23 +114,9 @@ impl Film<'_> {
         costs
     }
 
-    /// Returns `[t][state]`: the least cost of a path to each state that may jump from there, in turns. The
-    /// certificate checks these values.
-    pub fn potentials(&self, rows: &mut impl Rows) -> Vec<Vec<u32>> {
-        let mut column = Column::new(self, Way::Ahead, self.n_frames);
-        let mut columns = Vec::with_capacity(self.n_frames);
-        while column.n_left() > 0 {
-            column.advance_untraced(self, rows);
-            for lane in column.lanes() {
-                columns.push(column.values(lane).collect());
-            }
-        }
-        columns
-    }
-
     fn segment_blocks(&self) -> usize {
         let n_blocks = self.n_frames.div_ceil(2 * block::width(self.dwell)).max(1);
-        if Trace::block_bytes(self, Way::Ahead) * n_blocks <= TRACE_BUDGET_BYTES {
+        if Trace::block_bytes(self, Pass::Forward) * n_blocks <= TRACE_BUDGET_BYTES {
             n_blocks
         } else {
             n_blocks.isqrt() + 1
@@ -135,9 +124,9 @@ impl Film<'_> {
     }
 
     /// Returns the cheapest path and keeps the trace for `segment` blocks at a time.
-    fn cheapest_path_by_segments<R>(&self, rows: &R, segment: usize) -> Option<Path>
+    fn cheapest_path_by_segments<R>(&self, state_costs: &R, segment: usize) -> Option<Path>
     where
-        R: Rows + Clone + Send + Sync,
+        R: StateCosts + Clone + Send + Sync,
     {
         assert!(
             self.n_frames > 0 && self.dwell > 0 && segment > 0,
@@ -148,28 +137,28 @@ impl Film<'_> {
         }
         let n_second = self.n_frames / 2;
         let n_first = self.n_frames - n_second;
-        let half = |way, n_frames| Half::run(self, way, rows.clone(), n_frames, segment);
+        let half = |pass, n_frames| Half::run(self, pass, state_costs.clone(), n_frames, segment);
         let (first, second) = rayon::join(
-            || half(Way::Ahead, n_first),
-            || (n_second > 0).then(|| half(Way::Back, n_second)),
+            || half(Pass::Forward, n_first),
+            || (n_second > 0).then(|| half(Pass::Backward, n_second)),
         );
-        let meeting: Meeting = match &second {
-            Some(second) => meeting::across(&first, second)?,
-            None => meeting::end(self, &first.ends)?,
+        let Some(second) = second else {
+            let (cost, end) = meeting::cheapest_end(&first.ends)?;
+            let states = first.trace_back(end);
+            return Some(Path { states, cost });
         };
-        let mut states = first.walk(meeting.first);
-        if let Some(second) = second {
-            states.extend(second.walk(meeting.second).iter().rev());
-        }
+        let meeting = meeting::cheapest_meeting(&first, &second)?;
+        let mut states = first.trace_back(meeting.first);
+        states.extend(second.trace_back(meeting.second).iter().rev());
         let cost = meeting.cost;
         Some(Path { states, cost })
     }
 
     /// Returns the output frame that is processed after `age` others.
-    fn time(&self, way: Way, age: usize) -> usize {
-        match way {
-            Way::Ahead => age,
-            Way::Back => self.n_frames - 1 - age,
+    fn time(&self, pass: Pass, age: usize) -> usize {
+        match pass {
+            Pass::Forward => age,
+            Pass::Backward => self.n_frames - 1 - age,
         }
     }
 }

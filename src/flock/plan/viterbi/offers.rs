@@ -38,14 +38,14 @@ impl Offers {
 
     /// Returns the place for the offers of a block's landings.
     #[inline(always)]
-    pub(super) fn block(&mut self, clock: usize) -> OffersOfBlock<'_> {
+    pub(super) fn of_block(&mut self, clock: usize) -> OffersOfBlock<'_> {
         let slot = clock % self.n_clocks / FRAMES;
-        let has_more = self.n_slots * FRAMES > self.n_clocks.max(FRAMES);
+        let has_copy = self.n_slots * FRAMES > self.n_clocks.max(FRAMES);
         let (n_slots, landed) = (self.n_slots, self.dwell - 1);
         OffersOfBlock {
             slot,
             n_slots,
-            more: (slot == 0 && has_more).then_some(n_slots - 1),
+            copy_slot: (slot == 0 && has_copy).then_some(n_slots - 1),
             leads: &mut self.leads[landed * n_slots..],
         }
     }
@@ -53,7 +53,7 @@ impl Offers {
     /// Returns the offers of paths that may jump again, at a range of stations, in the block that begins at
     /// `clock`. `scratch` has one entry per station.
     #[inline(always)]
-    pub(super) fn of<'a>(
+    pub(super) fn ready<'a>(
         &'a self,
         stations: Range<usize>,
         clock: usize,
@@ -87,17 +87,17 @@ pub(super) struct OffersOfBlock<'a> {
     leads: &'a mut [[i32; FRAMES]],
     n_slots: usize,
     slot: usize,
-    more: Option<usize>,
+    copy_slot: Option<usize>,
 }
 
 impl OffersOfBlock<'_> {
     /// Stores the leads of landings at a station.
     #[inline(always)]
-    pub(super) fn put(&mut self, station: usize, leads: [i32; FRAMES]) {
+    pub(super) fn store(&mut self, station: usize, leads: [i32; FRAMES]) {
         let row = station * self.n_slots;
         self.leads[row + self.slot] = leads;
-        if let Some(more) = self.more {
-            self.leads[row + more] = leads;
+        if let Some(copy_slot) = self.copy_slot {
+            self.leads[row + copy_slot] = leads;
         }
     }
 }

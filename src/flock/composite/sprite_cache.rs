@@ -11,32 +11,32 @@ use crate::library::Sprites;
 use crate::raster::resample::Premultiplied;
 
 /// Maximum size of the cached sprites, in bytes. Free choice.
-const MOST_BYTES: usize = 96 << 20;
+const MAX_BYTES: usize = 96 << 20;
 
 /// Premultiplied sprites by frame and by level of halved pictures.
 #[derive(Default)]
-pub(super) struct Stock {
-    shelf: Mutex<Shelf>,
+pub(super) struct SpriteCache {
+    entries: Mutex<Entries>,
 }
 
 #[derive(Default)]
-struct Shelf {
+struct Entries {
     sprites: HashMap<(u32, u32), Arc<Premultiplied>>,
     n_bytes: usize,
 }
 
-impl Stock {
+impl SpriteCache {
     /// Returns the sprite of a frame, prepared for drawing at `scale`. A frame without a sprite gives an
     /// empty one. `packed` is a buffer for reuse.
-    pub(super) fn take(
+    pub(super) fn get(
         &self,
         sprites: &Sprites,
         frame: u32,
         scale: f64,
         packed: &mut Vec<u8>,
     ) -> Arc<Premultiplied> {
-        let key = (frame, Premultiplied::mip_level(scale));
-        let kept = self.with(|shelf| shelf.sprites.get(&key).cloned());
+        let key = (frame, Premultiplied::level_for(scale));
+        let kept = self.with(|entries| entries.sprites.get(&key).cloned());
         kept.unwrap_or_else(|| {
             let sprite = match sprites.matte(frame as usize) {
                 Some(matte) => {
@@ -46,20 +46,20 @@ impl Stock {
                 None => Premultiplied::new(&[], [0; 2], [0.0; 2], scale),
             };
             let sprite = Arc::new(sprite);
-            self.with(|shelf| shelf.keep(key, &sprite));
+            self.with(|entries| entries.keep(key, &sprite));
             sprite
         })
     }
 
-    fn with<T>(&self, work: impl FnOnce(&mut Shelf) -> T) -> T {
-        work(&mut self.shelf.lock().unwrap_or_else(PoisonError::into_inner))
+    fn with<T>(&self, work: impl FnOnce(&mut Entries) -> T) -> T {
+        work(&mut self.entries.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-impl Shelf {
+impl Entries {
     fn keep(&mut self, key: (u32, u32), sprite: &Arc<Premultiplied>) {
         let n_bytes = sprite.n_bytes();
-        if self.n_bytes + n_bytes > MOST_BYTES {
+        if self.n_bytes + n_bytes > MAX_BYTES {
             self.sprites.clear();
             self.n_bytes = 0;
         }
@@ -76,15 +76,16 @@ mod tests {
     use crate::library::View;
 
     #[test]
-    fn a_sprite_is_made_once_for_each_level_and_the_shelf_never_overflows() {
+    fn sprite_is_made_once_for_each_level_and_the_cache_is_bounded() {
         let library = synthetic::library(View::Side);
-        let (stock, mut packed) = (Stock::default(), Vec::new());
-        let mut take = |frame, scale| stock.take(&library.sprites, frame, scale, &mut packed);
+        let (sprite_cache, mut packed) = (SpriteCache::default(), Vec::new());
+        let mut take = |frame, scale| sprite_cache.get(&library.sprites, frame, scale, &mut packed);
         let first = take(3, 1.0);
         assert!(Arc::ptr_eq(&first, &take(3, 0.9)));
         assert!(!Arc::ptr_eq(&first, &take(3, 0.5)));
-        stock.with(|shelf| shelf.n_bytes = MOST_BYTES);
+        sprite_cache.with(|entries| entries.n_bytes = MAX_BYTES);
         take(4, 1.0);
-        stock.with(|shelf| assert!(shelf.n_bytes < MOST_BYTES && shelf.sprites.len() == 1));
+        sprite_cache
+            .with(|entries| assert!(entries.n_bytes < MAX_BYTES && entries.sprites.len() == 1));
     }
 }

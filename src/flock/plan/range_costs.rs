@@ -6,7 +6,7 @@
 //! moves by one state per frame.
 
 use super::cost::CEILING;
-use super::landings::Way;
+use super::landings::Pass;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::{load, store};
 use super::viterbi::{Block, FRAMES};
@@ -15,22 +15,22 @@ use crate::cpu::Level;
 
 /// Costs added to each state of a trellis at the frames of one block.
 #[derive(Clone)]
-pub(super) struct Added {
+pub(super) struct RangeCosts {
     /// By state, and one past the last: difference between the costs added to this state and to the state
     /// before. One value per frame of the block, in order of time, modulo 2^32.
-    more: Vec<[u32; FRAMES]>,
+    differences: Vec<[u32; FRAMES]>,
     /// Cost added to the station processed last.
-    now: [u32; FRAMES],
+    running: [u32; FRAMES],
     /// Whether any cost was added.
     is_any: bool,
 }
 
-impl Added {
+impl RangeCosts {
     /// Returns an empty set of costs.
-    pub(super) fn new(n_states: usize) -> Added {
-        Added {
-            more: vec![[0; FRAMES]; n_states + 1],
-            now: [0; FRAMES],
+    pub(super) fn new(n_states: usize) -> RangeCosts {
+        RangeCosts {
+            differences: vec![[0; FRAMES]; n_states + 1],
+            running: [0; FRAMES],
             is_any: false,
         }
     }
@@ -38,12 +38,12 @@ impl Added {
     /// Removes all costs, after all stations were processed.
     #[inline(always)]
     pub(super) fn clear(&mut self) {
-        // `pass` resets the entries that it processes. One of these two is not among them, depending on the
+        // `apply` resets the entries that it processes. One of these two is not among them, depending on the
         // direction.
-        let n_states = self.more.len() - 1;
-        self.more[0] = [0; FRAMES];
-        self.more[n_states] = [0; FRAMES];
-        self.now = [0; FRAMES];
+        let n_states = self.differences.len() - 1;
+        self.differences[0] = [0; FRAMES];
+        self.differences[n_states] = [0; FRAMES];
+        self.running = [0; FRAMES];
         self.is_any = false;
     }
 
@@ -54,28 +54,28 @@ impl Added {
         self.is_any = true;
         let n = costs.len();
         for (at, sign) in [(low as usize, 1), (high as usize, u32::MAX)] {
-            let more = &mut self.more[at..at + n];
-            for ((more, &cost), moment) in more.iter_mut().zip(costs).zip(first..) {
-                more[moment] = more[moment].wrapping_add(cost.wrapping_mul(sign));
+            let differences = &mut self.differences[at..at + n];
+            for ((differences, &cost), moment) in differences.iter_mut().zip(costs).zip(first..) {
+                differences[moment] = differences[moment].wrapping_add(cost.wrapping_mul(sign));
             }
         }
     }
 
     /// Adds the costs to `out` for the stations from `first` on, and resets the entries that it processes.
     #[inline(always)]
-    pub(super) fn pass(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
+    pub(super) fn apply(&mut self, block: &Block, first: usize, out: &mut [[u32; FRAMES]]) {
         if !self.is_any {
             return;
         }
         let states = block.states(first..first + out.len());
-        match block.way {
-            Way::Ahead => {
-                let more = self.more[states].iter_mut();
-                pass_on::<false>(block, &mut self.now, more, out);
+        match block.pass {
+            Pass::Forward => {
+                let differences = self.differences[states].iter_mut();
+                apply_sums::<false>(block, &mut self.running, differences, out);
             }
-            Way::Back => {
-                let more = self.more[states.start + 1..states.end + 1].iter_mut();
-                pass_on::<true>(block, &mut self.now, more.rev(), out);
+            Pass::Backward => {
+                let differences = self.differences[states.start + 1..states.end + 1].iter_mut();
+                apply_sums::<true>(block, &mut self.running, differences.rev(), out);
             }
         }
     }
@@ -84,10 +84,10 @@ impl Added {
 /// Adds the running sums to `out`. Backward in time the sum of a state is that of the next state minus the
 /// difference there, and lanes run against time.
 #[inline(always)]
-fn pass_on<'a, const BACK: bool>(
+fn apply_sums<'a, const BACKWARD: bool>(
     block: &Block,
-    now: &mut [u32; FRAMES],
-    more: impl Iterator<Item = &'a mut [u32; FRAMES]>,
+    running: &mut [u32; FRAMES],
+    differences: impl Iterator<Item = &'a mut [u32; FRAMES]>,
     out: &mut [[u32; FRAMES]],
 ) {
     match block.cpu {
@@ -96,51 +96,55 @@ fn pass_on<'a, const BACK: bool>(
             #[expect(unsafe_code, reason = "vectors of AVX2")]
             // SAFETY: the guard of this match arm checks for AVX2.
             unsafe {
-                pass_avx2::<BACK>(now, more, out);
+                apply_avx2::<BACKWARD>(running, differences, out);
             }
         }
         _ => {
-            for (more, out) in more.zip(out) {
-                for (moment, more) in more.iter_mut().enumerate() {
-                    let more = std::mem::take(more);
-                    now[moment] = match BACK {
-                        false => now[moment].wrapping_add(more),
-                        true => now[moment].wrapping_sub(more),
+            for (differences, out) in differences.zip(out) {
+                for (moment, differences) in differences.iter_mut().enumerate() {
+                    let differences = std::mem::take(differences);
+                    running[moment] = match BACKWARD {
+                        false => running[moment].wrapping_add(differences),
+                        true => running[moment].wrapping_sub(differences),
                     };
-                    let lane = if BACK { FRAMES - 1 - moment } else { moment };
-                    out[lane] = out[lane].wrapping_add(now[moment]).min(CEILING - 1);
+                    let lane = if BACKWARD {
+                        FRAMES - 1 - moment
+                    } else {
+                        moment
+                    };
+                    out[lane] = out[lane].wrapping_add(running[moment]).min(CEILING - 1);
                 }
             }
         }
     }
 }
 
-/// AVX2 version of the portable code in `pass_on`.
+/// AVX2 version of the portable code in `apply_sums`.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
-fn pass_avx2<'a, const BACK: bool>(
-    now: &mut [u32; FRAMES],
-    more: impl Iterator<Item = &'a mut [u32; FRAMES]>,
+fn apply_avx2<'a, const BACKWARD: bool>(
+    running: &mut [u32; FRAMES],
+    differences: impl Iterator<Item = &'a mut [u32; FRAMES]>,
     out: &mut [[u32; FRAMES]],
 ) {
     use std::arch::x86_64::*;
     let against = _mm256_setr_epi32(7, 6, 5, 4, 3, 2, 1, 0);
     let ceiling = _mm256_set1_epi32(CEILING as i32 - 1);
-    let mut sums = load(now);
-    for (more, out) in more.zip(out) {
-        let lanes = if BACK {
-            sums = _mm256_sub_epi32(sums, load(more));
+    let mut sums = load(running);
+    for (differences, out) in differences.zip(out) {
+        let lanes = if BACKWARD {
+            sums = _mm256_sub_epi32(sums, load(differences));
             _mm256_permutevar8x32_epi32(sums, against)
         } else {
-            sums = _mm256_add_epi32(sums, load(more));
+            sums = _mm256_add_epi32(sums, load(differences));
             sums
         };
-        store(more, _mm256_setzero_si256());
+        store(differences, _mm256_setzero_si256());
         let total = _mm256_add_epi32(load(out), lanes);
         store(out, _mm256_min_epu32(total, ceiling));
     }
-    store(now, sums);
+    store(running, sums);
 }
 
 #[cfg(test)]
@@ -153,36 +157,36 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_block_gets_all_that_was_added_to_its_states_and_the_next_nothing_of_it(
+        fn costs_of_a_block_are_added_once(
             rows in proptest::collection::vec((0u32..40, 0u32..12, 0..FRAMES, 1..=FRAMES, 1u32..900), 0..20),
-            stretch in 1usize..70,
+            chunk in 1usize..70,
         ) {
-            let ways = |cpu| [(cpu, Way::Ahead), (cpu, Way::Back)];
-            for (cpu, way) in Level::available().into_iter().flat_map(ways) {
-                let block = Block { way, cpu, n_states: N_STATES, times: [0; FRAMES] };
-                let mut added = Added::new(N_STATES);
+            let passes = |cpu| [(cpu, Pass::Forward), (cpu, Pass::Backward)];
+            for (cpu, pass) in Level::available().into_iter().flat_map(passes) {
+                let block = Block { pass, cpu, n_states: N_STATES, times: [0; FRAMES] };
+                let mut added = RangeCosts::new(N_STATES);
                 let mut expected = [[7; FRAMES]; N_STATES];
                 for &(low, n_states, first, n, cost) in &rows {
                     let n = n.min(FRAMES - first);
                     added.add([low, low + n_states], first, &vec![cost; n]);
                     for k in 0..n {
-                        let lane = if way == Way::Back { FRAMES - 1 - first - k } else { first + k };
+                        let lane = if pass == Pass::Backward { FRAMES - 1 - first - k } else { first + k };
                         for state in low as usize + k..(low + n_states) as usize + k {
-                            expected[way.station(N_STATES, state)][lane] += cost;
+                            expected[pass.station(N_STATES, state)][lane] += cost;
                         }
                     }
                 }
-                let pass = |added: &mut Added| {
+                let apply = |added: &mut RangeCosts| {
                     let mut found = vec![[7; FRAMES]; N_STATES];
-                    for (first, out) in (0..).step_by(stretch).zip(found.chunks_mut(stretch)) {
-                        added.pass(&block, first, out);
+                    for (first, out) in (0..).step_by(chunk).zip(found.chunks_mut(chunk)) {
+                        added.apply(&block, first, out);
                     }
                     added.clear();
                     found
                 };
-                prop_assert_eq!(pass(&mut added), expected);
+                prop_assert_eq!(apply(&mut added), expected);
                 added.add([0, 0], 0, &[1]);
-                prop_assert_eq!(pass(&mut added), [[7; FRAMES]; N_STATES]);
+                prop_assert_eq!(apply(&mut added), [[7; FRAMES]; N_STATES]);
             }
         }
     }

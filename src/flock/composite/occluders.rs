@@ -12,13 +12,13 @@ use crate::raster::resize::resized;
 use crate::raster::{Canvas, RgbImage, RgbaImage};
 
 /// Occluders at the size of the film.
-pub(super) struct Front {
+pub(super) struct Occluders {
     canvas: Canvas,
 }
 
-impl Front {
+impl Occluders {
     /// Returns the occluders, scaled to a view.
-    pub(super) fn of(occluders: &RgbaImage, view: &View) -> Front {
+    pub(super) fn new(occluders: &RgbaImage, view: &View) -> Occluders {
         let share = |pixel: &[u8]| [pixel[3]; 3];
         let rect = view.rect();
         let at_size = |image: RgbImage| Canvas::from_rgb(&resized(&image, rect.w, rect.h));
@@ -30,14 +30,14 @@ impl Front {
         }
         let [width, height] = view.size_px;
         let mut canvas = Canvas::new(width, height);
-        canvas.copy_box(&shown, rect);
-        Front { canvas }
+        canvas.put(&shown, rect);
+        Occluders { canvas }
     }
 
     /// Replaces a background of the film's size by the scene behind the occluders, S = (B - w F) / (1 - w).
     /// Drawing the occluders over S gives B again at any size: colors of occluders that resizing made too
     /// bright or too dark for B are clamped.
-    pub(super) fn take_off(&mut self, plate: &mut Canvas) {
+    pub(super) fn remove_from(&mut self, plate: &mut Canvas) {
         for (behind, front) in plate.pixels.iter_mut().zip(&mut self.canvas.pixels) {
             let through = i32::from(ONE as i16 - front[3]);
             if front[3] == 0 {
@@ -85,7 +85,7 @@ mod tests {
     use crate::raster::canvas::straight;
 
     #[test]
-    fn over_the_scene_behind_them_they_are_the_plate_again() {
+    fn occluders_over_the_scene_behind_them_give_the_background() {
         let (mut plate, mut occluders) = (RgbImage::new(16, 16), RgbaImage::new(16, 16));
         let pixels = plate.pixels.chunks_exact_mut(3);
         let both = pixels.zip(occluders.pixels.chunks_exact_mut(4));
@@ -100,9 +100,9 @@ mod tests {
         }
         for side in [16, 8, 11, 24, 33] {
             let view = View::fitted([16, 16], [side, side]);
-            let wanted = Canvas::from_rgb(&resized(&plate, side, side));
-            let (mut front, mut shown) = (Front::of(&occluders, &view), wanted.clone());
-            front.take_off(&mut shown);
+            let wanted = Canvas::of_rgb(&resized(&plate, side, side));
+            let (mut front, mut shown) = (Occluders::new(&occluders, &view), wanted.clone());
+            front.remove_from(&mut shown);
             front.draw(&mut shown, Rect::of_size(side, side));
             for (k, (pixel, wanted)) in shown.pixels.iter().zip(&wanted.pixels).enumerate() {
                 let [pixel, wanted] = [*pixel, *wanted].map(straight);

@@ -11,7 +11,7 @@ pub struct Plan {
     /// State shown at each frame.
     pub states: Vec<u32>,
     /// Cost of the plan.
-    pub cost: Spent,
+    pub cost: CostParts,
 }
 
 impl Plan {
@@ -24,7 +24,7 @@ impl Plan {
 
 /// Cost of a plan in parts, in turns.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Spent {
+pub struct CostParts {
     pub(super) heading: u64,
     pub(super) speed: u64,
     pub(super) transition: u64,
@@ -34,8 +34,8 @@ pub struct Spent {
     pub(super) lower_bound: u64,
 }
 
-impl AddAssign for Spent {
-    fn add_assign(&mut self, other: Spent) {
+impl AddAssign for CostParts {
+    fn add_assign(&mut self, other: CostParts) {
         self.heading += other.heading;
         self.speed += other.speed;
         self.transition += other.transition;
@@ -46,9 +46,9 @@ impl AddAssign for Spent {
     }
 }
 
-impl Spent {
+impl CostParts {
     /// Returns the cost as files store it: in radians, rounded to 6 decimals.
-    pub fn told(&self) -> PlanCost {
+    pub fn in_radians(&self) -> PlanCost {
         let rad = |turns: u64| rounded(turns as f64 / Turns::PER_RAD, 6);
         PlanCost {
             total: rad(self.total),

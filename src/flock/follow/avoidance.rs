@@ -7,41 +7,37 @@ use rayon::prelude::*;
 /// aside.
 const AHEAD_S: f64 = 0.6;
 /// Distance to keep between centroids, body lengths. Free choice between the width and the length of a body.
-pub(in crate::flock) const CLEAR_BL: f64 = 0.8;
+pub(in crate::flock) const CLEARANCE_BL: f64 = 0.8;
 
 /// Position and velocity of an animal in top view.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mover {
     pub(super) position_bl: [f64; 2],
     pub(super) velocity_bl_per_s: [f64; 2],
-    /// Whether the animal has a position yet. Without one, others ignore it.
-    pub(super) is_there: bool,
 }
 
 /// Returns the avoidance vector of each animal: the sum over the others that are about to come too near. Each
 /// term is at most 1 long, and longer for a nearer and earlier approach.
-pub(super) fn asides(movers: &[Mover]) -> Vec<[f64; 2]> {
-    let mut by_x: Vec<usize> = (0..movers.len())
-        .filter(|&id| movers[id].is_there)
-        .collect();
+pub(super) fn avoidance_vectors(movers: &[Mover]) -> Vec<[f64; 2]> {
+    let mut by_x: Vec<usize> = (0..movers.len()).collect();
     by_x.sort_by(|&a, &b| movers[a].position_bl[0].total_cmp(&movers[b].position_bl[0]));
     let fastest = movers
         .iter()
         .map(|m| m.velocity_bl_per_s[0].hypot(m.velocity_bl_per_s[1]));
-    let reach_bl = CLEAR_BL + 2.0 * AHEAD_S * fastest.fold(0.0, f64::max);
+    let reach_bl = CLEARANCE_BL + 2.0 * AHEAD_S * fastest.fold(0.0, f64::max);
     let of = |&one: &Mover| {
         let x = one.position_bl[0];
         let first = by_x.partition_point(|&id| movers[id].position_bl[0] < x - reach_bl);
         let near = by_x[first..].iter().map(|&id| &movers[id]);
         let near = near.take_while(|other| other.position_bl[0] <= x + reach_bl);
-        near.map(|other| aside(&one, other))
+        near.map(|other| avoidance_term(&one, other))
             .fold([0.0; 2], |[x, y], [dx, dy]| [x + dx, y + dy])
     };
     movers.par_iter().with_min_len(64).map(of).collect()
 }
 
 /// Returns the term of the avoidance vector that `other` adds.
-fn aside(one: &Mover, other: &Mover) -> [f64; 2] {
+fn avoidance_term(one: &Mover, other: &Mover) -> [f64; 2] {
     let offset = [0, 1].map(|k| one.position_bl[k] - other.position_bl[k]);
     let relative = [0, 1].map(|k| one.velocity_bl_per_s[k] - other.velocity_bl_per_s[k]);
     let square = relative[0] * relative[0] + relative[1] * relative[1];
@@ -53,17 +49,18 @@ fn aside(one: &Mover, other: &Mover) -> [f64; 2] {
     };
     let then = [0, 1].map(|k| offset[k] + after_s * relative[k]);
     let distance_bl = then[0].hypot(then[1]);
-    if distance_bl >= CLEAR_BL || offset == [0.0; 2] {
+    if distance_bl >= CLEARANCE_BL || offset == [0.0; 2] {
         return [0.0; 2];
     }
-    let strength = (1.0 - distance_bl / CLEAR_BL) * (1.0 - 0.5 * after_s / AHEAD_S);
+    let strength = (1.0 - distance_bl / CLEARANCE_BL) * (1.0 - 0.5 * after_s / AHEAD_S);
     // Two animals that approach head-on both turn to their left.
-    let way = match distance_bl > 0.05 {
-        true => then,
-        false => [-offset[1], offset[0]],
+    let away = if distance_bl > 0.05 {
+        then
+    } else {
+        [-offset[1], offset[0]]
     };
-    let length = way[0].hypot(way[1]).max(1e-9);
-    way.map(|part| strength * part / length)
+    let length = away[0].hypot(away[1]).max(1e-9);
+    away.map(|part| strength * part / length)
 }
 
 #[cfg(test)]
@@ -74,19 +71,19 @@ mod tests {
         Mover {
             position_bl,
             velocity_bl_per_s,
-            is_there: true,
         }
     }
 
-    /// Returns the least distance of two animals that steer along their `asides`, body lengths.
+    /// Returns the least distance of two animals that steer along their avoidance vectors, body lengths.
     fn nearest_bl(mut movers: [Mover; 2]) -> f64 {
         const STEP_S: f64 = 0.05;
         let mut nearest_bl = f64::INFINITY;
         for _ in 0..60 {
-            let asides = asides(&movers);
-            for (mover, aside) in movers.iter_mut().zip(asides) {
+            let avoidance_vectors = avoidance_vectors(&movers);
+            for (mover, avoidance_term) in movers.iter_mut().zip(avoidance_vectors) {
                 let speed = mover.velocity_bl_per_s[0].hypot(mover.velocity_bl_per_s[1]);
-                let wanted = [0, 1].map(|k| mover.velocity_bl_per_s[k] + 4.0 * STEP_S * aside[k]);
+                let wanted =
+                    [0, 1].map(|k| mover.velocity_bl_per_s[k] + 4.0 * STEP_S * avoidance_term[k]);
                 let length = wanted[0].hypot(wanted[1]);
                 mover.velocity_bl_per_s = wanted.map(|v| v * speed / length);
                 for k in 0..2 {
@@ -123,7 +120,7 @@ mod tests {
             mover([1.0, 0.0], [1.0, 0.0]),
         ];
         for movers in [parallel, parting] {
-            assert_eq!(asides(&movers), [[0.0; 2]; 2]);
+            assert_eq!(avoidance_vectors(&movers), [[0.0; 2]; 2]);
         }
     }
 }

@@ -17,19 +17,16 @@ const SAME_BL: f64 = 0.1;
 
 /// Resting places of the filmed animal.
 #[derive(Clone, Debug, Default)]
-pub(in crate::flock) struct Perches {
+pub(in crate::flock) struct RestingPlaces {
     /// Positions in the image, pixels. Empty in top view, where the animal may rest anywhere.
     places_px: Vec<[f64; 2]>,
     /// Share of the frames in which the animal rests, 0..=1.
     rest_share: f64,
 }
 
-/// Way to the next rest of the segment, or `None` if there is none.
-pub(super) type Way = Option<ToRest>;
-
 /// Way from the position before a frame to the next rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct ToRest {
+pub(super) struct WayToRest {
     /// Displacement, pixels.
     way_px: [f64; 2],
     /// Length along the way, pixels.
@@ -45,17 +42,17 @@ pub(super) fn rests(moved: &FrameMotion) -> bool {
 
 /// Returns the way to the next rest of at least `n_rest` frames, by frame. `steps` holds, by frame, whether
 /// the animal rests and its step from the previous frame, pixels.
-pub(super) fn ways(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Way> {
+pub(super) fn ways_to_rest(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Option<WayToRest>> {
     let mut ways = vec![None; steps.len()];
-    let mut ahead: Way = None;
+    let mut ahead: Option<WayToRest> = None;
     let mut n_rested = 0;
     for (t, &(rests, step)) in steps.iter().enumerate().rev() {
         n_rested = if rests { n_rested + 1 } else { 0 };
         if n_rested >= n_rest {
-            ahead = Some(ToRest::default());
+            ahead = Some(WayToRest::default());
         } else if let Some(rest) = &mut ahead {
             let step_px = libm::hypot(step[0], step[1]);
-            *rest = ToRest {
+            *rest = WayToRest {
                 way_px: [0, 1].map(|axis| rest.way_px[axis] + step[axis]),
                 length_px: rest.length_px + step_px,
                 step_px,
@@ -66,13 +63,17 @@ pub(super) fn ways(steps: &[(bool, [f64; 2])], n_rest: usize) -> Vec<Way> {
     ways
 }
 
-impl Perches {
+impl RestingPlaces {
     /// Returns the resting places of a library's animal. `lens` gives the body length in pixels.
-    pub(in crate::flock) fn of(library: &Library, motion: &[FrameMotion], lens: &Lens) -> Perches {
-        let mut perches = Perches::default();
+    pub(in crate::flock) fn new(
+        library: &Library,
+        motion: &[FrameMotion],
+        lens: &Lens,
+    ) -> RestingPlaces {
+        let mut resting_places = RestingPlaces::default();
         let poses = &library.poses;
         if poses.view == View::Top {
-            return perches;
+            return resting_places;
         }
         let same_px = SAME_BL * lens.length_px;
         let n_rest = (REST_S * poses.fps).ceil() as usize;
@@ -86,22 +87,22 @@ impl Perches {
                 continue;
             };
             n_rested += 1;
-            if (perches.places_px.iter()).all(|known| gap(known, &place) >= same_px) {
-                perches.places_px.push(place);
+            if (resting_places.places_px.iter()).all(|known| gap(known, &place) >= same_px) {
+                resting_places.places_px.push(place);
             }
         }
         let n_known = frames.iter().filter(|frame| is_known(frame)).count();
-        perches.rest_share = f64::from(n_rested) / n_known.max(1) as f64;
-        perches
+        resting_places.rest_share = f64::from(n_rested) / n_known.max(1) as f64;
+        resting_places
     }
 
     /// Returns the number of animals that find a resting place at least `clear_px` from the others. Each is
     /// assumed to rest for as much of the time as the filmed one. Returns `None` if the filmed animal never
     /// rested.
-    pub(in crate::flock) fn room_for(&self, clear_px: f64) -> Option<u32> {
+    pub(in crate::flock) fn capacity(&self, clearance_px: f64) -> Option<u32> {
         let mut clear: Vec<[f64; 2]> = Vec::new();
         for place in &self.places_px {
-            if clear.iter().all(|other| gap(other, place) >= clear_px) {
+            if clear.iter().all(|other| gap(other, place) >= clearance_px) {
                 clear.push(*place);
             }
         }
@@ -113,9 +114,10 @@ impl Perches {
         &self,
         from_px: [f64; 2],
         others: &[[f64; 2]],
-        clear_px: f64,
+        clearance_px: f64,
     ) -> Option<[f64; 2]> {
-        let is_clear = |place: &&[f64; 2]| others.iter().all(|other| gap(place, other) >= clear_px);
+        let is_clear =
+            |place: &&[f64; 2]| others.iter().all(|other| gap(place, other) >= clearance_px);
         let clear = self.places_px.iter().filter(is_clear);
         clear
             .min_by(|a, b| gap(a, &from_px).total_cmp(&gap(b, &from_px)))
@@ -127,16 +129,16 @@ fn gap(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     libm::hypot(a[0] - b[0], a[1] - b[1])
 }
 
-impl ToRest {
+impl WayToRest {
     /// Returns the correction of the step of this frame, pixels. The corrections of all steps together lead
     /// from the end of the way to the nearest resting place clear of `others`. Each is proportional to the
     /// length of its step. Returns `None` if no resting place is clear.
     pub(super) fn correction(
         &self,
         place_px: [f64; 2],
-        perches: &Perches,
+        resting_places: &RestingPlaces,
         others: &[[f64; 2]],
-        clear_px: f64,
+        clearance_px: f64,
     ) -> Option<[f64; 2]> {
         let end = [0, 1].map(|axis| place_px[axis] + self.way_px[axis]);
         let elsewhere: Vec<[f64; 2]> = others
@@ -144,9 +146,9 @@ impl ToRest {
             .copied()
             .filter(|other| *other != place_px)
             .collect();
-        let perch = perches.nearest(end, &elsewhere, clear_px)?;
+        let resting_place = resting_places.nearest(end, &elsewhere, clearance_px)?;
         let share = self.step_px / self.length_px.max(1e-9);
-        Some([0, 1].map(|axis| share * (perch[axis] - end[axis])))
+        Some([0, 1].map(|axis| share * (resting_place[axis] - end[axis])))
     }
 }
 
@@ -156,17 +158,20 @@ mod tests {
 
     /// Ten steps to the right, then ten frames of rest.
     fn flight() -> Vec<(bool, [f64; 2])> {
-        let step = |t| match t < 10 {
-            true => (false, [5.0, 0.0]),
-            false => (true, [0.0; 2]),
+        let step = |t| {
+            if t < 10 {
+                (false, [5.0, 0.0])
+            } else {
+                (true, [0.0; 2])
+            }
         };
         (0..20).map(step).collect()
     }
 
-    fn landed(perches: &Perches, others: &[[f64; 2]]) -> [f64; 2] {
+    fn landed(resting_places: &RestingPlaces, others: &[[f64; 2]]) -> [f64; 2] {
         let mut place = [0.0, 0.0];
-        for ((_, step), way) in flight().into_iter().zip(ways(&flight(), 5)) {
-            let correction = way.and_then(|way| way.correction(place, perches, others, 8.0));
+        for ((_, step), way) in flight().into_iter().zip(ways_to_rest(&flight(), 5)) {
+            let correction = way.and_then(|way| way.correction(place, resting_places, others, 8.0));
             let [dx, dy] = correction.unwrap_or_default();
             place = [place[0] + step[0] + dx, place[1] + step[1] + dy];
         }
@@ -174,31 +179,35 @@ mod tests {
     }
 
     #[test]
-    fn whoever_comes_to_rest_comes_to_a_perch_that_is_free() {
-        let perches = Perches {
+    fn animals_land_at_the_nearest_free_resting_place() {
+        let resting_places = RestingPlaces {
             places_px: vec![[46.0, 6.0], [58.0, -4.0], [0.0, 50.0]],
             rest_share: 0.5,
         };
         let near = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] - b[0], a[1] - b[1]) < 1e-6;
-        assert!(near(landed(&perches, &[]), [46.0, 6.0]));
-        assert!(near(landed(&perches, &[[44.0, 6.0]]), [58.0, -4.0]));
-        assert!(near(landed(&Perches::default(), &[]), [50.0, 0.0]));
+        assert!(near(landed(&resting_places, &[]), [46.0, 6.0]));
+        assert!(near(landed(&resting_places, &[[44.0, 6.0]]), [58.0, -4.0]));
+        assert!(near(landed(&RestingPlaces::default(), &[]), [50.0, 0.0]));
     }
 
     #[test]
-    fn who_rests_half_of_the_time_shares_its_places_with_as_many_again() {
-        let perches = Perches {
+    fn capacity_grows_with_the_time_not_rested() {
+        let resting_places = RestingPlaces {
             places_px: vec![[46.0, 6.0], [58.0, -4.0], [0.0, 50.0]],
             rest_share: 0.5,
         };
-        assert_eq!(perches.room_for(10.0), Some(6));
-        assert_eq!(perches.room_for(20.0), Some(4));
-        assert_eq!(Perches::default().room_for(10.0), None);
+        assert_eq!(resting_places.capacity(10.0), Some(6));
+        assert_eq!(resting_places.capacity(20.0), Some(4));
+        assert_eq!(RestingPlaces::default().capacity(10.0), None);
     }
 
     #[test]
-    fn a_short_pause_is_no_rest() {
-        assert!(ways(&flight(), 11).iter().all(Option::is_none));
-        assert!(ways(&flight(), 10)[..10].iter().all(Option::is_some));
+    fn pauses_shorter_than_a_rest_are_ignored() {
+        assert!(ways_to_rest(&flight(), 11).iter().all(Option::is_none));
+        assert!(
+            ways_to_rest(&flight(), 10)[..10]
+                .iter()
+                .all(Option::is_some)
+        );
     }
 }
