@@ -60,6 +60,16 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
     bytes
 }
 
+/// Returns one frame as JSON.
+pub(super) fn frame(idx: usize, pose: &Pose) -> serde_json::Value {
+    serde_json::to_value(PoseFile::of(idx, pose)).expect("plain values serialise")
+}
+
+/// Rounds a frequency as in the file.
+pub(super) fn rounded_hz(frequency_hz: f64) -> f64 {
+    rounded(frequency_hz, 3)
+}
+
 /// Parses the output of `write`.
 pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
     let file: PosesFile<Vec<PoseFile>> = serde_json::from_slice(bytes)?;
@@ -161,7 +171,7 @@ impl TailBeatFile {
             frames: span.frames,
             start_s: rounded(span.start_s, 6),
             end_s: rounded(span.end_s, 6),
-            frequency_hz: rounded(span.frequency_hz, 3),
+            frequency_hz: rounded_hz(span.frequency_hz),
             amplitude: rounded(span.amplitude, 5),
             confidence: rounded(span.confidence, 4),
         };
