@@ -55,7 +55,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     match format {
         Format::Numbers => write_numbers(&distances, &args.output)?,
         Format::Picture => {
-            let map = DistanceMap::of(&distances, &library, &Listener::new()).map_err(cancelled)?;
+            let map = DistanceMap::compute(&distances, &library, &Listener::new()).map_err(cancelled)?;
             let png = match args.candidates {
                 true => map.draw_candidates(&library),
                 false => map.draw_distances(),

@@ -173,7 +173,7 @@ impl Input {
             side: Side::Plain,
             cpu: cpu::Level::detect(),
         };
-        DistanceMap::of(&distances, library, attempt.listener)
+        DistanceMap::compute(&distances, library, attempt.listener)
             .map_err(|_cancelled| Error::Cancelled)
     }
 }
