@@ -22,7 +22,7 @@ pub struct Config {
     pub storage: Storage,
     /// The workers that run jobs.
     #[command(flatten)]
-    pub crew: Crew,
+    pub jobs: JobSettings,
     /// Do not add sample data to an empty data folder.
     #[arg(long, env = "FLOCKREEL_NO_SAMPLE")]
     pub no_sample: bool,
@@ -35,7 +35,7 @@ pub struct Config {
     pub max_queued: i64,
     /// Monitoring.
     #[command(flatten)]
-    pub watch: Watch,
+    pub monitoring: Monitoring,
     /// Maximum size of an upload, bytes.
     #[arg(long, env = "FLOCKREEL_MAX_UPLOAD_BYTES", default_value_t = 4 << 30, value_name = "N")]
     pub max_upload_bytes: u64,
@@ -52,7 +52,7 @@ pub struct Config {
 /// Settings of the media tools, for every command that reads or writes video.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Media tools")]
-pub struct Media {
+pub struct MediaTools {
     /// Isolation of ffmpeg: `auto` uses every protection that this machine has, `strict` requires them all,
     /// `off` applies only resource limits.
     #[arg(
@@ -62,7 +62,7 @@ pub struct Media {
         default_value = "auto",
         value_name = "MODE"
     )]
-    pub sandbox: Sandbox,
+    pub sandbox: SandboxMode,
     /// The ffmpeg program to use instead of the first on the PATH.
     #[arg(long, global = true, env = "FLOCKREEL_FFMPEG", value_name = "FILE")]
     pub ffmpeg: Option<PathBuf>,
@@ -73,7 +73,7 @@ pub struct Media {
 
 /// How much of the sandbox is required (docs/explanation/promises.md, "Sandbox").
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Sandbox {
+pub enum SandboxMode {
     /// Only resource limits.
     Off,
     /// All protections that this machine has; missing ones are reported.
@@ -107,12 +107,12 @@ pub struct Storage {
     /// Stored files: a folder, or s3://BUCKET/PREFIX with the usual AWS_* variables. Default: the data
     /// folder.
     #[arg(long, global = true, env = "FLOCKREEL_STORE", value_name = "DIR|URL")]
-    pub store: Option<Files>,
+    pub store: Option<FileStore>,
 }
 
 /// The workers of a process.
 #[derive(Args, Clone, Debug)]
-pub struct Crew {
+pub struct JobSettings {
     /// Number of jobs that run at once. They share the processor cores.
     #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
     pub workers: NonZeroUsize,
@@ -120,7 +120,7 @@ pub struct Crew {
     #[arg(
         long,
         env = "FLOCKREEL_JOB_TIME_S",
-        default_value_t = Crew::JOB_TIME_S,
+        default_value_t = JobSettings::JOB_TIME_S,
         value_name = "N"
     )]
     pub job_time_s: u64,
@@ -128,7 +128,7 @@ pub struct Crew {
 
 /// Monitoring of a process.
 #[derive(Args, Clone, Debug)]
-pub struct Watch {
+pub struct Monitoring {
     /// Second address, which serves only /metrics and needs no token.
     #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
     pub metrics_bind: Option<SocketAddr>,
@@ -145,7 +145,7 @@ pub enum Database {
 
 /// Location of the stored files.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Files {
+pub enum FileStore {
     /// A local folder.
     Folder(PathBuf),
     /// A bucket of an S3-compatible object store.
@@ -172,17 +172,17 @@ impl Config {
 
     /// Returns the part of the reserve that jobs leave free, bytes. Uploads leave all of the reserve; results
     /// of jobs may use the rest.
-    pub fn least_room_bytes(reserve_bytes: u64) -> u64 {
+    pub fn job_reserve_bytes(reserve_bytes: u64) -> u64 {
         reserve_bytes / 8
     }
 
     /// Returns whether requests without a token are refused.
-    pub fn demands_tokens(&self) -> bool {
+    pub fn requires_tokens(&self) -> bool {
         self.auth == Auth::Required || !self.bind.ip().is_loopback()
     }
 }
 
-impl Crew {
+impl JobSettings {
     /// Default time limit of a job, seconds. An hour of footage takes a few hours on a small machine.
     pub const JOB_TIME_S: u64 = 6 * 3600;
 
@@ -233,24 +233,25 @@ impl FromStr for Database {
     }
 }
 
-impl FromStr for Files {
+impl FromStr for FileStore {
     type Err = String;
 
-    fn from_str(place: &str) -> Result<Files, String> {
+    fn from_str(place: &str) -> Result<FileStore, String> {
         let Some(bucket) = place.strip_prefix("s3://") else {
             let is_url = place.contains("://");
             let wrong = || "the store must be a folder or s3://BUCKET/PREFIX".to_owned();
             return (!is_url)
-                .then(|| Files::Folder(place.into()))
+                .then(|| FileStore::Folder(place.into()))
                 .ok_or_else(wrong);
         };
         let (name, prefix) = bucket.split_once('/').unwrap_or((bucket, ""));
-        match name.is_empty() {
-            true => Err("the bucket name is missing: use s3://BUCKET/PREFIX".to_owned()),
-            false => Ok(Files::Bucket {
+        if name.is_empty() {
+            Err("the bucket name is missing: use s3://BUCKET/PREFIX".to_owned())
+        } else {
+            Ok(FileStore::Bucket {
                 name: name.to_owned(),
                 prefix: prefix.trim_matches('/').to_owned(),
-            }),
+            })
         }
     }
 }

@@ -17,17 +17,18 @@ use tracing_subscriber::EnvFilter;
 /// Maximum number of lines that wait for stderr: a few megabytes, or seconds of a busy service.
 const MAX_QUEUED_LINES: usize = 8192;
 /// Largest write that a pipe with free space takes without blocking, bytes (PIPE_BUF of Linux).
-const PIECE_BYTES: usize = 4096;
+const MAX_WRITE_BYTES: usize = 4096;
 /// Interval at which the writer thread checks whether the process is ending. It must be less than the 100 ms
 /// that `WorkerGuard` waits for space in a full queue.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Time that an ending process waits for a stderr that takes no bytes. Free choice.
-const LAST_WAIT: Duration = Duration::from_millis(50);
+const SHUTDOWN_WAIT: Duration = Duration::from_millis(50);
 
 static QUEUE: OnceLock<NonBlocking> = OnceLock::new();
 /// Number of lines that stderr did not take.
 static N_UNWRITTEN: AtomicU64 = AtomicU64::new(0);
-static ENDS: AtomicBool = AtomicBool::new(false);
+/// Whether the process is ending.
+static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Format of log lines.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -47,7 +48,7 @@ pub struct Log {
 
 impl Drop for Log {
     fn drop(&mut self) {
-        ENDS.store(true, Ordering::Relaxed);
+        IS_ENDING.store(true, Ordering::Relaxed);
     }
 }
 
@@ -119,25 +120,26 @@ impl Stderr {
     /// Waits until a write would not block, or until it would fail. Returns [`ErrorKind::TimedOut`] if the
     /// process ends and stderr takes nothing.
     fn wait(&mut self) -> io::Result<()> {
-        let (stderr, mut end) = (io::stderr(), None);
-        let look_ns = match self.is_stuck {
-            true => 0,
-            false => i64::from(LOOK.subsec_nanos()),
+        let (stderr, mut deadline) = (io::stderr(), None);
+        let interval_ns = if self.is_stuck {
+            0
+        } else {
+            i64::from(POLL_INTERVAL.subsec_nanos())
         };
-        let look = Timespec {
+        let interval = Timespec {
             tv_sec: 0,
-            tv_nsec: look_ns,
+            tv_nsec: interval_ns,
         };
         loop {
-            let ready = poll(&mut [PollFd::new(&stderr, PollFlags::OUT)], Some(&look));
+            let ready = poll(&mut [PollFd::new(&stderr, PollFlags::OUT)], Some(&interval));
             match ready {
                 Ok(0) | Err(Errno::INTR) => {}
                 Ok(_) => return Ok(()),
                 Err(error) => return Err(error.into()),
             }
-            if ENDS.load(Ordering::Relaxed) {
-                let end = *end.get_or_insert_with(|| Instant::now() + LAST_WAIT);
-                self.is_stuck |= Instant::now() >= end;
+            if IS_ENDING.load(Ordering::Relaxed) {
+                let deadline = *deadline.get_or_insert_with(|| Instant::now() + SHUTDOWN_WAIT);
+                self.is_stuck |= Instant::now() >= deadline;
                 if self.is_stuck {
                     return Err(ErrorKind::TimedOut.into());
                 }
@@ -149,8 +151,8 @@ impl Stderr {
 impl Write for Stderr {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.wait()?;
-        let piece = &bytes[..bytes.len().min(PIECE_BYTES)];
-        Ok(rustix::io::write(io::stderr(), piece)?)
+        let part = &bytes[..bytes.len().min(MAX_WRITE_BYTES)];
+        Ok(rustix::io::write(io::stderr(), part)?)
     }
 
     fn write_all(&mut self, line: &[u8]) -> io::Result<()> {
@@ -159,9 +161,9 @@ impl Write for Stderr {
             match self.write(rest) {
                 Ok(n) if n > 0 => rest = &rest[n..],
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
-                ended => {
+                failed => {
                     N_UNWRITTEN.fetch_add(1, Ordering::Relaxed);
-                    return ended.and(Err(ErrorKind::WriteZero.into()));
+                    return failed.and(Err(ErrorKind::WriteZero.into()));
                 }
             }
         }

@@ -74,7 +74,7 @@ pub struct Shared {
     /// Store, limits of the queue, and the signal that wakes the workers.
     pub context: Context,
     /// Version and sandbox of the media tool, found at the start; or the reason why there is no usable tool.
-    pub walls: Result<media::Walls, String>,
+    pub walls: Result<media::SandboxStatus, String>,
     /// Rate limits of owners and addresses.
     rates: Rates,
     /// Counters of HTTP requests.
@@ -96,12 +96,12 @@ impl AppState {
     /// opened. A missing media tool is only logged.
     pub async fn open(config: Config) -> Result<AppState, store::Error> {
         let store = Store::open(config.storage.clone()).await?;
-        let mut context = Context::new(store, config.crew.threads_per_worker());
-        context.budget = Duration::from_secs(config.crew.job_time_s);
+        let mut context = Context::new(store, config.jobs.threads_per_worker());
+        context.budget = Duration::from_secs(config.jobs.job_time_s);
         context.max_queued = config.max_queued;
-        context.least_room_bytes = Config::least_room_bytes(config.disk_reserve_bytes);
+        context.least_room_bytes = Config::job_reserve_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
-        let tool = tokio::task::spawn_blocking(media::walls).await;
+        let tool = tokio::task::spawn_blocking(media::sandbox_status).await;
         let tool = tool.map_err(std::io::Error::other)?;
         match &tool {
             Ok(walls) => tracing::info!(version = walls.version, "media tool found"),
@@ -125,7 +125,7 @@ pub fn router(state: AppState) -> Router {
     openapi::add_headers(&mut document);
     openapi::join_flattened(&mut document);
     let requests = state.requests.clone();
-    let names = match state.config.demands_tokens() {
+    let names = match state.config.requires_tokens() {
         true => Names::Any,
         false => Names::Loopback,
     };

@@ -15,9 +15,9 @@ use crate::cpu;
 use crate::footage::{FrameSource, Part};
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, params, svg};
-use crate::jobs::analysis::{Advice, hints};
+use crate::jobs::analysis::{Advice, read_options};
 use crate::jobs::masks::Masks;
-use crate::jobs::{self, overlay, refusal};
+use crate::jobs::{overlay, refusal};
 use crate::library::{Library, Poses, View};
 use crate::media::{self, Limits, Tool, Video, read_image};
 
@@ -103,37 +103,28 @@ pub struct Args {
 /// Analyzes the video and writes the library. Prints advice about the footage to stderr.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
-    for path in [
-        Some(&args.video),
-        args.background.as_ref(),
-        args.masks.as_ref(),
-    ]
-    .into_iter()
-    .flatten()
-    {
+    let optional = [&args.background, &args.masks];
+    let inputs = optional.into_iter().flatten();
+    for path in [&args.video].into_iter().chain(inputs) {
         File::open(path).map_err(|cause| {
             Error::Usage(format!("cannot read the file: {cause}: {}", path.display()))
         })?;
     }
-    media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
+    media::search_in_background(&[Tool::Ffprobe, Tool::Ffmpeg]);
     let limits = Limits::default();
-    let unreadable = |error: media::Error| Error::work(error.code(), &error);
-    let hints = hints(&params);
-    let video = Video::open_with(&args.video, &limits, &hints).map_err(unreadable)?;
-    let background = args
-        .background
-        .as_deref()
-        .map(|path| read_image(path, &limits));
-    let background = background.transpose().map_err(unreadable)?;
+    let options = read_options(&params);
+    let video = Video::open_with(&args.video, &limits, &options)?;
+    let background = args.background.as_deref();
+    let background = background
+        .map(|path| read_image(path, &limits))
+        .transpose()?;
     let progress = Listener::new();
     let level = cpu::Level::detect();
     let scratch = super::scratch_beside(&args.output);
     let background = background.as_ref();
-    let refused = |error: jobs::Error| Error::work(error.code(), &error);
     let given = (&*args.video, args.masks.as_deref());
-    let masks = Masks::open(&video, given, &limits, &hints).map_err(refused)?;
-    let masked = masks.as_ref().map(|masks| masks.over(&video));
-    let masked = masked.transpose().map_err(refused)?;
+    let masks = Masks::open(&video, given, &limits, &options)?;
+    let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
     let source: &dyn FrameSource = match &masked {
         Some(masked) => masked,
         None => &video,
@@ -148,12 +139,11 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
     write_views(&args.output, &library)?;
     if let Some(path) = &args.overlay {
-        let part = Part::new(source, params.from_s, params.to_s);
-        overlay::film(&part, &library.poses, path, &progress)
-            .map_err(|error| Error::work(error.code(), &error))?;
+        let part = Part::of(source, params.from_s, params.to_s);
+        overlay::film(&part, &library.poses, path, &progress)?;
     }
     super::say(&view_sentence(&library.poses));
-    let advice = Advice::all(&library, &params, video.notes());
+    let advice = Advice::all(&library, &params, video.notices());
     for Advice { code, sentence } in &advice {
         super::say(&format!("{sentence} ({code})"));
     }
@@ -183,9 +173,7 @@ fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) 
 fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
     let table = ("poses.csv", csv::write_poses(&library.poses));
     for (name, text) in svg::pictures(library).into_iter().chain([table]) {
-        let path = folder.join(name);
-        std::fs::write(&path, text)
-            .map_err(Error::io(format!("cannot write {}", path.display())))?;
+        super::write_file(&folder.join(name), text)?;
     }
     Ok(())
 }

@@ -4,10 +4,8 @@
 use std::path::PathBuf;
 
 use serde_json::json;
-use tokio::runtime::Runtime;
 
-use super::check::existing;
-use super::serve::from_store;
+use super::check::with_store;
 use super::{Error, Summary, say};
 use crate::config::{Database, Storage};
 
@@ -36,12 +34,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
                         then the stored files";
         return Err(Error::Usage(sentence.to_owned()));
     }
-    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
-    let copied = runtime.block_on(async {
-        let store = existing(args.storage).await?;
-        let copied = store.back_up(&args.target).await.map_err(from_store);
-        store.close().await;
-        copied
+    let copied = with_store(args.storage, async |store| {
+        store.back_up(&args.target).await
     })?;
     say(&format!("flockreel: files copied: {}", copied.n_files));
     let (n_files, n_bytes) = (copied.n_files, copied.n_bytes);

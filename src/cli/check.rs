@@ -6,10 +6,8 @@
 use std::time::Duration;
 
 use serde_json::json;
-use tokio::runtime::Runtime;
 
-use super::serve::from_store;
-use super::{Error, Summary, say};
+use super::{Error, Summary, runtime, say};
 use crate::code::Code;
 use crate::config::{Database, Storage};
 use crate::jobs::clock::now_ms;
@@ -17,7 +15,7 @@ use crate::store::check::Fault;
 use crate::store::{self, Store};
 
 /// Delay before a second check. A fault that is gone by then was an operation in progress. Free choice.
-const MOMENT: Duration = Duration::from_secs(2);
+const RECHECK_DELAY: Duration = Duration::from_secs(2);
 
 /// Arguments of `check`.
 #[derive(Debug, clap::Args)]
@@ -28,13 +26,7 @@ pub struct Args {
 
 /// Checks the data folder and prints every fault to stderr.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
-    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
-    let faults = runtime.block_on(async {
-        let store = existing(args.storage).await?;
-        let faults = faults(&store).await.map_err(from_store);
-        store.close().await;
-        faults
-    })?;
+    let faults = with_store(args.storage, faults)?;
     for fault in &faults {
         say(&format!("flockreel: {fault}"));
     }
@@ -47,24 +39,32 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     }
 }
 
-/// Opens an existing store. Fails if there is none, so a mistyped name does not create one.
-pub(super) async fn existing(storage: Storage) -> Result<Store, Error> {
+/// Runs `work` on an existing store. Fails if there is none, so a mistyped name does not create one.
+pub(super) fn with_store<T>(
+    storage: Storage,
+    work: impl AsyncFnOnce(&Store) -> Result<T, store::Error>,
+) -> Result<T, Error> {
     if let Database::Sqlite(file) = storage.database()
         && !file.is_file()
     {
         let data = storage.data.display();
         return Err(Error::Usage(format!("no data folder: {data}")));
     }
-    Store::open_beside(storage).await.map_err(from_store)
+    runtime()?.block_on(async {
+        let store = Store::open_beside(storage).await?;
+        let result = work(&store).await;
+        store.close().await;
+        Ok(result?)
+    })
 }
 
 /// Returns all faults. If other processes may use the store, only faults that persist are returned.
 async fn faults(store: &Store) -> Result<Vec<Fault>, store::Error> {
     let mut faults = store.check_after_crash(now_ms()).await?;
     if !faults.is_empty() && !store.is_alone() {
-        tokio::time::sleep(MOMENT).await;
-        let still = store.check_after_crash(now_ms()).await?;
-        faults.retain(|fault| still.contains(fault));
+        tokio::time::sleep(RECHECK_DELAY).await;
+        let later_faults = store.check_after_crash(now_ms()).await?;
+        faults.retain(|fault| later_faults.contains(fault));
     }
     Ok(faults)
 }

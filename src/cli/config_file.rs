@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_file_is_found_among_the_arguments() {
+    fn config_file_is_found_among_the_arguments() {
         let of = |line: &str| {
             let arguments: Vec<OsString> = line.split(' ').map(OsString::from).collect();
             named_in(&arguments)
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_in_the_file_replaces_the_default_and_a_flag_the_value() {
+    fn file_overrides_the_default_and_a_flag_the_file() {
         let settings = Settings::from([
             ("rate".to_owned(), "7".to_owned()),
             ("no_sample".to_owned(), "true".to_owned()),
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_in_the_file_is_named() {
+    fn errors_of_the_file_name_the_setting_or_line() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("flockreel.toml");
         let said = |text: &str| {

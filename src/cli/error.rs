@@ -4,6 +4,7 @@
 //! `api/problem.rs` does for HTTP.
 
 use crate::code::Code;
+use crate::{fish, jobs, media, store};
 
 /// Reasons why a command failed. Each prints as one line in lower case, with the value at the end.
 #[derive(Debug, thiserror::Error)]
@@ -20,10 +21,10 @@ pub enum Error {
         sentence: String,
     },
     /// `doctor` found missing parts and has printed them.
-    #[error("parts that flockreel needs are missing, see LACK above: {n_lacks}")]
-    Lacks {
+    #[error("parts that flockreel needs are missing, see LACK above: {n_missing}")]
+    MissingParts {
         /// Number of missing parts.
-        n_lacks: usize,
+        n_missing: usize,
     },
     /// A file or folder could not be read or written.
     #[error("{what}: {cause}")]
@@ -45,11 +46,6 @@ impl Error {
         }
     }
 
-    /// Returns the error of a media tool.
-    pub fn work_of_media(error: &crate::media::Error) -> Error {
-        Error::work(error.code(), error)
-    }
-
     /// Returns a function for `map_err` that adds the operation to an I/O error.
     pub fn io(what: impl Into<String>) -> impl FnOnce(std::io::Error) -> Error {
         let what = what.into();
@@ -60,7 +56,7 @@ impl Error {
     pub fn advice(&self) -> Option<&'static str> {
         match self {
             Error::Work { code, .. } => Some(code.advice()),
-            Error::Usage(_) | Error::Io { .. } | Error::Lacks { .. } => None,
+            Error::Usage(_) | Error::Io { .. } | Error::MissingParts { .. } => None,
         }
     }
 
@@ -68,18 +64,46 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Usage(_) => 2,
-            Error::Work { code, .. } if is_failure_inside(*code) => 1,
+            Error::Work { code, .. } if is_internal(*code) => 1,
             Error::Work { .. } => 2,
-            Error::Io { .. } | Error::Lacks { .. } => 1,
+            Error::Io { .. } | Error::MissingParts { .. } => 1,
         }
     }
 }
 
-fn is_failure_inside(code: Code) -> bool {
+fn is_internal(code: Code) -> bool {
     matches!(
         code,
         Code::Internal | Code::StorageFull | Code::MemoryLimit | Code::DecoderCrashed
     )
+}
+
+impl From<media::Error> for Error {
+    fn from(error: media::Error) -> Error {
+        Error::work(error.code(), &error)
+    }
+}
+
+impl From<jobs::Error> for Error {
+    fn from(error: jobs::Error) -> Error {
+        Error::work(error.code(), &error)
+    }
+}
+
+impl From<fish::Error> for Error {
+    fn from(error: fish::Error) -> Error {
+        Error::work(error.code(), &error)
+    }
+}
+
+/// A store that is in use, or belongs to another database, is a usage error.
+impl From<store::Error> for Error {
+    fn from(error: store::Error) -> Error {
+        match error {
+            store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),
+            _ => Error::work(error.code(), &error),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -87,7 +111,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bad_film_exits_with_2_and_a_full_disk_with_1() {
+    fn bad_film_exits_with_2_and_full_disk_with_1() {
         let of = |code| {
             let sentence = "why".to_owned();
             Error::Work { code, sentence }.exit_code()

@@ -1,7 +1,7 @@
 //! `flockreel fish`: writes a virtual fish that swims like the animal, as a video or a 3-D model
 //! (docs/explanation/algorithms.md, "Virtual fish").
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
@@ -40,20 +40,18 @@ pub struct Args {
 /// Writes the virtual fish.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
-    media::look_for(&[Tool::Ffmpeg]);
+    media::search_in_background(&[Tool::Ffmpeg]);
     let stored = super::read_library(&args.library, &args.output)?;
-    let motion =
-        fish::drive(&stored.library.poses, &params).map_err(|e| Error::work(e.code(), &e))?;
+    let motion = fish::drive(&stored.library.poses, &params)?;
     let n_visible = motion.frames.iter().filter(|p| p.visible).count();
     let n_frames = motion.frames.len();
-    match extension(&args.output).as_str() {
+    match super::extension(&args.output).as_str() {
         "glb" if args.side_by_side => {
             return Err(Error::Usage(
                 "--side-by-side needs an output that ends in .mp4".into(),
             ));
         }
-        "glb" => std::fs::write(&args.output, glb::write(&motion))
-            .map_err(Error::io(format!("writing {}", args.output.display())))?,
+        "glb" => super::write_file(&args.output, glb::write(&motion))?,
         "mp4" => write_video(&stored.library, motion, &args)?,
         other => {
             return Err(Error::Usage(format!(
@@ -87,24 +85,18 @@ fn write_video(library: &Library, motion: Motion, args: &Args) -> Result<(), Err
         fps: motion.fps,
         color: ColorSpec::default(),
     };
-    let refused = |e: crate::media::Error| Error::work(e.code(), &e);
     let film = Film::new(motion, library.background.clone());
-    let mut writer = VideoWriter::create(&args.output, &video).map_err(refused)?;
+    let mut writer = VideoWriter::create(&args.output, &video)?;
     let listener = Listener::new();
     let mut frame = Frame::new(video.width, video.height, video.color);
     for frame_idx in 0..n_frames {
-        match args.side_by_side {
-            true => side_by_side::render(library, &film, frame_idx, &mut frame),
-            false => film.render(frame_idx, &mut frame),
+        if args.side_by_side {
+            side_by_side::render(library, &film, frame_idx, &mut frame)
+        } else {
+            film.render(frame_idx, &mut frame)
         }
-        writer.write(&frame).map_err(refused)?;
+        writer.write(&frame)?;
         listener.report("filming", (frame_idx + 1) as f64 / n_frames as f64);
     }
-    writer.finish().map_err(refused)
-}
-
-/// Returns the extension of the file name in lower case; empty if there is none.
-fn extension(path: &Path) -> String {
-    let ending = path.extension().unwrap_or_default();
-    ending.to_string_lossy().to_lowercase()
+    Ok(writer.finish()?)
 }

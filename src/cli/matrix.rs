@@ -31,7 +31,7 @@ pub struct Args {
 
 /// Writes the distance matrix. Fails for numbers of more than 8192 frames.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
-    let format = Format::of(&args.output)?;
+    let format = Format::from_extension(&args.output)?;
     if args.candidates && matches!(format, Format::Numbers) {
         return Err(Error::Usage(format!(
             "the file name of --candidates must end in .png: {}",
@@ -55,13 +55,14 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     match format {
         Format::Numbers => write_numbers(&distances, &args.output)?,
         Format::Picture => {
-            let map = DistanceMap::of(&distances, &library, &Listener::new()).map_err(cancelled)?;
-            let png = match args.candidates {
-                true => map.draw_candidates(&library),
-                false => map.draw_distances(),
+            let map =
+                DistanceMap::compute(&distances, &library, &Listener::new()).map_err(cancelled)?;
+            let png = if args.candidates {
+                map.draw_candidates(&library)
+            } else {
+                map.draw_distances()
             };
-            std::fs::write(&args.output, png)
-                .map_err(Error::io(format!("cannot write {}", args.output.display())))?;
+            super::write_file(&args.output, png)?;
         }
     }
     Ok(Some(Summary(serde_json::json!({
@@ -78,7 +79,7 @@ enum Format {
 }
 
 impl Format {
-    fn of(path: &Path) -> Result<Format, Error> {
+    fn from_extension(path: &Path) -> Result<Format, Error> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("npy") => Ok(Format::Numbers),
             Some("png") => Ok(Format::Picture),
@@ -113,16 +114,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_files_name_says_what_is_written() {
+    fn extension_selects_numbers_or_picture() {
         assert!(matches!(
-            Format::of(Path::new("a/d.npy")),
+            Format::from_extension(Path::new("a/d.npy")),
             Ok(Format::Numbers)
         ));
         assert!(matches!(
-            Format::of(Path::new("d.png")),
+            Format::from_extension(Path::new("d.png")),
             Ok(Format::Picture)
         ));
-        let error = Format::of(Path::new("d.jpg")).err().expect("no such kind");
+        let error = Format::from_extension(Path::new("d.jpg"))
+            .err()
+            .expect("no such kind");
         assert_eq!(error.exit_code(), 2);
     }
 }

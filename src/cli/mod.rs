@@ -31,6 +31,7 @@ use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
 use serde_json::Value;
+use tokio::runtime::Runtime;
 
 pub use error::Error;
 pub use progress::Listener;
@@ -54,7 +55,7 @@ pub struct Cli {
     #[arg(long, global = true, env = "FLOCKREEL_LOG", value_name = "FILTER")]
     log: Option<String>,
     #[command(flatten)]
-    media: config::Media,
+    media: config::MediaTools,
     /// Format of log lines: plain text, or one JSON object per line.
     #[arg(
         long,
@@ -126,7 +127,7 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     if serves {
         logging::log_panics();
     }
-    media::set_up(&cli.media);
+    media::configure(&cli.media);
     match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
         Err(error) => {
@@ -171,8 +172,27 @@ fn read_library(folder: &Path, output: &Path) -> Result<StoredLibrary, Error> {
 
 /// Returns temporary storage on the disk of the output, in its nearest existing parent folder.
 fn scratch_beside(output: &Path) -> Arc<dyn Scratch> {
-    let folder = output.ancestors().find(|folder| folder.is_dir());
-    Arc::new(Spill::into(folder.unwrap_or(Path::new("."))))
+    Arc::new(Spill::into(nearest_folder(output)))
+}
+
+/// Returns the nearest existing folder that contains a path, or the current folder.
+fn nearest_folder(path: &Path) -> &Path {
+    let folder = path.ancestors().find(|folder| folder.is_dir());
+    folder.unwrap_or(Path::new("."))
+}
+
+/// Returns the extension of a file name in lower case; empty if there is none.
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_lowercase()
+}
+
+fn write_file(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Error> {
+    std::fs::write(path, bytes).map_err(Error::io(format!("cannot write {}", path.display())))
+}
+
+fn runtime() -> Result<Runtime, Error> {
+    Runtime::new().map_err(Error::io("starting the threads"))
 }
 
 fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
@@ -187,15 +207,15 @@ fn print(json: bool, summary: &Option<Summary>) -> ExitCode {
 
 /// Fails if the sandbox lacks a layer that `--sandbox` requires. Other missing layers are logged. Commands
 /// that read videos of untrusted people call this at their start.
-fn check_walls() -> Result<(), Error> {
-    media::look_for(&[Tool::Ffprobe, Tool::Ffmpeg]);
-    match media::demanded_walls() {
+fn check_sandbox() -> Result<(), Error> {
+    media::search_in_background(&[Tool::Ffprobe, Tool::Ffmpeg]);
+    match media::required_sandbox() {
         Err(error @ media::Error::SandboxIncomplete { .. }) => Err(Error::Usage(error.to_string())),
         // The search for ffmpeg reports a missing ffmpeg.
         Err(_) => Ok(()),
-        Ok(walls) => {
-            for (layer, lack) in walls.layers {
-                if let Some(reason) = lack {
+        Ok(sandbox) => {
+            for (layer, reason) in sandbox.layers {
+                if let Some(reason) = reason {
                     let (layer, meaning) = (layer.name(), layer.meaning());
                     tracing::warn!(layer, reason, meaning, "a layer of the sandbox is missing");
                 }
@@ -206,7 +226,9 @@ fn check_walls() -> Result<(), Error> {
 }
 
 /// Writes lines to stdout, for commands whose result is text.
-fn print_lines(lines: &[String]) -> std::io::Result<()> {
+fn print_lines(lines: &[String]) -> Result<(), Error> {
     let mut out = std::io::stdout().lock();
-    lines.iter().try_for_each(|line| writeln!(out, "{line}"))
+    let mut lines = lines.iter();
+    let written = lines.try_for_each(|line| writeln!(out, "{line}"));
+    written.map_err(Error::io("writing to stdout"))
 }

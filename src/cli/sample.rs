@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::{Error, Listener, Summary};
 use crate::fish::sample::{SampleFilm, SampleParams};
-use crate::footage::FrameSource;
+use crate::footage::{FrameSource, SourceError};
 use crate::formats::poses_json;
 use crate::media::VideoWriter;
 use crate::progress::Progress;
@@ -46,13 +46,12 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         height: args.size[1],
         ..SampleParams::default()
     };
-    let film = SampleFilm::new(params).map_err(|e| Error::work(e.code(), &e))?;
+    let film = SampleFilm::new(params)?;
     let listener = Listener::new();
     write_video(&film, &args, &listener)?;
     if let Some(path) = &args.truth {
         listener.report("truth", 0.0);
-        let bytes = poses_json::write(&film.truth(), None);
-        std::fs::write(path, bytes).map_err(Error::io(format!("writing {}", path.display())))?;
+        super::write_file(path, poses_json::write(&film.truth(), None))?;
     }
     Ok(Some(Summary(json!({
         "output": args.output.display().to_string(),
@@ -63,21 +62,16 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 fn write_video(film: &SampleFilm, args: &Args, listener: &Listener) -> Result<(), Error> {
-    let refused = |e: crate::media::Error| Error::work(e.code(), &e);
-    let mut writer = VideoWriter::create(&args.output, &film.format().into()).map_err(refused)?;
-    let mut stream = film.open().map_err(|e| Error::work(e.code, &e))?;
-    let mut frame = Frame::default();
-    for frame_idx in 0.. {
-        let more = stream
-            .next_frame(&mut frame)
-            .map_err(|e| Error::work(e.code, &e))?;
-        if more.is_none() {
-            break;
-        }
-        writer.write(&frame).map_err(refused)?;
-        listener.report("filming", (frame_idx + 1) as f64 / args.frames as f64);
+    let mut writer = VideoWriter::create(&args.output, &film.format().into())?;
+    let unreadable = |error: SourceError| Error::work(error.code, &error);
+    let mut stream = film.open().map_err(unreadable)?;
+    let (mut frame, mut n_written) = (Frame::default(), 0);
+    while stream.next_frame(&mut frame).map_err(unreadable)?.is_some() {
+        writer.write(&frame)?;
+        n_written += 1;
+        listener.report("filming", f64::from(n_written) / args.frames as f64);
     }
-    writer.finish().map_err(refused)
+    Ok(writer.finish()?)
 }
 
 /// Parses a size such as `640x480`. Returns width and height.
@@ -94,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_size_is_two_numbers_with_an_x_between() {
+    fn size_is_two_numbers_with_an_x_between() {
         assert_eq!(parse_size("640x480"), Ok([640, 480]));
         assert!(parse_size("640").is_err() && parse_size("ax1").is_err());
     }

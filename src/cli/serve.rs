@@ -3,7 +3,6 @@
 use std::net::SocketAddr;
 
 use tokio::net::TcpListener;
-use tokio::runtime::Runtime;
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::{Error, Summary};
@@ -14,7 +13,7 @@ use crate::jobs::clock::now_ms;
 use crate::jobs::sample;
 use crate::jobs::supervisor::Supervisor;
 use crate::logging::say;
-use crate::store::{self, Store};
+use crate::store::Store;
 
 /// Arguments of `serve`.
 #[derive(Debug, clap::Args)]
@@ -26,8 +25,8 @@ pub struct Args {
 /// Serves until SIGTERM or SIGINT.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let config = args.config;
-    super::check_walls()?;
-    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    super::check_sandbox()?;
+    let runtime = super::runtime()?;
     let served = runtime.block_on(serve(config));
     // A job that does not stop must not keep the process alive. The next start rescues it.
     runtime.shutdown_background();
@@ -35,12 +34,12 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
 }
 
 async fn serve(config: Config) -> Result<(), Error> {
-    let (bind, n_workers) = (config.bind, config.crew.workers.get());
+    let (bind, n_workers) = (config.bind, config.jobs.workers.get());
     let with_sample = !config.no_sample;
-    refuse_open_door(&config).await?;
-    let state = AppState::open(config).await.map_err(from_store)?;
+    require_token_beyond_loopback(&config).await?;
+    let state = AppState::open(config).await?;
     let (listener, address) = listen(bind).await?;
-    let metrics = match state.config.watch.metrics_bind {
+    let metrics = match state.config.monitoring.metrics_bind {
         Some(bind) => Some(listen(bind).await?),
         None => None,
     };
@@ -88,23 +87,21 @@ pub(super) async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr)
 
 /// Fails if the service would listen beyond loopback without a valid token in the database, because it would
 /// then refuse every request. `--auth required` disables this check.
-async fn refuse_open_door(config: &Config) -> Result<(), Error> {
+async fn require_token_beyond_loopback(config: &Config) -> Result<(), Error> {
     if config.bind.ip().is_loopback() || config.auth == Auth::Required {
         return Ok(());
     }
-    let store = Store::open(config.storage.clone())
-        .await
-        .map_err(from_store)?;
-    let has_tokens = store.has_tokens(now_ms()).await.map_err(from_store)?;
+    let store = Store::open(config.storage.clone()).await?;
+    let has_tokens = store.has_tokens(now_ms()).await?;
     store.close().await;
-    match has_tokens {
-        true => Ok(()),
-        false => Err(Error::Usage(format!(
-            "an address beyond loopback needs a token: run `flockreel token create --name NAME`, or bind to 127.0.0.1 \
-             instead of: {}",
-            config.bind
-        ))),
+    if has_tokens {
+        return Ok(());
     }
+    Err(Error::Usage(format!(
+        "an address beyond loopback needs a token: run `flockreel token create --name NAME`, or bind to 127.0.0.1 \
+         instead of: {}",
+        config.bind
+    )))
 }
 
 /// Waits for SIGTERM or SIGINT.
@@ -117,12 +114,4 @@ pub(super) async fn wait_for_signal() -> Result<(), Error> {
         _ = interrupt.recv() => {}
     }
     Ok(())
-}
-
-/// Converts an error of the store. A store that is in use, or belongs to another database, is a usage error.
-pub(super) fn from_store(error: store::Error) -> Error {
-    match error {
-        store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),
-        _ => Error::work(error.code(), &error),
-    }
 }

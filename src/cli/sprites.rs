@@ -29,9 +29,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .filter(|&idx| sprites.is_present(idx))
         .collect();
     present.par_iter().try_for_each(|&idx| {
-        let path = folder.join(picture_archive::name(idx));
+        let path = folder.join(picture_archive::frame_name(idx));
         let bytes = picture::write_rgba(sprites.width(), sprites.height(), &sprites.sprite(idx));
-        std::fs::write(&path, bytes).map_err(Error::io(format!("cannot write {}", path.display())))
+        super::write_file(&path, bytes)
     })?;
     Ok(Some(Summary(json!({
         "sprites": present.len(),

@@ -4,14 +4,10 @@
 //! The command writes to the database directly, even while a service runs. Changes take effect with the next
 //! request. A new token is printed to stdout once.
 
-use std::io::Write;
-
 use clap::Subcommand;
 use clap::builder::PossibleValuesParser;
 use serde_json::{Value, json};
-use tokio::runtime::Runtime;
 
-use super::serve::from_store;
 use super::{Error, Summary, say};
 use crate::config::Storage;
 use crate::jobs::clock::now_ms;
@@ -65,83 +61,83 @@ struct CreateArgs {
 
 /// Creates, lists or revokes tokens. The result is one line of JSON with `json`, else plain lines.
 pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
-    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
-    runtime.block_on(async {
-        let store = Store::open_beside(args.storage).await.map_err(from_store)?;
-        let done = match args.action {
-            Action::Create(wishes) => create(&store, wishes).await,
+    super::runtime()?.block_on(async {
+        let store = Store::open_beside(args.storage).await?;
+        let result = match args.action {
+            Action::Create(args) => create(&store, args).await,
             Action::List => list(&store).await,
             Action::Revoke { id } => revoke(&store, &id).await,
         };
         store.close().await;
-        match json {
-            true => done.map(|value| Some(Summary(value))),
-            false => print_lines(&done?).map(|()| None),
+        let result = result?;
+        if !json {
+            super::print_lines(&lines(&result))?;
         }
+        Ok(json.then_some(Summary(result)))
     })
 }
 
-/// Prints a new token, or a list with one line per token.
-fn print_lines(answer: &Value) -> Result<(), Error> {
-    let mut out = std::io::stdout().lock();
-    let written = match answer {
-        Value::Array(tokens) => tokens.iter().try_for_each(|token| {
-            let word = |name: &str| token[name].as_str().unwrap_or_default();
-            let state = match token["good"] == true {
-                true => "good",
-                false => "ended",
-            };
-            let (id, scope, name) = (word("id"), word("scope"), word("name"));
-            writeln!(
-                out,
-                "{id}  {state:5}  {scope:5}  {:>5}  {name}",
-                token["quota"]
-            )
-        }),
-        made => match made["token"].as_str() {
-            Some(token) => writeln!(out, "{token}"),
-            None => Ok(()),
-        },
-    };
-    written.map_err(Error::io("writing to stdout"))
+/// Returns a new token, or one line per token of a list.
+fn lines(result: &Value) -> Vec<String> {
+    match result {
+        Value::Array(tokens) => tokens.iter().map(line).collect(),
+        result => result["token"]
+            .as_str()
+            .map(str::to_owned)
+            .into_iter()
+            .collect(),
+    }
 }
 
-async fn create(store: &Store, wishes: CreateArgs) -> Result<Value, Error> {
-    let now_ms = now_ms();
-    let scope = Scope::from_name(&wishes.scope)
-        .ok_or_else(|| Error::Usage(format!("no such scope: {}", wishes.scope)))?;
-    let new = NewToken {
-        name: wishes.name,
-        owner: wishes.owner.map(Owner),
-        scope,
-        quota: wishes.quota,
-        expires_ms: wishes
-            .expires
-            .map(|lasts_ms| now_ms.saturating_add(lasts_ms)),
+fn line(token: &Value) -> String {
+    let text = |name: &str| token[name].as_str().unwrap_or_default();
+    let (id, scope, name) = (text("id"), text("scope"), text("name"));
+    let state = if token["good"] == true {
+        "good"
+    } else {
+        "ended"
     };
-    let (token, text) = store.add_token(&new, now_ms).await.map_err(from_store)?;
+    let quota = &token["quota"];
+    format!("{id}  {state:5}  {scope:5}  {quota:>5}  {name}")
+}
+
+async fn create(store: &Store, args: CreateArgs) -> Result<Value, Error> {
+    let now_ms = now_ms();
+    let scope = Scope::from_name(&args.scope)
+        .ok_or_else(|| Error::Usage(format!("no such scope: {}", args.scope)))?;
+    let new = NewToken {
+        name: args.name,
+        owner: args.owner.map(Owner),
+        scope,
+        quota: args.quota,
+        expires_ms: args
+            .expires
+            .map(|lifetime_ms| now_ms.saturating_add(lifetime_ms)),
+    };
+    let (token, text) = store.add_token(&new, now_ms).await?;
     say("flockreel: store this token, it is not shown again");
-    let mut value = described(&token);
+    let mut value = to_json(&token);
     value["token"] = json!(text);
     Ok(value)
 }
 
 async fn list(store: &Store) -> Result<Value, Error> {
-    let tokens = store.list_tokens().await.map_err(from_store)?;
-    Ok(tokens.iter().map(described).collect())
+    let tokens = store.list_tokens().await?;
+    Ok(tokens.iter().map(to_json).collect())
 }
 
 async fn revoke(store: &Store, id: &str) -> Result<Value, Error> {
     // The whole token is accepted in place of its id.
     let id = id.strip_prefix("frl_").unwrap_or(id);
     let id = id.split('_').next().unwrap_or(id);
-    match store.revoke_token(id, now_ms()).await.map_err(from_store)? {
-        true => Ok(json!({"id": id, "revoked": true})),
-        false => Err(Error::Usage(format!("no unrevoked token has the id: {id}"))),
+    if store.revoke_token(id, now_ms()).await? {
+        Ok(json!({"id": id, "revoked": true}))
+    } else {
+        Err(Error::Usage(format!("no unrevoked token has the id: {id}")))
     }
 }
 
-fn described(token: &Token) -> Value {
+fn to_json(token: &Token) -> Value {
     json!({
         "id": token.id,
         "name": token.name,
@@ -168,8 +164,8 @@ fn duration_ms(text: &str) -> Result<i64, String> {
     let count: i64 = text[..text.len() - 1]
         .parse()
         .map_err(|_not_a_number| wrong())?;
-    let lasts_ms = count.checked_mul(minutes * 60_000).ok_or_else(wrong)?;
-    (count > 0).then_some(lasts_ms).ok_or_else(wrong)
+    let lifetime_ms = count.checked_mul(minutes * 60_000).ok_or_else(wrong)?;
+    (count > 0).then_some(lifetime_ms).ok_or_else(wrong)
 }
 
 #[cfg(test)]
@@ -177,7 +173,7 @@ mod tests {
     use super::duration_ms;
 
     #[test]
-    fn a_time_is_a_number_of_days_hours_or_minutes() {
+    fn duration_is_a_number_of_days_hours_or_minutes() {
         assert_eq!(duration_ms("30d"), Ok(30 * 86_400_000));
         assert_eq!(duration_ms("12h"), Ok(43_200_000));
         assert_eq!(duration_ms("1m"), Ok(60_000));

@@ -6,13 +6,11 @@
 
 use std::time::Duration;
 
-use tokio::runtime::Runtime;
-
-use super::serve::{from_store, listen, wait_for_signal};
+use super::serve::{listen, wait_for_signal};
 use super::{Error, Summary};
 use crate::api;
 use crate::api::server::Stop;
-use crate::config::{Config, Crew, Database, Storage, Watch};
+use crate::config::{Config, Database, JobSettings, Monitoring, Storage};
 use crate::jobs::Context;
 use crate::jobs::supervisor::{Supervisor, recover};
 use crate::logging::say;
@@ -25,14 +23,14 @@ pub struct Args {
     #[command(flatten)]
     storage: Storage,
     #[command(flatten)]
-    crew: Crew,
+    jobs: JobSettings,
     #[command(flatten)]
-    watch: Watch,
+    monitoring: Monitoring,
 }
 
 /// Runs jobs until SIGTERM or SIGINT.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
-    let runtime = Runtime::new().map_err(Error::io("starting the threads"))?;
+    let runtime = super::runtime()?;
     let worked = runtime.block_on(work(args));
     // A job that does not stop must not keep the process alive. Another worker rescues it.
     runtime.shutdown_background();
@@ -46,16 +44,16 @@ async fn work(args: Args) -> Result<(), Error> {
             file.display()
         )));
     }
-    super::check_walls()?;
-    media::tool_version().map_err(|error| Error::work(error.code(), &error))?;
-    let (n_workers, threads) = (args.crew.workers.get(), args.crew.threads_per_worker());
-    let store = Store::open_beside(args.storage).await.map_err(from_store)?;
+    super::check_sandbox()?;
+    media::tool_version()?;
+    let (n_workers, threads) = (args.jobs.workers.get(), args.jobs.threads_per_worker());
+    let store = Store::open_beside(args.storage).await?;
     let mut context = Context::new(store, threads);
-    context.budget = Duration::from_secs(args.crew.job_time_s);
-    context.least_room_bytes = Config::least_room_bytes(Config::DISK_RESERVE_BYTES);
-    recover(&context).await.map_err(from_store)?;
+    context.budget = Duration::from_secs(args.jobs.job_time_s);
+    context.least_room_bytes = Config::job_reserve_bytes(Config::DISK_RESERVE_BYTES);
+    recover(&context).await?;
     let stop = Stop::default();
-    if let Some(bind) = args.watch.metrics_bind {
+    if let Some(bind) = args.monitoring.metrics_bind {
         let (listener, address) = listen(bind).await?;
         let router = api::worker_metrics_router(&context.meters);
         tokio::spawn(api::server::serve(listener, router, stop.clone()));

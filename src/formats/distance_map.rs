@@ -15,56 +15,55 @@ use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
 /// Maximum number of rows and columns.
-pub const LARGEST_SIDE: usize = 1024;
+pub const MAX_SIDE: usize = 1024;
 
 /// Number of cells per side from which a transition is drawn as 3 x 3 cells instead of one.
-const LARGE_SIDE: usize = 256;
+const MIN_SIDE_OF_LARGE_MARKS: usize = 256;
 
-/// Number of clips above which only distances below `FAR` epsilon are computed.
-const MOST_WHOLE: usize = 8192;
-const FAR: u64 = 4;
+/// Number of clips above which only distances below `WHITE_EPSILONS` epsilon are computed.
+const MAX_COMPLETE_CLIPS: usize = 8192;
+const WHITE_EPSILONS: u64 = 4;
 /// Marks a distance that was not computed.
 const UNKNOWN: u64 = u64::MAX;
 
-const PAPER: [u8; 3] = [0xfd, 0xfc, 0xf9];
+const BACKGROUND: [u8; 3] = [0xfd, 0xfc, 0xf9];
 /// A pair with D < epsilon.
-const ALIKE: [u8; 3] = [0xc2, 0xc6, 0xbf];
+const SIMILAR_PAIR: [u8; 3] = [0xc2, 0xc6, 0xbf];
 /// A transition.
-const KEPT: [u8; 3] = [0xc8, 0x3c, 0x08];
+const TRANSITION: [u8; 3] = [0xc8, 0x3c, 0x08];
 /// A transition to the mirror image.
-const MIRRORED: [u8; 3] = [0x12, 0x5c, 0x96];
+const MIRRORED_TRANSITION: [u8; 3] = [0x12, 0x5c, 0x96];
 
 /// The distances, pooled to the size of the pictures.
 pub struct DistanceMap {
     side: usize,
     n_clips: usize,
     /// Minimum D of each cell's pairs, row by row, symmetric.
-    least: Vec<u64>,
+    min_distance: Vec<u64>,
     /// Whether a cell has a pair with D < epsilon and all sprites present, row by row, symmetric.
-    alike: Vec<bool>,
+    has_similar_pair: Vec<bool>,
 }
 
 impl DistanceMap {
     /// Computes the distances and pools D(i, j) into cell (i side / n, j side / n). Divisions are rounded
     /// down, and `side` is min(n, 1024).
-    pub fn of(
+    pub fn compute(
         distances: &Distances<'_>,
         library: &Library,
         progress: &dyn Progress,
     ) -> Result<DistanceMap, Cancelled> {
-        let present = whole_clips(&library.sprites, library.clip_frames);
+        let present = complete_clips(&library.sprites, library.clip_frames);
         let mut map = DistanceMap::empty(distances.n_clips());
         let mut pool = |pair: ClipPair| map.pool(pair, &present, library.epsilon);
-        match distances.n_clips() > MOST_WHOLE {
-            false => distances.for_each_row(progress, |from, row| {
+        if distances.n_clips() > MAX_COMPLETE_CLIPS {
+            let limit = library.epsilon.saturating_mul(WHITE_EPSILONS);
+            let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
+            distances.for_each_row_below(limit, &Everything, progress, near)?
+        } else {
+            distances.for_each_row(progress, |from, row| {
                 let pair = |(to, &distance)| ClipPair { from, to, distance };
                 (from..).zip(row).map(pair).for_each(&mut pool);
-            })?,
-            true => {
-                let limit = library.epsilon.saturating_mul(FAR);
-                let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
-                distances.for_each_row_below(limit, &Everything, progress, near)?
-            }
+            })?
         }
         map.mirror_triangle();
         Ok(map)
@@ -75,7 +74,7 @@ impl DistanceMap {
         let side = self.side as u32;
         match side {
             0 => picture::write_gray(1, 1, &[255]),
-            _ => picture::write_gray(side, side, &levels(&self.least)),
+            _ => picture::write_gray(side, side, &gray_levels(&self.min_distance)),
         }
     }
 
@@ -83,13 +82,21 @@ impl DistanceMap {
     /// pixel.
     pub fn draw_candidates(&self, library: &Library) -> Vec<u8> {
         let side = self.side.max(1);
-        let mut pixels = vec![PAPER; side * side];
-        for (pixel, _) in pixels.iter_mut().zip(&self.alike).filter(|cell| *cell.1) {
-            *pixel = ALIKE;
+        let mut pixels = vec![BACKGROUND; side * side];
+        for (pixel, _) in pixels
+            .iter_mut()
+            .zip(&self.has_similar_pair)
+            .filter(|cell| *cell.1)
+        {
+            *pixel = SIMILAR_PAIR;
         }
         // Transitions without mirroring are drawn last and stay visible where both overlap.
         for mirrored in [true, false] {
-            let color = if mirrored { MIRRORED } else { KEPT };
+            let color = if mirrored {
+                MIRRORED_TRANSITION
+            } else {
+                TRANSITION
+            };
             for transition in library
                 .transitions
                 .iter()
@@ -108,32 +115,33 @@ impl DistanceMap {
     }
 
     fn empty(n_clips: usize) -> DistanceMap {
-        let side = n_clips.min(LARGEST_SIDE);
+        let side = n_clips.min(MAX_SIDE);
         DistanceMap {
             side,
             n_clips,
-            least: vec![UNKNOWN; side * side],
-            alike: vec![false; side * side],
+            min_distance: vec![UNKNOWN; side * side],
+            has_similar_pair: vec![false; side * side],
         }
     }
 
     fn pool(&mut self, pair: ClipPair, present: &[bool], epsilon: u64) {
-        let at = self.cell(pair.from) * self.side + self.cell(pair.to);
-        self.least[at] = pair.distance.min(self.least[at]);
-        self.alike[at] |= pair.distance < epsilon && present[pair.from] && present[pair.to];
+        let at = self.cell_of(pair.from) * self.side + self.cell_of(pair.to);
+        self.min_distance[at] = pair.distance.min(self.min_distance[at]);
+        self.has_similar_pair[at] |=
+            pair.distance < epsilon && present[pair.from] && present[pair.to];
     }
 
     fn mirror_triangle(&mut self) {
         for row in 0..self.side {
             for column in 0..row {
                 let (to, from) = (row * self.side + column, column * self.side + row);
-                self.least[to] = self.least[from];
-                self.alike[to] = self.alike[from];
+                self.min_distance[to] = self.min_distance[from];
+                self.has_similar_pair[to] = self.has_similar_pair[from];
             }
         }
     }
 
-    fn cell(&self, clip_idx: usize) -> usize {
+    fn cell_of(&self, clip_idx: usize) -> usize {
         clip_idx * self.side / self.n_clips
     }
 
@@ -142,9 +150,9 @@ impl DistanceMap {
         if from.max(to) >= self.n_clips {
             return;
         }
-        let reach = usize::from(self.side >= LARGE_SIDE);
+        let reach = usize::from(self.side >= MIN_SIDE_OF_LARGE_MARKS);
         let around = |clip_idx: usize| {
-            let cell = self.cell(clip_idx);
+            let cell = self.cell_of(clip_idx);
             cell.saturating_sub(reach)..(cell + reach + 1).min(self.side)
         };
         for row in around(from) {
@@ -157,7 +165,7 @@ impl DistanceMap {
 }
 
 /// Returns which clips have all their sprites. Frames without the animal are similar but show nothing.
-fn whole_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
+fn complete_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
     let present: Vec<bool> = (0..sprites.n_frames())
         .map(|frame_idx| sprites.is_present(frame_idx))
         .collect();
@@ -165,7 +173,7 @@ fn whole_clips(sprites: &Sprites, clip_frames: usize) -> Vec<bool> {
     clips.map(|clip| clip.iter().all(|&frame| frame)).collect()
 }
 
-fn levels(cells: &[u64]) -> Vec<u8> {
+fn gray_levels(cells: &[u64]) -> Vec<u8> {
     let drawn = cells.iter().copied().filter(|&d| d != UNKNOWN);
     let largest = drawn.max().unwrap_or(0).max(1);
     let level = |&distance: &u64| match distance {
@@ -190,10 +198,10 @@ mod tests {
     use crate::scratch::{Full, InMemory};
 
     #[test]
-    fn near_is_black_and_far_is_white() {
-        assert_eq!(levels(&[0, 50, 200, 100]), [0, 64, 255, 128]);
-        assert_eq!(levels(&[0, 0]), [0, 0]);
-        assert_eq!(levels(&[0, UNKNOWN, 10]), [0, 255, 255]);
+    fn small_distances_are_black_and_large_ones_white() {
+        assert_eq!(gray_levels(&[0, 50, 200, 100]), [0, 64, 255, 128]);
+        assert_eq!(gray_levels(&[0, 0]), [0, 0]);
+        assert_eq!(gray_levels(&[0, UNKNOWN, 10]), [0, 255, 255]);
     }
 
     /// Returns a map of `n_clips` clips, all distant except the given pairs.
@@ -234,10 +242,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_and_what_is_mirrored_stands_out_from_what_is_only_alike() {
+    fn transitions_are_drawn_over_similar_pairs() {
         let map = map(4, &[(0, 2), (1, 3)], &[true; 4]);
         let pixels = colors(&map, vec![transition(0, 2, false), transition(0, 3, true)]);
-        let (p, a, k, m) = (PAPER, ALIKE, KEPT, MIRRORED);
+        let (p, a, k, m) = (BACKGROUND, SIMILAR_PAIR, TRANSITION, MIRRORED_TRANSITION);
         assert_eq!(
             pixels,
             [p, p, k, m, p, p, p, a, k, p, p, p, m, a, p, p],
@@ -246,20 +254,29 @@ mod tests {
     }
 
     #[test]
-    fn a_single_like_pair_of_a_long_footage_is_still_seen() {
+    fn single_similar_pair_of_long_footage_stays_visible() {
         let map = map(3000, &[(700, 2999)], &[true; 3000]);
         assert_eq!(
-            (map.side, map.alike.iter().filter(|&&cell| cell).count()),
+            (
+                map.side,
+                map.has_similar_pair.iter().filter(|&&cell| cell).count()
+            ),
             (1024, 2)
         );
-        assert!(map.alike[(700 * 1024 / 3000) * 1024 + 1023]);
-        assert_eq!(map.least.iter().filter(|&&least| least == 5).count(), 2);
+        assert!(map.has_similar_pair[(700 * 1024 / 3000) * 1024 + 1023]);
+        assert_eq!(
+            map.min_distance
+                .iter()
+                .filter(|&&min_distance| min_distance == 5)
+                .count(),
+            2
+        );
     }
 
     #[test]
-    fn of_more_clips_than_can_all_be_compared_the_near_ones_are_drawn() {
+    fn above_the_limit_only_near_clips_are_compared() {
         // Dark in the first half, bright in the second.
-        let n = MOST_WHOLE + 8;
+        let n = MAX_COMPLETE_CLIPS + 8;
         let mut library = synthetic::library(View::Side);
         let scratch = Arc::new(InMemory::default());
         let draw = |frame_idx: usize, rgba: &mut [u8]| {
@@ -277,19 +294,19 @@ mod tests {
             side: Side::Plain,
             cpu: Level::detect(),
         };
-        let map = DistanceMap::of(&distances, &library, &Silent).expect("nobody cancels");
-        assert_eq!((map.least[0], map.least[1023]), (0, UNKNOWN));
-        assert_eq!(levels(&map.least)[1023], 255);
+        let map = DistanceMap::compute(&distances, &library, &Silent).expect("nobody cancels");
+        assert_eq!((map.min_distance[0], map.min_distance[1023]), (0, UNKNOWN));
+        assert_eq!(gray_levels(&map.min_distance)[1023], 255);
     }
 
     #[test]
-    fn frames_without_the_animal_are_not_alike() {
+    fn frames_without_the_animal_are_not_similar() {
         let map = map(4, &[(0, 2), (1, 3)], &[true, true, true, false]);
-        assert_eq!(map.alike.iter().filter(|&&cell| cell).count(), 2);
+        assert_eq!(map.has_similar_pair.iter().filter(|&&cell| cell).count(), 2);
     }
 
     #[test]
-    fn the_pairs_drawn_are_those_counted_from_the_distances_themselves() {
+    fn drawn_pairs_are_those_below_epsilon() {
         let mut library = synthetic::library(View::Side);
         library.transitions.clear();
         let pixels = ComparedSprites::new(&library.sprites, &library.poses, Planes::Rgba);
@@ -308,8 +325,8 @@ mod tests {
         all.sort_unstable();
         library.epsilon = all[all.len() / 50];
         let n_below = all.iter().filter(|&&d| d < library.epsilon).count();
-        let map = DistanceMap::of(&distances, &library, &Silent).expect("nobody cancels");
-        let drawn = map.alike.iter().filter(|&&cell| cell).count();
+        let map = DistanceMap::compute(&distances, &library, &Silent).expect("nobody cancels");
+        let drawn = map.has_similar_pair.iter().filter(|&&cell| cell).count();
         assert_eq!(drawn, 2 * n_below + distances.n_clips());
     }
 }

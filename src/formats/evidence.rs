@@ -8,14 +8,14 @@ use crate::raster::resize::resized;
 use crate::raster::{Frame, Pen, RgbImage};
 
 /// Maximum side of each frame, pixels. Larger frames are reduced. Free choice.
-const LONGEST_PX: u32 = 640;
+const MAX_SIDE_PX: u32 = 640;
 /// Gap between two frames, pixels.
 const GAP_PX: u32 = 8;
 /// Difference of luma above which a pixel counts as changed, levels of 255. Free choice.
-const CHANGED: u8 = 24;
+const MIN_DIFFERENCE: u8 = 24;
 /// Share of changed pixels above which they are not marked, because the marks would hide the frame. Free
 /// choice.
-const MOST_MARKED: f64 = 0.5;
+const MAX_MARKED_SHARE: f64 = 0.5;
 
 /// Draws the frames side by side as JPEG, with boxes over the last one. If there are two, changed pixels are
 /// marked in the second. Panics if there is no frame, or if the frames differ in size.
@@ -33,16 +33,18 @@ pub fn draw(mut frames: Vec<Frame>, boxes_px: &[Rect]) -> Vec<u8> {
     {
         mark_changes(&before, after, picture);
     }
-    let small: Vec<RgbImage> = pictures.iter().map(shrunk).collect();
+    let small: Vec<RgbImage> = pictures.iter().map(reduced).collect();
     picture::write_jpeg(&side_by_side(&small))
 }
 
 /// Tints the pixels that differ between two frames.
 fn mark_changes(before: &Frame, after: &Frame, picture: &mut RgbImage) {
     let pairs = before.luma().iter().zip(after.luma());
-    let changed: Vec<bool> = pairs.map(|(a, b)| a.abs_diff(*b) > CHANGED).collect();
+    let changed: Vec<bool> = pairs
+        .map(|(a, b)| a.abs_diff(*b) > MIN_DIFFERENCE)
+        .collect();
     let n_changed = changed.iter().filter(|changed| **changed).count();
-    if n_changed as f64 > MOST_MARKED * changed.len() as f64 {
+    if n_changed as f64 > MAX_MARKED_SHARE * changed.len() as f64 {
         return;
     }
     let marked = picture.pixels.chunks_exact_mut(3).zip(changed);
@@ -53,10 +55,10 @@ fn mark_changes(before: &Frame, after: &Frame, picture: &mut RgbImage) {
     }
 }
 
-/// Returns the picture, reduced so that no side is longer than [`LONGEST_PX`].
-fn shrunk(picture: &RgbImage) -> RgbImage {
+/// Returns the picture, reduced so that no side is longer than [`MAX_SIDE_PX`].
+fn reduced(picture: &RgbImage) -> RgbImage {
     let [width, height] = [picture.width, picture.height].map(f64::from);
-    let scale = (f64::from(LONGEST_PX) / width.max(height)).min(1.0);
+    let scale = (f64::from(MAX_SIDE_PX) / width.max(height)).min(1.0);
     let [width, height] = [width, height].map(|side| ((side * scale).round() as u32).max(1));
     resized(picture, width, height)
 }
@@ -99,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_shows_its_boxes_and_is_made_small() {
+    fn single_frame_has_its_boxes_and_is_reduced() {
         let rect = Rect {
             x: 200,
             y: 100,
@@ -113,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn two_frames_stand_side_by_side_with_what_changed_marked_in_the_second() {
+    fn two_frames_are_side_by_side_with_changes_marked() {
         let mut after = gray(64, 48);
         for y in 8..24 {
             after.planes[y * 64 + 16..y * 64 + 32].fill(200);
@@ -126,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn where_all_has_changed_the_second_frame_stays_as_it_is() {
+    fn changes_of_most_pixels_are_not_marked() {
         let mut after = gray(64, 48);
         after.planes[..64 * 48].fill(220);
         let picture = decoded(&draw(vec![gray(64, 48), after], &[]));

@@ -1,10 +1,10 @@
 //! The boids drawn over the video of their flock (Okabe et al., figure 10). For each individual: position and
 //! heading of the boid, a line to the drawn animal, the heading of the animal, and its number.
 
+use super::overlay::{RIM, arrow, unit_px, write_rim};
 use crate::flock::{Flock, Individual};
 use crate::raster::{Frame, Pen};
 
-const RIM: [u8; 3] = [16, 24, 28];
 const BOID: [u8; 3] = [84, 214, 230];
 const SHOWN: [u8; 3] = [255, 132, 60];
 const NUMBER: [u8; 3] = [236, 240, 238];
@@ -26,7 +26,7 @@ impl FlockOverlay {
         let [w, h] = flock.image_size_px.map(f64::from);
         let [width, height] = size_px.map(f64::from);
         let scale = (width / w).min(height / h);
-        let unit_px = (width.max(height) / 640.0).clamp(0.5, 4.0);
+        let unit_px = unit_px(size_px[0], size_px[1]);
         FlockOverlay {
             pen: Pen::new(size_px[0], size_px[1]),
             scale,
@@ -40,7 +40,7 @@ impl FlockOverlay {
     pub fn draw(&mut self, flock: &Flock, frame_idx: usize, frame: &mut Frame) {
         let unit = self.unit_px;
         for individual in &flock.individuals {
-            let (boid, shown) = self.places(individual, frame_idx);
+            let (boid, shown) = self.positions(individual, frame_idx);
             let (meant, seen) = (
                 self.arrow(boid, individual.boid.heading_rad[frame_idx]),
                 self.arrow(shown, individual.heading_rad[frame_idx]),
@@ -55,38 +55,19 @@ impl FlockOverlay {
     }
 
     /// Returns the positions of the boid and its animal in the video, pixels.
-    fn places(&self, individual: &Individual, frame_idx: usize) -> ([f64; 2], [f64; 2]) {
+    fn positions(&self, individual: &Individual, frame_idx: usize) -> ([f64; 2], [f64; 2]) {
         let [x, y, _] = individual.boid.position_px[frame_idx];
         let film = |at: [f64; 2]| [0, 1].map(|k| self.offset_px[k] + at[k] * self.scale);
         (film([x, y]), film(individual.centroid_px[frame_idx]))
     }
 
     fn arrow(&self, from: [f64; 2], heading_rad: f64) -> [[f64; 2]; 5] {
-        let toward = |turn: f64, reach: f64, from: [f64; 2]| {
-            let angle = heading_rad + turn;
-            [
-                from[0] + reach * libm::cos(angle),
-                from[1] + reach * libm::sin(angle),
-            ]
-        };
-        let tip = toward(0.0, self.reach_px, from);
-        let barb = 5.0 * self.unit_px;
-        [
-            from,
-            tip,
-            toward(2.6, barb, tip),
-            tip,
-            toward(-2.6, barb, tip),
-        ]
+        arrow(from, heading_rad, self.reach_px, 5.0 * self.unit_px)
     }
 
     fn number(&mut self, frame: &mut Frame, text: &str, at: [f64; 2]) {
         let dot_px = 1.1 * self.unit_px;
-        for (dx, dy) in [(-0.7, 0.0), (0.7, 0.0), (0.0, -0.7), (0.0, 0.7)] {
-            let beside = [at[0] + dx * dot_px, at[1] + dy * dot_px];
-            self.pen.text(text, beside, dot_px);
-        }
-        self.pen.draw(frame, RIM);
+        write_rim(&mut self.pen, frame, text, at, [dot_px, 0.7 * dot_px]);
         self.pen.text(text, at, dot_px);
         self.pen.draw(frame, NUMBER);
     }
@@ -110,7 +91,7 @@ mod tests {
     use crate::raster::ColorSpec;
 
     #[test]
-    fn every_boid_has_its_mark_where_it_is_at_any_size() {
+    fn boids_are_marked_at_their_positions_at_any_size() {
         let params = Params {
             count: Some(3),
             frames: 10,

@@ -67,19 +67,23 @@ pub fn write(library: &Library, params: &Params, footage: &FootageSummary) -> Ve
             .map(|idx| library.sprites.matte(idx).map(|matte| matte.center_px))
             .collect(),
         occluders: library.occluders.is_some(),
-        shadow: library.shadow.as_ref().map(ShadowFile::of),
+        shadow: library.shadow.as_ref().map(ShadowFile::new),
         clip_frames: library.clip_frames,
         epsilon: library.epsilon,
         natural_step: library.natural_step,
-        stats: StatsFile::of(&library.stats, &advice(library, params)),
-        transitions: library.transitions.iter().map(TransitionFile::of).collect(),
-        playback: library.playback.jumps.iter().map(JumpFile::of).collect(),
+        stats: StatsFile::new(&library.stats, &advice(library, params)),
+        transitions: library
+            .transitions
+            .iter()
+            .map(TransitionFile::new)
+            .collect(),
+        playback: library.playback.jumps.iter().map(JumpFile::new).collect(),
         component: library.playback.component.clone(),
         patches: library
             .patches
             .iter()
             .enumerate()
-            .map(|(id, p)| PatchFile::of(id, p))
+            .map(|(id, p)| PatchFile::new(id, p))
             .collect(),
     };
     serde_json::to_vec(&file).expect("plain values serialise")
@@ -95,15 +99,11 @@ pub fn read(bytes: &[u8]) -> Result<Summary, serde_json::Error> {
         sprite_scale: file.sprite_scale,
         matte_center_px: file.matte_center_px,
         occluders: file.occluders,
-        shadow: file.shadow.map(ShadowFile::into_shadow),
+        shadow: file.shadow.map(|shadow| shadow.0),
         clip_frames: file.clip_frames,
         epsilon: file.epsilon,
         natural_step: file.natural_step,
-        transitions: file
-            .transitions
-            .into_iter()
-            .map(TransitionFile::into_transition)
-            .collect(),
+        transitions: file.transitions.into_iter().map(|file| file.0).collect(),
         playback: Playback {
             jumps: file.playback.into_iter().map(JumpFile::into_jump).collect(),
             component: file.component,
@@ -148,33 +148,35 @@ struct LibraryFile {
 }
 
 #[derive(Serialize, Deserialize)]
-struct ShadowFile {
+#[serde(transparent)]
+struct ShadowFile(#[serde(with = "ShadowFields")] Shadow);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Shadow")]
+struct ShadowFields {
     darkness: f64,
     offset_bl: [f64; 2],
     blur_bl: f64,
 }
 
 impl ShadowFile {
-    fn of(shadow: &Shadow) -> ShadowFile {
+    fn new(shadow: &Shadow) -> ShadowFile {
         let round = |value| rounded(value, 4);
-        ShadowFile {
+        ShadowFile(Shadow {
             darkness: round(shadow.darkness),
             offset_bl: shadow.offset_bl.map(round),
             blur_bl: round(shadow.blur_bl),
-        }
-    }
-
-    fn into_shadow(self) -> Shadow {
-        Shadow {
-            darkness: self.darkness,
-            offset_bl: self.offset_bl,
-            blur_bl: self.blur_bl,
-        }
+        })
     }
 }
 
 #[derive(Serialize, Deserialize)]
-struct TransitionFile {
+#[serde(transparent)]
+struct TransitionFile(#[serde(with = "TransitionFields")] Transition);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Transition")]
+struct TransitionFields {
     from: u32,
     to: u32,
     mirrored: bool,
@@ -183,24 +185,11 @@ struct TransitionFile {
 }
 
 impl TransitionFile {
-    fn of(transition: &Transition) -> TransitionFile {
-        TransitionFile {
-            from: transition.from,
-            to: transition.to,
-            mirrored: transition.mirrored,
-            distance: transition.distance,
+    fn new(transition: &Transition) -> TransitionFile {
+        TransitionFile(Transition {
             heading_gap_rad: rounded(transition.heading_gap_rad, 5),
-        }
-    }
-
-    fn into_transition(self) -> Transition {
-        Transition {
-            from: self.from,
-            to: self.to,
-            mirrored: self.mirrored,
-            distance: self.distance,
-            heading_gap_rad: self.heading_gap_rad,
-        }
+            ..*transition
+        })
     }
 }
 
@@ -213,7 +202,7 @@ enum JumpFile {
 }
 
 impl JumpFile {
-    fn of(jump: &Jump) -> JumpFile {
+    fn new(jump: &Jump) -> JumpFile {
         if jump.mirrored {
             JumpFile::Mirrored(jump.from, jump.to, jump.cost, true)
         } else {
@@ -245,7 +234,7 @@ struct PatchFile {
 }
 
 impl PatchFile {
-    fn of(id: usize, patch: &Patch) -> PatchFile {
+    fn new(id: usize, patch: &Patch) -> PatchFile {
         let next = patch.next.clone();
         PatchFile {
             id,
@@ -301,7 +290,7 @@ struct AdviceFile {
 }
 
 impl AdviceFile {
-    fn of(advice: &Advice) -> AdviceFile {
+    fn new(advice: &Advice) -> AdviceFile {
         AdviceFile {
             code: advice.code(),
             sentence: advice.to_string(),
@@ -310,8 +299,8 @@ impl AdviceFile {
 }
 
 impl StatsFile {
-    fn of(stats: &LibraryStats, advice: &[Advice]) -> StatsFile {
-        let digits = |n: i32| move |value: f64| rounded(value, n);
+    fn new(stats: &LibraryStats, advice: &[Advice]) -> StatsFile {
+        let decimals = |n: i32| move |value: f64| rounded(value, n);
         StatsFile {
             n_frames: stats.n_frames,
             n_detected: stats.n_detected,
@@ -320,17 +309,17 @@ impl StatsFile {
             },
             several_animals: stats.several_animals,
             n_foreign_frames: stats.n_foreign_frames,
-            first_foreign_s: stats.first_foreign_s.map(digits(3)),
+            first_foreign_s: stats.first_foreign_s.map(decimals(3)),
             animal_too_small: stats.animal_too_small,
             n_candidates: stats.n_candidates,
             n_transitions: stats.n_transitions,
             kappa_used: stats.kappa_used,
-            component_share: digits(5)(stats.component_share),
+            component_share: decimals(5)(stats.component_share),
             heading_histogram: stats.heading_histogram.clone(),
-            speed_bl_per_s: stats.speed_bl_per_s.map(|s| s.map(digits(4))),
-            turn_rate_rad_per_s: stats.turn_rate_rad_per_s.map(digits(4)),
-            length_px: stats.length_px.map(digits(3)),
-            advice: advice.iter().map(AdviceFile::of).collect(),
+            speed_bl_per_s: stats.speed_bl_per_s.map(|s| s.map(decimals(4))),
+            turn_rate_rad_per_s: stats.turn_rate_rad_per_s.map(decimals(4)),
+            length_px: stats.length_px.map(decimals(3)),
+            advice: advice.iter().map(AdviceFile::new).collect(),
         }
     }
 
@@ -362,7 +351,7 @@ mod tests {
     use crate::library::View;
 
     #[test]
-    fn advice_is_written_and_an_older_file_without_it_is_read() {
+    fn advice_is_written_and_optional_when_read() {
         let mut library = synthetic::library(View::Side);
         library.playback.jumps.clear();
         let footage = FootageSummary {

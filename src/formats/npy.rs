@@ -79,7 +79,7 @@ mod tests {
     use crate::analysis::distance::tests::matrix_of_gray_levels;
 
     #[test]
-    fn numpys_own_bytes_come_out() {
+    fn bytes_are_those_of_numpy() {
         let mut bytes = Vec::new();
         write(&matrix_of_gray_levels(&[0, 3, 1], 1), &mut bytes).expect("memory takes all");
         // The output of numpy.save for numpy.array([[0, 9, 3], [9, 0, 6], [3, 6, 0]], "<u4").
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn footage_above_8192_frames_is_refused_with_advice() {
+    fn footage_above_8192_frames_is_refused() {
         assert_eq!(check(8192), Ok(()));
         let refusal = check(8193).expect_err("too long");
         assert_eq!(refusal.code(), Code::TooManyFrames);
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_beyond_32_bits_are_written_in_64() {
+    fn distances_above_32_bits_are_written_in_64() {
         let matrix = DistanceMatrix::of_triangle(2, vec![0, 1 << 40, 0]);
         let mut bytes = Vec::new();
         write(&matrix, &mut bytes).expect("memory takes all");

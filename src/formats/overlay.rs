@@ -9,7 +9,7 @@ use crate::raster::{Frame, Pen};
 
 /// Length of the drawn path, seconds. Free choice.
 const TRACE_S: f64 = 2.0;
-const RIM: [u8; 3] = [16, 24, 28];
+pub(super) const RIM: [u8; 3] = [16, 24, 28];
 const BOX: [u8; 3] = [236, 240, 238];
 const TRACE: [u8; 3] = [84, 214, 230];
 pub(super) const HEADING: [u8; 3] = [255, 132, 60];
@@ -91,22 +91,7 @@ impl<'a> Overlay<'a> {
         };
         let unit = self.unit_px;
         if let Some(heading) = pose.heading_rad {
-            let toward = |turn: f64, reach: f64, from: [f64; 2]| {
-                let angle = heading + turn;
-                [
-                    from[0] + reach * libm::cos(angle),
-                    from[1] + reach * libm::sin(angle),
-                ]
-            };
-            let tip = toward(0.0, self.reach_px, center);
-            let barb = 7.0 * unit;
-            let arrow = [
-                center,
-                tip,
-                toward(2.6, barb, tip),
-                tip,
-                toward(-2.6, barb, tip),
-            ];
+            let arrow = arrow(center, heading, self.reach_px, 7.0 * unit);
             self.stroke(frame, &arrow, 1.1 * unit, HEADING);
         }
         self.stroke(frame, &[center, center], 2.6 * unit, HEADING);
@@ -114,11 +99,7 @@ impl<'a> Overlay<'a> {
 
     fn label(&mut self, frame: &mut Frame, label: &str, dot_px: f64) {
         let at = [6.0 * dot_px, 5.0 * dot_px];
-        for (dx, dy) in [(-0.6, 0.0), (0.6, 0.0), (0.0, -0.6), (0.0, 0.6)] {
-            let beside = [at[0] + dx * dot_px, at[1] + dy * dot_px];
-            self.pen.text(label, beside, dot_px);
-        }
-        self.pen.draw(frame, RIM);
+        write_rim(&mut self.pen, frame, label, at, [dot_px, 0.6 * dot_px]);
         self.pen.text(label, at, dot_px);
         self.pen.draw(frame, BOX);
     }
@@ -141,6 +122,39 @@ pub(super) fn stroke(
     pen.draw(frame, RIM);
     pen.polyline(points, radius_px, 1.0);
     pen.draw(frame, rgb);
+}
+
+/// Draws the dark outline of a text: copies of the text, shifted by `rim_px` in four directions.
+pub(super) fn write_rim(
+    pen: &mut Pen,
+    frame: &mut Frame,
+    text: &str,
+    [x, y]: [f64; 2],
+    [dot_px, rim_px]: [f64; 2],
+) {
+    for (dx, dy) in [(-rim_px, 0.0), (rim_px, 0.0), (0.0, -rim_px), (0.0, rim_px)] {
+        pen.text(text, [x + dx, y + dy], dot_px);
+    }
+    pen.ink(frame, RIM);
+}
+
+/// Returns an arrow of length `reach_px` with two barbs of length `barb_px` as one line.
+pub(super) fn arrow(
+    from: [f64; 2],
+    heading_rad: f64,
+    reach_px: f64,
+    barb_px: f64,
+) -> [[f64; 2]; 5] {
+    let toward = |turn_rad: f64, reach_px: f64, [x, y]: [f64; 2]| {
+        let angle_rad = heading_rad + turn_rad;
+        [
+            x + reach_px * libm::cos(angle_rad),
+            y + reach_px * libm::sin(angle_rad),
+        ]
+    };
+    let tip = toward(0.0, reach_px, from);
+    let [left, right] = [2.6, -2.6].map(|turn_rad| toward(turn_rad, barb_px, tip));
+    [from, tip, left, tip, right]
 }
 
 /// Returns the unit of stroke widths for a picture size, pixels.
@@ -196,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn the_arrow_points_to_the_head_on_light_and_on_dark() {
+    fn arrow_is_visible_on_light_and_dark_pictures() {
         for level in [16, 235] {
             let frame = drawn(0, level).to_rgb();
             let [r, _, b] = frame.pixel(86, 59);
@@ -207,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_the_animal_shows_its_number_alone() {
+    fn frame_without_the_animal_has_only_its_label() {
         let frame = drawn(1, 16);
         let below_label = &frame.luma()[640 * 40..];
         assert!(below_label.iter().all(|&y| y == 16));
@@ -215,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_the_last_pose_nothing_is_drawn() {
+    fn frame_after_the_last_pose_is_unchanged() {
         assert!(drawn(2, 16).luma().iter().all(|&y| y == 16));
     }
 }

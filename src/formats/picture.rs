@@ -35,17 +35,17 @@ pub enum Error {
 
 /// Returns an RGB image as PNG.
 pub fn write_rgb(image: &RgbImage) -> Vec<u8> {
-    encode(image.width, image.height, ColorType::Rgb, &image.pixels)
+    encode_8_bits(image.width, image.height, ColorType::Rgb, &image.pixels)
 }
 
 /// Returns straight-alpha RGBA pixels as PNG. Panics unless there are `width * height * 4` bytes.
 pub fn write_rgba(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
-    encode(width, height, ColorType::Rgba, pixels)
+    encode_8_bits(width, height, ColorType::Rgba, pixels)
 }
 
 /// Returns gray levels as PNG. Panics unless there are `width * height` of them.
 pub fn write_gray(width: u32, height: u32, pixels: &[u8]) -> Vec<u8> {
-    encode(width, height, ColorType::Grayscale, pixels)
+    encode_8_bits(width, height, ColorType::Grayscale, pixels)
 }
 
 /// Returns labels as a PNG of 16-bit gray. Panics unless there are `width * height` of them.
@@ -54,10 +54,11 @@ pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
         .iter()
         .flat_map(|label| label.to_be_bytes())
         .collect();
-    encode_deep(
+    encode(
         width,
         height,
-        (ColorType::Grayscale, BitDepth::Sixteen),
+        ColorType::Grayscale,
+        BitDepth::Sixteen,
         &bytes,
     )
 }
@@ -79,7 +80,7 @@ pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
 
 /// Reads an 8-bit RGB PNG.
 pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
-    let (width, height, pixels) = decode(bytes, (ColorType::Rgb, "RGB"), [u32::MAX; 2])?;
+    let (width, height, pixels) = decode(bytes, ColorType::Rgb, [u32::MAX; 2])?;
     Ok(RgbImage {
         width,
         height,
@@ -87,9 +88,9 @@ pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
     })
 }
 
-/// Reads an 8-bit RGBA PNG of at most `most_px` columns and rows.
-pub fn read_rgba(bytes: &[u8], most_px: [u32; 2]) -> Result<RgbaImage, Error> {
-    let (width, height, pixels) = decode(bytes, (ColorType::Rgba, "RGBA"), most_px)?;
+/// Reads an 8-bit RGBA PNG of at most `max_size_px` columns and rows.
+pub fn read_rgba(bytes: &[u8], max_size_px: [u32; 2]) -> Result<RgbaImage, Error> {
+    let (width, height, pixels) = decode(bytes, ColorType::Rgba, max_size_px)?;
     Ok(RgbaImage {
         width,
         height,
@@ -97,15 +98,15 @@ pub fn read_rgba(bytes: &[u8], most_px: [u32; 2]) -> Result<RgbaImage, Error> {
     })
 }
 
-fn encode(width: u32, height: u32, color: ColorType, pixels: &[u8]) -> Vec<u8> {
-    encode_deep(width, height, (color, BitDepth::Eight), pixels)
+fn encode_8_bits(width: u32, height: u32, color: ColorType, pixels: &[u8]) -> Vec<u8> {
+    encode(width, height, color, BitDepth::Eight, pixels)
 }
 
-fn encode_deep(width: u32, height: u32, kind: (ColorType, BitDepth), pixels: &[u8]) -> Vec<u8> {
+fn encode(width: u32, height: u32, color: ColorType, depth: BitDepth, pixels: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(kind.0);
-    encoder.set_depth(kind.1);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
     encoder.set_compression(Compression::Fast);
     encoder
         .write_header()
@@ -116,16 +117,23 @@ fn encode_deep(width: u32, height: u32, kind: (ColorType, BitDepth), pixels: &[u
 
 fn decode(
     bytes: &[u8],
-    (color, wanted): (ColorType, &'static str),
-    most_px: [u32; 2],
+    color: ColorType,
+    max_size_px: [u32; 2],
 ) -> Result<(u32, u32, Vec<u8>), Error> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
     let found = reader.output_color_type();
     if found != (color, BitDepth::Eight) {
-        return Err(Error::Kind { wanted, found });
+        return Err(Error::Kind {
+            wanted: if color == ColorType::Rgb {
+                "RGB"
+            } else {
+                "RGBA"
+            },
+            found,
+        });
     }
     let (width, height) = (reader.info().width, reader.info().height);
-    if width > most_px[0] || height > most_px[1] {
+    if width > max_size_px[0] || height > max_size_px[1] {
         return Err(Error::TooLarge { width, height });
     }
     let mut pixels = vec![0; width as usize * height as usize * color.samples()];
@@ -138,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_come_back_as_they_were() {
+    fn pictures_are_read_back_as_written() {
         let mut rgb = RgbImage::new(5, 3);
         rgb.pixels
             .iter_mut()

@@ -31,7 +31,7 @@ pub struct Entry {
 const BATCH: usize = 256;
 
 /// Returns the name of a frame's picture in archives and folders.
-pub fn name(frame_idx: usize) -> String {
+pub fn frame_name(frame_idx: usize) -> String {
     format!("{frame_idx:06}.png")
 }
 
@@ -47,7 +47,7 @@ pub fn write<W: Write + Seek>(
     for batch in frames.chunks(BATCH) {
         let pictures: Vec<Vec<u8>> = batch.par_iter().map(|&idx| encode(idx)).collect();
         for (&idx, bytes) in batch.iter().zip(pictures) {
-            archive.start_file(name(idx), stored)?;
+            archive.start_file(frame_name(idx), stored)?;
             archive.write_all(&bytes)?;
         }
     }
@@ -91,7 +91,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_picture_lies_where_its_entry_says_and_other_archives_are_refused() {
+    fn entries_locate_the_pictures_and_other_archives_are_refused() {
         let encode = |idx: usize| vec![idx as u8; idx + 1];
         let archive = write(Cursor::new(Vec::new()), [0, 2, 3].into_iter(), encode);
         let bytes = archive.expect("memory has room").into_inner();

@@ -21,23 +21,12 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
         params: params.cloned(),
         fps: poses.fps,
         image_size_px: poses.image_size_px,
-        view: match poses.view {
-            View::Side => ViewName::Side,
-            View::Top => ViewName::Top,
-        },
+        view: poses.view,
         view_confidence: poses.view_confidence.map(|value| rounded(value, 3)),
-        other_movers: poses.other_movers.iter().map(MoverFile::of).collect(),
-        camera: poses.camera.map(|c| CameraFile {
-            z_min_m: c.z_min_m,
-            pane_px_per_m: c.pane_px_per_m,
-            center_px: c.center_px,
-            medium_index: c.medium_index,
-        }),
-        animal: poses.animal.map(|a| AnimalFile {
-            length_m: a.length_m,
-            height_m: a.height_m,
-        }),
-        tail_beat: poses.tail_beat.as_ref().map(TailBeatFile::of),
+        other_movers: poses.other_movers.iter().map(MoverFile::new).collect(),
+        camera: poses.camera.map(CameraFile),
+        animal: poses.animal.map(AnimalFile),
+        tail_beat: poses.tail_beat.as_ref().map(TailBeatFile::new),
         frames: (), // written line by line below
     };
     let head = serde_json::to_string(&file).expect("plain values serialise");
@@ -48,7 +37,7 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
         .to_vec();
     bytes.extend(b"[\n");
     for (idx, pose) in poses.frames.iter().enumerate() {
-        serde_json::to_writer(&mut bytes, &PoseFile::of(idx, pose))
+        serde_json::to_writer(&mut bytes, &PoseFile::new(idx, pose))
             .expect("plain values serialise");
         bytes.extend(if idx + 1 < poses.frames.len() {
             &b",\n"[..]
@@ -60,32 +49,31 @@ pub fn write(poses: &Poses, params: Option<&Params>) -> Vec<u8> {
     bytes
 }
 
+/// Returns one frame as JSON.
+pub(super) fn frame(idx: usize, pose: &Pose) -> serde_json::Value {
+    serde_json::to_value(PoseFile::new(idx, pose)).expect("plain values serialise")
+}
+
+/// Rounds a frequency as in the file.
+pub(super) fn rounded_hz(frequency_hz: f64) -> f64 {
+    rounded(frequency_hz, 3)
+}
+
 /// Parses the output of `write`.
 pub fn read(bytes: &[u8]) -> Result<Poses, serde_json::Error> {
     let file: PosesFile<Vec<PoseFile>> = serde_json::from_slice(bytes)?;
     Ok(Poses {
         fps: file.fps,
         image_size_px: file.image_size_px,
-        view: match file.view {
-            ViewName::Side => View::Side,
-            ViewName::Top => View::Top,
-        },
+        view: file.view,
         view_confidence: file.view_confidence,
         other_movers: file
             .other_movers
             .into_iter()
             .map(MoverFile::into_mover)
             .collect(),
-        camera: file.camera.map(|c| Camera {
-            z_min_m: c.z_min_m,
-            pane_px_per_m: c.pane_px_per_m,
-            center_px: c.center_px,
-            medium_index: c.medium_index,
-        }),
-        animal: file.animal.map(|a| Animal {
-            length_m: a.length_m,
-            height_m: a.height_m,
-        }),
+        camera: file.camera.map(|camera| camera.0),
+        animal: file.animal.map(|animal| animal.0),
         frames: file.frames.into_iter().map(PoseFile::into_pose).collect(),
         tail_beat: file.tail_beat.map(TailBeatFile::into_tail_beat),
     })
@@ -99,7 +87,8 @@ struct PosesFile<Frames> {
     params: Option<Params>,
     fps: f64,
     image_size_px: [u32; 2],
-    view: ViewName,
+    #[serde(with = "ViewName")]
+    view: View,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     view_confidence: Option<f64>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -112,14 +101,19 @@ struct PosesFile<Frames> {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(remote = "View", rename_all = "snake_case")]
 enum ViewName {
     Side,
     Top,
 }
 
 #[derive(Serialize, Deserialize)]
-struct CameraFile {
+#[serde(transparent)]
+struct CameraFile(#[serde(with = "CameraFields")] Camera);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Camera")]
+struct CameraFields {
     z_min_m: f64,
     pane_px_per_m: f64,
     center_px: [f64; 2],
@@ -127,26 +121,37 @@ struct CameraFile {
 }
 
 #[derive(Serialize, Deserialize)]
-struct AnimalFile {
+#[serde(transparent)]
+struct AnimalFile(#[serde(with = "AnimalFields")] Animal);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Animal")]
+struct AnimalFields {
     length_m: f64,
     height_m: f64,
 }
 
 #[derive(Serialize, Deserialize)]
 struct TailBeatFile {
-    method: MethodName,
+    #[serde(with = "MethodName")]
+    method: TailBeatMethod,
     spans: Vec<BeatSpanFile>,
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(remote = "TailBeatMethod", rename_all = "snake_case")]
 enum MethodName {
     Bend,
     LengthAndSkew,
 }
 
 #[derive(Serialize, Deserialize)]
-struct BeatSpanFile {
+#[serde(transparent)]
+struct BeatSpanFile(#[serde(with = "BeatSpanFields")] BeatSpan);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "BeatSpan")]
+struct BeatSpanFields {
     frames: [usize; 2],
     start_s: f64,
     end_s: f64,
@@ -156,39 +161,25 @@ struct BeatSpanFile {
 }
 
 impl TailBeatFile {
-    fn of(beat: &TailBeat) -> TailBeatFile {
-        let span = |span: &BeatSpan| BeatSpanFile {
+    fn new(beat: &TailBeat) -> TailBeatFile {
+        let span = |span: &BeatSpan| BeatSpan {
             frames: span.frames,
             start_s: rounded(span.start_s, 6),
             end_s: rounded(span.end_s, 6),
-            frequency_hz: rounded(span.frequency_hz, 3),
+            frequency_hz: rounded_hz(span.frequency_hz),
             amplitude: rounded(span.amplitude, 5),
             confidence: rounded(span.confidence, 4),
         };
         TailBeatFile {
-            method: match beat.method {
-                TailBeatMethod::Bend => MethodName::Bend,
-                TailBeatMethod::LengthAndSkew => MethodName::LengthAndSkew,
-            },
-            spans: beat.spans.iter().map(span).collect(),
+            method: beat.method,
+            spans: beat.spans.iter().map(span).map(BeatSpanFile).collect(),
         }
     }
 
     fn into_tail_beat(self) -> TailBeat {
-        let span = |span: BeatSpanFile| BeatSpan {
-            frames: span.frames,
-            start_s: span.start_s,
-            end_s: span.end_s,
-            frequency_hz: span.frequency_hz,
-            amplitude: span.amplitude,
-            confidence: span.confidence,
-        };
         TailBeat {
-            method: match self.method {
-                MethodName::Bend => TailBeatMethod::Bend,
-                MethodName::LengthAndSkew => TailBeatMethod::LengthAndSkew,
-            },
-            spans: self.spans.into_iter().map(span).collect(),
+            method: self.method,
+            spans: self.spans.into_iter().map(|span| span.0).collect(),
         }
     }
 }
@@ -220,9 +211,14 @@ struct PoseFile {
     raw: Option<RawFile>,
 }
 
+#[derive(Serialize, Deserialize)]
+#[serde(transparent)]
+struct RawFile(#[serde(with = "RawFields")] Raw);
+
 /// Estimates from one frame only, before all frames are combined.
 #[derive(Serialize, Deserialize)]
-struct RawFile {
+#[serde(remote = "Raw")]
+struct RawFields {
     heading_rad: Option<f64>,
     position_m: Option<[f64; 3]>,
     forward: Option<[f64; 3]>,
@@ -230,39 +226,41 @@ struct RawFile {
 }
 
 impl PoseFile {
-    fn of(frame: usize, pose: &Pose) -> PoseFile {
-        let digits = |n: i32| move |value: f64| rounded(value, n);
+    fn new(frame: usize, pose: &Pose) -> PoseFile {
+        let decimals = |n: i32| move |value: f64| rounded(value, n);
         PoseFile {
             frame,
             time_s: rounded(pose.time_s, 6),
             detected: pose.detected(),
             cut: pose.cut,
-            confidence: pose.confidence.map(digits(4)),
-            head_confidence: pose.head_confidence.map(digits(4)),
-            depth_sign_confidence: pose.depth_sign_confidence.map(digits(4)),
-            centroid_px: pose.centroid_px.map(|p| p.map(digits(3))),
+            confidence: pose.confidence.map(decimals(4)),
+            head_confidence: pose.head_confidence.map(decimals(4)),
+            depth_sign_confidence: pose.depth_sign_confidence.map(decimals(4)),
+            centroid_px: pose.centroid_px.map(|p| p.map(decimals(3))),
             box_px: pose.box_px.map(|r| [r.x, r.y, r.w, r.h]),
-            area_px: pose.area_px.map(digits(2)),
-            axis_rad: pose.axis_rad.map(digits(5)),
-            heading_rad: pose.heading_rad.map(digits(5)),
-            length_px: pose.length_px.map(digits(3)),
-            height_px: pose.height_px.map(digits(3)),
-            skew: pose.skew.map(digits(5)),
+            area_px: pose.area_px.map(decimals(2)),
+            axis_rad: pose.axis_rad.map(decimals(5)),
+            heading_rad: pose.heading_rad.map(decimals(5)),
+            length_px: pose.length_px.map(decimals(3)),
+            height_px: pose.height_px.map(decimals(3)),
+            skew: pose.skew.map(decimals(5)),
             midline_px: pose
                 .midline_px
                 .as_ref()
-                .map(|points| points.iter().map(|p| p.map(digits(2))).collect()),
-            bend_rad: pose.bend_rad.map(digits(5)),
-            position_m: pose.position_m.map(|p| p.map(digits(5))),
-            forward: pose.forward.map(|p| p.map(digits(5))),
-            yaw_rad: pose.yaw_rad.map(digits(5)),
-            pitch_rad: pose.pitch_rad.map(digits(5)),
-            gamma_rad: pose.gamma_rad.map(digits(5)),
-            raw: pose.raw.map(|raw| RawFile {
-                heading_rad: raw.heading_rad.map(digits(5)),
-                position_m: raw.position_m.map(|p| p.map(digits(5))),
-                forward: raw.forward.map(|p| p.map(digits(5))),
-                gamma_rad: raw.gamma_rad.map(digits(5)),
+                .map(|points| points.iter().map(|p| p.map(decimals(2))).collect()),
+            bend_rad: pose.bend_rad.map(decimals(5)),
+            position_m: pose.position_m.map(|p| p.map(decimals(5))),
+            forward: pose.forward.map(|p| p.map(decimals(5))),
+            yaw_rad: pose.yaw_rad.map(decimals(5)),
+            pitch_rad: pose.pitch_rad.map(decimals(5)),
+            gamma_rad: pose.gamma_rad.map(decimals(5)),
+            raw: pose.raw.map(|raw| {
+                RawFile(Raw {
+                    heading_rad: raw.heading_rad.map(decimals(5)),
+                    position_m: raw.position_m.map(|p| p.map(decimals(5))),
+                    forward: raw.forward.map(|p| p.map(decimals(5))),
+                    gamma_rad: raw.gamma_rad.map(decimals(5)),
+                })
             }),
         }
     }
@@ -289,12 +287,7 @@ impl PoseFile {
             yaw_rad: self.yaw_rad,
             pitch_rad: self.pitch_rad,
             gamma_rad: self.gamma_rad,
-            raw: self.raw.map(|raw| RawPose {
-                heading_rad: raw.heading_rad,
-                position_m: raw.position_m,
-                forward: raw.forward,
-                gamma_rad: raw.gamma_rad,
-            }),
+            raw: self.raw.map(|raw| raw.0),
         }
     }
 }
@@ -304,7 +297,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn poses_come_back_as_they_were_written() {
+    fn poses_are_read_back_as_written() {
         let pose = Pose {
             time_s: 0.033,
             centroid_px: Some([12.25, 7.5]),

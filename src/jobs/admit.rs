@@ -7,7 +7,7 @@ use super::clock::now_ms;
 use super::masks::Masks;
 use super::{Context, Error};
 use crate::footage::{FootageFormat, FrameSource};
-use crate::media::{Hints, Limits, Video, read_image};
+use crate::media::{Limits, ReadOptions, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
@@ -56,7 +56,7 @@ fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
     if arrival.masks.is_some() {
         let given = arrival.draft.path().join(MASKS);
         let given = (&*path, Some(&*given));
-        if let Some(masks) = Masks::open(&video, given, &limits, &Hints::default())? {
+        if let Some(masks) = Masks::open(&video, given, &limits, &ReadOptions::default())? {
             masks.over(&video)?;
         }
     }

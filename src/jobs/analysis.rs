@@ -16,7 +16,7 @@ use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, svg};
 use crate::ids::{FootageId, JobId, LibraryId};
 use crate::library::{Library, View};
-use crate::media::{Hints, Limits, Note, Video, read_image};
+use crate::media::{Limits, Notice, ReadOptions, Video, read_image};
 use crate::progress::Progress;
 use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::jobs::Kind;
@@ -80,11 +80,11 @@ pub struct Advice {
 }
 
 /// Returns the parameters that concern the decoding of the video.
-pub fn hints(params: &Params) -> Hints {
-    Hints {
+pub fn read_options(params: &Params) -> ReadOptions {
+    ReadOptions {
         fps: params.fps,
         pixel_aspect: params.pixel_aspect,
-        of_alpha: false,
+        alpha_as_gray: false,
     }
 }
 
@@ -111,7 +111,7 @@ impl Input {
         };
         let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND, MASKS])?;
         let path_of = |name| files.path().join(name);
-        let hints = hints(&self.params);
+        let hints = read_options(&self.params);
         let video = Video::open_with(&path_of(VIDEO), &limits, &hints)?;
         let given = (!footage.masks_sha256.is_empty()).then(|| path_of(MASKS));
         let masks = Masks::open(&video, (&path_of(VIDEO), given.as_deref()), &limits, &hints)?;
@@ -140,7 +140,7 @@ impl Input {
         Ok(Product {
             made: Made::Library(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
-            summary: serde_json::to_string(&Summary::of(&library, &self.params, video.notes()))?,
+            summary: serde_json::to_string(&Summary::of(&library, &self.params, video.notices()))?,
         })
     }
 
@@ -173,13 +173,13 @@ impl Input {
             side: Side::Plain,
             cpu: cpu::Level::detect(),
         };
-        DistanceMap::of(&distances, library, attempt.listener)
+        DistanceMap::compute(&distances, library, attempt.listener)
             .map_err(|_cancelled| Error::Cancelled)
     }
 }
 
 impl Summary {
-    fn of(library: &Library, params: &Params, notes: &[Note]) -> Summary {
+    fn of(library: &Library, params: &Params, notices: &[Notice]) -> Summary {
         let stats = &library.stats;
         Summary {
             fps: library.poses.fps,
@@ -194,7 +194,7 @@ impl Summary {
             component_share: stats.component_share,
             clip_frames: library.clip_frames,
             length_px: stats.length_px,
-            advice: Advice::all(library, params, notes),
+            advice: Advice::all(library, params, notices),
         }
     }
 }
@@ -209,10 +209,12 @@ impl Advice {
     }
 
     /// Returns the weaknesses of a library, most serious first, followed by remarks on its video file.
-    pub fn all(library: &Library, params: &Params, notes: &[Note]) -> Vec<Advice> {
+    pub fn all(library: &Library, params: &Params, notices: &[Notice]) -> Vec<Advice> {
         let all = analysis::stats::advice(library, params);
         let of_library = all.iter().map(|one| Advice::new(one.code(), one));
-        let of_file = notes.iter().map(|note| Advice::new(note.code(), note));
+        let of_file = notices
+            .iter()
+            .map(|notice| Advice::new(notice.code(), notice));
         of_library.chain(of_file).collect()
     }
 }

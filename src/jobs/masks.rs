@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::Error;
 use crate::footage::{FrameSource, Masked, Visit};
-use crate::media::{Hints, Limits, Video};
+use crate::media::{Limits, ReadOptions, Video};
 
 /// Alpha below which a pixel counts as transparent, 0..=255. Free choice.
 const OPAQUE: u8 = 250;
@@ -28,11 +28,11 @@ impl Masks {
         footage: &Video,
         (path, given): (&Path, Option<&Path>),
         limits: &Limits,
-        hints: &Hints,
+        hints: &ReadOptions,
     ) -> Result<Option<Masks>, Error> {
         if let Some(given) = given {
             // Masks have no frame rate of their own: each belongs to one frame.
-            let hints = Hints {
+            let hints = ReadOptions {
                 fps: Some(footage.format().fps),
                 ..*hints
             };
@@ -45,8 +45,8 @@ impl Masks {
         if !footage.has_alpha() {
             return Ok(None);
         }
-        let hints = Hints {
-            of_alpha: true,
+        let hints = ReadOptions {
+            alpha_as_gray: true,
             ..*hints
         };
         let video = Video::open_with(path, limits, &hints)?;

@@ -59,7 +59,7 @@ pub use places::Places;
 
 use allotted::next_id;
 
-use crate::config::Crew;
+use crate::config::JobSettings;
 use crate::ids::JobId;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::{Kind, Lease};
@@ -142,7 +142,7 @@ impl Context {
             draining: CancellationToken::new(),
             threads,
             lease: Duration::from_secs(15),
-            budget: Duration::from_secs(Crew::JOB_TIME_S),
+            budget: Duration::from_secs(JobSettings::JOB_TIME_S),
             sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
             least_room_bytes: 0,

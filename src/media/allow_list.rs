@@ -23,7 +23,7 @@ const OTHER_DECODERS: &str = "aac,mp3float,mp3,mp2float,mp2,ac3,eac3,dca,truehd,
 
 /// Frame rate with which an elementary stream is opened, frames per second. A stream with its own rate
 /// overrides it. No camera has this rate, so it marks an unknown rate.
-pub(super) const NO_RATE: f64 = 997.0 / 7.0;
+pub(super) const UNKNOWN_RATE_FPS: f64 = 997.0 / 7.0;
 
 /// Returns the arguments that restrict ffmpeg to the given file, followed by the file as input.
 pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> Vec<OsString> {
@@ -49,7 +49,7 @@ pub(super) fn input_args(container: Container, path: &Path, limits: &Limits) -> 
     .into_iter()
     .flat_map(|(name, value)| [name.into(), value.into()])
     .collect();
-    if container.is_bare() {
+    if container.is_elementary_stream() {
         args.extend(["-framerate", "997/7"].map(Into::into));
     }
     args.extend(["-i".into(), file]);
@@ -63,24 +63,30 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::media::gate::{Child, Order};
+    use crate::media::gate::Child;
+    use crate::media::invocation::Invocation;
     use crate::media::sandbox::Layers;
-    use crate::media::tools::Tool;
+    use crate::media::tools::{Tool, installed};
 
     /// The limits for these tests. Only the allow-lists are tested, so the kernel layers of the sandbox are
     /// off.
     fn limits() -> Limits {
         Limits {
-            layers: Layers::OLD,
+            layers: Layers::BASIC,
             // Starting a program takes longer on a busy machine.
             probe_time: Duration::from_secs(60),
             ..Limits::default()
         }
     }
 
+    fn ffmpeg(args: Vec<OsString>, limits: &Limits) -> Invocation<'static> {
+        Invocation::new(installed(Tool::Ffmpeg).unwrap(), args, limits, 0)
+    }
+
     /// Returns the error message of ffmpeg for the arguments; `None` on success.
-    fn complaint(args: Vec<OsString>) -> Option<String> {
-        let mut child = Child::reading(Order::new(Tool::Ffmpeg, args, &limits(), 0)).unwrap();
+    fn error_message(args: Vec<OsString>) -> Option<String> {
+        let limits = limits();
+        let mut child = Child::reading(ffmpeg(args, &limits)).unwrap();
         child.read_full(&mut vec![0; 1 << 20]).unwrap();
         child.finish().unwrap().check().err().map(|e| e.to_string())
     }
@@ -97,7 +103,7 @@ mod tests {
             }
         }
         args.extend(["-f", "null", "-"].map(Into::into));
-        complaint(args)
+        error_message(args)
     }
 
     fn make(folder: &Path, name: &str, options: &str) -> std::path::PathBuf {
@@ -109,9 +115,9 @@ mod tests {
         args.extend(["-frames:v", "5"].map(Into::into));
         args.extend(options.split(' ').map(Into::into));
         args.push(path.clone().into());
-        let order = Order::new(Tool::Ffmpeg, args, &limits(), 0).with_output(&path, 1 << 20);
-        let end = Child::reading(order).unwrap().finish().unwrap();
-        assert!(end.check().is_ok());
+        let invocation = ffmpeg(args, &limits()).with_output(&path, 1 << 20);
+        let exit = Child::reading(invocation).unwrap().finish().unwrap();
+        assert!(exit.check().is_ok());
         path
     }
 
@@ -123,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn each_list_alone_closes_a_way_out_of_a_film() {
+    fn each_list_alone_refuses_a_reference_to_another_file_or_decoder() {
         let folder = tempfile::tempdir().unwrap();
         make(folder.path(), "another.ts", "-c:v mpeg2video -f mpegts");
         let list = playlist(folder.path(), "film.mp4", "another.ts");
@@ -143,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn no_address_is_asked_even_where_every_format_is_allowed() {
+    fn protocol_list_refuses_network_addresses_for_every_format() {
         let folder = tempfile::tempdir().unwrap();
         let server = TcpListener::bind("127.0.0.1:0").unwrap();
         server.set_nonblocking(true).unwrap();

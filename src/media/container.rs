@@ -4,7 +4,7 @@
 
 use super::error::Error;
 
-/// Number of bytes that [`Container::of`] needs.
+/// Number of bytes that [`Container::detect`] needs.
 pub(super) const HEAD_BYTES: usize = 4096;
 
 /// Accepted containers.
@@ -72,7 +72,7 @@ const STILL_BRANDS: [&[u8; 4]; 6] = [b"heic", b"heix", b"mif1", b"msf1", b"avif"
 impl Container {
     /// Returns the container of a file. `head` is its first [`HEAD_BYTES`] bytes, or the whole file if
     /// shorter.
-    pub(super) fn of(head: &[u8]) -> Result<Container, Error> {
+    pub(super) fn detect(head: &[u8]) -> Result<Container, Error> {
         let has = |at: usize, magic: &[u8]| head.get(at..at + magic.len()) == Some(magic);
         if has(0, b"\x1a\x45\xdf\xa3") {
             return Ok(Container::Matroska);
@@ -84,9 +84,10 @@ impl Container {
             return Ok(Container::Asf);
         }
         if is_mov(head) {
-            return match STILL_BRANDS.iter().any(|b| has(4, b"ftyp") && has(8, *b)) {
-                true => Err(Error::NotAVideo("a still image".into())),
-                false => Ok(Container::Mov),
+            return if STILL_BRANDS.iter().any(|b| has(4, b"ftyp") && has(8, *b)) {
+                Err(Error::NotAVideo("a still image".into()))
+            } else {
+                Ok(Container::Mov)
             };
         }
         if is_transport_stream(head) {
@@ -101,8 +102,8 @@ impl Container {
         if has(0, b"OggS\0") {
             return Ok(Container::Ogg);
         }
-        if let Some(bare) = bare_stream(head) {
-            return Ok(bare);
+        if let Some(stream) = elementary_stream(head) {
+            return Ok(stream);
         }
         if let Some((_, _, name)) = OTHER_CONTAINERS.iter().find(|c| has(c.0, c.1)) {
             return Err(Error::ContainerNotAllowed(name));
@@ -110,13 +111,13 @@ impl Container {
         if SOUNDS.iter().any(|s| has(s.0, s.1)) {
             return Err(Error::NoVideoStream);
         }
-        let what = match PICTURES.iter().find(|p| has(p.0, p.1)) {
-            Some((_, _, what)) => what,
+        let kind = match PICTURES.iter().find(|p| has(p.0, p.1)) {
+            Some((_, _, kind)) => kind,
             None if head.is_empty() => "the file is empty",
             None if std::str::from_utf8(head).is_ok() => "a text",
             None => "the file format is unknown",
         };
-        Err(Error::NotAVideo(what.into()))
+        Err(Error::NotAVideo(kind.into()))
     }
 
     /// Returns the name of the demuxer for ffmpeg's `-f`.
@@ -137,7 +138,7 @@ impl Container {
 
     /// Returns whether the file is an elementary stream, without timestamps. Its frame rate is in the stream
     /// header or unknown.
-    pub(super) fn is_bare(self) -> bool {
+    pub(super) fn is_elementary_stream(self) -> bool {
         matches!(self, Container::H264 | Container::Hevc)
     }
 }
@@ -148,7 +149,7 @@ impl Container {
 /// H.264 (ITU-T H.264, 7.3.1): the unit header is one byte with type 7 in the low five bits; a known profile
 /// follows. H.265 (ITU-T H.265, 7.3.1.2): the unit header is two bytes, type 32 or 33 in bits 1 to 6, layer
 /// 0, temporal id 1.
-fn bare_stream(head: &[u8]) -> Option<Container> {
+fn elementary_stream(head: &[u8]) -> Option<Container> {
     const H264_PROFILES: [u8; 10] = [44, 66, 77, 88, 100, 110, 118, 122, 128, 244];
     let starts = head.windows(3).enumerate();
     let starts = starts.filter(|(_, bytes)| *bytes == b"\0\0\x01");
@@ -193,13 +194,13 @@ mod tests {
     use crate::code::Code;
 
     fn code_of(head: &[u8]) -> Code {
-        Container::of(head)
+        Container::detect(head)
             .expect_err("these bytes are no accepted container")
             .code()
     }
 
     #[test]
-    fn each_accepted_container_is_known_by_its_first_bytes() {
+    fn accepted_containers_are_detected_by_their_first_bytes() {
         let mut packets = vec![0; 188 * 6];
         packets.iter_mut().step_by(188).for_each(|b| *b = 0x47);
         let cases: [(&[u8], Container); 10] = [
@@ -218,12 +219,12 @@ mod tests {
             (b"\0\0\0\x01\x40\x01\x0c\x01", Container::Hevc),
         ];
         for (head, container) in cases {
-            assert_eq!(Container::of(head).ok(), Some(container));
+            assert_eq!(Container::detect(head).ok(), Some(container));
         }
     }
 
     #[test]
-    fn what_is_no_video_is_told_apart() {
+    fn other_files_have_the_code_of_their_kind() {
         assert_eq!(code_of(b""), Code::NotAVideo);
         assert_eq!(
             code_of(b"#EXTM3U\n#EXTINF:1,\nother.mp4\n"),
@@ -247,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_only_speaks_of_boxes_is_no_mov() {
+    fn text_that_contains_a_box_name_is_no_mov() {
         assert_eq!(code_of(b"see ftyp"), Code::NotAVideo);
     }
 }

@@ -30,7 +30,7 @@ pub enum Damage {
     },
 }
 
-/// A reason to fail. `complaint` is the end of ffmpeg's stderr, for the log.
+/// A reason to fail. `stderr_tail` is the end of ffmpeg's stderr, for the log.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Not a video: empty, text, a still image, a playlist or noise.
@@ -116,18 +116,18 @@ pub enum Error {
     #[error("ffmpeg or ffprobe exceeded its time limit")]
     TimeLimit,
     /// The child ran out of address space.
-    #[error("ffmpeg or ffprobe exceeded its memory limit: {complaint}")]
+    #[error("ffmpeg or ffprobe exceeded its memory limit: {stderr_tail}")]
     MemoryLimit {
         /// The end of ffmpeg's stderr.
-        complaint: String,
+        stderr_tail: String,
     },
     /// The child died or failed.
-    #[error("ffmpeg or ffprobe stopped unexpectedly ({status}): {complaint}")]
+    #[error("ffmpeg or ffprobe stopped unexpectedly ({status}): {stderr_tail}")]
     Crashed {
         /// Exit code or signal.
         status: String,
         /// The end of ffmpeg's stderr.
-        complaint: String,
+        stderr_tail: String,
     },
     /// The disk is full.
     #[error("the disk has too little free space for the output")]

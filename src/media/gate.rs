@@ -4,97 +4,30 @@
 //!
 //! The time limit counts only while we wait for the child. A slow caller does not use up its decoder's time.
 
-use std::ffi::OsString;
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{self, ChildStdin, ChildStdout, Stdio};
 use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec};
-use rustix::process::{Pid, PidfdFlags, Signal};
+use rustix::process::{Pid, PidfdFlags, Signal, getpriority_process, setpriority_process};
 
-use super::end::{self, End};
 use super::error::Error;
-use super::limits::Limits;
-use super::sandbox::{self, Cage};
-use super::tools::{self, Place, Tool};
+use super::exit::{Exit, hide_paths};
+use super::invocation::Invocation;
+use super::sandbox::{self, Policy};
 
-/// Kept length of a child's stderr, bytes. Free choice.
-const COMPLAINT_BYTES: usize = 8 << 10;
+/// Length of the kept end of a child's stderr, bytes. Free choice.
+const STDERR_TAIL_BYTES: usize = 8 << 10;
 /// Requested size of each pipe, bytes.
 const PIPE_BYTES: usize = 1 << 20;
 
 /// Time for a decoder to exit once its output is closed. Free choice. An encoder may rewrite the whole file
 /// to move the index to the front, so it gets all of its remaining time.
-const END_TIME: Duration = Duration::from_secs(30);
-
-/// A program to start, with its limits.
-pub(super) struct Order {
-    tool: Tool,
-    args: Vec<OsString>,
-    /// Whether the loader lists the program's libraries instead of running the program.
-    lists_libraries: bool,
-    cage: Cage,
-    time: Duration,
-    stall: Duration,
-}
-
-impl Order {
-    /// Makes an order for work on `n_frames` frames (0 for reading headers). The child may open no file.
-    pub(super) fn new(tool: Tool, args: Vec<OsString>, limits: &Limits, n_frames: usize) -> Order {
-        let time = match n_frames {
-            0 => limits.probe_time,
-            n => limits.work_time(n),
-        };
-        Order {
-            tool,
-            args,
-            lists_libraries: false,
-            cage: Cage {
-                layers: limits.layers,
-                memory_bytes: limits.max_memory_bytes,
-                cpu_s: (time.as_secs() + 1) * n_cores(),
-                file_bytes: 0,
-                input: None,
-                output: None,
-            },
-            time,
-            stall: limits.stall_time.min(time),
-        }
-    }
-
-    /// Adds `more` to the time limit.
-    pub(super) fn with_more_time(mut self, more: Duration) -> Order {
-        self.time += more;
-        self
-    }
-
-    /// Allows the child to read a file.
-    pub(super) fn with_input(mut self, path: &Path) -> Order {
-        self.cage.input = Some(path.to_owned());
-        self
-    }
-
-    /// Allows the child to write an existing file, up to `bytes`.
-    pub(super) fn with_output(mut self, path: &Path, bytes: u64) -> Order {
-        self.cage.output = Some(path.to_owned());
-        self.cage.file_bytes = bytes;
-        self
-    }
-
-    /// Makes the loader list the program's libraries and exit.
-    pub(super) fn listing_libraries(mut self) -> Order {
-        self.lists_libraries = true;
-        self
-    }
-}
-
-fn n_cores() -> u64 {
-    std::thread::available_parallelism().map_or(1, |n| n.get() as u64)
-}
+const EXIT_TIME: Duration = Duration::from_secs(30);
 
 /// A running child. Dropping it kills and reaps its whole group.
 pub(super) struct Child {
@@ -102,27 +35,29 @@ pub(super) struct Child {
     group: Pid,
     /// After reaping, the process id may belong to another process.
     reaped: bool,
-    ended: OwnedFd,
+    /// Becomes readable when the process exits.
+    pidfd: OwnedFd,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
+    /// Thread that returns the end of stderr.
     stderr: Option<JoinHandle<String>>,
     time_left: Duration,
     /// End of the time limit by the wall clock, for `read_some`.
-    due: Instant,
-    stall: Duration,
+    deadline: Instant,
+    stall_limit: Duration,
     /// Files given to the child. Their paths are removed from its messages, because users do not know them.
     files: Vec<PathBuf>,
 }
 
 impl Child {
     /// Starts a child that reads no input and writes to us.
-    pub(super) fn reading(order: Order) -> Result<Child, Error> {
-        Child::start(order, Stdio::null())
+    pub(super) fn reading(invocation: Invocation<'_>) -> Result<Child, Error> {
+        Child::start(invocation, Stdio::null())
     }
 
     /// Starts a child that reads from us and writes a file.
-    pub(super) fn writing(order: Order) -> Result<Child, Error> {
-        let child = Child::start(order, Stdio::piped())?;
+    pub(super) fn writing(invocation: Invocation<'_>) -> Result<Child, Error> {
+        let child = Child::start(invocation, Stdio::piped())?;
         if let Some(stdin) = &child.stdin {
             // A blocking write could not be abandoned at the time limit.
             let flags = rustix::fs::fcntl_getfl(stdin);
@@ -131,31 +66,27 @@ impl Child {
                     rustix::fs::fcntl_setfl(stdin, flags | rustix::fs::OFlags::NONBLOCK)
                 })
                 .map_err(|e| Error::io("preparing the encoder's pipe")(e.into()))?;
-            grow(stdin);
+            enlarge_pipe(stdin);
         }
         Ok(child)
     }
 
-    fn start(order: Order, stdin: Stdio) -> Result<Child, Error> {
-        let place = tools::place(order.tool)?;
-        Child::launch(order, place, stdin)
-    }
-
-    /// Starts a program in the layers that both the order and the tool allow.
-    pub(super) fn launch(order: Order, place: &Place, stdin: Stdio) -> Result<Child, Error> {
+    /// Starts a program in the layers that both the invocation and the tool allow.
+    fn start(invocation: Invocation<'_>, stdin: Stdio) -> Result<Child, Error> {
         let failed = Error::io("starting the media tool");
-        let cage = Cage {
-            layers: order.cage.layers.and(place.layers),
-            ..order.cage
+        let tool = invocation.tool;
+        let policy = Policy {
+            layers: invocation.policy.layers.and(tool.layers),
+            ..invocation.policy.clone()
         };
-        let mut command = command(&order.args, place, order.lists_libraries);
+        let mut command = command(&invocation);
         command.stdin(stdin);
-        sandbox::enclose(&mut command, &cage, &place.reach).map_err(&failed)?;
+        sandbox::apply(&mut command, &policy, &tool.program_files).map_err(&failed)?;
         let mut process = spawn(command).map_err(failed)?;
         let group = Pid::from_child(&process);
-        super::niceness::pass_on(group);
-        let ended = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
-            Ok(ended) => ended,
+        inherit_niceness(group);
+        let pidfd = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
+            Ok(pidfd) => pidfd,
             Err(errno) => {
                 kill_and_reap(&mut process, group);
                 return Err(Error::io("watching the media tool")(errno.into()));
@@ -163,24 +94,24 @@ impl Child {
         };
         let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
         if let Some(stdout) = &stdout {
-            grow(stdout);
+            enlarge_pipe(stdout);
         }
-        let stderr = process
-            .stderr
-            .take()
-            .map(|pipe| std::thread::spawn(|| last_words(pipe)));
+        let stderr = process.stderr.take();
         Ok(Child {
             process,
             group,
             reaped: false,
-            ended,
+            pidfd,
             stdin,
             stdout,
-            stderr,
-            time_left: order.time,
-            due: Instant::now() + order.time,
-            stall: order.stall,
-            files: [cage.input, cage.output].into_iter().flatten().collect(),
+            stderr: stderr.map(|pipe| std::thread::spawn(|| read_tail(pipe))),
+            time_left: invocation.time_limit,
+            deadline: Instant::now() + invocation.time_limit,
+            stall_limit: invocation.stall_limit,
+            files: [policy.input, policy.output]
+                .into_iter()
+                .flatten()
+                .collect(),
         })
     }
 
@@ -190,7 +121,7 @@ impl Child {
         let Some(mut stdout) = self.stdout.take() else {
             return Ok(0);
         };
-        let deadline = Instant::now() + self.stall;
+        let deadline = Instant::now() + self.stall_limit;
         let mut n_read = 0;
         while n_read < buffer.len() {
             self.wait_for(stdout.as_fd(), PollFlags::IN, deadline)?;
@@ -208,13 +139,17 @@ impl Child {
     /// Reads the available output of the child; 0 at its end. Here the time limit counts all the time,
     /// because a child with endless output never makes us wait.
     pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
-        if Instant::now() > self.due {
+        if Instant::now() > self.deadline {
             return Err(Error::TimeLimit);
         }
         let Some(mut stdout) = self.stdout.take() else {
             return Ok(0);
         };
-        self.wait_for(stdout.as_fd(), PollFlags::IN, Instant::now() + self.stall)?;
+        self.wait_for(
+            stdout.as_fd(),
+            PollFlags::IN,
+            Instant::now() + self.stall_limit,
+        )?;
         let n_read = stdout
             .read(buffer)
             .map_err(Error::io("reading from the media tool"))?;
@@ -227,7 +162,7 @@ impl Child {
         let Some(mut stdin) = self.stdin.take() else {
             return Err(Error::BadOutput("a frame after the last"));
         };
-        let deadline = Instant::now() + self.stall;
+        let deadline = Instant::now() + self.stall_limit;
         while !bytes.is_empty() {
             match stdin.write(bytes) {
                 Ok(n) => bytes = &bytes[n..],
@@ -238,7 +173,7 @@ impl Child {
                     io::ErrorKind::Interrupted => {}
                     io::ErrorKind::BrokenPipe => {
                         drop(stdin);
-                        return Err(self.reason_of_death());
+                        return Err(self.exit_error());
                     }
                     _ => return Err(Error::io("writing to the media tool")(error)),
                 },
@@ -249,45 +184,42 @@ impl Child {
     }
 
     /// Closes the child's input, waits for its exit and returns it.
-    pub(super) fn finish(mut self) -> Result<End, Error> {
-        self.end()
+    pub(super) fn finish(mut self) -> Result<Exit, Error> {
+        self.wait_for_exit()
     }
 
-    fn reason_of_death(&mut self) -> Error {
-        match self.end().and_then(End::check) {
+    /// Returns why a child closed its input early.
+    fn exit_error(&mut self) -> Error {
+        match self.wait_for_exit().and_then(Exit::check) {
             Err(error) => error,
-            Ok(end) => Error::Crashed {
+            Ok(exit) => Error::Crashed {
                 status: "it closed its input early".into(),
-                complaint: end.complaint,
+                stderr_tail: exit.stderr_tail,
             },
         }
     }
 
-    fn end(&mut self) -> Result<End, Error> {
-        let patience = match self.stdin.take() {
+    fn wait_for_exit(&mut self) -> Result<Exit, Error> {
+        let time_limit = match self.stdin.take() {
             Some(_) => self.time_left,
-            None => END_TIME.max(self.stall),
+            None => EXIT_TIME.max(self.stall_limit),
         };
         self.stdout = None;
-        let ended = self
-            .ended
-            .try_clone()
-            .map_err(Error::io("watching the media tool"))?;
-        self.wait_for(ended.as_fd(), PollFlags::IN, Instant::now() + patience)?;
+        let watching = Error::io("watching the media tool");
+        let pidfd = self.pidfd.try_clone().map_err(watching)?;
+        self.wait_for(pidfd.as_fd(), PollFlags::IN, Instant::now() + time_limit)?;
         // The child has exited but is not reaped, so its process id is still valid. Kill any processes that
         // it started.
         rustix::process::kill_process_group(self.group, Signal::KILL).ok();
-        let status = self
-            .process
-            .wait()
-            .map_err(Error::io("reaping the media tool"))?;
+        let reaping = Error::io("reaping the media tool");
+        let status = self.process.wait().map_err(reaping)?;
         self.reaped = true;
-        let complaint = self
-            .stderr
-            .take()
-            .map(|thread| thread.join().unwrap_or_default());
-        let complaint = end::without(&self.files, complaint.unwrap_or_default());
-        Ok(End { status, complaint })
+        let stderr_tail = self.stderr.take().map(|thread| thread.join());
+        let stderr_tail = stderr_tail.and_then(Result::ok).unwrap_or_default();
+        Ok(Exit {
+            status,
+            stderr_tail: hide_paths(&self.files, stderr_tail),
+        })
     }
 
     /// Waits until `fd` is ready, at most until `deadline` and within the remaining time.
@@ -327,11 +259,11 @@ impl Drop for Child {
     }
 }
 
-fn command(args: &[OsString], place: &Place, lists_libraries: bool) -> process::Command {
-    let mut command = process::Command::new(&place.path);
+fn command(invocation: &Invocation<'_>) -> process::Command {
+    let mut command = process::Command::new(&invocation.tool.path);
     command
         .args(["-v", "error"])
-        .args(args)
+        .args(&invocation.args)
         .env_clear()
         .env("LC_ALL", "C")
         // Each arena reserves address space, which the sandbox limits.
@@ -339,7 +271,7 @@ fn command(args: &[OsString], place: &Place, lists_libraries: bool) -> process::
         .current_dir("/")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
-    if lists_libraries {
+    if invocation.lists_libraries {
         command.env("LD_TRACE_LOADED_OBJECTS", "1");
     }
     command
@@ -379,13 +311,29 @@ fn spawn(command: process::Command) -> io::Result<process::Child> {
     receive.recv().map_err(|_closed| gone())?
 }
 
+/// Gives the child the niceness of the calling thread; another thread starts the child. A decoder works for
+/// minutes, so it runs at the low priority of the job that needs it and yields to requests
+/// (docs/explanation/promises.md, "Overload"). A tool that a request waits for, such as the check of an
+/// upload, is started by a thread of normal priority.
+///
+/// Sets the niceness of its autogroup, too. The child has its own session, and Linux gives each session its
+/// own share of the processor, regardless of the niceness within. Failure is ignored: the child then runs at
+/// normal priority.
+fn inherit_niceness(child: Pid) {
+    if let Ok(niceness @ 1..) = getpriority_process(None) {
+        setpriority_process(Some(child), niceness).ok();
+        let group = format!("/proc/{}/autogroup", child.as_raw_nonzero());
+        std::fs::write(group, niceness.to_string()).ok();
+    }
+}
+
 /// Enlarges a pipe, which reduces context switches. Failure is ignored: it only costs speed.
-fn grow(pipe: impl AsFd) {
+fn enlarge_pipe(pipe: impl AsFd) {
     rustix::pipe::fcntl_setpipe_size(pipe, PIPE_BYTES).ok();
 }
 
-/// Reads to the end and returns the last [`COMPLAINT_BYTES`].
-fn last_words(mut pipe: impl Read) -> String {
+/// Reads to the end and returns the last [`STDERR_TAIL_BYTES`].
+fn read_tail(mut pipe: impl Read) -> String {
     let mut kept = Vec::new();
     let mut chunk = [0; 4096];
     while let Ok(n) = pipe.read(&mut chunk) {
@@ -393,7 +341,7 @@ fn last_words(mut pipe: impl Read) -> String {
             break;
         }
         kept.extend_from_slice(&chunk[..n]);
-        let surplus = kept.len().saturating_sub(COMPLAINT_BYTES);
+        let surplus = kept.len().saturating_sub(STDERR_TAIL_BYTES);
         kept.drain(..surplus);
     }
     String::from_utf8_lossy(&kept).into_owned()

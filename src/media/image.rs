@@ -14,9 +14,8 @@ use crate::raster::RgbImage;
 pub fn read_image(path: &Path, limits: &Limits) -> Result<RgbImage, Error> {
     let failed = Error::io("reading the image");
     let file = std::fs::File::open(path).map_err(&failed)?;
-    let most = largest_file(limits);
     let mut bytes = Vec::new();
-    file.take(most + 1)
+    file.take(limits.max_picture_bytes() + 1)
         .read_to_end(&mut bytes)
         .map_err(&failed)?;
     decode_image(&bytes, limits)
@@ -42,13 +41,8 @@ pub(super) fn decode(
     formats: &[ImageFormat],
     limits: &Limits,
 ) -> Result<DynamicImage, Error> {
-    if bytes.len() as u64 > largest_file(limits) {
-        return Err(Error::TooLong {
-            found: bytes.len() as f64,
-            unit: "bytes",
-        });
-    }
-    let format = image::guess_format(bytes).map_err(refused)?;
+    limits.check_picture_bytes(bytes.len() as u64)?;
+    let format = image::guess_format(bytes).map_err(from_image)?;
     if !formats.contains(&format) {
         let accepted: Vec<&str> = formats
             .iter()
@@ -60,23 +54,18 @@ pub(super) fn decode(
         )));
     }
     let reader = || ImageReader::with_format(Cursor::new(bytes), format);
-    let (width, height) = reader().into_dimensions().map_err(refused)?;
-    super::probe::check_size(u64::from(width), u64::from(height), limits)?;
+    let (width, height) = reader().into_dimensions().map_err(from_image)?;
+    limits.check_size(width.into(), height.into())?;
     let mut reader = reader();
     let mut bounds = image::Limits::default();
     bounds.max_image_width = Some(limits.max_side_px);
     bounds.max_image_height = Some(limits.max_side_px);
     bounds.max_alloc = Some(limits.max_pixels * 16);
     reader.limits(bounds);
-    reader.decode().map_err(refused)
+    reader.decode().map_err(from_image)
 }
 
-/// Returns the largest accepted file, bytes: more than any encoder needs for the largest picture.
-pub(super) fn largest_file(limits: &Limits) -> u64 {
-    limits.max_pixels * 8 + (1 << 20)
-}
-
-fn refused(error: ImageError) -> Error {
+fn from_image(error: ImageError) -> Error {
     Error::NotAVideo(format!("the picture cannot be read: {error}"))
 }
 
@@ -96,14 +85,14 @@ mod tests {
     }
 
     #[test]
-    fn a_png_comes_back_pixel_by_pixel() {
+    fn decoded_png_has_the_pixels_of_its_source() {
         let image = decode_image(&png_of(40, 20), &Limits::default()).expect("a good image");
         assert_eq!((image.width, image.height), (40, 20));
         assert_eq!(image.pixel(33, 12), [33, 12, 7]);
     }
 
     #[test]
-    fn an_image_beyond_the_limits_or_cut_off_is_refused() {
+    fn image_beyond_the_limits_or_cut_off_is_refused() {
         let code = |bytes: &[u8], limits: &Limits| {
             decode_image(bytes, limits).expect_err("a bad image").code()
         };

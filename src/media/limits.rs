@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::error::Error;
 use super::sandbox::Layers;
 
 /// The limits of one file and of the child processes that read it.
@@ -71,9 +72,68 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// Checks the size of a picture, pixels.
+    pub(super) fn check_size(&self, width: u64, height: u64) -> Result<(), Error> {
+        let is_too_large = width.max(height) > u64::from(self.max_side_px)
+            || width.saturating_mul(height) > self.max_pixels;
+        if is_too_large {
+            return Err(Error::TooManyPixels { width, height });
+        }
+        if width.min(height) < u64::from(self.min_side_px) {
+            return Err(Error::TooFewPixels { width, height });
+        }
+        Ok(())
+    }
+
+    /// Checks that there are not too many frames.
+    pub(super) fn check_n_frames(&self, n_frames: usize) -> Result<(), Error> {
+        if n_frames > self.max_frames {
+            return Err(Error::TooManyFrames {
+                limit: self.max_frames,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks that there are not too many streams.
+    pub(super) fn check_n_streams(&self, n_streams: usize) -> Result<(), Error> {
+        if n_streams > self.max_streams as usize {
+            return Err(Error::TooManyStreams {
+                limit: self.max_streams,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks the size of a file, bytes.
+    pub(super) fn check_n_bytes(&self, n_bytes: u64) -> Result<(), Error> {
+        check_n_bytes(n_bytes, self.max_bytes)
+    }
+
+    /// Checks the size of a file with one picture, bytes.
+    pub(super) fn check_picture_bytes(&self, n_bytes: u64) -> Result<(), Error> {
+        check_n_bytes(n_bytes, self.max_picture_bytes())
+    }
+
+    /// Returns the largest accepted file with one picture, bytes: more than any encoder needs for the largest
+    /// picture.
+    pub(super) fn max_picture_bytes(&self) -> u64 {
+        self.max_pixels * 8 + (1 << 20)
+    }
+
     /// Returns the time limit for `n_frames` frames, wall clock.
     pub(super) fn work_time(&self, n_frames: usize) -> Duration {
         let n = u32::try_from(n_frames).unwrap_or(u32::MAX);
         self.base_time + self.time_per_frame.saturating_mul(n)
     }
+}
+
+fn check_n_bytes(n_bytes: u64, limit: u64) -> Result<(), Error> {
+    if n_bytes > limit {
+        return Err(Error::TooLong {
+            found: n_bytes as f64,
+            unit: "bytes",
+        });
+    }
+    Ok(())
 }

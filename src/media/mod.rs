@@ -7,32 +7,35 @@
 //! Its frames are planar YUV 4:2:0 at a constant rate.
 
 mod allow_list; // arguments that restrict what ffmpeg may open
-mod coders; // decoders and encoders of the installed ffmpeg
+mod codecs; // decoders and encoders of the installed ffmpeg
 mod container; // detection of the container from the first bytes
 mod decode; // video file -> frames
 mod encode; // VideoWriter: frames -> MP4, WebM, ProRes, GIF, WebP
-mod end; // exit of a child and its meaning
 mod error;
+mod exit; // exit of a child and its meaning
 mod gate; // the only module that starts a media tool
-mod hints; // metadata given by the user
+mod gray_range; // reduction of gray to 8 bits
 mod image; // still pictures, such as a background
+mod invocation; // one run of a media tool
 mod limits;
-mod niceness; // priority of media tools
-mod note; // notes about accepted footage
+mod notice; // notices about accepted footage
 mod pictures; // folder, zip or TIFF of pictures -> frames
 mod probe; // contents of a file: headers, packets, pictures, times
+mod read_options; // metadata given by the user
 mod sandbox; // sandbox of a child
-mod stretch; // reduction of gray to 8 bits
 mod tools; // paths of the tools, and the layers in which they run
 mod video; // Video: video files and still pictures
 
-pub use coders::Coders;
-pub use encode::{Coding, Quality, VideoFormat, VideoWriter};
+pub use codecs::Codecs;
+pub use encode::{Encoding, Quality, VideoFormat, VideoWriter};
 pub use error::{Damage, Error};
-pub use hints::Hints;
 pub use image::{decode_image, read_image};
 pub use limits::Limits;
-pub use note::Note;
+pub use notice::Notice;
+pub use read_options::ReadOptions;
 pub use sandbox::{Layer, Layers};
-pub use tools::{Tool, Walls, demanded_walls, look_for, set_up, tool_version, walls};
+pub use tools::{
+    SandboxStatus, Tool, configure, required_sandbox, sandbox_status, search_in_background,
+    tool_version,
+};
 pub use video::Video;

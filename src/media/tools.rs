@@ -7,10 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use super::error::Error;
-use super::gate::{Child, Order};
+use super::exit::Exit;
+use super::gate::Child;
+use super::invocation::{InstalledTool, Invocation};
 use super::limits::Limits;
-use super::sandbox::{Layer, Layers, Reach, lack_of, landlock_abi};
-use crate::config::{Media, Sandbox};
+use super::sandbox::{Layer, Layers, ProgramFiles, landlock_abi, unsupported_reason};
+use crate::config::{MediaTools, SandboxMode};
 
 /// The programs that may be started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,20 +23,9 @@ pub enum Tool {
     Ffmpeg,
 }
 
-/// An installed tool.
-#[derive(Clone, Debug)]
-pub(super) struct Place {
-    /// Path of the program.
-    pub(super) path: PathBuf,
-    /// Files that the program needs.
-    pub(super) reach: Reach,
-    /// Layers in which it runs on this machine.
-    pub(super) layers: Layers,
-}
-
 /// The media tool and its sandbox on this machine.
 #[derive(Clone, Debug)]
-pub struct Walls {
+pub struct SandboxStatus {
     /// The version line of ffmpeg.
     pub version: String,
     /// Landlock ABI version of the kernel; `None` if it has no Landlock.
@@ -43,39 +34,41 @@ pub struct Walls {
     pub layers: Vec<(Layer, Option<String>)>,
 }
 
-/// The result of a search for a tool.
-struct Found {
-    place: Place,
+/// A tool that was found.
+struct FoundTool {
+    tool: InstalledTool,
     version: String,
-    lacks: Vec<(Layer, String)>,
+    /// Layers that are not in use, each with the reason.
+    missing_layers: Vec<(Layer, String)>,
 }
 
 /// The search for a tool.
 struct Search {
-    outcome: OnceLock<Result<Found, String>>,
+    result: OnceLock<Result<FoundTool, String>>,
     /// Held during the search, so that other threads wait for the result instead of searching too.
-    turn: Mutex<()>,
+    lock: Mutex<()>,
 }
 
-static SETTINGS: OnceLock<Media> = OnceLock::new();
+static SETTINGS: OnceLock<MediaTools> = OnceLock::new();
 static FFMPEG: Search = Search::new();
 static FFPROBE: Search = Search::new();
 
 /// Library folders if the loader lists none, for example for a static program or another loader.
-const USUAL_FOLDERS: [&str; 5] = ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib"];
+const DEFAULT_LIBRARY_DIRS: [&str; 5] =
+    ["/lib", "/lib64", "/usr/lib", "/usr/lib64", "/usr/local/lib"];
 
 /// Maximum output of a tool about itself, bytes. Free choice.
-const MAX_ANSWER_BYTES: usize = 1 << 20;
+const MAX_OUTPUT_BYTES: usize = 1 << 20;
 
 /// Sets tools and sandbox for this process. Call it before the first film is read; later calls have no
 /// effect.
-pub fn set_up(settings: &Media) {
+pub fn configure(settings: &MediaTools) {
     // On a second call the first settings remain.
     SETTINGS.set(settings.clone()).ok();
 }
 
 /// Starts the search for the tools in the background, because starting a tool to get its version takes time.
-pub fn look_for(tools: &[Tool]) {
+pub fn search_in_background(tools: &[Tool]) {
     for &tool in tools {
         // Errors are ignored here: the search is repeated at first use, which reports them.
         let thread = std::thread::Builder::new();
@@ -84,26 +77,25 @@ pub fn look_for(tools: &[Tool]) {
 }
 
 /// Returns the sandbox of media children on this machine. Fails if a tool is missing or does not run.
-pub fn walls() -> Result<Walls, Error> {
-    let found = found(Tool::Ffmpeg)?;
-    let other = self::found(Tool::Ffprobe)?;
-    let lack_in = |lacks: &[(Layer, String)], layer| {
-        let lack = lacks.iter().find(|(lacking, _)| *lacking == layer);
-        lack.map(|(_, reason)| reason.clone())
+pub fn sandbox_status() -> Result<SandboxStatus, Error> {
+    let (ffmpeg, ffprobe) = (found(Tool::Ffmpeg)?, found(Tool::Ffprobe)?);
+    let reason = |layer| {
+        let mut missing = ffmpeg.missing_layers.iter().chain(&ffprobe.missing_layers);
+        let (_, reason) = missing.find(|(missing, _)| *missing == layer)?;
+        Some(reason.clone())
     };
-    let lack = |layer| lack_in(&found.lacks, layer).or_else(|| lack_in(&other.lacks, layer));
-    Ok(Walls {
-        version: found.version.clone(),
+    Ok(SandboxStatus {
+        version: ffmpeg.version.clone(),
         landlock_abi: landlock_abi().ok(),
-        layers: Layer::ALL.map(|layer| (layer, lack(layer))).to_vec(),
+        layers: Layer::ALL.map(|layer| (layer, reason(layer))).to_vec(),
     })
 }
 
-/// Like [`walls`], but also fails if `--sandbox strict` is set and a layer is missing.
-pub fn demanded_walls() -> Result<Walls, Error> {
-    place(Tool::Ffprobe)?;
-    place(Tool::Ffmpeg)?;
-    walls()
+/// Like [`sandbox_status`], but also fails if `--sandbox strict` is set and a layer is missing.
+pub fn required_sandbox() -> Result<SandboxStatus, Error> {
+    installed(Tool::Ffprobe)?;
+    installed(Tool::Ffmpeg)?;
+    sandbox_status()
 }
 
 /// Returns the version line of the installed ffmpeg.
@@ -112,111 +104,114 @@ pub fn tool_version() -> Result<String, Error> {
 }
 
 /// Returns an installed tool. Fails if it is missing, or if `--sandbox strict` is set and a layer is missing.
-pub(super) fn place(tool: Tool) -> Result<&'static Place, Error> {
+pub(super) fn installed(tool: Tool) -> Result<&'static InstalledTool, Error> {
     let found = found(tool)?;
-    let strict = mode() == Sandbox::Strict;
-    match found.lacks.first().filter(|_| strict) {
+    let strict = mode() == SandboxMode::Strict;
+    match found.missing_layers.first().filter(|_| strict) {
         Some((layer, reason)) => Err(Error::SandboxIncomplete {
             layer: layer.name(),
             reason: reason.clone(),
         }),
-        None => Ok(&found.place),
+        None => Ok(&found.tool),
     }
 }
 
-/// Returns the installed ffmpeg even if `--sandbox strict` is not satisfied, to query its features.
-pub(super) fn whole_place() -> Result<&'static Place, Error> {
-    found(Tool::Ffmpeg).map(|found| &found.place)
+/// Returns the output of the installed ffmpeg for a query of its features, even if `--sandbox strict` is not
+/// satisfied.
+pub(super) fn query_ffmpeg(args: &[&str]) -> Result<String, Error> {
+    output(&found(Tool::Ffmpeg)?.tool, args)
 }
 
-fn mode() -> Sandbox {
-    SETTINGS.get().map_or(Sandbox::Auto, |media| media.sandbox)
+fn mode() -> SandboxMode {
+    let settings = SETTINGS.get();
+    settings.map_or(SandboxMode::Auto, |settings| settings.sandbox)
 }
 
-fn found(tool: Tool) -> Result<&'static Found, Error> {
+fn found(tool: Tool) -> Result<&'static FoundTool, Error> {
     let search = match tool {
         Tool::Ffmpeg => &FFMPEG,
         Tool::Ffprobe => &FFPROBE,
     };
-    (search.outcome(tool)?.as_ref()).map_err(|why| Error::ToolMissing(why.clone()))
+    (search.result(tool)?.as_ref()).map_err(|why| Error::ToolMissing(why.clone()))
 }
 
 impl Search {
     const fn new() -> Search {
         Search {
-            outcome: OnceLock::new(),
-            turn: Mutex::new(()),
+            result: OnceLock::new(),
+            lock: Mutex::new(()),
         }
     }
 
     /// Returns the result of the search and searches if there is none. Transient errors are not stored as
     /// results.
-    fn outcome(&self, tool: Tool) -> Result<&Result<Found, String>, Error> {
-        let _turn = match self.outcome.get() {
-            Some(outcome) => return Ok(outcome),
-            None => self.turn.lock().unwrap_or_else(PoisonError::into_inner),
+    fn result(&self, tool: Tool) -> Result<&Result<FoundTool, String>, Error> {
+        let _guard = match self.result.get() {
+            Some(result) => return Ok(result),
+            None => self.lock.lock().unwrap_or_else(PoisonError::into_inner),
         };
-        if let Some(outcome) = self.outcome.get() {
-            return Ok(outcome);
+        if let Some(result) = self.result.get() {
+            return Ok(result);
         }
         let found = match find(tool) {
-            Err(error) if is_of_the_moment(&error) => return Err(error),
+            Err(error) if is_transient(&error) => return Err(error),
             found => found.map_err(|error| error.to_string()),
         };
-        Ok(self.outcome.get_or_init(|| found))
+        Ok(self.result.get_or_init(|| found))
     }
 }
 
-fn find(tool: Tool) -> Result<Found, Error> {
+fn find(tool: Tool) -> Result<FoundTool, Error> {
     let path = path_of(tool)?;
     let mut layers = Layers::ALL;
-    let mut lacks = Vec::new();
+    let mut missing_layers = Vec::new();
     for layer in Layer::ALL {
-        let reason = match mode() == Sandbox::Off && !Layers::OLD.has(layer) {
-            true => Some("turned off by `--sandbox off`".to_owned()),
-            false => lack_of(layer),
+        let reason = if mode() == SandboxMode::Off && !Layers::BASIC.has(layer) {
+            Some("turned off by `--sandbox off`".to_owned())
+        } else {
+            unsupported_reason(layer)
         };
         if let Some(reason) = reason {
             layers = layers.without(layer);
-            lacks.push((layer, reason));
+            missing_layers.push((layer, reason));
         }
     }
-    let reach = match layers.has(Layer::Files) {
-        true => reach_of(&path),
-        false => Reach::default(),
+    let program_files = if layers.has(Layer::Files) {
+        program_files_of(&path)
+    } else {
+        ProgramFiles::default()
     };
-    let mut place = Place {
+    let mut tool = InstalledTool {
         path,
-        reach,
+        program_files,
         layers,
     };
-    let (version, unbearable) = try_out(&mut place)?;
-    lacks.extend(unbearable);
-    Ok(Found {
-        place,
+    let version = find_usable_layers(&mut tool, &mut missing_layers)?;
+    Ok(FoundTool {
+        tool,
         version,
-        lacks,
+        missing_layers,
     })
 }
 
 fn path_of(tool: Tool) -> Result<PathBuf, Error> {
     let settings = SETTINGS.get();
-    let (name, chosen) = match tool {
+    let (name, configured) = match tool {
         Tool::Ffmpeg => ("ffmpeg", settings.and_then(|media| media.ffmpeg.clone())),
         Tool::Ffprobe => ("ffprobe", settings.and_then(|media| media.ffprobe.clone())),
     };
-    if let Some(path) = chosen {
+    if let Some(path) = configured {
         return std::path::absolute(path).map_err(Error::io("finding the media tool"));
     }
     let folders = std::env::var_os("PATH").unwrap_or_default();
-    let mut places = std::env::split_paths(&folders).map(|folder| folder.join(name));
-    places
+    let mut files = std::env::split_paths(&folders).map(|folder| folder.join(name));
+    files
         .find(|file| file.is_absolute() && file.is_file())
         .ok_or_else(|| Error::ToolMissing(name.to_owned()))
 }
 
 /// Returns whether the error is transient, caused by an overloaded machine and not by the tool or its layers.
-fn is_of_the_moment(error: &Error) -> bool {
+fn is_transient(error: &Error) -> bool {
     use std::io::ErrorKind::{Interrupted, OutOfMemory, ResourceBusy, WouldBlock};
     const TOO_MANY_FILES: [Option<i32>; 2] = [Some(libc::EMFILE), Some(libc::ENFILE)];
     match error {
@@ -229,101 +224,102 @@ fn is_of_the_moment(error: &Error) -> bool {
     }
 }
 
-/// Runs the tool for its version in all supported layers, and with fewer layers if that fails. Returns the
-/// version and the layers in which it does not run. A transient error never removes a layer.
-fn try_out(place: &mut Place) -> Result<(String, Vec<(Layer, String)>), Error> {
-    let asked = match ask(place, &["-version"]) {
-        Err(error) if is_of_the_moment(&error) => ask(place, &["-version"]),
-        asked => asked,
+/// Runs the tool for its version in all its layers, and with fewer layers if that fails. Removes the layers
+/// in which it does not run, adds them to `missing_layers`, and returns the version. A transient error never
+/// removes a layer.
+fn find_usable_layers(
+    tool: &mut InstalledTool,
+    missing_layers: &mut Vec<(Layer, String)>,
+) -> Result<String, Error> {
+    let first_try = match version(tool) {
+        Err(error) if is_transient(&error) => version(tool),
+        version => version,
     };
-    let whole = match asked {
-        Ok(version) => return Ok((version, Vec::new())),
-        Err(error) if is_of_the_moment(&error) => return Err(error),
+    let failure = match first_try {
+        Ok(version) => return Ok(version),
+        Err(error) if is_transient(&error) => return Err(error),
         Err(error) => error.to_string(),
     };
-    let all = place.layers;
+    let all = tool.layers;
     let suspects = [Layer::Files, Layer::Calls, Layer::Privileges, Layer::Limits];
     let one_less = suspects.map(|layer| all.without(layer));
-    let few = Layers::NONE.with(Layer::Leash);
-    for layers in one_less.into_iter().chain([few]) {
-        place.layers = layers;
-        let Ok(version) = ask(place, &["-version"]) else {
+    let only_leash = Layers::NONE.with(Layer::Leash);
+    let program = tool.path.display().to_string();
+    for layers in one_less.into_iter().chain([only_leash]) {
+        tool.layers = layers;
+        let Ok(version) = version(tool) else {
             continue;
         };
-        let unbearable = Layer::ALL
-            .into_iter()
-            .filter(|&layer| all.has(layer) && !layers.has(layer));
-        let reason = format!(
-            "{} does not run with this layer: {whole}",
-            place.path.display()
-        );
-        let lacks = unbearable.map(|layer| (layer, reason.clone()));
-        return Ok((version, lacks.collect()));
+        let is_removed = |layer: &Layer| all.has(*layer) && !layers.has(*layer);
+        let reason = format!("{program} does not run with this layer: {failure}");
+        let removed = Layer::ALL.into_iter().filter(is_removed);
+        missing_layers.extend(removed.map(|layer| (layer, reason.clone())));
+        return Ok(version);
     }
     Err(Error::ToolMissing(format!(
-        "{} does not run: {whole}",
-        place.path.display()
+        "{program} does not run: {failure}"
     )))
 }
 
-/// Returns the first line of the tool's answer to a query about itself.
-fn ask(place: &Place, question: &[&str]) -> Result<String, Error> {
-    let text = answer(place, question, false)?;
+/// Returns the version of a tool: the first line that `-version` prints.
+fn version(tool: &InstalledTool) -> Result<String, Error> {
+    let text = output(tool, &["-version"])?;
     Ok(text.lines().next().unwrap_or_default().to_owned())
 }
 
 /// Returns the files that a program needs, as listed by its loader: its library folders and the loader.
-fn reach_of(path: &Path) -> Reach {
-    let place = Place {
+fn program_files_of(path: &Path) -> ProgramFiles {
+    let tool = InstalledTool {
         path: path.to_owned(),
-        reach: Reach::default(),
-        layers: Layers::OLD,
+        program_files: ProgramFiles::default(),
+        layers: Layers::BASIC,
     };
-    let listing = answer(&place, &[], true).unwrap_or_default();
-    let mut reach = parse_listing(&listing);
-    if reach.reads.is_empty() {
-        reach.reads = USUAL_FOLDERS.map(PathBuf::from).to_vec();
+    let limits = Limits::default();
+    let listing = Invocation::new(&tool, Vec::new(), &limits, 0).listing_libraries();
+    // The loader's exit status does not matter.
+    let listing = run(listing).map_or(String::new(), |(listing, _)| listing);
+    let mut files = parse_listing(&listing);
+    if files.library_dirs.is_empty() {
+        files.library_dirs = DEFAULT_LIBRARY_DIRS.map(PathBuf::from).to_vec();
     }
-    reach.runs.push(path.to_owned());
-    reach
+    files.executables.push(path.to_owned());
+    files
 }
 
-/// Returns the output of the tool for `question`, or with `of_loader` the list of its libraries.
-pub(super) fn answer(place: &Place, question: &[&str], of_loader: bool) -> Result<String, Error> {
-    let limits = Limits::default();
-    let args = question.iter().map(Into::into).collect();
-    let mut order = Order::new(Tool::Ffmpeg, args, &limits, 0);
-    if of_loader {
-        order = order.listing_libraries();
-    }
-    let mut child = Child::launch(order, place, std::process::Stdio::null())?;
-    let mut text = vec![0; MAX_ANSWER_BYTES];
+/// Returns the output of a tool for a query about itself.
+fn output(tool: &InstalledTool, args: &[&str]) -> Result<String, Error> {
+    let args = args.iter().map(Into::into).collect();
+    let (text, exit) = run(Invocation::new(tool, args, &Limits::default(), 0))?;
+    exit.check().map(|_| text)
+}
+
+/// Runs a tool and returns its output and exit.
+fn run(invocation: Invocation<'_>) -> Result<(String, Exit), Error> {
+    let mut child = Child::reading(invocation)?;
+    let mut text = vec![0; MAX_OUTPUT_BYTES];
     let n_bytes = child.read_full(&mut text)?;
-    let end = child.finish()?;
-    if !of_loader {
-        end.check()?;
-    }
-    Ok(String::from_utf8_lossy(&text[..n_bytes]).into_owned())
+    let exit = child.finish()?;
+    Ok((String::from_utf8_lossy(&text[..n_bytes]).into_owned(), exit))
 }
 
 /// Parses lines such as `libz.so.1 => /lib/libz.so.1 (0x7f00)`. The line of the loader itself has no arrow.
-fn parse_listing(listing: &str) -> Reach {
-    let mut reach = Reach::default();
+fn parse_listing(listing: &str) -> ProgramFiles {
+    let mut files = ProgramFiles::default();
     for line in listing.lines().filter(|line| line.contains(" (0x")) {
         let (name, path) = line.split_once("=>").unwrap_or((line, line));
         let path = path.split(" (0x").next().unwrap_or_default().trim();
         let Ok(file) = Path::new(path).canonicalize() else {
             continue;
         };
-        if name.contains("/ld-") || !line.contains("=>") {
-            reach.runs.push(file.clone());
-        }
         let folder = file.parent().map(Path::to_owned);
-        reach.reads.extend(folder);
+        files.library_dirs.extend(folder);
+        if name.contains("/ld-") || !line.contains("=>") {
+            files.executables.push(file);
+        }
     }
-    reach.reads.sort();
-    reach.reads.dedup();
-    reach
+    files.library_dirs.sort();
+    files.library_dirs.dedup();
+    files
 }
 
 #[cfg(test)]
@@ -333,7 +329,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_busy_machine_says_nothing_of_a_layer_and_a_refusal_does() {
+    fn overload_is_transient_and_a_refused_call_is_not() {
         let io = |errno| Error::io("starting the media tool")(io::Error::from_raw_os_error(errno));
         for error in [
             Error::TimeLimit,
@@ -341,10 +337,10 @@ mod tests {
             io(libc::ENOMEM),
             io(libc::EMFILE),
         ] {
-            assert!(is_of_the_moment(&error), "{error}");
+            assert!(is_transient(&error), "{error}");
         }
         for error in [io(libc::EPERM), io(libc::ENOSYS), io(libc::ENOENT)] {
-            assert!(!is_of_the_moment(&error), "{error}");
+            assert!(!is_transient(&error), "{error}");
         }
     }
 }

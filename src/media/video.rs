@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::decode::Film;
 use super::error::Error;
-use super::hints::Hints;
 use super::limits::Limits;
-use super::note::Note;
+use super::notice::Notice;
 use super::pictures::Pictures;
+use super::read_options::ReadOptions;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
 
 /// Footage that is within the limits and can be read any number of times.
@@ -21,21 +21,21 @@ enum Kind {
 }
 
 impl Video {
-    /// Opens footage like [`Video::open_with`], without hints.
+    /// Opens footage like [`Video::open_with`], without options.
     pub fn open(path: &Path, limits: &Limits) -> Result<Video, Error> {
-        Video::open_with(path, limits, &Hints::default())
+        Video::open_with(path, limits, &ReadOptions::default())
     }
 
-    /// Opens a video file, a zip of pictures, a TIFF of several pages or a folder of pictures. `hints`
+    /// Opens a video file, a zip of pictures, a TIFF of several pages or a folder of pictures. `options`
     /// override the file's own metadata.
     ///
     /// Fails with the reason of the first limit that the footage exceeds. `path` comes from the store or from
     /// the command line, never from the name of an uploaded file.
-    pub fn open_with(path: &Path, limits: &Limits, hints: &Hints) -> Result<Video, Error> {
+    pub fn open_with(path: &Path, limits: &Limits, options: &ReadOptions) -> Result<Video, Error> {
         let path = std::path::absolute(path).map_err(Error::io("finding the footage"))?;
-        Ok(Video(match Pictures::open(&path, limits, hints)? {
+        Ok(Video(match Pictures::open(&path, limits, options)? {
             Some(pictures) => Kind::Pictures(Box::new(pictures)),
-            None => Kind::Film(Box::new(Film::open(path, limits, hints)?)),
+            None => Kind::Film(Box::new(Film::open(path, limits, options)?)),
         }))
     }
 
@@ -48,10 +48,10 @@ impl Video {
     }
 
     /// Returns notes about the file: assumptions, and corrected faults.
-    pub fn notes(&self) -> &[Note] {
+    pub fn notices(&self) -> &[Notice] {
         match &self.0 {
-            Kind::Film(film) => film.notes(),
-            Kind::Pictures(pictures) => pictures.notes(),
+            Kind::Film(film) => film.notices(),
+            Kind::Pictures(pictures) => pictures.notices(),
         }
     }
 

@@ -8,12 +8,13 @@
 use crate::analysis::Params;
 use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
-use crate::library::{Animal, Poses, RawPose};
+use crate::library::{Animal, Poses, Raw, View};
 
-/// Writes the raw heading of every pose. With a camera and the animal's size, also the raw position and
-/// direction.
+/// Writes the raw heading of every pose. In side view, with a camera and the animal's size, also the raw
+/// position and direction. From above they are unknown, because the silhouette does not show the height.
 pub fn measure_alone(poses: &mut Poses, params: &Params) {
-    let calibrated = poses.camera.zip(poses.animal);
+    let known = poses.camera.zip(poses.animal);
+    let calibrated = known.filter(|_| poses.view == View::Side);
     let mut last_depth = None;
     for pose in &mut poses.frames {
         if !pose.detected() {
@@ -64,6 +65,7 @@ fn depth_and_cosine(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::library::Pose;
 
     const CAMERA: Camera = Camera {
         z_min_m: 0.7,
@@ -93,5 +95,38 @@ mod tests {
     fn a_fish_seen_at_half_its_length_is_turned_by_sixty_degrees() {
         let (_, cosine) = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 50.0), Eq7::Corrected);
         assert!((libm::acos(cosine).to_degrees() - 60.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn position_and_direction_in_space_are_measured_from_the_side_only() {
+        let pose = Pose {
+            centroid_px: Some([100.0, 80.0]),
+            length_px: Some(50.0),
+            height_px: Some(25.0),
+            heading_rad: Some(0.5),
+            ..Pose::default()
+        };
+        let measured = |view| {
+            let mut poses = Poses {
+                fps: 30.0,
+                image_size_px: [640, 480],
+                view,
+                view_confidence: None,
+                other_movers: Vec::new(),
+                camera: Some(CAMERA),
+                animal: Some(ANIMAL),
+                frames: vec![pose.clone()],
+                tail_beat: None,
+            };
+            measure_alone(&mut poses, &Params::default());
+            poses.frames[0].raw.expect("a detected animal")
+        };
+        let from_side = measured(View::Side);
+        assert!(from_side.position_m.is_some() && from_side.forward.is_some());
+        let only_heading = Raw {
+            heading_rad: Some(0.5),
+            ..Raw::default()
+        };
+        assert_eq!(measured(View::Top), only_heading);
     }
 }

@@ -186,7 +186,7 @@ async fn caller(state: &AppState, parts: &Parts) -> Result<Caller, Problem> {
         }
         None => match of_browser(state, parts).await? {
             Some(caller) => caller,
-            None if state.config.demands_tokens() => return Err(Code::Unauthenticated.into()),
+            None if state.config.requires_tokens() => return Err(Code::Unauthenticated.into()),
             None => Caller::local(),
         },
     };

@@ -6,7 +6,7 @@ use serde::Serialize;
 use utoipa::ToSchema;
 
 use crate::api::AppState;
-use crate::media::Walls;
+use crate::media::SandboxStatus;
 
 /// Readiness of the service and of everything that it needs.
 #[derive(Debug, Serialize, ToSchema)]
@@ -98,7 +98,7 @@ pub(in crate::api) async fn readyz(
 }
 
 impl LayerView {
-    fn all(walls: &Walls) -> Vec<LayerView> {
+    fn all(walls: &SandboxStatus) -> Vec<LayerView> {
         let views = walls.layers.iter().map(|(layer, lack)| LayerView {
             name: layer.name(),
             on: lack.is_none(),

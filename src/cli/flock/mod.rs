@@ -69,11 +69,11 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = args.params()?;
     let background = args.outputs.open_background()?;
     let targets = args.outputs.targets(&params.render)?;
-    media::look_for(&[Tool::Ffmpeg]);
+    media::search_in_background(&[Tool::Ffmpeg]);
     let library = super::read_library(&args.library, &args.outputs.output)?.library;
     let progress = Listener::new();
     let flock = match &args.from {
-        Some(path) => planned(path, &library, params)?,
+        Some(path) => read_plan(path, &library, params)?,
         None => plan_flock(&library, &params, &progress)
             .map_err(|error| Error::work(error.code(), &error))?,
     };
@@ -82,10 +82,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             .map_err(Error::io(format!("writing the plan: {}", path.display())))?;
     }
     if let Some(path) = &args.plan_picture {
-        std::fs::write(path, svg::plan(&flock)).map_err(Error::io(format!(
-            "writing the picture: {}",
-            path.display()
-        )))?;
+        super::write_file(path, svg::plan(&flock))?;
     }
     for advice in Advice::all(&flock) {
         super::say(&format!("{advice} ({})", advice.code()));
@@ -96,10 +93,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         backdrop: background.backdrop(),
         progress: &progress,
     };
-    let began = Instant::now();
-    film.make(&targets, args.outputs.ground_truth.as_deref())
-        .map_err(|error| Error::work(error.code(), &error))?;
-    Ok(Some(summary(&args, &flock, began.elapsed())))
+    let start = Instant::now();
+    film.make(&targets, args.outputs.ground_truth.as_deref())?;
+    Ok(Some(summary(&args, &flock, start.elapsed())))
 }
 
 fn write_plan(flock: &Flock, path: &Path) -> io::Result<()> {
@@ -127,14 +123,14 @@ fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
 
 /// Reads an existing plan, to be filmed with the `render` parameters of `params`. Fails if it belongs to
 /// another library.
-fn planned(path: &Path, library: &Library, params: Params) -> Result<Flock, Error> {
-    let named = |why: &str| Error::Usage(format!("{why}: {}", path.display()));
-    let bytes =
-        std::fs::read(path).map_err(|cause| named(&format!("the plan cannot be read: {cause}")))?;
+fn read_plan(path: &Path, library: &Library, params: Params) -> Result<Flock, Error> {
+    let refused = |why: &str| Error::Usage(format!("{why}: {}", path.display()));
+    let bytes = std::fs::read(path)
+        .map_err(|cause| refused(&format!("the plan cannot be read: {cause}")))?;
     let mut flock =
-        flock_json::read(&bytes).map_err(|cause| named(&format!("not a flock.json: {cause}")))?;
+        flock_json::read(&bytes).map_err(|cause| refused(&format!("not a flock.json: {cause}")))?;
     if !flock.fits(library) {
-        return Err(named("the plan belongs to another library"));
+        return Err(refused("the plan belongs to another library"));
     }
     flock.params.render = params.render;
     Ok(flock)

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use crate::cli::Error;
 use crate::cli::sample::parse_size;
+use crate::cli::{Error, extension};
 use crate::flock::composite::params::{Background, Format, Render};
 use crate::jobs::flock::film::{Backdrop, Output, Target};
 use crate::media::{Limits, Video, read_image};
@@ -54,7 +54,7 @@ pub(super) struct Outputs {
 }
 
 /// Background of the film, with its file opened.
-pub(super) enum OpenedBackground {
+pub(super) enum OpenBackground {
     /// As the `render` parameters say.
     FromParams,
     /// A picture.
@@ -99,8 +99,11 @@ impl Outputs {
             output: Output::Overlay,
             path,
         }));
-        let clear = render.background == Background::Transparent;
-        match targets.iter().find(|target| clear && !keeps_alpha(target)) {
+        let is_transparent = render.background == Background::Transparent;
+        match targets
+            .iter()
+            .find(|target| is_transparent && !keeps_alpha(target))
+        {
             Some(target) => Err(Error::Usage(format!(
                 "this format has no transparency, use .webm, .mov, .webp or --format png: {}",
                 target.path.display()
@@ -110,10 +113,10 @@ impl Outputs {
     }
 
     /// Opens the picture or video that is named as background, if any.
-    pub(super) fn open_background(&self) -> Result<OpenedBackground, Error> {
+    pub(super) fn open_background(&self) -> Result<OpenBackground, Error> {
         let named = self.named_background();
         let Some(path) = self.background.as_deref().filter(|_| named.is_none()) else {
-            return Ok(OpenedBackground::FromParams);
+            return Ok(OpenBackground::FromParams);
         };
         let path = Path::new(path);
         if !path.is_file() {
@@ -122,15 +125,11 @@ impl Outputs {
                 path.display()
             )));
         }
-        let (limits, work) = (Limits::default(), |e| Error::work_of_media(&e));
-        match ending(path).as_str() {
-            "png" | "jpg" | "jpeg" => read_image(path, &limits)
-                .map(OpenedBackground::Picture)
-                .map_err(work),
-            _ => Video::open(path, &limits)
-                .map(|video| OpenedBackground::Video(Box::new(video)))
-                .map_err(work),
-        }
+        let limits = Limits::default();
+        Ok(match extension(path).as_str() {
+            "png" | "jpg" | "jpeg" => OpenBackground::Picture(read_image(path, &limits)?),
+            _ => OpenBackground::Film(Box::new(Video::open(path, &limits)?)),
+        })
     }
 
     /// Returns the background, unless it is a file.
@@ -140,13 +139,13 @@ impl Outputs {
     }
 }
 
-impl OpenedBackground {
+impl OpenBackground {
     /// Returns the background in the type that `Film` takes.
     pub(super) fn backdrop(&self) -> Backdrop<'_> {
         match self {
-            OpenedBackground::FromParams => Backdrop::AsAsked,
-            OpenedBackground::Picture(picture) => Backdrop::Picture(picture),
-            OpenedBackground::Video(video) => Backdrop::Film(video.as_ref()),
+            OpenBackground::FromParams => Backdrop::AsAsked,
+            OpenBackground::Picture(picture) => Backdrop::Picture(picture),
+            OpenBackground::Film(video) => Backdrop::Film(video.as_ref()),
         }
     }
 }
@@ -154,14 +153,16 @@ impl OpenedBackground {
 fn keeps_alpha(target: &Target) -> bool {
     match target.output {
         Output::Overlay => true, // it has its own background
-        Output::Film(Format::Poster) => !["jpg", "jpeg"].contains(&ending(&target.path).as_str()),
+        Output::Film(Format::Poster) => {
+            !["jpg", "jpeg"].contains(&extension(&target.path).as_str())
+        }
         Output::Film(format) => format.has_alpha(),
     }
 }
 
 /// Returns the format for the extension of a file name. Fails if it is unknown.
 fn format_of(path: &Path) -> Result<Format, Error> {
-    match ending(path).as_str() {
+    match extension(path).as_str() {
         "mp4" | "m4v" => Ok(Format::Mp4),
         "webm" => Ok(Format::Webm),
         "mov" => Ok(Format::Mov),
@@ -174,11 +175,6 @@ fn format_of(path: &Path) -> Result<Format, Error> {
             path.display()
         ))),
     }
-}
-
-fn ending(path: &Path) -> String {
-    let extension = path.extension().unwrap_or_default();
-    extension.to_string_lossy().to_lowercase()
 }
 
 #[cfg(test)]
@@ -202,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn format_follows_from_the_name_unless_a_flag_sets_it() {
+    fn extension_gives_the_format_and_a_flag_overrides_it() {
         for (words, format) in [
             ("-o a.mp4", Format::Mp4),
             ("-o a.WEBM", Format::Webm),
@@ -225,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn formats_without_transparency_are_refused_for_a_transparent_film() {
+    fn formats_without_alpha_are_refused_for_a_transparent_background() {
         for (words, is_good) in [
             ("-o a.mp4 --background transparent", false),
             ("-o a.gif --background transparent", false),

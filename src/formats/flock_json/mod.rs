@@ -36,8 +36,8 @@ pub fn write_to(flock: &Flock, out: &mut impl Write) -> io::Result<()> {
         fps: flock.fps,
         image_size_px: flock.image_size_px,
         length_px: flock.length_px,
-        space: Some(SpaceFile::of(&flock.space)),
-        stats: StatsFile::of(&flock.stats, &flock.orders),
+        space: Some(SpaceFile::new(&flock.space)),
+        stats: StatsFile::new(flock.stats, &flock.orders),
         predator: flock.predator_px.clone(),
         individuals: (), // written line by line below
     };
@@ -46,7 +46,7 @@ pub fn write_to(flock: &Flock, out: &mut impl Write) -> io::Result<()> {
     out.write_all(head.as_bytes())?;
     for (idx, individual) in flock.individuals.iter().enumerate() {
         out.write_all(if idx == 0 { b"[\n" } else { b",\n" })?;
-        serde_json::to_writer(&mut *out, &IndividualFile::of(individual))?;
+        serde_json::to_writer(&mut *out, &IndividualFile::new(individual))?;
     }
     out.write_all(b"\n]}\n")
 }
@@ -67,7 +67,7 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
             .map(IndividualFile::into_individual)
             .collect(),
         orders: file.stats.orders()?,
-        stats: file.stats.into_stats(),
+        stats: file.stats.stats,
     })
 }
 
@@ -111,7 +111,8 @@ struct IndividualFile {
     forward: Option<Vec<[f64; 3]>>,
     scale: Vec<f64>,
     depth_m: Option<Vec<f64>>,
-    boid: BoidFile,
+    #[serde(with = "BoidFields")]
+    boid: BoidTrack,
     cost: CostFile,
 }
 
@@ -128,7 +129,12 @@ impl Default for VariationFile {
 }
 
 #[derive(Serialize, Deserialize)]
-struct FadeFile {
+#[serde(transparent)]
+struct FadeFile(#[serde(with = "FadeFields")] Fade);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Fade")]
+struct FadeFields {
     start: u32,
     source_frame: Vec<u32>,
     mirrored: bool,
@@ -139,17 +145,29 @@ struct FadeFile {
 
 /// `position`: x, y and depth behind the front of the tank, pixels; `speed`: body lengths per second.
 #[derive(Serialize, Deserialize)]
-struct BoidFile {
-    position: Vec<[f64; 3]>,
+#[serde(remote = "BoidTrack")]
+struct BoidFields {
+    #[serde(rename = "position")]
+    position_px: Vec<[f64; 3]>,
     /// Absent in older files.
     #[serde(default)]
     forward: Option<Vec<[f64; 3]>>,
     heading_rad: Vec<f64>,
-    speed: Vec<f64>,
+    #[serde(rename = "speed")]
+    speed_bl_per_s: Vec<f64>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct CostFile {
+    #[serde(flatten, with = "CostFields")]
+    cost: PlanCost,
+    /// Always true: the plan of each segment is optimal.
+    exact: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "PlanCost")]
+struct CostFields {
     total: f64,
     heading: f64,
     speed: f64,
@@ -159,12 +177,10 @@ struct CostFile {
     #[serde(default)]
     repetition: f64,
     lower_bound: f64,
-    /// Always true: the plan of each segment is optimal.
-    exact: bool,
 }
 
 impl IndividualFile {
-    fn of(individual: &Individual) -> IndividualFile {
+    fn new(individual: &Individual) -> IndividualFile {
         let individual = individual.clone();
         IndividualFile {
             id: individual.id,
@@ -176,19 +192,17 @@ impl IndividualFile {
                 size: individual.size,
             },
             state: individual.state,
-            fade: individual.fades.into_iter().map(FadeFile::of).collect(),
+            fade: individual.fades.into_iter().map(FadeFile).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
             forward: individual.forward,
             scale: individual.scale,
             depth_m: individual.depth_m,
-            boid: BoidFile {
-                position: individual.boid.position_px,
-                forward: individual.boid.forward,
-                heading_rad: individual.boid.heading_rad,
-                speed: individual.boid.speed_bl_per_s,
+            boid: individual.boid,
+            cost: CostFile {
+                cost: individual.cost,
+                exact: true,
             },
-            cost: CostFile::of(individual.cost),
         }
     }
 
@@ -201,70 +215,14 @@ impl IndividualFile {
             continues_as: self.continues_as,
             size: self.variation.size,
             state: self.state,
-            fades: self.fade.into_iter().map(FadeFile::into_fade).collect(),
+            fades: self.fade.into_iter().map(|fade| fade.0).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,
             forward: self.forward,
             scale: self.scale,
             depth_m: self.depth_m,
-            boid: BoidTrack {
-                position_px: self.boid.position,
-                forward: self.boid.forward,
-                heading_rad: self.boid.heading_rad,
-                speed_bl_per_s: self.boid.speed,
-            },
-            cost: self.cost.into_cost(),
-        }
-    }
-}
-
-impl FadeFile {
-    fn of(fade: Fade) -> FadeFile {
-        FadeFile {
-            start: fade.start,
-            source_frame: fade.source_frame,
-            mirrored: fade.mirrored,
-            rotation_rad: fade.rotation_rad,
-            scale: fade.scale,
-            weight: fade.weight,
-        }
-    }
-
-    fn into_fade(self) -> Fade {
-        Fade {
-            start: self.start,
-            source_frame: self.source_frame,
-            mirrored: self.mirrored,
-            rotation_rad: self.rotation_rad,
-            scale: self.scale,
-            weight: self.weight,
-        }
-    }
-}
-
-impl CostFile {
-    fn of(cost: PlanCost) -> CostFile {
-        CostFile {
-            total: cost.total,
-            heading: cost.heading,
-            speed: cost.speed,
-            transition: cost.transition,
-            crowd: cost.crowd,
-            repetition: cost.repetition,
-            lower_bound: cost.lower_bound,
-            exact: true,
-        }
-    }
-
-    fn into_cost(self) -> PlanCost {
-        PlanCost {
-            total: self.total,
-            heading: self.heading,
-            speed: self.speed,
-            transition: self.transition,
-            crowd: self.crowd,
-            repetition: self.repetition,
-            lower_bound: self.lower_bound,
+            boid: self.boid,
+            cost: self.cost.cost,
         }
     }
 }
@@ -277,7 +235,7 @@ mod tests {
     use crate::progress::Silent;
 
     #[test]
-    fn reading_a_flock_returns_what_was_written() {
+    fn flock_is_read_back_as_written() {
         let library = synthetic::library(View::Side);
         let params = Params {
             count: Some(3),
@@ -292,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flock_whose_measures_have_different_numbers_of_frames_is_refused() {
+    fn measures_with_different_numbers_of_frames_are_refused() {
         let library = synthetic::library(View::Top);
         let params = Params {
             count: Some(2),

@@ -22,40 +22,40 @@ pub(super) struct SpaceFile {
 }
 
 #[derive(Serialize, Deserialize)]
-struct CameraFile {
+#[serde(transparent)]
+struct CameraFile(#[serde(with = "CameraFields")] Pinhole);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Pinhole")]
+struct CameraFields {
     focal_px: f64,
     center_px: [f64; 2],
     pane_bl: f64,
     medium_index: f64,
     /// Metres per body length; null if unknown.
-    m_per_bl: Option<f64>,
+    #[serde(rename = "m_per_bl")]
+    metres: Option<f64>,
 }
+
+#[derive(Serialize, Deserialize)]
+#[serde(transparent)]
+struct WallFile(#[serde(with = "WallFields")] Wall);
 
 /// A point is inside if `outward` . point <= `offset_bl`.
 #[derive(Serialize, Deserialize)]
-struct WallFile {
+#[serde(remote = "Wall")]
+struct WallFields {
     outward: [f64; 3],
     offset_bl: f64,
 }
 
 impl SpaceFile {
-    pub(super) fn of(space: &Space) -> SpaceFile {
-        let camera = |camera: &Pinhole| CameraFile {
-            focal_px: camera.focal_px,
-            center_px: camera.center_px,
-            pane_bl: camera.pane_bl,
-            medium_index: camera.medium_index,
-            m_per_bl: camera.metres,
-        };
-        let wall = |wall: &Wall| WallFile {
-            outward: wall.outward,
-            offset_bl: wall.offset_bl,
-        };
+    pub(super) fn new(space: &Space) -> SpaceFile {
         SpaceFile {
-            camera: space.lens.camera().map(camera),
+            camera: space.lens.camera().copied().map(CameraFile),
             front_bl: space.front_bl,
             up: space.up,
-            walls: space.walls.iter().map(wall).collect(),
+            walls: space.walls.iter().copied().map(WallFile).collect(),
         }
     }
 
@@ -69,22 +69,11 @@ impl SpaceFile {
                 walls: Vec::new(),
             };
         };
-        let camera = |camera: CameraFile| Pinhole {
-            focal_px: camera.focal_px,
-            center_px: camera.center_px,
-            pane_bl: camera.pane_bl,
-            medium_index: camera.medium_index,
-            metres: camera.m_per_bl,
-        };
-        let wall = |wall: WallFile| Wall {
-            outward: wall.outward,
-            offset_bl: wall.offset_bl,
-        };
         Space {
-            lens: Lens::with(length_px, file.camera.map(camera)),
+            lens: Lens::with(length_px, file.camera.map(|camera| camera.0)),
             front_bl: file.front_bl,
             up: file.up,
-            walls: file.walls.into_iter().map(wall).collect(),
+            walls: file.walls.into_iter().map(|wall| wall.0).collect(),
         }
     }
 }

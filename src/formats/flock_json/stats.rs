@@ -4,8 +4,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::flock::{Order, Stats};
 
+/// `stats` of flock.json.
 #[derive(Serialize, Deserialize)]
 pub(super) struct StatsFile {
+    #[serde(flatten, with = "StatsFields")]
+    pub(super) stats: Stats,
+    /// Absent in older files; then empty.
+    #[serde(default)]
+    per_frame: OrdersFile,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Stats")]
+struct StatsFields {
     heading_error_median_rad: f64,
     heading_error_p90_rad: f64,
     jumps_per_100_frames: f64,
@@ -25,7 +36,7 @@ pub(super) struct StatsFile {
     polarization: f64,
     milling: f64,
     nearest_neighbor_bl: f64,
-    /// This field and the following ones are absent in older files; then 0 or empty.
+    /// This field and the following ones are absent in older files; then 0.
     #[serde(default)]
     spacing_bl: f64,
     #[serde(default)]
@@ -42,8 +53,6 @@ pub(super) struct StatsFile {
     wall_violations: u64,
     #[serde(default)]
     overlap_violations: u64,
-    #[serde(default)]
-    per_frame: OrdersFile,
 }
 
 /// The order of every frame, one list per measure.
@@ -59,30 +68,10 @@ struct OrdersFile {
 }
 
 impl StatsFile {
-    pub(super) fn of(stats: &Stats, orders: &[Order]) -> StatsFile {
+    pub(super) fn new(stats: Stats, orders: &[Order]) -> StatsFile {
         StatsFile {
-            heading_error_median_rad: stats.heading_error_median_rad,
-            heading_error_p90_rad: stats.heading_error_p90_rad,
-            jumps_per_100_frames: stats.jumps_per_100_frames,
-            repeats_per_100_frames: stats.repeats_per_100_frames,
-            path_deviation_p95_bl: stats.path_deviation_p95_bl,
-            slip_median_rad: stats.slip_median_rad,
-            clone_share: stats.clone_share,
-            distinct_looks: stats.distinct_looks,
-            room_for: stats.room_for,
-            variety: stats.variety,
-            polarization: stats.polarization,
-            milling: stats.milling,
-            nearest_neighbor_bl: stats.nearest_neighbor_bl,
-            spacing_bl: stats.spacing_bl,
-            crossings_per_min: stats.crossings_per_min,
-            visible_share: stats.visible_share,
-            neighbor_share: stats.neighbor_share,
-            groups: stats.groups,
-            overlap_bl: stats.overlap_bl,
-            wall_violations: stats.wall_violations,
-            overlap_violations: stats.overlap_violations,
-            per_frame: OrdersFile::of(orders),
+            stats,
+            per_frame: OrdersFile::new(orders),
         }
     }
 
@@ -90,38 +79,12 @@ impl StatsFile {
     pub(super) fn orders(&self) -> Result<Vec<Order>, serde_json::Error> {
         self.per_frame.orders()
     }
-
-    pub(super) fn into_stats(self) -> Stats {
-        Stats {
-            heading_error_median_rad: self.heading_error_median_rad,
-            heading_error_p90_rad: self.heading_error_p90_rad,
-            jumps_per_100_frames: self.jumps_per_100_frames,
-            repeats_per_100_frames: self.repeats_per_100_frames,
-            path_deviation_p95_bl: self.path_deviation_p95_bl,
-            slip_median_rad: self.slip_median_rad,
-            clone_share: self.clone_share,
-            distinct_looks: self.distinct_looks,
-            room_for: self.room_for,
-            variety: self.variety,
-            polarization: self.polarization,
-            milling: self.milling,
-            nearest_neighbor_bl: self.nearest_neighbor_bl,
-            spacing_bl: self.spacing_bl,
-            crossings_per_min: self.crossings_per_min,
-            visible_share: self.visible_share,
-            neighbor_share: self.neighbor_share,
-            groups: self.groups,
-            overlap_bl: self.overlap_bl,
-            wall_violations: self.wall_violations,
-            overlap_violations: self.overlap_violations,
-        }
-    }
 }
 
 impl OrdersFile {
-    fn of(orders: &[Order]) -> OrdersFile {
-        fn each<T>(orders: &[Order], of: impl Fn(&Order) -> T) -> Vec<T> {
-            orders.iter().map(of).collect()
+    fn new(orders: &[Order]) -> OrdersFile {
+        fn each<T>(orders: &[Order], value: impl Fn(&Order) -> T) -> Vec<T> {
+            orders.iter().map(value).collect()
         }
         OrdersFile {
             polarization: each(orders, |order| order.polarization),

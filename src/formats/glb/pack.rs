@@ -22,7 +22,7 @@ struct Kind {
 }
 
 impl Kind {
-    fn of(component: ComponentType, shape: Type, target: Option<Target>) -> Kind {
+    fn new(component: ComponentType, shape: Type, target: Option<Target>) -> Kind {
         Kind {
             component,
             shape,
@@ -53,13 +53,13 @@ impl Packer {
             .flatten()
             .flat_map(|c| c.to_le_bytes())
             .collect();
-        let kind = Kind::of(ComponentType::U16, Type::Vec4, VERTICES);
+        let kind = Kind::new(ComponentType::U16, Type::Vec4, VERTICES);
         self.add(bytes, colors.len(), kind)
     }
 
     /// Adds the joints of each vertex.
     pub(super) fn joints(&mut self, joints: &[[u8; 4]]) -> Index<Accessor> {
-        let kind = Kind::of(ComponentType::U8, Type::Vec4, VERTICES);
+        let kind = Kind::new(ComponentType::U8, Type::Vec4, VERTICES);
         self.add(joints.concat(), joints.len(), kind)
     }
 
@@ -76,7 +76,7 @@ impl Packer {
             .flat_map(|v| v.to_le_bytes())
             .collect();
         let target = Some(Target::ElementArrayBuffer);
-        let kind = Kind::of(ComponentType::U32, Type::Scalar, target);
+        let kind = Kind::new(ComponentType::U32, Type::Scalar, target);
         self.add(bytes, 3 * triangles.len(), kind)
     }
 
@@ -140,7 +140,7 @@ impl Packer {
         self.add(
             bytes,
             rows.len(),
-            Kind::of(ComponentType::F32, shape, target),
+            Kind::new(ComponentType::F32, shape, target),
         )
     }
 
@@ -173,14 +173,18 @@ impl Packer {
         })
     }
 
-    fn bound<const N: usize>(&mut self, of: Index<Accessor>, rows: &[[f32; N]]) -> Index<Accessor> {
+    fn bound<const N: usize>(
+        &mut self,
+        index: Index<Accessor>,
+        rows: &[[f32; N]],
+    ) -> Index<Accessor> {
         let fold = |start: f32, pick: fn(f32, f32) -> f32| -> Value {
             let bounds = (0..N).map(|c| rows.iter().map(|r| r[c]).fold(start, pick));
             Value::from(bounds.collect::<Vec<f32>>())
         };
-        let accessor = &mut self.root.accessors[of.value()];
+        let accessor = &mut self.root.accessors[index.value()];
         accessor.min = Some(fold(f32::MAX, f32::min));
         accessor.max = Some(fold(f32::MIN, f32::max));
-        of
+        index
     }
 }

@@ -58,7 +58,7 @@ fn channel(root: &Root, node: u32, path: Property) -> (usize, usize) {
 }
 
 #[test]
-fn a_loader_puts_every_joint_where_the_renderer_does() {
+fn joints_of_the_file_are_at_the_positions_of_the_renderer() {
     let motion = motion(12);
     let (root, bytes) = open(&write(&motion));
     let k = 7;
@@ -90,7 +90,7 @@ fn a_loader_puts_every_joint_where_the_renderer_does() {
 }
 
 #[test]
-fn at_rest_the_inverse_bind_matrices_undo_the_joints() {
+fn inverse_bind_matrices_undo_the_joints_at_rest() {
     let (root, bytes) = open(&write(&motion(2)));
     let skin = &root.skins[0];
     let matrices = floats(
@@ -112,7 +112,7 @@ fn at_rest_the_inverse_bind_matrices_undo_the_joints() {
 }
 
 #[test]
-fn bounds_are_those_of_the_bytes_and_every_index_names_a_vertex() {
+fn bounds_match_the_vertices_and_indices_are_in_range() {
     let (root, bytes) = open(&write(&motion(3)));
     for primitive in &root.meshes[0].primitives {
         let accessor = primitive.attributes[&Valid(Semantic::Positions)].value();
@@ -131,7 +131,7 @@ fn bounds_are_those_of_the_bytes_and_every_index_names_a_vertex() {
 }
 
 #[test]
-fn the_fish_stands_upright_and_times_are_those_of_the_frames() {
+fn fish_is_upright_and_times_are_those_of_the_frames() {
     let (root, bytes) = open(&write(&motion(30)));
     let (input, output) = channel(&root, ROOT, Property::Rotation);
     let times = floats(&root, &bytes, input);
@@ -143,7 +143,7 @@ fn the_fish_stands_upright_and_times_are_those_of_the_frames() {
 }
 
 #[test]
-fn a_hidden_fish_has_no_size_and_one_seen_throughout_no_such_track() {
+fn only_a_fish_with_hidden_frames_has_a_scale_track() {
     let mut motion = motion(4);
     let has_scale = |motion: &Motion| {
         let (root, _) = open(&write(motion));

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::{FilmShape, everyone, frame_name, rle};
+use super::{FilmShape, frame_name, rle, with_truth};
 use crate::flock::Flock;
 use crate::flock::composite::truth::{FrameTruth, Seen};
 use crate::geometry::{Rect, rounded};
@@ -85,7 +85,7 @@ impl<W: Write> Coco<W> {
 
     /// Adds the annotations of all visible individuals in a frame.
     pub fn add(&mut self, flock: &Flock, frame_idx: usize, truth: &FrameTruth) -> io::Result<()> {
-        for (individual, seen) in everyone(flock, truth) {
+        for (individual, seen) in with_truth(flock, truth) {
             let Some(visible_box) = seen.visible_box else {
                 continue;
             };

@@ -10,6 +10,7 @@ pub mod mot;
 pub mod rle;
 pub mod tracks;
 
+pub use super::picture_archive::frame_name;
 use crate::flock::composite::truth::{FrameTruth, Seen};
 use crate::flock::{Flock, Individual};
 
@@ -24,13 +25,8 @@ pub struct FilmShape {
     pub fps: f64,
 }
 
-/// Returns the file name of a frame's label picture, and of the frame in a picture sequence.
-pub fn frame_name(frame_idx: usize) -> String {
-    format!("{frame_idx:06}.png")
-}
-
 /// Yields all individuals with their truth in a frame, by id.
-fn everyone<'a>(
+fn with_truth<'a>(
     flock: &'a Flock,
     truth: &'a FrameTruth,
 ) -> impl Iterator<Item = (&'a Individual, &'a Seen)> {

@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::{FilmShape, everyone};
+use super::{FilmShape, with_truth};
 use crate::flock::Flock;
 use crate::flock::composite::truth::FrameTruth;
 use crate::geometry::rounded;
@@ -17,7 +17,7 @@ pub fn write_frame(
     frame_idx: usize,
     truth: &FrameTruth,
 ) -> io::Result<()> {
-    for (individual, seen) in everyone(flock, truth) {
+    for (individual, seen) in with_truth(flock, truth) {
         let Some([x, y, w, h]) = seen.amodal_box else {
             continue;
         };

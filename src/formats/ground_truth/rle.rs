@@ -50,40 +50,40 @@ pub fn text(counts: &[u32]) -> String {
     text
 }
 
-/// Returns the counts of a text, or `None` if it is malformed.
-pub fn read(text: &str) -> Option<Vec<u32>> {
-    let mut counts: Vec<u32> = Vec::new();
-    let (mut value, mut shift) = (0i64, 0);
-    for byte in text.bytes() {
-        let letter = i64::from(byte.checked_sub(48)?);
-        if letter > 0x3f || shift > 35 {
-            return None;
-        }
-        value |= (letter & 0x1f) << shift;
-        shift += 5;
-        if letter & 0x20 == 0 {
-            if letter & 0x10 != 0 {
-                value |= -1 << shift;
-            }
-            let before = if counts.len() > 2 {
-                counts[counts.len() - 2]
-            } else {
-                0
-            };
-            counts.push(u32::try_from(value + i64::from(before)).ok()?);
-            (value, shift) = (0, 0);
-        }
-    }
-    (shift == 0).then_some(counts)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Returns the counts of a text, or `None` if it is malformed.
+    fn read(text: &str) -> Option<Vec<u32>> {
+        let mut counts: Vec<u32> = Vec::new();
+        let (mut value, mut shift) = (0i64, 0);
+        for byte in text.bytes() {
+            let letter = i64::from(byte.checked_sub(48)?);
+            if letter > 0x3f || shift > 35 {
+                return None;
+            }
+            value |= (letter & 0x1f) << shift;
+            shift += 5;
+            if letter & 0x20 == 0 {
+                if letter & 0x10 != 0 {
+                    value |= -1 << shift;
+                }
+                let before = if counts.len() > 2 {
+                    counts[counts.len() - 2]
+                } else {
+                    0
+                };
+                counts.push(u32::try_from(value + i64::from(before)).ok()?);
+                (value, shift) = (0, 0);
+            }
+        }
+        (shift == 0).then_some(counts)
+    }
+
     #[test]
-    fn counts_run_down_the_columns_and_begin_with_the_clear() {
+    fn counts_are_by_column_and_start_with_clear_pixels() {
         // . #
         // # #
         let set = |x, y| x == 1 || y == 1;
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn the_text_is_the_one_that_pycocotools_makes() {
+    fn text_is_that_of_pycocotools() {
         // pycocotools.mask.encode of a 4 x 6 (rows x columns) array, set in rows 1 and 2 of columns 2..5.
         let square = |x: u32, y: u32| (1..3).contains(&y) && (2..5).contains(&x);
         let found = counts([6, 4], Rect::of_size(6, 4), square);
@@ -103,12 +103,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn reading_a_text_returns_the_counts(counts in prop::collection::vec(0u32..3_000_000, 0..40)) {
+        fn counts_are_restored_from_their_text(counts in prop::collection::vec(0u32..3_000_000, 0..40)) {
             prop_assert_eq!(read(&text(&counts)), Some(counts));
         }
 
         #[test]
-        fn every_mask_comes_back_from_its_counts(
+        fn mask_is_restored_from_its_counts(
             bits in prop::collection::vec(any::<bool>(), 35),
             left in 0u32..3, top in 0u32..3,
         ) {

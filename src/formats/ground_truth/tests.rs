@@ -5,12 +5,13 @@ use serde_json::Value;
 use super::*;
 use crate::flock::{Compositor, Params, Shot, plan_flock, synthetic};
 use crate::formats::picture;
+use crate::geometry::Rect;
 use crate::library::View;
 use crate::progress::Silent;
 
 const N_FRAMES: usize = 30;
 
-struct Told {
+struct Written {
     flock: Flock,
     truths: Vec<FrameTruth>,
     coco: Value,
@@ -18,7 +19,7 @@ struct Told {
     tracks: String,
 }
 
-fn told() -> Told {
+fn written() -> Written {
     let library = synthetic::library(View::Side);
     let params = Params {
         count: Some(10),
@@ -40,11 +41,11 @@ fn told() -> Told {
         compositor.render(frame, &mut shot);
         coco.add(&flock, frame, &shot.truth).unwrap();
         mot::write_frame(&mut mot, &flock, frame, &shot.truth).unwrap();
-        tracks::write_frame(&mut tracks, (&flock, &film), frame, &shot.truth).unwrap();
+        tracks::write_frame(&mut tracks, &flock, &film, frame, &shot.truth).unwrap();
         truths.push(shot.truth.clone());
     }
     coco.end().unwrap();
-    Told {
+    Written {
         flock,
         truths,
         coco: serde_json::from_slice(&json).unwrap(),
@@ -54,27 +55,21 @@ fn told() -> Told {
 }
 
 #[test]
-fn every_annotation_is_its_label() {
-    let told = told();
-    assert_eq!(told.coco["images"].as_array().unwrap().len(), N_FRAMES);
-    let annotations = told.coco["annotations"].as_array().unwrap();
+fn annotations_match_the_labels() {
+    let written = written();
+    assert_eq!(written.coco["images"].as_array().unwrap().len(), N_FRAMES);
+    let annotations = written.coco["annotations"].as_array().unwrap();
     assert!(annotations.len() > 9 * N_FRAMES, "{}", annotations.len());
     for (k, annotation) in annotations.iter().enumerate() {
         assert_eq!(annotation["id"], k as u64 + 1);
         let frame = annotation["image_id"].as_u64().unwrap() as usize - 1;
         let track = annotation["track_id"].as_u64().unwrap() as usize;
         let text = annotation["segmentation"]["counts"].as_str().unwrap();
-        let counts = rle::read(text).expect("our own text");
-        let mut set = Vec::new();
-        for (k, &count) in counts.iter().enumerate() {
-            set.extend(vec![k % 2 == 1; count as usize]);
-        }
-        let truth = &told.truths[frame];
-        for (at, set) in set.iter().enumerate() {
-            let (x, y) = (at / 240, at % 240);
-            assert_eq!(*set, usize::from(truth.labels[y * 320 + x]) == track);
-        }
-        let individual = &told.flock.individuals[track - 1];
+        let labels = &written.truths[frame].labels;
+        let is_set = |x: u32, y: u32| usize::from(labels[(y * 320 + x) as usize]) == track;
+        let counts = rle::counts([320, 240], Rect::of_size(320, 240), is_set);
+        assert_eq!(text, rle::text(&counts));
+        let individual = &written.flock.individuals[track - 1];
         assert_eq!(annotation["heading_rad"], individual.heading_rad[frame]);
         assert_eq!(
             annotation["centroid_px"][0],
@@ -84,16 +79,16 @@ fn every_annotation_is_its_label() {
             annotation["centroid_px"][1],
             individual.centroid_px[frame][1]
         );
-        let n_set = set.iter().filter(|set| **set).count();
-        assert_eq!(annotation["area"], n_set);
+        let n_set = labels.iter().filter(|&&label| usize::from(label) == track);
+        assert_eq!(annotation["area"], n_set.count());
     }
 }
 
 #[test]
-fn every_individual_has_a_row_in_every_frame() {
-    let told = told();
+fn tracks_have_a_row_for_each_individual_and_frame() {
+    let written = written();
     let n_cells = tracks::COLUMNS.split(',').count();
-    let rows: Vec<Vec<&str>> = told
+    let rows: Vec<Vec<&str>> = written
         .tracks
         .lines()
         .map(|l| l.split(',').collect())
@@ -103,20 +98,20 @@ fn every_individual_has_a_row_in_every_frame() {
         assert_eq!(row.len(), n_cells);
         assert_eq!(row[0], (k / 10).to_string());
         assert_eq!(row[2], (k % 10).to_string());
-        let individual = &told.flock.individuals[k % 10];
+        let individual = &written.flock.individuals[k % 10];
         let [x, y] = individual.centroid_px[k / 10];
         assert_eq!([row[3], row[4]], [x.to_string(), y.to_string()]);
     }
 }
 
 #[test]
-fn challenge_lines_count_from_one_and_hold_the_whole_animal() {
-    let told = told();
+fn mot_lines_count_from_one_and_have_amodal_boxes() {
+    let written = written();
     let mut n_lines = 0;
-    for line in told.mot.lines() {
+    for line in written.mot.lines() {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
         let (frame, id) = (cells[0] as usize - 1, cells[1] as usize - 1);
-        let seen = &told.truths[frame].seen[id];
+        let seen = &written.truths[frame].seen[id];
         let [x, y, w, h] = seen.amodal_box.unwrap().map(|edge| edge as f64);
         assert_eq!(cells[2..6], [x + 1.0, y + 1.0, w, h]);
         assert_eq!(cells[6..8], [1.0, 1.0]);
@@ -127,7 +122,7 @@ fn challenge_lines_count_from_one_and_hold_the_whole_animal() {
 }
 
 #[test]
-fn a_label_picture_keeps_ids_beyond_a_byte() {
+fn label_picture_keeps_ids_above_255() {
     let labels: Vec<u16> = vec![0, 1, 255, 256, 2000, 65535];
     let bytes = picture::write_labels(3, 2, &labels);
     let decoder = png::Decoder::new(std::io::Cursor::new(&bytes));

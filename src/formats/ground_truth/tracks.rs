@@ -3,7 +3,7 @@
 
 use std::io::{self, Write};
 
-use super::{FilmShape, everyone};
+use super::{FilmShape, with_truth};
 use crate::flock::Flock;
 use crate::flock::composite::truth::FrameTruth;
 use crate::geometry::rounded;
@@ -16,12 +16,13 @@ amodal_w_px,amodal_h_px,amodal_area_px,visibility\n";
 /// Writes the rows of one frame.
 pub fn write_frame(
     out: &mut impl Write,
-    (flock, film): (&Flock, &FilmShape),
+    flock: &Flock,
+    film: &FilmShape,
     frame_idx: usize,
     truth: &FrameTruth,
 ) -> io::Result<()> {
     let time_s = rounded(frame_idx as f64 / film.fps, 6);
-    for (individual, seen) in everyone(flock, truth) {
+    for (individual, seen) in with_truth(flock, truth) {
         let [x, y] = seen.centroid_px.map(|px| rounded(px, 3));
         let depth = individual.depth_m.as_ref().map(|depth| depth[frame_idx]);
         write!(

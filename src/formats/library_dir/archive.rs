@@ -59,11 +59,11 @@ impl Archive<'_> {
         })
     }
 
-    /// Stores the picture of every frame in `scratch`. Fails if one is larger than `most_px`.
+    /// Stores the picture of every frame in `scratch`. Fails if one is larger than `max_size_px`.
     pub(super) fn mattes(
         &self,
         n_frames: usize,
-        most_px: [u32; 2],
+        max_size_px: [u32; 2],
         scratch: &dyn Scratch,
     ) -> Result<Vec<Option<Matte>>, Error> {
         if self.centers_px.is_some_and(|all| all.len() != n_frames) {
@@ -74,7 +74,7 @@ impl Archive<'_> {
         let entries = self.entries(n_frames)?;
         let matte = |(frame_idx, entry): (usize, &Option<Entry>)| {
             let Some(entry) = entry else { return Ok(None) };
-            let image = self.picture(entry, most_px)?;
+            let image = self.picture(entry, max_size_px)?;
             let size = [image.width, image.height];
             let center_px = match self.centers_px {
                 Some(centers_px) => centers_px[frame_idx],
@@ -105,12 +105,12 @@ impl Archive<'_> {
         })
     }
 
-    /// Reads a picture of at most `most_px`.
-    fn picture(&self, entry: &Entry, most_px: [u32; 2]) -> Result<RgbaImage, Error> {
+    /// Reads a picture of at most `max_size_px`.
+    fn picture(&self, entry: &Entry, max_size_px: [u32; 2]) -> Result<RgbaImage, Error> {
         let file = self.name;
         let mut bytes = vec![0; entry.n_bytes];
         let read = self.file.read_exact_at(&mut bytes, entry.at);
         read.map_err(|cause| Error::Io { file, cause })?;
-        picture::read_rgba(&bytes, most_px).map_err(|cause| Error::Picture { file, cause })
+        picture::read_rgba(&bytes, max_size_px).map_err(|cause| Error::Picture { file, cause })
     }
 }

@@ -84,7 +84,7 @@ const OCCLUDERS: &str = "occluders.png";
 const MATTES: &str = "mattes.zip";
 const SPRITES: &str = "sprites.zip";
 /// Maximum width and height of the pictures in a library, pixels. Free choice.
-const MOST_SIDE_PX: u32 = 16384;
+const MAX_SIDE_PX: u32 = 16384;
 /// Files from which a library is read; the folder may hold others. One of the archives is sufficient, and
 /// only some libraries have occluders.
 pub const FILES: [&str; 6] = [LIBRARY, POSES, BACKGROUND, OCCLUDERS, MATTES, SPRITES];
@@ -97,24 +97,24 @@ pub fn write(
     footage: &FootageSummary,
 ) -> Result<(), Error> {
     fs::create_dir_all(dir).map_err(|cause| Error::Io { file: ".", cause })?;
-    let put = |file: &'static str, bytes: &[u8]| {
+    let write_file = |file: &'static str, bytes: &[u8]| {
         fs::write(dir.join(file), bytes).map_err(|cause| Error::Io { file, cause })
     };
-    put(POSES, &poses_json::write(&library.poses, Some(params)))?;
-    put(BACKGROUND, &picture::write_rgb(&library.background))?;
+    write_file(POSES, &poses_json::write(&library.poses, Some(params)))?;
+    write_file(BACKGROUND, &picture::write_rgb(&library.background))?;
     write_mattes(dir, &library.sprites)?;
     // Remove the sprites of an earlier analysis.
     fs::remove_file(dir.join(SPRITES)).ok();
     match &library.occluders {
         Some(image) => {
             let png = picture::write_rgba(image.width, image.height, &image.pixels);
-            put(OCCLUDERS, &png)?;
+            write_file(OCCLUDERS, &png)?;
         }
         None => {
             fs::remove_file(dir.join(OCCLUDERS)).ok();
         }
     }
-    put(LIBRARY, &library_json::write(library, params, footage))
+    write_file(LIBRARY, &library_json::write(library, params, footage))
 }
 
 /// Writes the sprites into the folder, as an archive of pictures of one size.
@@ -134,15 +134,16 @@ fn write_mattes(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
 
 /// Reads a library from a folder and stores its mattes in `scratch`.
 pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Error> {
-    let get =
+    let read_file =
         |file: &'static str| fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause });
     let json = |file| move |cause| Error::Json { file, cause };
-    let summary = library_json::read(&get(LIBRARY)?).map_err(json(LIBRARY))?;
-    let poses = poses_json::read(&get(POSES)?).map_err(json(POSES))?;
-    let background = picture::read_rgb(&get(BACKGROUND)?).map_err(|cause| Error::Picture {
-        file: BACKGROUND,
-        cause,
-    })?;
+    let summary = library_json::read(&read_file(LIBRARY)?).map_err(json(LIBRARY))?;
+    let poses = poses_json::read(&read_file(POSES)?).map_err(json(POSES))?;
+    let background =
+        picture::read_rgb(&read_file(BACKGROUND)?).map_err(|cause| Error::Picture {
+            file: BACKGROUND,
+            cause,
+        })?;
     if poses.image_size_px != [background.width, background.height] {
         return Err(Error::Mismatch(
             "background.png and poses.json differ in size",
@@ -153,11 +154,11 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
         .transpose()?;
     check(&summary, poses.frames.len())?;
     let archive = Archive::open(dir, &summary)?;
-    let most_px = match archive.centers_px {
-        Some(_) => poses.image_size_px.map(|side| side.min(MOST_SIDE_PX)),
+    let max_size_px = match archive.centers_px {
+        Some(_) => poses.image_size_px.map(|side| side.min(MAX_SIDE_PX)),
         None => summary.sprite_size_px,
     };
-    let mattes = archive.mattes(poses.frames.len(), most_px, &*scratch)?;
+    let mattes = archive.mattes(poses.frames.len(), max_size_px, &*scratch)?;
     let library = Library {
         poses,
         background,
@@ -190,11 +191,12 @@ fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<RgbaImage, Error> {
     let bytes = fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause })?;
     let image = picture::read_rgba(&bytes, size_px);
     let image = image.map_err(|cause| Error::Picture { file, cause })?;
-    match [image.width, image.height] == size_px {
-        true => Ok(image),
-        false => Err(Error::Mismatch(
+    if [image.width, image.height] == size_px {
+        Ok(image)
+    } else {
+        Err(Error::Mismatch(
             "occluders.png and poses.json differ in size",
-        )),
+        ))
     }
 }
 
@@ -228,11 +230,12 @@ fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
         ));
     }
     let mut sides_px = summary.sprite_size_px.iter();
-    match sides_px.all(|side| (1..=MOST_SIDE_PX).contains(side)) {
-        true => Ok(()),
-        false => Err(Error::Mismatch(
+    if sides_px.all(|side| (1..=MAX_SIDE_PX).contains(side)) {
+        Ok(())
+    } else {
+        Err(Error::Mismatch(
             "the sprite size in library.json is out of range",
-        )),
+        ))
     }
 }
 
@@ -310,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn a_library_comes_back_from_its_folder_as_it_was() {
+    fn library_is_read_back_as_written() {
         let library = small_library();
         let footage = footage();
         let dir = tempfile::tempdir().expect("a temporary folder");
@@ -332,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_of_before_is_read_and_what_does_not_belong_together_is_refused() {
+    fn older_folder_is_read_and_mismatched_files_are_refused() {
         let library = small_library();
         let dir = tempfile::tempdir().expect("a temporary folder");
         write(dir.path(), &library, &Params::default(), &footage()).expect("written");

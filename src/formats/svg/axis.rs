@@ -94,14 +94,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn steps_are_round() {
+    fn steps_are_round_numbers() {
         assert_eq!(round_step(0.3), 0.5);
         assert_eq!(round_step(5.0), 5.0);
         assert_eq!(round_step(70.0), 100.0);
     }
 
     #[test]
-    fn a_short_film_has_no_halves_of_frames() {
+    fn frame_axis_has_no_fractional_steps() {
         let axis = Axis::of_frames(3, [0.0, 960.0]);
         assert_eq!((axis.step(), axis.n_steps()), (1.0, 3));
     }

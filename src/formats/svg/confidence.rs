@@ -103,7 +103,7 @@ impl Rows<'_> {
             let x = self.axis.x(chunk[0].time_s);
             write!(path, "L{x:.1} {:.1}", bottom - share * STRIP[0]).expect("memory");
         }
-        self.sheet.put(format_args!(
+        self.sheet.write(format_args!(
             "<path {} d=\"{path}L{RIGHT} {bottom:.1}Z\"/>\n",
             fill("water")
         ));
@@ -118,7 +118,7 @@ impl Rows<'_> {
         self.label("tail beat");
         for span in &beat.spans {
             let [x0, x1] = self.span_x(span.frames);
-            self.sheet.put(format_args!(
+            self.sheet.write(format_args!(
                 "<rect {} stroke-width=\"1\" x=\"{x0:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{}\"/>\n",
                 rimmed("water", "paper"),
                 self.y,
@@ -146,7 +146,7 @@ mod tests {
     use crate::library::View;
 
     #[test]
-    fn one_doubtful_frame_of_many_is_seen() {
+    fn single_doubtful_frame_stays_visible() {
         let mut frames = vec![
             Pose {
                 centroid_px: Some([1.0, 1.0]),

@@ -6,26 +6,26 @@ use std::fmt::Write;
 
 /// One point of a curve.
 #[derive(Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct CurvePoint {
     pub(super) x: f64,
     /// Heading in (-pi, pi]; `None` breaks the curve.
     pub(super) heading_rad: Option<f64>,
     /// Whether to draw the line to this point.
-    pub(super) drawn: bool,
+    pub(super) is_drawn: bool,
 }
 
 /// Returns the curve as SVG path data; `y` converts a heading to a coordinate.
-pub(super) fn wrapped(places: impl Iterator<Item = Place>, y: impl Fn(f64) -> f64) -> String {
+pub(super) fn wrapped(points: impl Iterator<Item = CurvePoint>, y: impl Fn(f64) -> f64) -> String {
     let mut path = String::new();
     let mut last: Option<(f64, f64)> = None;
     let mut pen_down = false;
-    for place in places {
-        let Some(heading) = place.heading_rad else {
+    for point in points {
+        let Some(heading) = point.heading_rad else {
             (last, pen_down) = (None, false);
             continue;
         };
-        let to = place.x;
-        if !place.drawn {
+        let to = point.x;
+        if !point.is_drawn {
             (last, pen_down) = (Some((to, heading)), false);
             continue;
         }
@@ -49,14 +49,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wrap_lifts_the_pen_and_an_ordinary_turn_does_not() {
+    fn wrap_breaks_the_curve_and_ordinary_turn_does_not() {
         let strokes = |headings: &[Option<f64>]| {
-            let places = headings.iter().map(|&heading_rad| Place {
+            let points = headings.iter().map(|&heading_rad| CurvePoint {
                 x: 0.0,
                 heading_rad,
-                drawn: true,
+                is_drawn: true,
             });
-            wrapped(places, |heading| heading).matches('M').count()
+            wrapped(points, |heading| heading).matches('M').count()
         };
         assert_eq!(strokes(&[Some(0.1), Some(0.5), Some(2.0)]), 1);
         assert_eq!(strokes(&[Some(3.0), Some(-3.0)]), 2);

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 
 use super::axis::Axis;
-use super::curve::{Place, wrapped};
+use super::curve::{CurvePoint, wrapped};
 use super::{LEFT, RIGHT, Sheet, fill, runs};
 use crate::library::{Pose, Poses};
 
@@ -16,7 +16,7 @@ const BOTTOM: f64 = 262.0;
 /// Top and bottom of the strip of head confidence.
 const STRIP: [f64; 2] = [272.0, 298.0];
 /// Confidence below which a heading is drawn with a thin line. Free choice.
-const SURE: f64 = 0.9;
+const MIN_CONFIDENCE: f64 = 0.9;
 
 /// Returns the heading over time as an SVG picture of 960 by 340.
 pub fn headings(poses: &Poses) -> String {
@@ -40,18 +40,19 @@ pub fn headings(poses: &Poses) -> String {
     sheet.text("ink", "start", [16.0, 24.0], "Heading, degrees");
     axis.draw(&mut sheet, TOP, STRIP[1]);
     grid(&mut sheet, poses, &axis, y);
-    let pen = |sure: bool| {
-        if sure {
+    let pen = |is_confident: bool| {
+        if is_confident {
             "stroke-width=\"1.8\""
         } else {
             "stroke-width=\"0.7\""
         }
     };
-    for sure in [false, true] {
-        let of = |pose: &Pose| (pose.head_confidence.unwrap_or(1.0) >= SURE) == sure;
+    for is_confident in [false, true] {
+        let of =
+            |pose: &Pose| (pose.head_confidence.unwrap_or(1.0) >= MIN_CONFIDENCE) == is_confident;
         let more = format!(
             "{} stroke-linejoin=\"round\" stroke-linecap=\"round\"",
-            pen(sure)
+            pen(is_confident)
         );
         let path = line(poses, of, |t| axis.x(t), y);
         sheet.stroke("accent", &path, &more);
@@ -100,16 +101,15 @@ fn strip(sheet: &mut Sheet, poses: &Poses, axis: &Axis) {
         [LEFT, STRIP[0], RIGHT - LEFT, STRIP[1] - STRIP[0]],
     );
     let height = |pose: &Pose| {
-        let sure = pose
-            .head_confidence
-            .map_or(0.0, |sure| (2.0 * sure - 1.0).clamp(0.0, 1.0));
-        STRIP[1] - sure * (STRIP[1] - STRIP[0])
+        let confidence = pose.head_confidence;
+        let share = confidence.map_or(0.0, |confidence| (2.0 * confidence - 1.0).clamp(0.0, 1.0));
+        STRIP[1] - share * (STRIP[1] - STRIP[0])
     };
     let mut path = format!("M{LEFT} {}", STRIP[1]);
     for pose in poses.frames.iter().step_by(stride(poses)) {
         write!(path, "L{:.1} {:.1}", axis.x(pose.time_s), height(pose)).expect("memory");
     }
-    sheet.put(format_args!(
+    sheet.write(format_args!(
         "<path {} d=\"{path}L{RIGHT} {}Z\"/>\n",
         fill("water"),
         STRIP[1]
@@ -124,14 +124,14 @@ fn stride(poses: &Poses) -> usize {
 /// Returns the line as path data. It contains the chosen poses and the step to each.
 fn line(
     poses: &Poses,
-    chosen: impl Fn(&Pose) -> bool,
+    is_chosen: impl Fn(&Pose) -> bool,
     x: impl Fn(f64) -> f64,
     y: impl Fn(f64) -> f64,
 ) -> String {
-    let place = |pose: &Pose| Place {
+    let place = |pose: &Pose| CurvePoint {
         x: x(pose.time_s),
         heading_rad: pose.heading_rad,
-        drawn: chosen(pose),
+        is_drawn: is_chosen(pose),
     };
     let poses = poses.frames.iter().step_by(stride(poses));
     wrapped(poses.map(place), y)
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_heading_that_is_not_known_breaks_the_line() {
+    fn unknown_heading_breaks_the_line() {
         let strokes = |headings: &[Option<f64>]| {
             let line = line(&poses(headings), |_| true, |t| t, |h| h);
             line.matches('M').count()

@@ -61,7 +61,7 @@ impl Sheet {
         let mut sheet = Sheet {
             svg: String::with_capacity(1 << 16),
         };
-        sheet.put(format_args!(
+        sheet.write(format_args!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {height}\" width=\"{WIDTH}\" \
              height=\"{height}\" role=\"img\" aria-labelledby=\"title desc\" \
              font-family=\"system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif\" font-size=\"13\">\n\
@@ -71,33 +71,33 @@ impl Sheet {
             (0, "", ""),
             (1, "@media (prefers-color-scheme: dark) { ", " }"),
         ] {
-            sheet.put(format_args!("{open}"));
+            sheet.write(format_args!("{open}"));
             for (role, light, dark) in COLORS {
                 let color = [light, dark][scheme];
-                sheet.put(format_args!(
+                sheet.write(format_args!(
                     ".{role} {{ fill: {color} }} .{role}-stroke {{ stroke: {color} }} "
                 ));
             }
-            sheet.put(format_args!("{close}"));
+            sheet.write(format_args!("{close}"));
         }
-        sheet.put(format_args!("</style>\n"));
+        sheet.write(format_args!("</style>\n"));
         sheet.rect("paper", [0.0, 0.0, WIDTH, height]);
         sheet
     }
 
-    fn put(&mut self, text: std::fmt::Arguments) {
+    fn write(&mut self, text: std::fmt::Arguments) {
         self.svg.write_fmt(text).expect("memory");
     }
 
     fn rect(&mut self, role: &str, [x, y, w, h]: [f64; 4]) {
-        self.put(format_args!(
+        self.write(format_args!(
             "<rect {} x=\"{x:.1}\" y=\"{y:.1}\" width=\"{w:.1}\" height=\"{h:.1}\"/>\n",
             fill(role)
         ));
     }
 
     fn text(&mut self, role: &str, anchor: &str, [x, y]: [f64; 2], text: &str) {
-        self.put(format_args!(
+        self.write(format_args!(
             "<text {} text-anchor=\"{anchor}\" x=\"{x:.1}\" y=\"{y:.1}\">{text}</text>\n",
             fill(role)
         ));
@@ -106,7 +106,7 @@ impl Sheet {
     /// Draws a line of path data; `more` holds further attributes.
     fn stroke(&mut self, role: &str, path: &str, more: &str) {
         if !path.is_empty() {
-            self.put(format_args!(
+            self.write(format_args!(
                 "<path {} fill=\"none\" {more} d=\"{path}\"/>\n",
                 stroke(role)
             ));
@@ -114,7 +114,7 @@ impl Sheet {
     }
 
     fn finish(mut self) -> String {
-        self.put(format_args!("</svg>\n"));
+        self.write(format_args!("</svg>\n"));
         self.svg
     }
 }
@@ -155,12 +155,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_whole() {
+    fn runs_have_their_first_frame_and_the_one_after_the_last() {
         assert_eq!(runs(6, |k| [0, 1, 4].contains(&k)), [[0, 2], [4, 5]]);
     }
 
     #[test]
-    fn no_element_has_an_attribute_twice() {
+    fn no_attribute_is_repeated() {
         let mut library = crate::flock::synthetic::library(crate::library::View::Side);
         let flock = crate::flock::Params {
             count: Some(3),
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_names_itself_and_has_colors_for_a_dark_page() {
+    fn chart_has_a_title_and_dark_colors() {
         let svg = Sheet::new(100.0, "A title", "What it shows").finish();
         assert!(svg.contains("<title id=\"title\">A title</title>"));
         assert!(svg.contains("<desc id=\"desc\">What it shows</desc>"));

@@ -5,17 +5,17 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use super::axis::Axis;
-use super::curve::{Place, wrapped};
+use super::curve::{CurvePoint, wrapped};
 use super::{LEFT, RIGHT, Sheet, stroke};
 use crate::flock::placement::is_jump;
 use crate::flock::{Flock, Individual};
 use crate::geometry::wrap_rad;
 
 /// Maximum number of drawn individuals. Free choice.
-const MOST: usize = 20;
+const MAX_DRAWN: usize = 20;
 const TOP: f64 = 92.0;
 /// Height of the label above a plot and of the gap below it.
-const ROOM: [f64; 2] = [20.0, 14.0];
+const PLOT_MARGINS: [f64; 2] = [20.0, 14.0];
 /// Rotation of headings before drawing, radians. It places the wrap of the angle at straight down, because
 /// most animals head left or right.
 const UP: f64 = PI / 2.0;
@@ -25,24 +25,24 @@ const JUMP: &str = "stroke-width=\"1.4\"";
 
 /// Returns the plan of a flock as an SVG picture, 960 wide.
 pub fn plan(flock: &Flock) -> String {
-    let drawn = &flock.individuals[..flock.individuals.len().min(MOST)];
+    let drawn = &flock.individuals[..flock.individuals.len().min(MAX_DRAWN)];
     let n_columns = if drawn.len() > 3 { 2 } else { 1 };
     let n_rows = drawn.len().div_ceil(n_columns).max(1);
     let plot_height = if n_columns == 1 { 190.0 } else { 84.0 };
-    let row_height = ROOM[0] + plot_height + ROOM[1];
+    let row_height = PLOT_MARGINS[0] + plot_height + PLOT_MARGINS[1];
     let bottom = TOP + n_rows as f64 * row_height;
-    let said = summary(flock, drawn.len());
+    let description = summary(flock, drawn.len());
     let title = "Headings of boids and of the frames shown, degrees";
-    let mut sheet = Sheet::new(bottom + 26.0, title, &said);
+    let mut sheet = Sheet::new(bottom + 26.0, title, &description);
     sheet.text("ink", "start", [16.0, 26.0], title);
-    sheet.text("soft", "start", [16.0, 46.0], &said);
+    sheet.text("soft", "start", [16.0, 46.0], &description);
     key(&mut sheet, 68.0);
     let n_frames = drawn.first().map_or(1, |one| one.heading_rad.len());
     let width = (RIGHT - LEFT - 20.0 * (n_columns - 1) as f64) / n_columns as f64;
     for (idx, individual) in drawn.iter().enumerate() {
         let (column, row) = (idx % n_columns, idx / n_columns);
         let left = LEFT + column as f64 * (width + 20.0);
-        let top = TOP + row as f64 * row_height + ROOM[0];
+        let top = TOP + row as f64 * row_height + PLOT_MARGINS[0];
         let panel = Panel {
             axis: Axis::of_frames(n_frames.saturating_sub(1), [left, left + width]),
             span: [top, top + plot_height],
@@ -55,13 +55,15 @@ pub fn plan(flock: &Flock) -> String {
 
 fn summary(flock: &Flock, n_drawn: usize) -> String {
     let n_all = flock.individuals.len();
-    let who = match n_drawn < n_all {
-        true => format!("The first {n_drawn} of {n_all} individuals"),
-        false if n_all == 1 => "The only individual".to_owned(),
-        false => format!("All {n_all} individuals"),
+    let subject = if n_drawn < n_all {
+        format!("The first {n_drawn} of {n_all} individuals")
+    } else if n_all == 1 {
+        "The only individual".to_owned()
+    } else {
+        format!("All {n_all} individuals")
     };
     format!(
-        "{who}. Over all individuals, half of the shown headings are within {:.1}° of the boid's, 90 % within {:.1}°; \
+        "{subject}. Over all individuals, half of the shown headings are within {:.1}° of the boid's, 90 % within {:.1}°; \
          {:.1} jumps per 100 frames.",
         flock.stats.heading_error_median_rad.to_degrees(),
         flock.stats.heading_error_p90_rad.to_degrees(),
@@ -70,17 +72,17 @@ fn summary(flock: &Flock, n_drawn: usize) -> String {
 }
 
 fn key(sheet: &mut Sheet, y: f64) {
-    for (role, pen, path, x, words) in [
+    for (role, pen, path, x, label) in [
         ("water", BOID, "h30", 16.0, "the boid's heading"),
         ("accent", SHOWN, "h30", 206.0, "the heading shown"),
         ("ink", JUMP, "m15 -5v10", 396.0, "a jump in the footage"),
     ] {
-        sheet.put(format_args!(
+        sheet.write(format_args!(
             "<path {} fill=\"none\" {pen} d=\"M{x} {}{path}\"/>\n",
             stroke(role),
             y - 4.5
         ));
-        sheet.text("soft", "start", [x + 38.0, y], words);
+        sheet.text("soft", "start", [x + 38.0, y], label);
     }
 }
 
@@ -95,9 +97,10 @@ impl Panel {
     fn draw(&self, sheet: &mut Sheet, individual: &Individual, named: bool, is_last: bool) {
         let [top, bottom] = self.span;
         let [left, right] = [self.axis.left, self.axis.right];
-        match is_last {
-            true => self.axis.draw(sheet, top, bottom),
-            false => self.axis.draw_lines(sheet, top, bottom),
+        if is_last {
+            self.axis.draw(sheet, top, bottom)
+        } else {
+            self.axis.draw_lines(sheet, top, bottom)
         }
         for (degrees, label) in [
             (-270, "down"),
@@ -113,12 +116,9 @@ impl Panel {
             }
         }
         let jumps = jumps(individual);
-        let words = format!(
-            "individual {} · {}",
-            individual.id,
-            words(individual, jumps.len())
-        );
-        sheet.text("ink", "start", [left, top - 6.0], &words);
+        let summary = individual_summary(individual, jumps.len());
+        let label = format!("individual {} · {summary}", individual.id);
+        sheet.text("ink", "start", [left, top - 6.0], &label);
         let boid = self.curve(&individual.boid.heading_rad);
         sheet.stroke("water", &boid, BOID);
         let mut ticks = String::new();
@@ -139,10 +139,10 @@ impl Panel {
     fn curve(&self, headings_rad: &[f64]) -> String {
         let stride = headings_rad.len().div_ceil(2000).max(1);
         let places = headings_rad.iter().enumerate().step_by(stride);
-        let place = |(frame, &heading_rad): (usize, &f64)| Place {
+        let place = |(frame, &heading_rad): (usize, &f64)| CurvePoint {
             x: self.axis.x(frame as f64),
             heading_rad: Some(wrap_rad(heading_rad + UP)),
-            drawn: true,
+            is_drawn: true,
         };
         wrapped(places.map(place), |from_up_rad| self.y(from_up_rad))
     }
@@ -157,7 +157,7 @@ fn jumps(individual: &Individual) -> Vec<usize> {
         .collect()
 }
 
-fn words(individual: &Individual, n_jumps: usize) -> String {
+fn individual_summary(individual: &Individual, n_jumps: usize) -> String {
     let wanted = individual.boid.heading_rad.iter();
     let mut off_rad: Vec<f64> = (individual.heading_rad.iter().zip(wanted))
         .map(|(shown, wanted)| wrap_rad(shown - wanted).abs())
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_individuals_the_first_are_drawn_and_it_is_said() {
+    fn large_flock_shows_its_first_individuals() {
         let svg = plan(&flock(23));
         assert!(svg.contains("The first 20 of 23 individuals"));
         assert!(svg.contains(">individual 19 ·") && !svg.contains(">individual 20 ·"));
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn every_jump_has_its_mark_and_a_wrap_is_no_stroke_through_the_circle() {
+    fn jumps_are_marked_and_wraps_break_the_curve() {
         let mut flock = flock(1);
         let one = &mut flock.individuals[0];
         one.source_frame = (100..160).collect();

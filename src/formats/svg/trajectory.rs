@@ -6,7 +6,7 @@ use super::{RIGHT, Sheet, WIDTH, fill, rimmed, runs};
 use crate::library::Poses;
 
 /// Colors from the first to the last frame, readable on light and dark pages.
-const RAMP: [[f64; 3]; 5] = [
+const TIME_COLORS: [[f64; 3]; 5] = [
     [42.0, 128.0, 160.0],
     [70.0, 165.0, 120.0],
     [205.0, 165.0, 40.0],
@@ -19,12 +19,12 @@ const N_COLORS: usize = 96;
 const MARGINS: [f64; 2] = [44.0, 56.0];
 const SIDE: f64 = 16.0;
 /// Maximum height of the picture.
-const MOST_HEIGHT: f64 = 900.0;
+const MAX_HEIGHT: f64 = 900.0;
 
 /// Returns the path of the animal as an SVG picture, 960 wide, in the proportions of the footage.
 pub fn trajectory(poses: &Poses) -> String {
     let [width_px, height_px] = poses.image_size_px.map(|side| f64::from(side.max(1)));
-    let zoom = ((RIGHT - SIDE) / width_px).min(MOST_HEIGHT / height_px);
+    let zoom = ((RIGHT - SIDE) / width_px).min(MAX_HEIGHT / height_px);
     let left = (WIDTH - zoom * width_px) / 2.0;
     let height = MARGINS[0] + zoom * height_px + MARGINS[1];
     let seen = poses.frames.iter().filter(|pose| pose.detected()).count();
@@ -43,14 +43,14 @@ pub fn trajectory(poses: &Poses) -> String {
         [left, MARGINS[0], zoom * width_px, zoom * height_px],
     );
     let place = |[x, y]: [f64; 2]| [left + zoom * x, MARGINS[0] + zoom * y];
-    way(&mut sheet, poses, place);
+    draw_path(&mut sheet, poses, place);
     let below = MARGINS[0] + zoom * height_px + 24.0;
     scale_bar(&mut sheet, poses, [left, below], zoom);
     time_key(&mut sheet, poses, [left + zoom * width_px, below]);
     sheet.finish()
 }
 
-fn way(sheet: &mut Sheet, poses: &Poses, place: impl Fn([f64; 2]) -> [f64; 2]) {
+fn draw_path(sheet: &mut Sheet, poses: &Poses, place: impl Fn([f64; 2]) -> [f64; 2]) {
     let n_frames = poses.frames.len();
     let point = |k: usize| poses.frames[k].centroid_px.map(&place);
     let spans = runs(n_frames, |k| poses.frames[k].detected());
@@ -77,7 +77,7 @@ fn way(sheet: &mut Sheet, poses: &Poses, place: impl Fn([f64; 2]) -> [f64; 2]) {
                 .map(|[x, y]| format!("{x:.1} {y:.1}"))
                 .collect();
             let color = color_at(at as f64 / n_frames as f64);
-            sheet.put(format_args!(
+            sheet.write(format_args!(
                 "<path fill=\"none\" stroke=\"{color}\" stroke-width=\"2.4\" stroke-linecap=\"round\" \
                  stroke-linejoin=\"round\" d=\"M{}\"/>\n",
                 path.join("L")
@@ -85,11 +85,11 @@ fn way(sheet: &mut Sheet, poses: &Poses, place: impl Fn([f64; 2]) -> [f64; 2]) {
             at = end;
         }
     }
-    ends(sheet, &spans, point);
+    draw_ends(sheet, &spans, point);
 }
 
 /// Draws a ring at the start of the path and a disc at its end.
-fn ends(sheet: &mut Sheet, spans: &[[usize; 2]], point: impl Fn(usize) -> Option<[f64; 2]>) {
+fn draw_ends(sheet: &mut Sheet, spans: &[[usize; 2]], point: impl Fn(usize) -> Option<[f64; 2]>) {
     let (Some(first), Some(last)) = (spans.first(), spans.last()) else {
         return;
     };
@@ -101,19 +101,19 @@ fn ends(sheet: &mut Sheet, spans: &[[usize; 2]], point: impl Fn(usize) -> Option
         } else {
             format!("fill=\"{color}\"")
         };
-        sheet.put(format_args!(
+        sheet.write(format_args!(
             "<circle {inside} stroke=\"{color}\" stroke-width=\"2.5\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"/>\n"
         ));
-        let (anchor, aside) = if x > WIDTH / 2.0 {
+        let (anchor, offset) = if x > WIDTH / 2.0 {
             ("end", -12.0)
         } else {
             ("start", 12.0)
         };
-        sheet.put(format_args!(
+        sheet.write(format_args!(
             "<text {} stroke-width=\"3\" paint-order=\"stroke\" text-anchor=\"{anchor}\" x=\"{:.1}\" \
              y=\"{:.1}\">{word}</text>\n",
             rimmed("ink", "sunken"),
-            x + aside,
+            x + offset,
             y + 4.5
         ));
     }
@@ -139,9 +139,10 @@ fn scale_bar(sheet: &mut Sheet, poses: &Poses, [x, y]: [f64; 2], zoom: f64) {
     let (length_px, label) = match px_per_m {
         Some(px_per_m) => {
             let length_m = round_step(wanted_px / px_per_m);
-            let label = match length_m < 1.0 {
-                true => format!("{} cm", (length_m * 1e4).round() / 1e2),
-                false => format!("{length_m} m"),
+            let label = if length_m < 1.0 {
+                format!("{} cm", (length_m * 1e4).round() / 1e2)
+            } else {
+                format!("{length_m} m")
             };
             (length_m * px_per_m, format!("{label} at the median depth"))
         }
@@ -166,7 +167,7 @@ fn time_key(sheet: &mut Sheet, poses: &Poses, [right, y]: [f64; 2]) {
     sheet.text("soft", "start", [left + KEY + 8.0, y + 4.5], &label);
     for k in 0..40 {
         let share = f64::from(k) / 40.0;
-        sheet.put(format_args!(
+        sheet.write(format_args!(
             "<rect fill=\"{}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"8\"/>\n",
             color_at(share),
             left + share * KEY,
@@ -177,9 +178,10 @@ fn time_key(sheet: &mut Sheet, poses: &Poses, [right, y]: [f64; 2]) {
 }
 
 fn color_at(share: f64) -> String {
-    let at = share.clamp(0.0, 1.0) * (RAMP.len() - 1) as f64;
-    let k = (at as usize).min(RAMP.len() - 2);
-    let [r, g, b] = [0, 1, 2].map(|c| RAMP[k][c] + (at - k as f64) * (RAMP[k + 1][c] - RAMP[k][c]));
+    let at = share.clamp(0.0, 1.0) * (TIME_COLORS.len() - 1) as f64;
+    let k = (at as usize).min(TIME_COLORS.len() - 2);
+    let [r, g, b] = [0, 1, 2]
+        .map(|c| TIME_COLORS[k][c] + (at - k as f64) * (TIME_COLORS[k + 1][c] - TIME_COLORS[k][c]));
     format!("#{:02x}{:02x}{:02x}", r as u8, g as u8, b as u8)
 }
 
@@ -208,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_is_dashed_and_the_ends_are_marked() {
+    fn gaps_are_dashed_and_ends_marked() {
         let svg = trajectory(&poses(&[true, true, false, false, true, true]));
         assert_eq!(svg.matches("stroke-dasharray").count(), 1);
         assert_eq!(svg.matches("<circle").count(), 2);
@@ -220,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn an_animal_that_was_never_seen_leaves_an_empty_picture() {
+    fn path_is_empty_without_detections() {
         let svg = trajectory(&poses(&[false; 4]));
         assert_eq!(
             svg.matches("<circle").count() + svg.matches("dasharray").count(),

@@ -11,19 +11,19 @@ use crate::library::{Jump, Library};
 /// Top of the highest arc.
 const TOP: f64 = 64.0;
 /// Height of an arc over the whole footage.
-const HIGHEST: f64 = 250.0;
+const MAX_RISE: f64 = 250.0;
 /// Height of the axis with its patches.
 const BAND: f64 = 20.0;
 /// Maximum number of drawn arcs, the cheapest; more would not be distinguishable. Free choice.
-const MOST_ARCS: usize = 4000;
+const MAX_ARCS: usize = 4000;
 
 /// Number of arcs for which the line widths below hold. Lines are thinner for more arcs and stronger for
 /// fewer.
-const USUAL_ARCS: f64 = 500.0;
+const REFERENCE_ARCS: f64 = 500.0;
 
-/// Line style of jumps that cost at most `most` times epsilon.
-struct Class {
-    most: f64,
+/// Line style of jumps that cost at most `max_share` times epsilon.
+struct CostClass {
+    max_share: f64,
     role: &'static str,
     width: f64,
     opacity: f64,
@@ -31,30 +31,30 @@ struct Class {
 }
 
 /// The costliest first, so that cheaper ones are drawn over them.
-const CLASSES: [Class; 4] = [
-    Class {
-        most: f64::INFINITY,
+const CLASSES: [CostClass; 4] = [
+    CostClass {
+        max_share: f64::INFINITY,
         role: "soft",
         width: 0.6,
         opacity: 0.45,
         name: "above 0.8",
     },
-    Class {
-        most: 0.8,
+    CostClass {
+        max_share: 0.8,
         role: "water",
         width: 0.8,
         opacity: 0.65,
         name: "0.6 to 0.8",
     },
-    Class {
-        most: 0.6,
+    CostClass {
+        max_share: 0.6,
         role: "water",
         width: 1.5,
         opacity: 0.9,
         name: "0.4 to 0.6",
     },
-    Class {
-        most: 0.4,
+    CostClass {
+        max_share: 0.4,
         role: "accent",
         width: 1.9,
         opacity: 1.0,
@@ -62,9 +62,11 @@ const CLASSES: [Class; 4] = [
     },
 ];
 
-impl Class {
+impl CostClass {
     fn pen(&self, n_arcs: usize) -> String {
-        let strength = (USUAL_ARCS / n_arcs.max(1) as f64).sqrt().clamp(0.3, 1.6);
+        let strength = (REFERENCE_ARCS / n_arcs.max(1) as f64)
+            .sqrt()
+            .clamp(0.3, 1.6);
         format!(
             "stroke-width=\"{:.2}\" stroke-opacity=\"{:.2}\"",
             self.width * strength,
@@ -88,10 +90,10 @@ pub fn transitions(library: &Library) -> String {
     let above = TOP + highest(false).unwrap_or(28.0);
     let band = [above, above + BAND];
     let bottom = band[1] + highest(true).unwrap_or(0.0) + 6.0;
-    let said = summary(library, n_mirrored, jumps.len());
-    let mut sheet = Sheet::new(bottom + 66.0, "Jumps of the library", &said);
+    let description = summary(library, n_mirrored, jumps.len());
+    let mut sheet = Sheet::new(bottom + 66.0, "Jumps of the library", &description);
     sheet.text("ink", "start", [16.0, 26.0], "Jumps of the library");
-    sheet.text("soft", "start", [16.0, 46.0], &said);
+    sheet.text("soft", "start", [16.0, 46.0], &description);
     axis.draw(&mut sheet, TOP, bottom);
     sheet.text("soft", "end", [LEFT - 8.0, band[0] - 12.0], "same side");
     if n_mirrored > 0 {
@@ -106,9 +108,10 @@ pub fn transitions(library: &Library) -> String {
 fn summary(library: &Library, n_mirrored: usize, n_drawn: usize) -> String {
     let n_jumps = library.playback.jumps.len();
     let share = 100.0 * library.stats.component_share;
-    let drawn = match n_drawn < n_jumps {
-        true => format!("; the cheapest {n_drawn} are drawn"),
-        false => String::new(),
+    let drawn = if n_drawn < n_jumps {
+        format!("; the cheapest {n_drawn} are drawn")
+    } else {
+        String::new()
     };
     format!(
         "{} transitions allow {n_jumps} jumps, {n_mirrored} of them mirrored{drawn}; endless playback uses {share:.0} \
@@ -118,18 +121,18 @@ fn summary(library: &Library, n_mirrored: usize, n_drawn: usize) -> String {
     )
 }
 
-/// Returns the cheapest `MOST_ARCS` jumps, the costliest first, so that cheaper ones are drawn over them.
+/// Returns the cheapest `MAX_ARCS` jumps, the costliest first, so that cheaper ones are drawn over them.
 fn cheapest(jumps: &[Jump]) -> Vec<Jump> {
     let mut jumps = jumps.to_vec();
     jumps.sort_by_key(|jump| (jump.cost, jump.from, jump.to, jump.mirrored));
-    jumps.truncate(MOST_ARCS);
+    jumps.truncate(MAX_ARCS);
     jumps.reverse();
     jumps
 }
 
 /// Returns the height of an arc. The exponent below 1 keeps short arcs visible.
 fn rise(jump: &Jump, axis: &Axis) -> f64 {
-    HIGHEST * libm::pow(f64::from(jump.from.abs_diff(jump.to)) / axis.end, 0.75)
+    MAX_RISE * libm::pow(f64::from(jump.from.abs_diff(jump.to)) / axis.end, 0.75)
 }
 
 /// Draws the arcs. Arcs of one class form one path, so that they do not darken each other.
@@ -137,15 +140,16 @@ fn arcs(sheet: &mut Sheet, library: &Library, jumps: &[Jump], axis: &Axis, band:
     let mut paths: [String; CLASSES.len()] = Default::default();
     for jump in jumps {
         let share = jump.cost as f64 / library.epsilon.max(1) as f64;
-        let fits = |class: &Class| share <= class.most;
+        let fits = |class: &CostClass| share <= class.max_share;
         let class = CLASSES.iter().rposition(fits).unwrap_or(0);
         let (first, last) = (jump.from.min(jump.to), jump.from.max(jump.to));
         let [x0, x1] = [first, last].map(|frame| axis.x(f64::from(frame) + 0.5));
         let rx = (x1 - x0) / 2.0;
         let ry = rise(jump, axis);
-        let (y, sweep) = match jump.mirrored {
-            false => (band[0], 1),
-            true => (band[1], 0),
+        let (y, sweep) = if jump.mirrored {
+            (band[1], 0)
+        } else {
+            (band[0], 1)
         };
         let arc = format_args!("M{x0:.1} {y}A{rx:.1} {ry:.1} 0 0 {sweep} {x1:.1} {y}");
         paths[class].write_fmt(arc).expect("memory");
@@ -166,7 +170,7 @@ fn patches(sheet: &mut Sheet, library: &Library, axis: &Axis, band: [f64; 2]) {
     }
     for (path, opacity) in shades.iter().zip(["1", "0.6"]) {
         if !path.is_empty() {
-            sheet.put(format_args!(
+            sheet.write(format_args!(
                 "<path {} fill-opacity=\"{opacity}\" d=\"{path}\"/>\n",
                 fill("water")
             ));
@@ -183,7 +187,7 @@ fn key(sheet: &mut Sheet, n_arcs: usize, y: f64) {
     );
     let mut x = 232.0;
     for class in CLASSES.iter().rev() {
-        sheet.put(format_args!(
+        sheet.write(format_args!(
             "<path {} {} fill=\"none\" d=\"M{x} {}h26\"/>\n",
             stroke(class.role),
             class.pen(n_arcs),
@@ -193,9 +197,9 @@ fn key(sheet: &mut Sheet, n_arcs: usize, y: f64) {
         x += 122.0;
     }
     let blocks = format!("M{x} {0}h13v11h-13z", y - 10.0);
-    sheet.put(format_args!("<path {} d=\"{blocks}\"/>\n", fill("water")));
+    sheet.write(format_args!("<path {} d=\"{blocks}\"/>\n", fill("water")));
     let blocks = format!("M{} {}h13v11h-13z", x + 13.0, y - 10.0);
-    sheet.put(format_args!(
+    sheet.write(format_args!(
         "<path {} fill-opacity=\"0.6\" d=\"{blocks}\"/>\n",
         fill("water")
     ));
@@ -224,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_arcs_rise_and_mirrored_ones_hang() {
+    fn plain_arcs_are_above_and_mirrored_ones_below() {
         // 600 frames, and an epsilon of 1000.
         let jumps = vec![jump(0, 300, 300, false), jump(599, 300, 900, true)];
         let svg = transitions(&library(jumps));
@@ -239,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn of_too_many_jumps_the_cheapest_are_drawn_and_it_is_said() {
+    fn above_the_limit_only_the_cheapest_jumps_are_drawn() {
         let jumps = (0..5000).map(|k| jump(k % 300, 300 + k % 299, u64::from(k), false));
         let svg = transitions(&library(jumps.collect()));
         assert!(svg.contains("the cheapest 4000 are drawn"));

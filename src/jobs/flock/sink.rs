@@ -14,7 +14,7 @@ use crate::formats::flock_overlay::FlockOverlay;
 use crate::formats::ground_truth::{FilmShape, frame_name};
 use crate::formats::picture;
 use crate::jobs::Error;
-use crate::media::{Coding, VideoFormat, VideoWriter};
+use crate::media::{Encoding, VideoFormat, VideoWriter};
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
 /// Maximum length of a preview (GIF and WebP), seconds. Free choice.
@@ -52,18 +52,18 @@ impl Sink {
             color: ColorSpec::default(),
         };
         let path = &target.path;
-        let video = |coding| VideoWriter::create_as(path, format, coding).map(Kind::Video);
+        let video = |encoding| VideoWriter::create_as(path, format, encoding).map(Kind::Video);
         let kind = match target.output {
             Output::Overlay => {
                 let overlay = FlockOverlay::new(flock, film.size_px);
                 let writer = VideoWriter::create(path, format)?;
                 Kind::Overlay(writer, Box::new(overlay), Frame::default())
             }
-            Output::Film(Format::Mp4) => video(Coding::H264(Default::default()))?,
-            Output::Film(Format::Webm) => video(Coding::Vp9 { alpha })?,
-            Output::Film(Format::Mov) => video(Coding::ProRes { alpha })?,
-            Output::Film(Format::Gif) => video(Coding::Gif)?,
-            Output::Film(Format::Webp) => video(Coding::Webp)?,
+            Output::Film(Format::Mp4) => video(Encoding::H264(Default::default()))?,
+            Output::Film(Format::Webm) => video(Encoding::Vp9 { alpha })?,
+            Output::Film(Format::Mov) => video(Encoding::ProRes { alpha })?,
+            Output::Film(Format::Gif) => video(Encoding::Gif)?,
+            Output::Film(Format::Webp) => video(Encoding::Webp)?,
             Output::Film(Format::Png | Format::Poster) => pictures(path)?,
         };
         Ok(Sink {

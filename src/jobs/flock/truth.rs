@@ -64,7 +64,7 @@ impl TruthFolder {
         }
         self.coco.add(flock, frame_idx, truth)?;
         mot::write_frame(&mut self.mot, flock, frame_idx, truth)?;
-        tracks::write_frame(&mut self.tracks, (flock, &self.film), frame_idx, truth)
+        tracks::write_frame(&mut self.tracks, flock, &self.film, frame_idx, truth)
     }
 
     /// Completes all files, and removes pictures that a longer earlier video has left.

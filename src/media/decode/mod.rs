@@ -6,36 +6,36 @@
 
 mod filters; // ffmpeg filters after the decoder
 mod gray; // range of gray levels in use
-mod wanted; // frames that a decoder has to output
+mod selection; // frames that a decoder has to output
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
 use super::allow_list::input_args;
 use super::error::{Damage, Error};
-use super::gate::{Child, Order};
-
-use super::hints::Hints;
+use super::gate::Child;
+use super::gray_range::GrayRange;
+use super::invocation::Invocation;
 use super::limits::Limits;
-use super::note::Note;
+use super::notice::Notice;
 use super::probe::header::gray_bits;
 use super::probe::timeline::Timeline;
 use super::probe::{Probe, probe};
-
-use super::stretch::Stretch;
-use super::tools::Tool;
+use super::read_options::ReadOptions;
+use super::tools::{Tool, installed};
+use crate::config;
 use crate::footage::{
     FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
 };
 use crate::raster::Frame;
-use wanted::{MOST_UNTOLD, Wanted};
+use selection::{FrameSelection, MAX_UNANNOUNCED_FRAMES};
 
 /// Largest number of frames that a child may decode without output. Free choice.
-const MOST_SKIPPED: usize = 300;
+const MAX_SKIPPED_FRAMES: usize = 300;
 
 /// Least number of frames in a part of the film, so that it contains a reference frame. Three frames in a row
 /// without one are common. Free choice.
-const LEAST_SKIPPED: usize = 8;
+const MIN_FRAMES_PER_PART: usize = 8;
 
 /// A video file that is within the limits and can be read any number of times.
 #[derive(Clone, Debug)]
@@ -43,31 +43,35 @@ pub(super) struct Film {
     path: PathBuf,
     limits: Limits,
     probe: Probe,
-    stretch: Option<Stretch>,
+    gray_range: Option<GrayRange>,
 }
 
 impl Film {
     /// Checks the file: container, codec, size, rate and length. Reads it once, and decodes it only if the
     /// packets do not determine its pictures. `path` must be absolute, because the child has another working
     /// directory.
-    pub(super) fn open(path: PathBuf, limits: &Limits, hints: &Hints) -> Result<Film, Error> {
-        let mut video = Film {
-            probe: probe(&path, limits, hints)?,
+    pub(super) fn open(
+        path: PathBuf,
+        limits: &Limits,
+        options: &ReadOptions,
+    ) -> Result<Film, Error> {
+        let mut film = Film {
+            probe: probe(&path, limits, options)?,
             limits: limits.clone(),
             path,
-            stretch: None,
+            gray_range: None,
         };
-        if let Some(bits) = gray_bits(&video.probe.pix_fmt) {
-            let stretch = video.measure_gray()?;
-            video.probe.notes.push(stretch.note(bits));
-            video.stretch = Some(stretch);
+        if let Some(bits) = gray_bits(&film.probe.pix_fmt) {
+            let gray_range = film.measure_gray()?;
+            film.probe.notices.push(gray_range.notice(bits));
+            film.gray_range = Some(gray_range);
         }
-        Ok(video)
+        Ok(film)
     }
 
     /// Returns notes about the file: assumptions, and corrected faults.
-    pub(super) fn notes(&self) -> &[Note] {
-        &self.probe.notes
+    pub(super) fn notices(&self) -> &[Notice] {
+        &self.probe.notices
     }
 
     /// Returns whether the film has an alpha channel.
@@ -80,44 +84,33 @@ impl Film {
         std::slice::from_ref(&self.path)
     }
 
-    /// Returns the order to decode the wanted frames.
-    fn order(&self, wanted: &Wanted) -> Order {
-        let n_pictures = self.probe.n_pictures;
-        let filters = filters::filters(&self.probe, self.stretch.as_ref(), wanted);
-        let args = self.args(wanted, &filters);
-        Order::new(Tool::Ffmpeg, args, &self.limits, n_pictures).with_input(&self.path)
+    /// Starts a decoder of the selected frames that are filtered by `filters`.
+    fn start_decoder(&self, selection: &FrameSelection, filters: &str) -> Result<Child, Error> {
+        let (tool, n_pictures) = (installed(Tool::Ffmpeg)?, self.probe.n_pictures);
+        let args = self.args(selection, filters);
+        let invocation = Invocation::new(tool, args, &self.limits, n_pictures);
+        Child::reading(invocation.with_input(&self.path))
     }
 
-    fn args(&self, wanted: &Wanted, filters: &str) -> Vec<OsString> {
+    fn args(&self, selection: &FrameSelection, filters: &str) -> Vec<OsString> {
         let probe = &self.probe;
         let threads = self.n_threads().to_string();
-        let mut args: Vec<OsString> =
-            ["-nostdin", "-copyts", "-noautorotate", "-threads", &threads]
-                .map(Into::into)
-                .into();
-        if matches!(wanted, Wanted::InTime { .. }) {
-            args.extend(["-skip_frame", "noref"].map(Into::into));
+        let mut input = vec!["-nostdin", "-copyts", "-noautorotate", "-threads", &threads];
+        if matches!(selection, FrameSelection::OnePerPart { .. }) {
+            input.extend(["-skip_frame", "noref"]);
         }
         if let Some(decoder) = probe.decoder {
-            args.extend(["-c:v", decoder].map(Into::into));
+            input.extend(["-c:v", decoder]);
         }
-        args.extend(input_args(probe.container, &self.path, &self.limits));
         let stream = format!("0:{}", probe.stream_idx);
-        args.extend(
-            [
-                "-map",
-                &stream,
-                "-an",
-                "-sn",
-                "-dn",
-                "-fps_mode",
-                "passthrough",
-            ]
-            .map(Into::into),
-        );
-        args.extend(["-vf", filters, "-f", "rawvideo"].map(Into::into));
+        let mut output = vec!["-map", &stream, "-an", "-sn", "-dn"];
+        output.extend(["-fps_mode", "passthrough"]);
+        output.extend(["-vf", filters, "-f", "rawvideo"]);
         // Write each frame at once, without a copy to a buffer.
-        args.extend(["-avioflags", "direct", "pipe:1"].map(Into::into));
+        output.extend(["-avioflags", "direct", "pipe:1"]);
+        let mut args: Vec<OsString> = input.into_iter().map(Into::into).collect();
+        args.extend(input_args(probe.container, &self.path, &self.limits));
+        args.extend(output.into_iter().map(Into::into));
         args
     }
 
@@ -127,33 +120,36 @@ impl Film {
         let pixels = u64::from(self.probe.width) * u64::from(self.probe.height);
         let useful = 1 + (pixels >> 20) as u32;
         match self.limits.threads {
-            0 => useful.min(std::thread::available_parallelism().map_or(1, |n| n.get() as u32)),
-            most => useful.min(most),
+            0 => useful.min(config::cores() as u32),
+            max => useful.min(max),
         }
     }
 
-    /// Calls `visit` with the wanted frames and returns their number. The number is not compared with the
+    /// Calls `visit` with the selected frames and returns their number. The number is not compared with the
     /// header's; that check belongs to reading the whole footage.
-    fn show(&self, wanted: &Wanted, visit: &mut Visit<'_>) -> Result<usize, Error> {
-        let mut stream = FilmStream::of(self, self.order(wanted))?;
+    fn visit_frames(
+        &self,
+        selection: &FrameSelection,
+        visit: &mut Visit<'_>,
+    ) -> Result<usize, Error> {
+        let mut stream = FilmStream::start(self, selection)?;
         let mut frame = Frame::default();
-        let mut n_shown = 0;
-        let most = wanted.most();
+        let mut n_visited = 0;
+        let limit = selection.max_frames();
         while stream.read(&mut frame)? == frame.planes.len() {
-            n_shown += 1;
-            if n_shown > most {
-                return Err(Error::TooManyFrames { limit: most });
+            n_visited += 1;
+            if n_visited > limit {
+                return Err(Error::TooManyFrames { limit });
             }
             if visit(&frame).is_break() {
-                return Ok(n_shown);
+                return Ok(n_visited);
             }
         }
         // With no frames the caller tries another way, which then reports the error.
-        match wanted {
-            Wanted::InTime { .. } => {}
-            _ => stream.check_end()?,
+        if !matches!(selection, FrameSelection::OnePerPart { .. }) {
+            stream.check_exit()?;
         }
-        Ok(n_shown)
+        Ok(n_visited)
     }
 }
 
@@ -164,98 +160,92 @@ impl FrameSource for Film {
             width: probe.width,
             height: probe.height,
             fps: probe.timeline.fps(),
-            n_frames_hint: match &probe.timeline {
-                Timeline::Constant { .. } => probe.n_pictures,
-                Timeline::Variable { sources, .. } => sources.len(),
-            },
+            n_frames_hint: probe.timeline.n_frames(probe.n_pictures),
             color: probe.color,
         }
     }
 
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
-        Ok(Box::new(FilmStream::of(self, self.order(&Wanted::All))?))
+        Ok(Box::new(FilmStream::start(self, &FrameSelection::All)?))
     }
 
-    /// The child outputs only the wanted frames. For a long footage it decodes only reference frames and uses
+    /// The child outputs only the selected frames. For a long footage it decodes only reference frames and uses
     /// the first one after the middle of each part. This takes at most half the time.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         let n_pictures = self.probe.n_pictures;
         // A child that outputs nothing for long counts as stalled.
-        if n_pictures > MOST_SKIPPED * n {
+        if n_pictures > MAX_SKIPPED_FRAMES * n {
             return spread_by_reading(self, n, visit);
         }
         let format = self.format();
-        if n_pictures >= LEAST_SKIPPED * n && self.probe.has_plain_times {
+        if n_pictures >= MIN_FRAMES_PER_PART * n && self.probe.has_plain_times {
             let parts_per_s = n as f64 * format.fps / format.n_frames_hint as f64;
-            let n_parts = n;
-            if self.show(
-                &Wanted::InTime {
-                    parts_per_s,
-                    n_parts,
-                },
-                visit,
-            )? > 0
-            {
+            let selection = FrameSelection::OnePerPart {
+                parts_per_s,
+                n_parts: n,
+            };
+            if self.visit_frames(&selection, visit)? > 0 {
                 return Ok(());
             }
         }
-        let given = spread_idx(format.n_frames_hint, n);
+        let frames = spread_idx(format.n_frames_hint, n);
         let decoded = match &self.probe.timeline {
-            Timeline::Constant { .. } => given,
+            Timeline::Constant { .. } => frames,
             Timeline::Variable { sources, .. } => {
-                given.iter().map(|&idx| sources[idx] as usize).collect()
+                frames.iter().map(|&idx| sources[idx] as usize).collect()
             }
         };
-        self.show(&Wanted::Numbers(decoded), visit)?;
+        self.visit_frames(&FrameSelection::Indices(decoded), visit)?;
         Ok(())
     }
 }
 
 /// A reader of a video.
 struct FilmStream<'a> {
-    video: &'a Film,
+    film: &'a Film,
     child: Option<Child>,
     n_decoded: usize,
-    n_given: usize,
+    n_returned: usize,
     /// The last decoded frame, kept only if frames may repeat.
-    held: Frame,
+    last_frame: Frame,
 }
 
 impl FrameStream for FilmStream<'_> {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
-        let video = self.video;
-        let time_s = match &video.probe.timeline {
-            Timeline::Constant { fps, ragged_s } => {
-                let first_ragged = video.probe.n_pictures - ragged_s.len();
+        let probe = &self.film.probe;
+        let time_s = match &probe.timeline {
+            Timeline::Constant { fps, late_s } => {
+                let first_late = probe.n_pictures - late_s.len();
                 let late = self
-                    .n_given
-                    .checked_sub(first_ragged)
-                    .and_then(|k| ragged_s.get(k));
-                let time_s = late.copied().unwrap_or(self.n_given as f64 / fps);
+                    .n_returned
+                    .checked_sub(first_late)
+                    .and_then(|k| late_s.get(k));
+                let time_s = late.copied().unwrap_or(self.n_returned as f64 / fps);
                 self.decode(frame)?.then_some(time_s)
             }
             Timeline::Variable {
                 times_s, sources, ..
             } => self.resample(times_s, sources, frame)?,
         };
-        self.n_given += usize::from(time_s.is_some());
+        self.n_returned += usize::from(time_s.is_some());
         Ok(time_s)
     }
 }
 
 impl<'a> FilmStream<'a> {
-    fn of(video: &'a Film, order: Order) -> Result<FilmStream<'a>, Error> {
+    fn start(film: &'a Film, selection: &FrameSelection) -> Result<FilmStream<'a>, Error> {
+        let filters = filters::filters(&film.probe, film.gray_range.as_ref(), selection);
         Ok(FilmStream {
-            video,
-            child: Some(Child::reading(order)?),
+            film,
+            child: Some(film.start_decoder(selection, &filters)?),
             n_decoded: 0,
-            n_given: 0,
-            held: Frame::default(),
+            n_returned: 0,
+            last_frame: Frame::default(),
         })
     }
 
     /// Checks that the child, which has closed its output, exited successfully.
-    fn check_end(&mut self) -> Result<(), Error> {
+    fn check_exit(&mut self) -> Result<(), Error> {
         match self.child.take() {
             Some(child) => child.finish()?.check().map(drop),
             None => Ok(()),
@@ -264,7 +254,7 @@ impl<'a> FilmStream<'a> {
 
     /// Reads the bytes of one frame. Returns fewer bytes if the child closed its output.
     fn read(&mut self, frame: &mut Frame) -> Result<usize, Error> {
-        let probe = &self.video.probe;
+        let probe = &self.film.probe;
         (frame.width, frame.height, frame.color) = (probe.width, probe.height, probe.color);
         frame
             .planes
@@ -282,16 +272,17 @@ impl<'a> FilmStream<'a> {
         }
         let n_read = self.read(frame)?;
         if n_read < frame.planes.len() {
-            self.end(n_read)?;
+            self.finish(n_read)?;
             return Ok(false);
         }
         self.n_decoded += 1;
         // A packet holds one or two pictures. More pictures than that indicate a malicious file.
-        let plenty = 2 * self.video.probe.n_pictures + MOST_UNTOLD;
-        let limit = self.video.limits.max_frames.min(plenty);
-        match self.n_decoded > limit {
-            true => Err(Error::TooManyFrames { limit }),
-            false => Ok(true),
+        let plausible = 2 * self.film.probe.n_pictures + MAX_UNANNOUNCED_FRAMES;
+        let limit = self.film.limits.max_frames.min(plausible);
+        if self.n_decoded > limit {
+            Err(Error::TooManyFrames { limit })
+        } else {
+            Ok(true)
         }
     }
 
@@ -302,46 +293,47 @@ impl<'a> FilmStream<'a> {
         sources: &[u32],
         frame: &mut Frame,
     ) -> Result<Option<f64>, Error> {
-        let wanted = sources
-            .get(self.n_given)
-            .map_or(usize::MAX, |&source| source as usize);
-        let mut held = std::mem::take(&mut self.held);
-        while self.n_decoded <= wanted {
-            if !self.decode(&mut held)? {
+        let source = sources.get(self.n_returned);
+        let source_idx = source.map_or(usize::MAX, |&source| source as usize);
+        let mut last_frame = std::mem::take(&mut self.last_frame);
+        while self.n_decoded <= source_idx {
+            if !self.decode(&mut last_frame)? {
                 return Ok(None);
             }
         }
-        frame.clone_from(&held);
-        self.held = held;
-        Ok(times_s.get(wanted).copied())
+        frame.clone_from(&last_frame);
+        self.last_frame = last_frame;
+        Ok(times_s.get(source_idx).copied())
     }
 
     /// Handles the end of the output, `n_left` bytes after the last complete frame.
-    fn end(&mut self, n_left: usize) -> Result<(), Error> {
+    fn finish(&mut self, n_left: usize) -> Result<(), Error> {
         let Some(child) = self.child.take() else {
             return Ok(());
         };
-        let end = child.finish()?.check()?;
+        let exit = child.finish()?.check()?;
         if n_left > 0 {
             return Err(Error::Crashed {
                 status: "it ended inside a frame".into(),
-                complaint: end.complaint,
+                stderr_tail: exit.stderr_tail,
             });
         }
-        let probe = &self.video.probe;
+        let probe = &self.film.probe;
         let n_pictures = probe.n_pictures;
         // A few pictures may be lost at an open GOP. More are missing without an error message only in codecs
         // that can encode a repeated picture as nothing.
-        let n_least = match end.complaint.is_empty() {
-            true => n_pictures / 2,
-            false => n_pictures - (n_pictures / 50).max(2).min(n_pictures),
+        let min_decoded = if exit.stderr_tail.is_empty() {
+            n_pictures / 2
+        } else {
+            n_pictures.saturating_sub((n_pictures / 50).max(2))
         };
-        match self.n_decoded < n_least.max(1) && !self.video.limits.allow_truncated {
-            true => Err(Error::Truncated(Damage::Undecodable {
+        if self.n_decoded < min_decoded.max(1) && !self.film.limits.allow_truncated {
+            Err(Error::Truncated(Damage::Undecodable {
                 n_decoded: self.n_decoded,
                 n_pictures,
-            })),
-            false => Ok(()),
+            }))
+        } else {
+            Ok(())
         }
     }
 }

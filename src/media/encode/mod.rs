@@ -1,5 +1,5 @@
 //! Encoding of frames: an MP4 for browsers (H.264 High, 4:2:0, index in front), or another format of
-//! `coding`, some with straight alpha.
+//! `encoding`, some with straight alpha.
 //!
 //! Equal frames give equal bytes on every machine. The output of x264 depends on its number of threads, so
 //! that number is fixed. Measured: 1, 2, 3 and 4 threads give four different files. With 4 threads the file
@@ -8,17 +8,18 @@
 //!
 //! The file gets its final name only when it is complete.
 
-mod coding; // arguments of ffmpeg for each output format
+mod encoding; // arguments of ffmpeg for each output format
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-pub use coding::Coding;
+pub use encoding::Encoding;
 
 use super::error::Error;
-use super::gate::{Child, Order};
+use super::gate::Child;
+use super::invocation::Invocation;
 use super::limits::Limits;
-use super::tools::Tool;
+use super::tools::{Tool, installed};
 use crate::footage::FootageFormat;
 use crate::raster::{ColorSpec, Frame};
 
@@ -68,10 +69,10 @@ impl Default for Quality {
 /// A video file being written. Dropping it before [`VideoWriter::finish`] deletes it.
 pub struct VideoWriter {
     format: VideoFormat,
-    coding: Coding,
+    encoding: Encoding,
     /// `None` once the encoder has failed; all later frames are refused.
     child: Option<Child>,
-    part: Part,
+    part: PartFile,
     path: PathBuf,
     padded: Vec<u8>,
 }
@@ -79,32 +80,23 @@ pub struct VideoWriter {
 impl VideoWriter {
     /// Starts an MP4 at `path` with default quality and limits.
     pub fn create(path: &Path, format: &VideoFormat) -> Result<VideoWriter, Error> {
-        VideoWriter::create_with(path, format, Quality::default(), &Limits::default())
+        VideoWriter::create_as(path, format, Encoding::H264(Quality::default()))
     }
 
     /// Starts a file of another format with default limits.
     pub fn create_as(
         path: &Path,
         format: &VideoFormat,
-        coding: Coding,
+        encoding: Encoding,
     ) -> Result<VideoWriter, Error> {
-        VideoWriter::start(path, format, coding, &Limits::default())
+        VideoWriter::create_with(path, format, encoding, &Limits::default())
     }
 
-    /// Starts an MP4 with given quality. Only the limits of time, memory and output size apply.
+    /// Starts a file. Only the limits of time, memory and output size apply.
     pub fn create_with(
         path: &Path,
         format: &VideoFormat,
-        quality: Quality,
-        limits: &Limits,
-    ) -> Result<VideoWriter, Error> {
-        VideoWriter::start(path, format, Coding::H264(quality), limits)
-    }
-
-    fn start(
-        path: &Path,
-        format: &VideoFormat,
-        coding: Coding,
+        encoding: Encoding,
         limits: &Limits,
     ) -> Result<VideoWriter, Error> {
         let sides = 1..=8192;
@@ -115,14 +107,14 @@ impl VideoWriter {
             return Err(Error::BadOutput("a frame rate outside 0..=1000"));
         }
         let path = std::path::absolute(path).map_err(Error::io("finding the output folder"))?;
-        let part = Part::beside(&path)?;
-        let args = coding.args(&part.0, format);
-        let order = Order::new(Tool::Ffmpeg, args, limits, limits.max_frames)
+        let part = PartFile::beside(&path)?;
+        let args = encoding.args(&part.0, format);
+        let invocation = Invocation::new(installed(Tool::Ffmpeg)?, args, limits, limits.max_frames)
             .with_output(&part.0, limits.max_output_bytes);
         Ok(VideoWriter {
             format: *format,
-            coding,
-            child: Some(Child::writing(order)?),
+            encoding,
+            child: Some(Child::writing(invocation)?),
             part,
             path,
             padded: Vec::new(),
@@ -138,18 +130,18 @@ impl VideoWriter {
             ..
         } = self.format;
         if (frame.width, frame.height, frame.color) != (width, height, color)
-            || self.coding.takes_rgba()
+            || self.encoding.takes_rgba()
         {
             return Err(Error::BadOutput(
                 "the size or color format of a frame differs from that of the video",
             ));
         }
-        if width % 2 == 0 && height % 2 == 0 || !self.coding.is_even() {
-            return self.give(&frame.planes);
+        if width % 2 == 0 && height % 2 == 0 || !self.encoding.is_even() {
+            return self.send(&frame.planes);
         }
         let mut padded = std::mem::take(&mut self.padded);
         pad(frame, &mut padded);
-        let written = self.give(&padded);
+        let written = self.send(&padded);
         self.padded = padded;
         written
     }
@@ -157,15 +149,15 @@ impl VideoWriter {
     /// Adds a frame of straight-alpha RGBA, row by row, with the size of the video.
     pub fn write_rgba(&mut self, rgba: &[u8]) -> Result<(), Error> {
         let n_bytes = self.format.width as usize * self.format.height as usize * 4;
-        if rgba.len() != n_bytes || !self.coding.takes_rgba() {
+        if rgba.len() != n_bytes || !self.encoding.takes_rgba() {
             return Err(Error::BadOutput(
                 "the size or kind of a picture differs from that of the output",
             ));
         }
-        self.give(rgba)
+        self.send(rgba)
     }
 
-    fn give(&mut self, bytes: &[u8]) -> Result<(), Error> {
+    fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let Some(child) = &mut self.child else {
             return Err(Error::BadOutput(
                 "the encoder has failed before and takes no more frames",
@@ -189,11 +181,11 @@ impl VideoWriter {
 }
 
 /// The file under its temporary name. Dropping it deletes the file, unless it was renamed.
-struct Part(PathBuf);
+struct PartFile(PathBuf);
 
-impl Part {
+impl PartFile {
     /// Creates the file empty, because the encoder may write this file but not create one.
-    fn beside(path: &Path) -> Result<Part, Error> {
+    fn beside(path: &Path) -> Result<PartFile, Error> {
         let mut name = OsString::from(".");
         name.push(path.file_name().unwrap_or_default());
         name.push(".part");
@@ -201,11 +193,11 @@ impl Part {
         // Remove the file of an earlier run, if any.
         std::fs::remove_file(&part).ok();
         std::fs::File::create_new(&part).map_err(Error::io("making the video"))?;
-        Ok(Part(part))
+        Ok(PartFile(part))
     }
 }
 
-impl Drop for Part {
+impl Drop for PartFile {
     fn drop(&mut self) {
         // After a rename there is nothing to remove.
         std::fs::remove_file(&self.0).ok();
@@ -234,7 +226,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_odd_frame_gains_copies_of_its_last_row_and_column() {
+    fn odd_frame_gets_copies_of_its_last_row_and_column() {
         let mut frame = Frame::new(3, 3, ColorSpec::default());
         frame.planes = (1..=17).collect();
         let mut padded = Vec::new();

@@ -2,20 +2,20 @@
 //! them. Libraries without unsafe C code decode each picture on request, under the same limits as films.
 //! Pictures have no frame rate: it comes from a hint or is assumed.
 
-mod order; // order of numbered names
+mod natural_order; // order of numbered names
 mod picture; // decoding of one picture
 mod source; // pictures of a folder, zip or TIFF
-mod stack; // pages of a TIFF
+mod tiff_stack; // pages of a TIFF
 
 use std::path::{Path, PathBuf};
 
 use super::error::Error;
-use super::hints::Hints;
+use super::gray_range::{GrayRange, MIN_SAMPLED_FRAMES};
 use super::limits::Limits;
-use super::note::Note;
-use super::probe::check_size;
+use super::notice::Notice;
+use super::probe::header::square_pixels;
 use super::probe::timeline::{Claims, Timeline};
-use super::stretch::{LEAST_FRAMES, Stretch};
+use super::read_options::ReadOptions;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_idx};
 use crate::raster::{ColorSpec, Frame, Matrix, Range, RgbImage};
 use picture::Picture;
@@ -38,12 +38,12 @@ pub(super) struct Pictures {
     shown: [u32; 2],
     fps: f64,
     /// Range of gray levels, if the first picture is gray of more than 8 bits.
-    stretch: Option<Stretch>,
+    gray_range: Option<GrayRange>,
     /// Whether the first picture has an alpha channel.
     has_alpha: bool,
     /// Whether the alpha channel is returned, as gray.
-    of_alpha: bool,
-    notes: Vec<Note>,
+    alpha_as_gray: bool,
+    notices: Vec<Notice>,
 }
 
 impl Pictures {
@@ -52,7 +52,7 @@ impl Pictures {
     pub(super) fn open(
         path: &Path,
         limits: &Limits,
-        hints: &Hints,
+        options: &ReadOptions,
     ) -> Result<Option<Pictures>, Error> {
         let Some(source) = Source::find(path, limits)? else {
             return Ok(None);
@@ -61,38 +61,39 @@ impl Pictures {
         let claims = Claims {
             fps: Vec::new(),
             tick_s: 0.0,
-            wanted_fps: hints.fps,
+            given_fps: options.fps,
         };
-        let (timeline, mut notes) = Timeline::found(&vec![None; n_pictures], &claims, limits)?;
+        let (timeline, mut notices) = Timeline::new(&vec![None; n_pictures], &claims, limits)?;
         let (first, has_alpha) = source.read(limits, false)?.picture(0)?;
         let stored = first.size();
-        let shown = shown_size(stored, hints);
-        check_size(u64::from(shown[0]), u64::from(shown[1]), limits)?;
+        let shown = square_pixels(stored.map(f64::from), options.pixel_aspect);
+        let shown = shown.map(|side| side as u32);
+        limits.check_size(shown[0].into(), shown[1].into())?;
         let mut pictures = Pictures {
             source,
             limits: limits.clone(),
             stored,
             shown,
             fps: timeline.fps(),
-            stretch: None,
+            gray_range: None,
             has_alpha,
-            of_alpha: hints.of_alpha,
-            notes: Vec::new(),
+            alpha_as_gray: options.alpha_as_gray,
+            notices: Vec::new(),
         };
         if let Picture::Gray16(_) = first
-            && !hints.of_alpha
+            && !options.alpha_as_gray
         {
-            let stretch = pictures.measure_gray()?;
-            notes.push(stretch.note(16));
-            pictures.stretch = Some(stretch);
+            let gray_range = pictures.measure_gray()?;
+            notices.push(gray_range.notice(16));
+            pictures.gray_range = Some(gray_range);
         }
-        pictures.notes = notes;
+        pictures.notices = notices;
         Ok(Some(pictures))
     }
 
     /// Returns the assumptions made.
-    pub(super) fn notes(&self) -> &[Note] {
-        &self.notes
+    pub(super) fn notices(&self) -> &[Notice] {
+        &self.notices
     }
 
     /// Returns whether the pictures have an alpha channel.
@@ -106,17 +107,17 @@ impl Pictures {
     }
 
     /// Returns the range of gray levels in pictures spread over the footage.
-    fn measure_gray(&self) -> Result<Stretch, Error> {
+    fn measure_gray(&self) -> Result<GrayRange, Error> {
         let mut reader = self.source.read(&self.limits, false)?;
         let mut counts = vec![0_u64; 1 << 16];
-        for idx in spread_idx(self.source.n_pictures(), LEAST_FRAMES) {
+        for idx in spread_idx(self.source.n_pictures(), MIN_SAMPLED_FRAMES) {
             if let (Picture::Gray16(picture), _) = reader.picture(idx)? {
                 picture
                     .iter()
                     .for_each(|&level| counts[usize::from(level)] += 1);
             }
         }
-        Ok(Stretch::of(&counts))
+        Ok(GrayRange::from_histogram(&counts))
     }
 
     /// Decodes a picture into a frame. Fails if its size differs from the first picture's.
@@ -129,7 +130,7 @@ impl Pictures {
                 first: self.stored,
             });
         }
-        let pixels = picture.into_rgb(self.stretch.as_ref(), self.shown);
+        let pixels = picture.into_rgb(self.gray_range.as_ref(), self.shown);
         let [width, height] = self.shown;
         let canvas = RgbImage {
             width,
@@ -141,15 +142,6 @@ impl Pictures {
         }
         frame.draw_all_rgb(&canvas);
         Ok(())
-    }
-}
-
-/// Returns the size in square pixels. The smaller dimension is stretched, so that no measured detail is lost.
-fn shown_size([width, height]: [u32; 2], hints: &Hints) -> [u32; 2] {
-    match hints.pixel_aspect {
-        Some(aspect) if aspect > 1.0 => [(f64::from(width) * aspect).round() as u32, height],
-        Some(aspect) if aspect > 0.0 => [width, (f64::from(height) / aspect).round() as u32],
-        _ => [width, height],
     }
 }
 
@@ -168,14 +160,14 @@ impl FrameSource for Pictures {
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
         Ok(Box::new(PictureStream {
             pictures: self,
-            reader: self.source.read(&self.limits, self.of_alpha)?,
-            n_given: 0,
+            reader: self.source.read(&self.limits, self.alpha_as_gray)?,
+            n_returned: 0,
         }))
     }
 
     /// Decodes only the wanted pictures.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
-        let mut reader = self.source.read(&self.limits, self.of_alpha)?;
+        let mut reader = self.source.read(&self.limits, self.alpha_as_gray)?;
         let mut frame = Frame::default();
         for idx in spread_idx(self.source.n_pictures(), n) {
             self.show(&mut reader, idx, &mut frame)?;
@@ -191,17 +183,17 @@ impl FrameSource for Pictures {
 struct PictureStream<'a> {
     pictures: &'a Pictures,
     reader: Reader<'a>,
-    n_given: usize,
+    n_returned: usize,
 }
 
 impl FrameStream for PictureStream<'_> {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
-        let idx = self.n_given;
+        let idx = self.n_returned;
         if idx == self.pictures.source.n_pictures() {
             return Ok(None);
         }
         self.pictures.show(&mut self.reader, idx, frame)?;
-        self.n_given += 1;
+        self.n_returned += 1;
         Ok(Some(idx as f64 / self.pictures.fps))
     }
 }

@@ -2,22 +2,23 @@
 //! unpacked to disk. Each picture is read from it directly, up to the size of the largest allowed picture.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
+use image::{DynamicImage, GrayImage, ImageFormat, Luma};
 use tiff::decoder::Decoder;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
-use super::order::by_number;
+use super::natural_order::compare_natural;
 use super::picture::Picture;
-use super::stack;
+use super::tiff_stack;
 use crate::media::error::Error;
-use crate::media::image::largest_file;
+use crate::media::image::decode;
 use crate::media::limits::Limits;
 
 /// File name extensions of pictures.
-const ENDINGS: [&str; 6] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp"];
+const EXTENSIONS: [&str; 6] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp"];
 
 /// Allowed size of a zip directory per picture of the limit, bytes: an entry of 46, its name, and its date in
 /// extra fields. The directory is kept in memory.
@@ -46,25 +47,19 @@ impl Source {
         let file = File::open(path).map_err(&failed)?;
         let mut head = Vec::with_capacity(4);
         (&file).take(4).read_to_end(&mut head).map_err(&failed)?;
-        let (is_zip, is_tiff) = (head.starts_with(b"PK\x03\x04"), stack::is_tiff(&head));
+        let (is_zip, is_tiff) = (head.starts_with(b"PK\x03\x04"), tiff_stack::is_tiff(&head));
         if !is_zip && !is_tiff {
             return Ok(None);
         }
-        if about.len() > limits.max_bytes {
-            return Err(Error::TooLong {
-                found: about.len() as f64,
-                unit: "bytes",
-            });
-        }
+        limits.check_n_bytes(about.len())?;
         let path = path.to_owned();
         let mut file = BufReader::new(file);
         file.rewind().map_err(&failed)?;
-        Ok(Some(match is_zip {
-            true => Source::Zip(path, entries_of(file, limits)?),
-            false => {
-                let n_pages = stack::n_pages(&mut stack::open(file, limits)?, limits)?;
-                Source::Stack(path, n_pages)
-            }
+        Ok(Some(if is_zip {
+            Source::Zip(path, entries_of(file, limits)?)
+        } else {
+            let n_pages = tiff_stack::n_pages(&mut tiff_stack::open(file, limits)?, limits)?;
+            Source::Stack(path, n_pages)
         }))
     }
 
@@ -89,35 +84,37 @@ impl Source {
     pub(super) fn read<'a>(
         &'a self,
         limits: &'a Limits,
-        of_alpha: bool,
+        alpha_as_gray: bool,
     ) -> Result<Reader<'a>, Error> {
         let open = |path| -> Result<BufReader<File>, Error> {
             let file = File::open(path).map_err(Error::io("opening the pictures"))?;
             Ok(BufReader::new(file))
         };
-        let place = match self {
-            Source::Folder(files) => Place::Folder(files),
+        let source = match self {
+            Source::Folder(files) => OpenSource::Folder(files),
             Source::Zip(path, entries) => {
-                Place::Zip(ZipArchive::new(open(path)?).map_err(refused)?, entries)
+                OpenSource::Zip(ZipArchive::new(open(path)?).map_err(from_zip)?, entries)
             }
-            Source::Stack(path, _) => Place::Stack(Box::new(stack::open(open(path)?, limits)?)),
+            Source::Stack(path, _) => {
+                OpenSource::Stack(Box::new(tiff_stack::open(open(path)?, limits)?))
+            }
         };
         Ok(Reader {
-            place,
+            source,
             limits,
-            of_alpha,
+            alpha_as_gray,
         })
     }
 }
 
 /// Reads pictures by index.
 pub(super) struct Reader<'a> {
-    place: Place<'a>,
+    source: OpenSource<'a>,
     limits: &'a Limits,
-    of_alpha: bool,
+    alpha_as_gray: bool,
 }
 
-enum Place<'a> {
+enum OpenSource<'a> {
     Folder(&'a [PathBuf]),
     Zip(ZipArchive<BufReader<File>>, &'a [usize]),
     Stack(Box<Decoder<BufReader<File>>>),
@@ -127,43 +124,82 @@ impl Reader<'_> {
     /// Decodes a picture and returns whether it has an alpha channel. If it cannot be decoded, the error
     /// names its number, counted from 1.
     pub(super) fn picture(&mut self, idx: usize) -> Result<(Picture, bool), Error> {
-        let (limits, of_alpha) = (self.limits, self.of_alpha);
-        let picture = match &mut self.place {
-            Place::Folder(files) => File::open(&files[idx])
-                .map_err(Error::io("opening a picture"))
-                .and_then(|file| bytes_of(file, limits))
-                .and_then(|bytes| Picture::decoded(&bytes, limits, of_alpha)),
-            Place::Zip(archive, entries) => archive
-                .by_index(entries[idx])
-                .map_err(refused)
-                .and_then(|entry| bytes_of(entry, limits))
-                .and_then(|bytes| Picture::decoded(&bytes, limits, of_alpha)),
-            Place::Stack(pages) => stack::page(pages, idx, limits).map(|page| (page, false)),
-        };
-        picture.map_err(|error| match error {
+        self.decode(idx).map_err(|error| match error {
             Error::NotAVideo(why) => Error::NotAVideo(format!("picture {}: {why}", idx + 1)),
             error => error,
         })
     }
+
+    fn decode(&mut self, idx: usize) -> Result<(Picture, bool), Error> {
+        let limits = self.limits;
+        let bytes = match &mut self.source {
+            OpenSource::Folder(files) => {
+                let file = File::open(&files[idx]).map_err(Error::io("opening a picture"))?;
+                bytes_of(file, limits)?
+            }
+            OpenSource::Zip(archive, entries) => {
+                bytes_of(archive.by_index(entries[idx]).map_err(from_zip)?, limits)?
+            }
+            OpenSource::Stack(pages) => {
+                return tiff_stack::page(pages, idx, limits).map(|page| (page, false));
+            }
+        };
+        decode_picture(&bytes, limits, self.alpha_as_gray)
+    }
+}
+
+/// Decodes a PNG, JPEG, BMP or the first page of a TIFF. Returns the picture and whether it has an alpha
+/// channel.
+///
+/// With `alpha_as_gray` the picture is the alpha instead, opaque if there is none. The alpha of a TIFF is
+/// ignored.
+fn decode_picture(
+    bytes: &[u8],
+    limits: &Limits,
+    alpha_as_gray: bool,
+) -> Result<(Picture, bool), Error> {
+    if tiff_stack::is_tiff(bytes) {
+        let mut pages = tiff_stack::open(Cursor::new(bytes), limits)?;
+        return Ok((tiff_stack::page(&mut pages, 0, limits)?, false));
+    }
+    let formats = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp];
+    let image = decode(bytes, &formats, limits)?;
+    let has_alpha = image.color().has_alpha();
+    let picture = match image {
+        image if alpha_as_gray => Picture::Gray(alpha_of(image)),
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+            Picture::Gray(image.into_luma8())
+        }
+        DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
+            Picture::Gray16(image.into_luma16())
+        }
+        _ => Picture::Rgb(image.into_rgb8()),
+    };
+    Ok((picture, has_alpha))
+}
+
+/// Returns the alpha of a picture as gray.
+fn alpha_of(image: DynamicImage) -> GrayImage {
+    let rgba = image.into_rgba8();
+    GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| {
+        Luma([rgba.get_pixel(x, y).0[3]])
+    })
 }
 
 fn bytes_of(from: impl Read, limits: &Limits) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
-    let read = from.take(largest_file(limits) + 1).read_to_end(&mut bytes);
+    let read = from
+        .take(limits.max_picture_bytes() + 1)
+        .read_to_end(&mut bytes);
     match read {
         Ok(_) => Ok(bytes),
         // Errors of the zip library for damaged data.
-        Err(error)
-            if matches!(
-                error.kind(),
-                io::ErrorKind::InvalidData
-                    | io::ErrorKind::InvalidInput
-                    | io::ErrorKind::UnexpectedEof
-            ) =>
-        {
-            Err(Error::NotAVideo(format!("it is damaged: {error}")))
-        }
-        Err(error) => Err(Error::io("reading a picture")(error)),
+        Err(error) => match error.kind() {
+            ErrorKind::InvalidData | ErrorKind::InvalidInput | ErrorKind::UnexpectedEof => {
+                Err(Error::NotAVideo(format!("it is damaged: {error}")))
+            }
+            _ => Err(Error::io("reading a picture")(error)),
+        },
     }
 }
 
@@ -178,40 +214,40 @@ fn files_of(folder: &Path, limits: &Limits) -> Result<Vec<PathBuf>, Error> {
             files.push((name.into_owned(), path));
         }
     }
-    in_order(files, "the folder", limits)
+    sorted(files, "the folder", limits)
 }
 
 /// Returns the pictures of a zip, ordered by path.
 fn entries_of(file: BufReader<File>, limits: &Limits) -> Result<Vec<usize>, Error> {
-    let n_most = limits.max_frames as u64 * DIRECTORY_BYTES;
+    let max_bytes = limits.max_frames as u64 * DIRECTORY_BYTES;
     let bounded = Bounded {
         inner: file,
-        n_left: n_most.max(1 << 20),
+        n_left: max_bytes.max(1 << 20),
     };
-    let archive = ZipArchive::new(bounded).map_err(refused)?;
+    let archive = ZipArchive::new(bounded).map_err(from_zip)?;
     let mut entries = Vec::new();
     for idx in 0..archive.len() {
-        let name = archive.name_for_index(idx).transpose().map_err(refused)?;
+        let name = archive.name_for_index(idx).transpose().map_err(from_zip)?;
         if let Some(name) = name.filter(|name| is_picture(name)) {
             entries.push((name.into_owned(), idx));
         }
     }
-    in_order(entries, "the zip", limits)
+    sorted(entries, "the zip", limits)
 }
 
-fn in_order<T>(mut named: Vec<(String, T)>, place: &str, limits: &Limits) -> Result<Vec<T>, Error> {
+fn sorted<T>(
+    mut named: Vec<(String, T)>,
+    container: &str,
+    limits: &Limits,
+) -> Result<Vec<T>, Error> {
     if named.is_empty() {
-        let endings = ENDINGS.join(", .");
+        let endings = EXTENSIONS.join(", .");
         return Err(Error::NotAVideo(format!(
-            "{place} contains no pictures (.{endings})"
+            "{container} contains no pictures (.{endings})"
         )));
     }
-    if named.len() > limits.max_frames {
-        return Err(Error::TooManyFrames {
-            limit: limits.max_frames,
-        });
-    }
-    named.sort_by(|(a, _), (b, _)| by_number(a, b));
+    limits.check_n_frames(named.len())?;
+    named.sort_by(|(a, _), (b, _)| compare_natural(a, b));
     Ok(named.into_iter().map(|(_, picture)| picture).collect())
 }
 
@@ -221,12 +257,12 @@ fn is_picture(name: &str) -> bool {
     let is_hidden = |part: &str| part.starts_with('.') || part == "__MACOSX";
     let ending = name.rsplit_once('.').map(|(_, ending)| ending);
     let ending = ending.unwrap_or_default().to_ascii_lowercase();
-    ENDINGS.contains(&&*ending) && !name.split('/').any(is_hidden)
+    EXTENSIONS.contains(&&*ending) && !name.split('/').any(is_hidden)
 }
 
-fn refused(error: ZipError) -> Error {
+fn from_zip(error: ZipError) -> Error {
     match error {
-        ZipError::Io(error) if error.kind() != io::ErrorKind::UnexpectedEof => {
+        ZipError::Io(error) if error.kind() != ErrorKind::UnexpectedEof => {
             Error::io("reading the zip")(error)
         }
         error => Error::NotAVideo(format!("the zip cannot be read: {error}")),
@@ -244,7 +280,7 @@ impl<R: Read> Read for Bounded<R> {
         let n_read = self.inner.read(buffer)?;
         match self.n_left.checked_sub(n_read as u64) {
             Some(n_left) => self.n_left = n_left,
-            None => return Err(io::ErrorKind::UnexpectedEof.into()),
+            None => return Err(ErrorKind::UnexpectedEof.into()),
         }
         Ok(n_read)
     }
@@ -261,12 +297,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_are_known_by_their_names() {
+    fn pictures_are_recognized_by_their_names() {
         for name in ["1.png", "a/b/2.TIFF", "x.y.jpg"] {
             assert!(is_picture(name), "{name}");
         }
         for name in [
-            "notes.txt",
+            "notices.txt",
             "png",
             ".1.png",
             "__MACOSX/1.png",
@@ -278,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn a_directory_longer_than_the_limit_is_not_read() {
+    fn directory_above_the_limit_is_not_read() {
         let mut bounded = Bounded {
             inner: io::repeat(1),
             n_left: 100,

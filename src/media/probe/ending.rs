@@ -25,7 +25,7 @@ pub(super) enum Ending {
 const MAX_STEPS: usize = 2_000_000;
 
 /// Boxes besides `mdat` and `moof` that may come last (ISO/IEC 14496-12, table 1; QuickTime File Format).
-const BOXES: [&[u8; 4]; 13] = [
+const TRAILING_BOXES: [&[u8; 4]; 13] = [
     b"moov", b"free", b"skip", b"wide", b"udta", b"meta", b"uuid", b"mfra", b"sidx", b"styp",
     b"ftyp", b"pdin", b"emsg",
 ];
@@ -35,7 +35,7 @@ const MAX_OGG_PAGE: u64 = 27 + 255 + 255 * 255;
 
 impl Ending {
     /// Returns how `file` of `n_bytes` ends. Fails only if reading fails.
-    pub(super) fn of(container: Container, file: &File, n_bytes: u64) -> io::Result<Ending> {
+    pub(super) fn detect(container: Container, file: &File, n_bytes: u64) -> io::Result<Ending> {
         let bytes = Bytes { file, n_bytes };
         match container {
             Container::Mov => bytes.ending_of_mov(),
@@ -92,7 +92,7 @@ impl Bytes<'_> {
                 return Ok(match &name {
                     b"mdat" => Ending::InsideSamples,
                     b"moof" => Ending::InsideData,
-                    name if BOXES.contains(&name) => Ending::AfterPictures,
+                    name if TRAILING_BOXES.contains(&name) => Ending::AfterPictures,
                     _ => Ending::Whole, // not a box: appended data
                 });
             }
@@ -112,7 +112,7 @@ impl Bytes<'_> {
             if place == self.n_bytes || is_past {
                 break;
             }
-            let Some((id, size, head)) = self.ebml_head(place)? else {
+            let Some((id, size, head)) = self.ebml_header(place)? else {
                 return Ok(Ending::InsideData);
             };
             let end = size.map(|size| place.saturating_add(head).saturating_add(size));
@@ -135,7 +135,7 @@ impl Bytes<'_> {
     }
 
     /// Returns the id of an element, its size (`None` if unknown), and the length of both.
-    fn ebml_head(&self, place: u64) -> io::Result<Option<(u64, Option<u64>, u64)>> {
+    fn ebml_header(&self, place: u64) -> io::Result<Option<(u64, Option<u64>, u64)>> {
         let Some((id, n_id)) = self.ebml_number(place, false)? else {
             return Ok(None);
         };
@@ -195,9 +195,10 @@ impl Bytes<'_> {
             }
             place = end;
         }
-        match riff_end > self.n_bytes + 1 {
-            true => Ok(Ending::AfterPictures),
-            false => Ok(Ending::Whole),
+        if riff_end > self.n_bytes + 1 {
+            Ok(Ending::AfterPictures)
+        } else {
+            Ok(Ending::Whole)
         }
     }
 
@@ -221,9 +222,10 @@ impl Bytes<'_> {
             }
             let end = place.saturating_add(size);
             if end > self.n_bytes {
-                return Ok(match id == DATA {
-                    true => Ending::InsideData,
-                    false => Ending::AfterPictures,
+                return Ok(if id == DATA {
+                    Ending::InsideData
+                } else {
+                    Ending::AfterPictures
                 });
             }
             place = end;
@@ -267,9 +269,10 @@ impl Bytes<'_> {
             return Ok(Ending::InsideData);
         };
         let n_bytes: usize = pieces.iter().map(|&piece| usize::from(piece)).sum();
-        Ok(match at + 27 + n_pieces + n_bytes <= tail.len() {
-            true => Ending::Whole,
-            false => Ending::InsideData,
+        Ok(if at + 27 + n_pieces + n_bytes <= tail.len() {
+            Ending::Whole
+        } else {
+            Ending::InsideData
         })
     }
 }
@@ -283,16 +286,16 @@ mod tests {
     fn ending(container: Container, bytes: &[u8]) -> Ending {
         let mut file = tempfile::tempfile().unwrap();
         file.write_all(bytes).unwrap();
-        Ending::of(container, &file, bytes.len() as u64).unwrap()
+        Ending::detect(container, &file, bytes.len() as u64).unwrap()
     }
 
     #[test]
-    fn a_movie_cut_in_its_index_keeps_its_pictures_and_one_cut_in_its_data_does_not() {
+    fn mov_cut_in_its_index_keeps_its_pictures_and_one_cut_in_its_data_does_not() {
         let boxed = |name: &[u8], n_bytes: u32| {
             [&n_bytes.to_be_bytes(), name, &vec![0; n_bytes as usize - 8]].concat()
         };
         let film = [boxed(b"ftyp", 24), boxed(b"mdat", 100), boxed(b"moov", 60)].concat();
-        for (n_kept, wanted) in [
+        for (n_kept, selection) in [
             (184, Ending::Whole),
             (170, Ending::AfterPictures),
             (124, Ending::Whole),
@@ -300,20 +303,20 @@ mod tests {
         ] {
             assert_eq!(
                 ending(Container::Mov, &film[..n_kept]),
-                wanted,
+                selection,
                 "{n_kept} bytes"
             );
         }
     }
 
     #[test]
-    fn what_is_no_box_of_a_movie_does_not_make_it_a_cut_one() {
+    fn appended_data_does_not_count_as_a_cut() {
         let film = [b"\0\0\0\x10ftypisom\0\0\0\0".as_slice(), b"\nTEXT and more"].concat();
         assert_eq!(ending(Container::Mov, &film), Ending::Whole);
     }
 
     #[test]
-    fn an_avi_of_unknown_size_is_whole_wherever_it_ends() {
+    fn avi_of_unknown_size_is_whole() {
         let chunk =
             |name: &[u8], size: u32, inside: &[u8]| [name, &size.to_le_bytes(), inside].concat();
         let movi = |size| chunk(b"LIST", size, &[b"movi".as_slice(), &[0; 100]].concat());
@@ -328,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_sizes_end_the_look_soon() {
+    fn malicious_sizes_do_not_loop() {
         for container in [
             Container::Mov,
             Container::Matroska,

@@ -8,10 +8,11 @@ use serde_json::Value;
 use crate::media::allow_list::input_args;
 use crate::media::container::Container;
 use crate::media::error::{Damage, Error};
-use crate::media::gate::{Child, Order};
-use crate::media::hints::Hints;
+use crate::media::gate::Child;
+use crate::media::invocation::Invocation;
 use crate::media::limits::Limits;
-use crate::media::tools::Tool;
+use crate::media::read_options::ReadOptions;
+use crate::media::tools::{Tool, installed};
 use crate::raster::{ColorSpec, Matrix, Range};
 
 /// Accepted codecs, by ffprobe's names.
@@ -49,7 +50,7 @@ const MAX_HEADER_BYTES: usize = 1 << 20;
 
 /// Transformation of the stored picture for display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::media) struct Turn {
+pub(in crate::media) struct Orientation {
     /// Whether rows and columns are exchanged, as the first step.
     pub(in crate::media) transpose: bool,
     /// Whether left and right are exchanged afterwards.
@@ -70,8 +71,8 @@ pub(super) fn read_header(
         "json".into(),
     ];
     args.extend(input_args(container, path, limits));
-    let order = Order::new(Tool::Ffprobe, args, limits, 0).with_input(path);
-    let mut child = Child::reading(order)?;
+    let invocation = Invocation::new(installed(Tool::Ffprobe)?, args, limits, 0);
+    let mut child = Child::reading(invocation.with_input(path))?;
     let mut json = vec![0; MAX_HEADER_BYTES];
     let n_read = child.read_full(&mut json)?;
     if n_read == json.len() {
@@ -79,8 +80,8 @@ pub(super) fn read_header(
             "the header of the file is too large".into(),
         ));
     }
-    let end = child.finish()?;
-    let says = |what| end.complaint.contains(what);
+    let exit = child.finish()?;
+    let says = |what| exit.stderr_tail.contains(what);
     if says("Number of streams exceeds") {
         return Err(Error::TooManyStreams {
             limit: limits.max_streams,
@@ -89,22 +90,23 @@ pub(super) fn read_header(
     if says("moov atom not found") {
         return Err(Error::Truncated(Damage::NoIndex));
     }
-    if let Some(codec) = refused_codec(&end.complaint) {
+    if let Some(codec) = disallowed_codec(&exit.stderr_tail) {
         return Err(Error::CodecNotAllowed(codec.to_owned()));
     }
-    match end.check() {
+    match exit.check() {
         Ok(_) => serde_json::from_slice(&json[..n_read])
             .map_err(|error| Error::NotAVideo(error.to_string())),
-        Err(Error::Crashed { status, complaint }) if status.starts_with("exit") => {
-            Err(Error::NotAVideo(complaint))
-        }
+        Err(Error::Crashed {
+            status,
+            stderr_tail,
+        }) if status.starts_with("exit") => Err(Error::NotAVideo(stderr_tail)),
         Err(error) => Err(error),
     }
 }
 
 /// Returns the codec that ffprobe was not allowed to open, from its error message.
-fn refused_codec(complaint: &str) -> Option<&str> {
-    let line = complaint
+fn disallowed_codec(stderr_tail: &str) -> Option<&str> {
+    let line = stderr_tail
         .lines()
         .find(|line| line.contains(") not on whitelist"))?;
     Some(line.split_once("Codec (")?.1.split_once(')')?.0)
@@ -115,17 +117,14 @@ pub(super) fn video_streams<'a>(
     header: &'a Value,
     limits: &Limits,
 ) -> Result<Vec<&'a Value>, Error> {
-    let streams = header["streams"].as_array().map_or(&[][..], Vec::as_slice);
-    if streams.len() > limits.max_streams as usize {
-        return Err(Error::TooManyStreams {
-            limit: limits.max_streams,
-        });
-    }
+    let streams = array(&header["streams"]);
+    limits.check_n_streams(streams.len())?;
     let films = streams.iter().filter(|s| text(&s["codec_type"]) == "video");
     let films: Vec<&Value> = films.collect();
-    match films.is_empty() {
-        true => Err(Error::NoVideoStream),
-        false => Ok(films),
+    if films.is_empty() {
+        Err(Error::NoVideoStream)
+    } else {
+        Ok(films)
     }
 }
 
@@ -135,37 +134,38 @@ pub(super) fn check_codec(stream: &Value) -> Result<(), Error> {
     if tag == "encv" || !stream["tags"]["enc_key_id"].is_null() {
         return Err(Error::Encrypted);
     }
-    match CODECS.contains(&codec) {
-        true => Ok(()),
-        false => Err(Error::CodecNotAllowed(codec.to_owned())),
+    if CODECS.contains(&codec) {
+        Ok(())
+    } else {
+        Err(Error::CodecNotAllowed(codec.to_owned()))
     }
 }
 
 /// Returns the displayed size and the transformation to it.
-pub(super) fn shown_size(stream: &Value, hints: &Hints) -> (u64, u64, Turn) {
+pub(super) fn shown_size(stream: &Value, options: &ReadOptions) -> (u64, u64, Orientation) {
     let side = |name: &str| number(&stream[name]).unwrap_or(0.0);
-    let (mut width, mut height) = (side("width"), side("height"));
-    let told = ratio(text(&stream["sample_aspect_ratio"]), ':');
-    let aspect = hints.pixel_aspect.or(told).unwrap_or(1.0);
-    // Stretch the smaller dimension, so that no measured detail is lost.
-    match aspect {
-        a if a > 1.0 => width = (width * a).round(),
-        a if a > 0.0 => height = (height / a).round(),
-        _ => {}
-    }
-    let turn = turn_of(stream);
-    if turn.transpose {
+    let stored_aspect = ratio(text(&stream["sample_aspect_ratio"]), ':');
+    let aspect = options.pixel_aspect.or(stored_aspect);
+    let [mut width, mut height] = square_pixels([side("width"), side("height")], aspect);
+    let orientation = orientation_of(stream);
+    if orientation.transpose {
         std::mem::swap(&mut width, &mut height);
     }
-    (width as u64, height as u64, turn)
+    (width as u64, height as u64, orientation)
+}
+
+/// Returns the size in square pixels. The smaller dimension is stretched, so that no measured detail is lost.
+pub(in crate::media) fn square_pixels([width, height]: [f64; 2], aspect: Option<f64>) -> [f64; 2] {
+    match aspect {
+        Some(aspect) if aspect > 1.0 => [(width * aspect).round(), height],
+        Some(aspect) if aspect > 0.0 => [width, (height / aspect).round()],
+        _ => [width, height],
+    }
 }
 
 /// Returns the rotation of a display matrix, rounded to a quarter turn.
-fn turn_of(stream: &Value) -> Turn {
-    let matrices = stream["side_data_list"]
-        .as_array()
-        .map_or(&[][..], Vec::as_slice);
-    let matrix = matrices
+fn orientation_of(stream: &Value) -> Orientation {
+    let matrix = array(&stream["side_data_list"])
         .iter()
         .map(|data| text(&data["displaymatrix"]))
         .find(|m| !m.is_empty());
@@ -177,7 +177,7 @@ fn turn_of(stream: &Value) -> Turn {
         .flat_map(|(_, row)| row.split_whitespace().filter_map(|cell| cell.parse().ok()))
         .collect();
     let &[a, b, _, c, d, ..] = cells.as_slice() else {
-        return Turn {
+        return Orientation {
             transpose: false,
             flip_x: false,
             flip_y: false,
@@ -185,7 +185,7 @@ fn turn_of(stream: &Value) -> Turn {
     };
     // A stored point (x, y) is displayed at (a x + c y, b x + d y).
     let transpose = f64::abs(b) > f64::abs(a);
-    Turn {
+    Orientation {
         transpose,
         flip_x: if transpose { c < 0.0 } else { a < 0.0 },
         flip_y: if transpose { b < 0.0 } else { d < 0.0 },
@@ -248,6 +248,10 @@ pub(super) fn alpha_decoder(stream: &Value) -> Option<&'static str> {
         "vp9" => Some("libvpx-vp9"),
         _ => None,
     }
+}
+
+fn array(value: &Value) -> &[Value] {
+    value.as_array().map_or(&[], Vec::as_slice)
 }
 
 pub(super) fn text(value: &Value) -> &str {

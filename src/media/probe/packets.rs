@@ -8,25 +8,26 @@ use std::time::Duration;
 use crate::media::allow_list::input_args;
 use crate::media::container::Container;
 use crate::media::error::Error;
-use crate::media::gate::{Child, Order};
+use crate::media::gate::Child;
+use crate::media::invocation::Invocation;
 use crate::media::limits::Limits;
-use crate::media::tools::Tool;
+use crate::media::tools::{Tool, installed};
 
 /// Minimum read speed of a disk, bytes per second. Reading packet times needs the whole file. Free choice.
-const SLOWEST_DISK: u64 = 50_000_000;
+const MIN_DISK_BYTES_PER_S: u64 = 50_000_000;
 
 /// Maximum length of ffprobe's output for one packet with its side data, bytes. Free choice.
 const MAX_LINE_BYTES: usize = 64 << 10;
 
 /// Messages of ffprobe for a Matroska file whose structure breaks off.
-const BROKEN: [&str; 2] = ["File ended prematurely", "EBML number"];
+const STRUCTURE_ERRORS: [&str; 2] = ["File ended prematurely", "EBML number"];
 
 /// Packets of up to this size, bytes, may encode a repeated picture. Some decoders output no picture for
 /// them.
-const MAX_SILENT_BYTES: u64 = 16;
+const MAX_EMPTY_BYTES: u64 = 16;
 
 /// Longest delay of a picture by reordering in any codec, seconds.
-const LONGEST_REORDER_S: f64 = 1.0;
+const MAX_REORDER_S: f64 = 1.0;
 
 /// The packets of one stream.
 #[derive(Clone, Debug)]
@@ -36,7 +37,7 @@ pub(super) struct Packets {
     /// Presentation times of the displayed packets, in file order.
     times_s: Vec<Option<f64>>,
     /// Whether the packets alone do not determine the pictures.
-    is_unclear: bool,
+    is_ambiguous: bool,
     /// Whether a packet is encrypted.
     pub(super) encrypted: bool,
 }
@@ -46,7 +47,7 @@ pub(super) struct Packets {
 pub(super) struct AllPackets {
     streams: Vec<Packets>,
     /// The end of ffprobe's stderr.
-    complaint: String,
+    stderr_tail: String,
 }
 
 impl AllPackets {
@@ -61,41 +62,46 @@ impl AllPackets {
         let mut args = vec!["-select_streams".into(), "v".into()];
         args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
         args.extend(input_args(container, path, limits));
-        let order = Order::new(Tool::Ffprobe, args, limits, 0)
+        let invocation = Invocation::new(installed(Tool::Ffprobe)?, args, limits, 0)
             .with_input(path)
-            .with_more_time(Duration::from_secs(n_bytes / SLOWEST_DISK));
+            .with_more_time(Duration::from_secs(n_bytes / MIN_DISK_BYTES_PER_S));
         let mut streams = Vec::new();
-        let complaint = read_lines(order, |line| add(&mut streams, line, limits))?;
-        Ok(AllPackets { streams, complaint })
+        let stderr_tail = read_lines(invocation, |line| add_packet(&mut streams, line, limits))?;
+        Ok(AllPackets {
+            streams,
+            stderr_tail,
+        })
     }
 
     /// Returns the packets of a stream; an empty list if it has none.
-    pub(super) fn of(&self, stream_idx: u64) -> Packets {
-        let packets = self.streams.iter().find(|p| p.stream_idx == stream_idx);
-        packets.cloned().unwrap_or(Packets::none(stream_idx))
+    pub(super) fn of_stream(&self, stream_idx: u64) -> Packets {
+        let packets = self.find(stream_idx).cloned();
+        packets.unwrap_or(Packets::empty(stream_idx))
     }
 
     /// Returns the number of displayed packets of a stream.
     pub(super) fn n_shown(&self, stream_idx: u64) -> usize {
-        let packets = self.streams.iter().find(|p| p.stream_idx == stream_idx);
-        packets.map_or(0, Packets::n_shown)
+        self.find(stream_idx).map_or(0, Packets::n_shown)
+    }
+
+    fn find(&self, stream_idx: u64) -> Option<&Packets> {
+        self.streams.iter().find(|p| p.stream_idx == stream_idx)
     }
 
     /// Returns whether samples of a stream lie beyond the end of the file, the file ends inside a block, or
     /// its blocks are damaged.
     pub(super) fn is_cut(&self, stream_idx: u64) -> bool {
         let of_stream = format!("stream {stream_idx}, offset ");
-        let lines = self.complaint.lines();
-        let partial = |line: &str| line.contains("partial file") && line.contains(&of_stream);
-        let mut lines =
-            lines.filter(|line| BROKEN.iter().any(|what| line.contains(what)) || partial(line));
-        lines.next().is_some()
+        let is_partial = |line: &str| line.contains("partial file") && line.contains(&of_stream);
+        let is_broken = |line: &str| STRUCTURE_ERRORS.iter().any(|error| line.contains(error));
+        let mut lines = self.stderr_tail.lines();
+        lines.any(|line| is_broken(line) || is_partial(line))
     }
 }
 
 /// Parses one line about a packet: stream, time, size, flags, side data. Side data may continue on further
 /// lines.
-fn add(streams: &mut Vec<Packets>, line: &str, limits: &Limits) -> Result<(), Error> {
+fn add_packet(streams: &mut Vec<Packets>, line: &str, limits: &Limits) -> Result<(), Error> {
     let mut cells = line.split(',');
     let numbers = (cells.next().map(str::parse), cells.next(), cells.next());
     let (Some(Ok(stream_idx)), Some(time), Some(size)) = numbers else {
@@ -105,7 +111,7 @@ fn add(streams: &mut Vec<Packets>, line: &str, limits: &Limits) -> Result<(), Er
     };
     let at = streams.iter().position(|p| p.stream_idx == stream_idx);
     let at = at.unwrap_or_else(|| {
-        streams.push(Packets::none(stream_idx));
+        streams.push(Packets::empty(stream_idx));
         streams.len() - 1
     });
     let packets = &mut streams[at];
@@ -114,21 +120,16 @@ fn add(streams: &mut Vec<Packets>, line: &str, limits: &Limits) -> Result<(), Er
         return Ok(()); // outside the edit list: decoded, never shown
     }
     packets.times_s.push(time.parse().ok());
-    packets.is_unclear |= size.parse().is_ok_and(|size: u64| size <= MAX_SILENT_BYTES);
-    match packets.n_shown() > limits.max_frames {
-        true => Err(Error::TooManyFrames {
-            limit: limits.max_frames,
-        }),
-        false => Ok(()),
-    }
+    packets.is_ambiguous |= size.parse().is_ok_and(|size: u64| size <= MAX_EMPTY_BYTES);
+    limits.check_n_frames(packets.n_shown())
 }
 
 impl Packets {
-    fn none(stream_idx: u64) -> Packets {
+    fn empty(stream_idx: u64) -> Packets {
         Packets {
             stream_idx,
             times_s: Vec::new(),
-            is_unclear: false,
+            is_ambiguous: false,
             encrypted: false,
         }
     }
@@ -145,9 +146,9 @@ impl Packets {
         let mut latest_s = f64::MIN;
         let leaps_back = shown_s.iter().any(|&time| {
             latest_s = latest_s.max(time);
-            time < latest_s - LONGEST_REORDER_S
+            time < latest_s - MAX_REORDER_S
         });
-        if self.is_unclear || leaps_back {
+        if self.is_ambiguous || leaps_back {
             return None;
         }
         shown_s.sort_by(f64::total_cmp);
@@ -161,45 +162,45 @@ pub(super) struct Pictures {
     /// Times in display order; `None` for a picture without a time.
     pub(super) times_s: Vec<Option<f64>>,
     /// The end of the decoder's stderr.
-    pub(super) complaint: String,
+    pub(super) stderr_tail: String,
 }
 
 impl Pictures {
-    /// Decodes a stream of `n_packets` and reads the times of its pictures. Fails beyond `limits.max_frames`.
+    /// Decodes the stream of the packets and reads the times of its pictures. Fails beyond `limits.max_frames`.
     pub(super) fn read(
         container: Container,
         path: &Path,
-        (stream_idx, n_packets): (u64, usize),
+        packets: &Packets,
         limits: &Limits,
     ) -> Result<Pictures, Error> {
-        let mut args = vec!["-select_streams".into(), stream_idx.to_string().into()];
+        let stream = packets.stream_idx.to_string();
+        let mut args = vec!["-select_streams".into(), stream.into()];
         let entries = "frame=best_effort_timestamp_time";
         args.extend(["-show_entries", entries, "-of", "csv=p=0"].map(Into::into));
         args.extend(input_args(container, path, limits));
-        let order = Order::new(Tool::Ffprobe, args, limits, n_packets.max(1)).with_input(path);
+        let (ffprobe, n_frames) = (installed(Tool::Ffprobe)?, packets.n_shown().max(1));
+        let invocation = Invocation::new(ffprobe, args, limits, n_frames).with_input(path);
         let mut times_s = Vec::new();
-        let complaint = read_lines(order, |line| {
+        let stderr_tail = read_lines(invocation, |line| {
             let time = line.split(',').next().unwrap_or_default();
             if time == "N/A" || time.parse::<f64>().is_ok() {
                 times_s.push(time.parse().ok());
             }
-            match times_s.len() > limits.max_frames {
-                true => Err(Error::TooManyFrames {
-                    limit: limits.max_frames,
-                }),
-                false => Ok(()),
-            }
+            limits.check_n_frames(times_s.len())
         })?;
-        Ok(Pictures { times_s, complaint })
+        Ok(Pictures {
+            times_s,
+            stderr_tail,
+        })
     }
 }
 
 /// Runs a tool and passes each line of its output to `take`. Returns its stderr.
 fn read_lines(
-    order: Order,
+    invocation: Invocation<'_>,
     mut take: impl FnMut(&str) -> Result<(), Error>,
 ) -> Result<String, Error> {
-    let mut child = Child::reading(order)?;
+    let mut child = Child::reading(invocation)?;
     let (mut chunk, mut line) = (vec![0; 1 << 16], Vec::new());
     loop {
         let n_read = child.read_some(&mut chunk)?;
@@ -208,7 +209,7 @@ fn read_lines(
         }
         split_lines(&chunk[..n_read], &mut line, &mut take)?;
     }
-    Ok(child.finish()?.check()?.complaint)
+    Ok(child.finish()?.check()?.stderr_tail)
 }
 
 /// Splits a piece of output into lines. `line` holds the start of an unfinished line.
@@ -238,17 +239,17 @@ mod tests {
     fn packets(lines: &str) -> Packets {
         let mut streams = Vec::new();
         for line in lines.lines() {
-            add(&mut streams, line, &Limits::default()).unwrap();
+            add_packet(&mut streams, line, &Limits::default()).unwrap();
         }
         let all = AllPackets {
             streams,
-            complaint: String::new(),
+            stderr_tail: String::new(),
         };
-        all.of(1)
+        all.of_stream(1)
     }
 
     #[test]
-    fn a_line_may_come_in_pieces_but_must_end() {
+    fn line_in_pieces_is_joined_and_endless_line_refused() {
         let (mut line, mut seen) = (Vec::new(), Vec::new());
         let mut take = |line: &str| {
             seen.push(line.to_owned());
@@ -265,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn each_stream_is_counted_by_itself_and_what_is_never_shown_is_not() {
+    fn packets_are_counted_by_stream_without_discarded_ones() {
         let lines = "0,0.0,99,K__\n1,0.0,99,K__\n1,0.2,99,___\n1,0.1,99,__\n1,0.3,99,_D_\nEncryption info\n";
         let packets = packets(lines);
         assert_eq!(packets.shown_s(), Some(vec![0.0, 0.1, 0.2]));
@@ -273,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn packets_without_times_or_pictures_or_order_do_not_tell() {
+    fn packets_without_times_pictures_or_order_determine_no_times() {
         for unclear in ["1,N/A,99,___", "1,0.2,0,___", "1,-3.0,99,___"] {
             let lines = format!("1,0.0,99,K__\n1,0.1,99,___\n{unclear}\n");
             assert_eq!(packets(&lines).shown_s(), None, "{unclear}");

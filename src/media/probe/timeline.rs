@@ -4,10 +4,10 @@
 //! up to the rounding of its clock, stays unchanged. Any other film is resampled at its nominal rate. Each
 //! frame is then the one nearest in time and keeps its own true time.
 
-use super::clock;
+use super::timestamps;
 use crate::media::error::Error;
 use crate::media::limits::Limits;
-use crate::media::note::Note;
+use crate::media::notice::Notice;
 
 /// Frame rate of a film without any timing, frames per second: that of most cameras.
 const ASSUMED_FPS: f64 = 30.0;
@@ -28,10 +28,10 @@ const COMMON_FPS: [f64; 11] = [
 ];
 
 /// Tolerance between the measured and a nominal rate: 0.5 %. Free choice.
-const NEAR: f64 = 0.005;
+const RATE_TOLERANCE: f64 = 0.005;
 
 /// Number of last frames that may be late in a film of constant rate.
-const RAGGED: usize = 3;
+const MAX_LATE_FRAMES: usize = 3;
 
 /// Assignment of decoded frames to times.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +42,7 @@ pub(in crate::media) enum Timeline {
         fps: f64,
         /// True times, seconds from the first, of the last few frames, if those are late. A film cut without
         /// re-encoding lacks some of the frames before its last.
-        ragged_s: Vec<f64>,
+        late_s: Vec<f64>,
     },
     /// Frames skipped and repeated to make the rate constant.
     Variable {
@@ -63,67 +63,65 @@ pub(in crate::media) struct Claims {
     /// Resolution of the file's timestamps, seconds.
     pub(in crate::media) tick_s: f64,
     /// Frame rate given by the user, which overrides the file.
-    pub(in crate::media) wanted_fps: Option<f64>,
+    pub(in crate::media) given_fps: Option<f64>,
 }
 
 impl Timeline {
     /// Returns the timeline of pictures with the given times in the file, in display order. Fails if it
     /// exceeds the limits.
-    pub(in crate::media) fn found(
+    pub(in crate::media) fn new(
         times_s: &[Option<f64>],
         claims: &Claims,
         limits: &Limits,
-    ) -> Result<(Timeline, Vec<Note>), Error> {
+    ) -> Result<(Timeline, Vec<Notice>), Error> {
         let n_pictures = times_s.len();
         if n_pictures < limits.min_frames {
             return Err(Error::TooFewFrames {
                 n_frames: n_pictures,
             });
         }
-        let mut notes = Vec::new();
-        let timeline = match claims.wanted_fps {
-            Some(fps) => Timeline::even(fps),
-            None => Timeline::by_clock(times_s, claims, limits, &mut notes)?,
-        };
-        let n_frames = match &timeline {
-            Timeline::Constant { .. } => n_pictures,
-            Timeline::Variable { sources, .. } => sources.len(),
+        let mut notices = Vec::new();
+        let timeline = match claims.given_fps {
+            Some(fps) => Timeline::constant(fps),
+            None => Timeline::from_times(times_s, claims, limits, &mut notices)?,
         };
         let fps = timeline.fps();
-        check_extent(n_frames as f64 / fps, fps, limits)?;
-        Ok((timeline, notes))
+        let duration_s = timeline.n_frames(n_pictures) as f64 / fps;
+        check_extent(duration_s, fps, limits)?;
+        Ok((timeline, notices))
     }
 
-    fn by_clock(
+    /// Returns the timeline of repaired times, with notices about repairs and assumptions.
+    fn from_times(
         times_s: &[Option<f64>],
         claims: &Claims,
         limits: &Limits,
-        notes: &mut Vec<Note>,
+        notices: &mut Vec<Notice>,
     ) -> Result<Timeline, Error> {
-        let Some(mended) = clock::mend(times_s) else {
+        let Some(repaired) = timestamps::repair(times_s) else {
             let fps = claims.fps.first().copied().unwrap_or(ASSUMED_FPS);
             if claims.fps.is_empty() {
-                notes.push(Note::RateAssumed { fps });
+                notices.push(Notice::RateAssumed { fps });
             }
-            return Ok(Timeline::even(fps));
+            return Ok(Timeline::constant(fps));
         };
-        if let Some(&[at_s, by_s]) = mended.leaps_s.first() {
-            let n_leaps = mended.leaps_s.len();
-            notes.push(Note::TimesLeap {
+        if let Some(&[at_s, by_s]) = repaired.leaps_s.first() {
+            let n_leaps = repaired.leaps_s.len();
+            notices.push(Notice::TimesLeap {
                 at_s,
                 by_s,
                 n_leaps,
             });
         }
-        let found = Timeline::of(&mended.times_s, &claims.fps, claims.tick_s, limits)?;
-        found.ok_or(Error::TooFewFrames {
+        let timeline = Timeline::fit(&repaired.times_s, &claims.fps, claims.tick_s, limits)?;
+        timeline.ok_or(Error::TooFewFrames {
             n_frames: times_s.len(),
         })
     }
 
-    fn even(fps: f64) -> Timeline {
-        let ragged_s = Vec::new();
-        Timeline::Constant { fps, ragged_s }
+    fn constant(fps: f64) -> Timeline {
+        let late_s = Vec::new();
+        Timeline::Constant { fps, late_s }
     }
 
     /// Returns the timeline of frames shown at `times_s` (ascending), given the claimed rates and the clock
@@ -131,7 +129,7 @@ impl Timeline {
     ///
     /// Returns `None` if there are fewer than two times or all are equal. Excessive time spans and rates are
     /// refused before the frames are enumerated, because a few bytes can claim billions of frames.
-    fn of(
+    fn fit(
         times_s: &[f64],
         claimed_fps: &[f64],
         tick_s: f64,
@@ -145,19 +143,19 @@ impl Timeline {
             return Ok(None);
         }
         let mean_fps = (times_s.len() - 1) as f64 / span_s;
-        for n_ragged in [0, RAGGED] {
-            let Some(even) = times_s
-                .len()
-                .checked_sub(n_ragged)
-                .filter(|n| *n > n_ragged)
-            else {
+        for n_late in [0, MAX_LATE_FRAMES] {
+            let n_regular = times_s.len().saturating_sub(n_late);
+            if n_regular <= n_late {
                 break;
-            };
-            let (even, ragged) = times_s.split_at(even);
+            }
+            let (regular, late) = times_s.split_at(n_regular);
             let rates = claimed_fps.iter().copied().chain([mean_fps]);
-            if let Some(fps) = rates.into_iter().find(|&fps| is_regular(even, fps, tick_s)) {
-                let ragged_s = ragged.iter().map(|time| time - first).collect();
-                return Ok(Some(Timeline::Constant { fps, ragged_s }));
+            if let Some(fps) = rates
+                .into_iter()
+                .find(|&fps| is_regular(regular, fps, tick_s))
+            {
+                let late_s = late.iter().map(|time| time - first).collect();
+                return Ok(Some(Timeline::Constant { fps, late_s }));
             }
         }
         let times_s: Vec<f64> = times_s.iter().map(|time| time - first).collect();
@@ -171,6 +169,14 @@ impl Timeline {
             times_s,
             sources,
         }))
+    }
+
+    /// Returns the number of output frames of a film with `n_pictures`.
+    pub(in crate::media) fn n_frames(&self, n_pictures: usize) -> usize {
+        match self {
+            Timeline::Constant { .. } => n_pictures,
+            Timeline::Variable { sources, .. } => sources.len(),
+        }
     }
 
     /// Returns the frame rate of the output, frames per second.
@@ -203,17 +209,12 @@ fn nominal_fps(times_s: &[f64], claimed_fps: &[f64]) -> Option<f64> {
         .collect();
     steps.sort_by(f64::total_cmp);
     let median = *steps.get(steps.len() / 2)?;
-    let ordinary = || {
-        steps
-            .iter()
-            .filter(|step| (median * 0.5..median * 1.5).contains(*step))
-    };
-    let fps = ordinary().count() as f64 / ordinary().sum::<f64>();
-    let known = claimed_fps.iter().chain(&COMMON_FPS);
+    steps.retain(|step| (median * 0.5..median * 1.5).contains(step));
+    let fps = steps.len() as f64 / steps.iter().sum::<f64>();
+    let mut known = claimed_fps.iter().chain(&COMMON_FPS).copied();
     Some(
         known
-            .copied()
-            .find(|k| (k / fps - 1.0).abs() < NEAR)
+            .find(|known| (known / fps - 1.0).abs() < RATE_TOLERANCE)
             .unwrap_or(fps),
     )
 }
@@ -229,11 +230,12 @@ fn check_extent(span_s: f64, fps: f64, limits: &Limits) -> Result<(), Error> {
             unit: "s",
         });
     }
-    match span_s * fps >= limits.max_frames as f64 + 0.5 {
-        true => Err(Error::TooManyFrames {
+    if span_s * fps >= limits.max_frames as f64 + 0.5 {
+        Err(Error::TooManyFrames {
             limit: limits.max_frames,
-        }),
-        false => Ok(()),
+        })
+    } else {
+        Ok(())
     }
 }
 
@@ -242,7 +244,7 @@ fn nearest(times_s: &[f64], fps: f64) -> Vec<u32> {
     let last_s = times_s[times_s.len() - 1];
     let n_frames = (last_s * fps + 0.5) as usize + 1;
     let mut at = 0;
-    let choose = |k: usize| {
+    let nearest_idx = |k: usize| {
         let instant_s = k as f64 / fps;
         let gap = |i: usize| (times_s[i] - instant_s).abs();
         while at + 1 < times_s.len() && (gap(at + 1) < gap(at) || times_s[at + 1] <= instant_s) {
@@ -250,7 +252,7 @@ fn nearest(times_s: &[f64], fps: f64) -> Vec<u32> {
         }
         at as u32
     };
-    (0..n_frames).map(choose).collect()
+    (0..n_frames).map(nearest_idx).collect()
 }
 
 #[cfg(test)]
@@ -260,17 +262,17 @@ mod tests {
     use super::*;
     use crate::code::Code;
 
-    fn of(times_s: &[f64], claimed_fps: &[f64], tick_s: f64) -> Option<Timeline> {
-        Timeline::of(times_s, claimed_fps, tick_s, &Limits::default()).unwrap()
+    fn fit(times_s: &[f64], claimed_fps: &[f64], tick_s: f64) -> Option<Timeline> {
+        Timeline::fit(times_s, claimed_fps, tick_s, &Limits::default()).unwrap()
     }
 
     #[test]
-    fn a_leap_in_time_is_refused_before_its_frames_are_counted_out() {
+    fn excessive_leap_is_refused_before_frames_are_enumerated() {
         let refusal = |steps_s: [f64; 2]| {
             let times: Vec<f64> = (0..40)
                 .map(|k| f64::from(k) * steps_s[0] + f64::from(k / 20) * steps_s[1])
                 .collect();
-            let timeline = Timeline::of(&times, &[], 1e-6, &Limits::default());
+            let timeline = Timeline::fit(&times, &[], 1e-6, &Limits::default());
             timeline.unwrap_err().code()
         };
         assert_eq!(refusal([0.04, 1e11]), Code::TooLong);
@@ -283,32 +285,26 @@ mod tests {
     }
 
     #[test]
-    fn times_rounded_to_milliseconds_are_a_constant_rate() {
+    fn times_rounded_to_milliseconds_are_constant() {
         let times = rounded((0..500).map(|k| f64::from(k) / 29.97), 0.001);
-        let timeline = of(&times, &[29.97], 0.001);
-        let ragged_s = Vec::new();
-        let constant = Timeline::Constant {
-            fps: 29.97,
-            ragged_s,
-        };
+        let timeline = fit(&times, &[29.97], 0.001);
+        let late_s = Vec::new();
+        let constant = Timeline::Constant { fps: 29.97, late_s };
         assert_eq!(timeline, Some(constant));
     }
 
     #[test]
-    fn a_film_that_lacks_its_last_frame_but_one_is_still_constant() {
+    fn film_without_its_last_frame_but_one_is_constant() {
         let shown = (0..10).filter(|k| *k != 8);
         let times: Vec<f64> = shown.map(|k| f64::from(k) / 25.0).collect();
-        let timeline = of(&times, &[25.0], 1e-4);
-        let ragged_s = vec![0.24, 0.28, 0.36];
-        let constant = Timeline::Constant {
-            fps: 25.0,
-            ragged_s,
-        };
+        let timeline = fit(&times, &[25.0], 1e-4);
+        let late_s = vec![0.24, 0.28, 0.36];
+        let constant = Timeline::Constant { fps: 25.0, late_s };
         assert_eq!(timeline, Some(constant));
     }
 
     #[test]
-    fn a_missing_frame_is_replaced_by_its_neighbor_and_keeps_its_true_time() {
+    fn missing_frame_is_replaced_by_its_neighbor_with_its_true_time() {
         let times: Vec<f64> = (0..10)
             .filter(|k| *k != 4)
             .map(|k| f64::from(k) / 25.0)
@@ -317,7 +313,7 @@ mod tests {
             fps,
             times_s,
             sources,
-        }) = of(&times, &[25.0], 1e-4)
+        }) = fit(&times, &[25.0], 1e-4)
         else {
             panic!("a gap is not a constant rate");
         };
@@ -327,21 +323,21 @@ mod tests {
     }
 
     #[test]
-    fn a_coarse_clock_does_not_hide_a_missing_frame() {
+    fn coarse_clock_does_not_hide_a_missing_frame() {
         let times: Vec<f64> = (0..10)
             .filter(|k| *k != 5)
             .map(|k| f64::from(k) / 30.0)
             .collect();
-        let timeline = of(&times, &[30.0], 1.0 / 30.0);
+        let timeline = fit(&times, &[30.0], 1.0 / 30.0);
         assert!(matches!(timeline, Some(Timeline::Variable { .. })));
     }
 
     proptest! {
         #[test]
-        fn every_given_frame_is_the_nearest_in_time(steps in prop::collection::vec(0.001f64..0.2, 2..60)) {
+        fn every_output_frame_is_the_nearest_in_time(steps in prop::collection::vec(0.001f64..0.2, 2..60)) {
             let mut time = 0.0;
             let times: Vec<f64> = steps.iter().map(|step| { time += step; time }).collect();
-            if let Some(Timeline::Variable { fps, times_s, sources }) = of(&times, &[], 1e-6) {
+            if let Some(Timeline::Variable { fps, times_s, sources }) = fit(&times, &[], 1e-6) {
                 for (k, &source) in sources.iter().enumerate() {
                     let instant_s = k as f64 / fps;
                     let least = times_s.iter().map(|t| (t - instant_s).abs()).fold(f64::MAX, f64::min);

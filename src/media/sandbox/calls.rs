@@ -18,11 +18,11 @@ use libc::{c_long, sock_filter};
 use super::refused::REFUSED;
 
 /// Placeholder in the filter for the child's process id, which is known only after the fork.
-const OWN: u32 = u32::MAX;
+const PID_PLACEHOLDER: u32 = u32::MAX;
 
 /// Highest known system call number. Calls with higher numbers fail with ENOSYS, as on an older kernel, which
 /// libraries handle. On x86-64 this range includes the 32-bit (x32) numbers.
-const NEWEST: u32 = libc::SYS_mseal as u32;
+const MAX_NUMBER: u32 = libc::SYS_mseal as u32;
 
 #[cfg(target_arch = "x86_64")]
 const ARCH: Option<u32> = Some(0xc000_003e);
@@ -34,7 +34,7 @@ const ARCH: Option<u32> = None;
 // Offsets of a call's number, architecture and the low and high halves of its arguments. Both architectures
 // above are little-endian.
 const NUMBER: u32 = 0;
-const LANGUAGE: u32 = 4;
+const ARCHITECTURE: u32 = 4;
 const fn low(argument: u32) -> u32 {
     16 + 8 * argument
 }
@@ -43,15 +43,16 @@ const fn high(argument: u32) -> u32 {
 }
 
 /// Returns why this machine does not support the filter; `None` if it does.
-pub(super) fn lack() -> Option<String> {
+pub(super) fn unsupported_reason() -> Option<String> {
     if ARCH.is_none() {
         return Some("the system call filter does not support this processor".to_owned());
     }
-    const ASK_ACTION: libc::c_ulong = 2;
+    const GET_ACTION_AVAIL: libc::c_ulong = 2;
     let action = libc::SECCOMP_RET_ERRNO;
     // SAFETY: the kernel reads one number, which lives until the call returns.
-    let asked = unsafe { libc::syscall(libc::SYS_seccomp, ASK_ACTION, 0, &raw const action) };
-    match asked {
+    let result =
+        unsafe { libc::syscall(libc::SYS_seccomp, GET_ACTION_AVAIL, 0, &raw const action) };
+    match result {
         0 => None,
         _ => Some(format!(
             "this kernel has no seccomp filters: {}",
@@ -63,38 +64,38 @@ pub(super) fn lack() -> Option<String> {
 /// Returns the filter, which the kernel runs for every system call of the child.
 pub(super) fn program() -> Vec<sock_filter> {
     let mut program = Program(Vec::new());
-    program.load(LANGUAGE);
-    program.when_not(ARCH.unwrap_or_default(), libc::SECCOMP_RET_KILL_PROCESS);
+    program.load(ARCHITECTURE);
+    program.return_if_not(ARCH.unwrap_or_default(), libc::SECCOMP_RET_KILL_PROCESS);
     program.load(NUMBER);
-    program.when_above(NEWEST, refusal(libc::ENOSYS));
+    program.return_if_above(MAX_NUMBER, refusal(libc::ENOSYS));
     // The flags of clone3 are in memory, which a filter cannot read. Libraries fall back to `clone`.
-    program.when(libc::SYS_clone3, refusal(libc::ENOSYS));
-    for call in REFUSED.iter().flat_map(|(_, calls)| *calls) {
-        program.when(*call, refusal(libc::EPERM));
+    program.return_if(libc::SYS_clone3, refusal(libc::ENOSYS));
+    for call in REFUSED {
+        program.return_if(*call, refusal(libc::EPERM));
     }
     // Threads are also created by `clone`.
-    program.when_then(libc::SYS_clone, |then| {
+    program.when_equal_then(libc::SYS_clone, |then| {
         then.load(low(0));
-        then.unless_bit(libc::CLONE_THREAD as u32, refusal(libc::EPERM));
+        then.return_unless_bit(libc::CLONE_THREAD as u32, refusal(libc::EPERM));
     });
     // A program aborts by sending itself a signal.
-    program.when_then(libc::SYS_tgkill, |then| {
+    program.when_equal_then(libc::SYS_tgkill, |then| {
         then.load(low(0));
-        then.when_not(OWN, refusal(libc::EPERM));
+        then.return_if_not(PID_PLACEHOLDER, refusal(libc::EPERM));
     });
     // The parent death signal must stay set.
-    program.when_then(libc::SYS_prctl, |then| {
+    program.when_equal_then(libc::SYS_prctl, |then| {
         then.load(low(0));
-        then.when(libc::PR_SET_PDEATHSIG.into(), refusal(libc::EPERM));
+        then.return_if(libc::PR_SET_PDEATHSIG.into(), refusal(libc::EPERM));
     });
     // Limits may be read but not set.
-    program.when_then(libc::SYS_prlimit64, |then| {
+    program.when_equal_then(libc::SYS_prlimit64, |then| {
         for half in [low(2), high(2)] {
             then.load(half);
-            then.when_not(0, refusal(libc::EPERM));
+            then.return_if_not(0, refusal(libc::EPERM));
         }
     });
-    program.end(libc::SECCOMP_RET_ALLOW);
+    program.return_with(libc::SECCOMP_RET_ALLOW);
     program.0
 }
 
@@ -103,17 +104,17 @@ fn refusal(errno: i32) -> u32 {
 }
 
 /// Writes the id of the calling process into its filter. Async-signal-safe.
-fn own(program: &mut [sock_filter]) {
+fn insert_own_pid(program: &mut [sock_filter]) {
     // SAFETY: the call has no arguments and cannot fail.
     let process = unsafe { libc::getpid() };
-    for step in program.iter_mut().filter(|step| step.k == OWN) {
+    for step in program.iter_mut().filter(|step| step.k == PID_PLACEHOLDER) {
         step.k = process as u32;
     }
 }
 
 /// Enters the filter in the child. This cannot be undone. Async-signal-safe.
 pub(super) fn enter(program: &mut [sock_filter]) -> io::Result<()> {
-    own(program);
+    insert_own_pid(program);
     let filter = libc::sock_fprog {
         len: program.len() as u16,
         filter: program.as_ptr().cast_mut(),
@@ -137,7 +138,7 @@ pub(super) fn enter(program: &mut [sock_filter]) -> io::Result<()> {
 struct Program(Vec<sock_filter>);
 
 impl Program {
-    fn put(&mut self, code: u32, value: u32, if_true: u8, if_false: u8) {
+    fn push(&mut self, code: u32, value: u32, if_true: u8, if_false: u8) {
         self.0.push(sock_filter {
             code: code as u16,
             jt: if_true,
@@ -147,44 +148,44 @@ impl Program {
     }
 
     fn load(&mut self, at: u32) {
-        self.put(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, at, 0, 0);
+        self.push(libc::BPF_LD | libc::BPF_W | libc::BPF_ABS, at, 0, 0);
     }
 
-    fn end(&mut self, answer: u32) {
-        self.put(libc::BPF_RET | libc::BPF_K, answer, 0, 0);
+    fn return_with(&mut self, action: u32) {
+        self.push(libc::BPF_RET | libc::BPF_K, action, 0, 0);
     }
 
-    fn when(&mut self, value: c_long, answer: u32) {
+    fn return_if(&mut self, value: c_long, action: u32) {
         let equal = libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K;
-        self.put(equal, value as u32, 0, 1);
-        self.end(answer);
+        self.push(equal, value as u32, 0, 1);
+        self.return_with(action);
     }
 
-    fn when_not(&mut self, value: u32, answer: u32) {
+    fn return_if_not(&mut self, value: u32, action: u32) {
         let equal = libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K;
-        self.put(equal, value, 1, 0);
-        self.end(answer);
+        self.push(equal, value, 1, 0);
+        self.return_with(action);
     }
 
-    fn when_above(&mut self, value: u32, answer: u32) {
+    fn return_if_above(&mut self, value: u32, action: u32) {
         let greater = libc::BPF_JMP | libc::BPF_JGT | libc::BPF_K;
-        self.put(greater, value, 0, 1);
-        self.end(answer);
+        self.push(greater, value, 0, 1);
+        self.return_with(action);
     }
 
-    fn unless_bit(&mut self, bit: u32, answer: u32) {
+    fn return_unless_bit(&mut self, bit: u32, action: u32) {
         let any_bit = libc::BPF_JMP | libc::BPF_JSET | libc::BPF_K;
-        self.put(any_bit, bit, 1, 0);
-        self.end(answer);
+        self.push(any_bit, bit, 1, 0);
+        self.return_with(action);
     }
 
     /// Adds tests for one call. If none of them refuses it, the call is allowed.
-    fn when_then(&mut self, call: c_long, look: impl FnOnce(&mut Program)) {
+    fn when_equal_then(&mut self, call: c_long, tests: impl FnOnce(&mut Program)) {
         let mut then = Program(Vec::new());
-        look(&mut then);
-        then.end(libc::SECCOMP_RET_ALLOW);
+        tests(&mut then);
+        then.return_with(libc::SECCOMP_RET_ALLOW);
         let equal = libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K;
-        self.put(equal, call as u32, 0, then.0.len() as u8);
+        self.push(equal, call as u32, 0, then.0.len() as u8);
         self.0.append(&mut then.0);
     }
 }
@@ -194,7 +195,7 @@ mod tests {
     use super::*;
 
     /// Runs the filter as the kernel would.
-    fn answer(number: c_long, arguments: [u64; 3]) -> u32 {
+    fn action_for(number: c_long, arguments: [u64; 3]) -> u32 {
         let mut call = vec![number as u32, ARCH.unwrap_or_default(), 0, 0];
         call.extend(
             arguments
@@ -206,7 +207,7 @@ mod tests {
 
     fn run(call: &[u32]) -> u32 {
         let mut program = program();
-        own(&mut program);
+        insert_own_pid(&mut program);
         let (mut at, mut loaded) = (0, 0);
         loop {
             let step = &program[at];
@@ -228,12 +229,12 @@ mod tests {
         }
     }
 
-    const YES: u32 = libc::SECCOMP_RET_ALLOW;
+    const ALLOW: u32 = libc::SECCOMP_RET_ALLOW;
 
     #[test]
-    fn every_listed_call_is_refused_and_what_a_decoder_lives_on_is_not() {
-        for call in REFUSED.iter().flat_map(|(_, calls)| *calls) {
-            assert_eq!(answer(*call, [0; 3]), refusal(libc::EPERM), "{call}");
+    fn listed_calls_are_refused_and_those_of_decoders_allowed() {
+        for call in REFUSED {
+            assert_eq!(action_for(*call, [0; 3]), refusal(libc::EPERM), "{call}");
         }
         for call in [
             libc::SYS_read,
@@ -244,51 +245,54 @@ mod tests {
             libc::SYS_ftruncate,
             libc::SYS_madvise,
         ] {
-            assert_eq!(answer(call, [0; 3]), YES, "{call}");
+            assert_eq!(action_for(call, [0; 3]), ALLOW, "{call}");
         }
     }
 
     #[test]
-    fn a_program_may_abort_itself_and_nobody_else() {
+    fn signal_to_own_process_is_allowed_and_to_others_refused() {
         let process = u64::from(std::process::id());
-        assert_eq!(answer(libc::SYS_tgkill, [process, 7, 6]), YES);
-        let other = answer(libc::SYS_tgkill, [process + 1, 7, 6]);
+        assert_eq!(action_for(libc::SYS_tgkill, [process, 7, 6]), ALLOW);
+        let other = action_for(libc::SYS_tgkill, [process + 1, 7, 6]);
         assert_eq!(other, refusal(libc::EPERM));
     }
 
     #[test]
-    fn a_thread_is_no_process() {
+    fn new_threads_are_allowed_and_processes_refused() {
         let thread = (libc::CLONE_VM | libc::CLONE_THREAD) as u64;
-        assert_eq!(answer(libc::SYS_clone, [thread, 0, 0]), YES);
+        assert_eq!(action_for(libc::SYS_clone, [thread, 0, 0]), ALLOW);
         let process = libc::SIGCHLD as u64;
         assert_eq!(
-            answer(libc::SYS_clone, [process, 0, 0]),
+            action_for(libc::SYS_clone, [process, 0, 0]),
             refusal(libc::EPERM)
         );
-        assert_eq!(answer(libc::SYS_clone3, [0; 3]), refusal(libc::ENOSYS));
+        assert_eq!(action_for(libc::SYS_clone3, [0; 3]), refusal(libc::ENOSYS));
     }
 
     #[test]
-    fn limits_may_be_read_and_not_set_nor_the_leash_slipped() {
-        assert_eq!(answer(libc::SYS_prlimit64, [0, 7, 0]), YES);
+    fn reading_limits_is_allowed_and_setting_them_or_the_death_signal_refused() {
+        assert_eq!(action_for(libc::SYS_prlimit64, [0, 7, 0]), ALLOW);
         for new in [1, 1 << 40] {
-            let set = answer(libc::SYS_prlimit64, [0, 7, new]);
+            let set = action_for(libc::SYS_prlimit64, [0, 7, new]);
             assert_eq!(set, refusal(libc::EPERM));
         }
         let slip = libc::PR_SET_PDEATHSIG as u64;
-        assert_eq!(answer(libc::SYS_prctl, [slip, 0, 0]), refusal(libc::EPERM));
         assert_eq!(
-            answer(libc::SYS_prctl, [libc::PR_SET_NAME as u64, 0, 0]),
-            YES
+            action_for(libc::SYS_prctl, [slip, 0, 0]),
+            refusal(libc::EPERM)
+        );
+        assert_eq!(
+            action_for(libc::SYS_prctl, [libc::PR_SET_NAME as u64, 0, 0]),
+            ALLOW
         );
     }
 
     #[test]
-    fn calls_of_another_language_kill_and_those_of_tomorrow_are_unknown() {
+    fn other_architectures_are_killed_and_newer_calls_unknown() {
         let of_i386 = [libc::SYS_read as u32, 0x4000_0003, 0, 0, 0, 0, 0, 0, 0, 0];
         assert_eq!(run(&of_i386), libc::SECCOMP_RET_KILL_PROCESS);
         let unknown = refusal(libc::ENOSYS);
-        assert_eq!(answer(c_long::from(NEWEST) + 1, [0; 3]), unknown);
-        assert_eq!(answer(libc::SYS_socket | 0x4000_0000, [0; 3]), unknown);
+        assert_eq!(action_for(c_long::from(MAX_NUMBER) + 1, [0; 3]), unknown);
+        assert_eq!(action_for(libc::SYS_socket | 0x4000_0000, [0; 3]), unknown);
     }
 }

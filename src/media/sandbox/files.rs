@@ -18,19 +18,19 @@ use landlock::{
     RulesetCreated, RulesetCreatedAttr, Scope,
 };
 
-use super::{Cage, Layer};
+use super::{Layer, Policy};
 
 /// Files that a program needs to run: the program, its loader and its libraries.
 #[derive(Clone, Debug, Default)]
-pub(in crate::media) struct Reach {
+pub(in crate::media) struct ProgramFiles {
     /// Files that may be executed: the program and its loader.
-    pub(in crate::media) runs: Vec<PathBuf>,
+    pub(in crate::media) executables: Vec<PathBuf>,
     /// Folders of its libraries, which may be read.
-    pub(in crate::media) reads: Vec<PathBuf>,
+    pub(in crate::media) library_dirs: Vec<PathBuf>,
 }
 
 /// Files that libraries read when they are loaded. None of them is secret.
-const USUAL: [&str; 9] = [
+const STARTUP_FILES: [&str; 9] = [
     "/etc/ld.so.cache",
     "/etc/ld.so.preload",
     "/dev/null",
@@ -46,11 +46,14 @@ const USUAL: [&str; 9] = [
 const NEWEST: ABI = ABI::V6;
 
 /// Returns the rules of a child, ready to be entered; `None` if no layer needs them.
-pub(super) fn ruleset(cage: &Cage, reach: &Reach) -> io::Result<Option<OwnedFd>> {
+pub(super) fn ruleset(
+    policy: &Policy,
+    program_files: &ProgramFiles,
+) -> io::Result<Option<OwnedFd>> {
     let mut rules = Ruleset::default();
     let mut is_empty = true;
     for layer in [Layer::Files, Layer::Network, Layer::Signals] {
-        if !cage.layers.has(layer) {
+        if !policy.layers.has(layer) {
             continue;
         }
         is_empty = false;
@@ -65,28 +68,37 @@ pub(super) fn ruleset(cage: &Cage, reach: &Reach) -> io::Result<Option<OwnedFd>>
         return Ok(None);
     }
     let mut rules = rules.create().map_err(io::Error::other)?;
-    if cage.layers.has(Layer::Files) {
-        rules = allow(rules, cage, reach)?;
+    if policy.layers.has(Layer::Files) {
+        rules = allow(rules, policy, program_files)?;
     }
     Ok(rules.into())
 }
 
-fn allow(mut rules: RulesetCreated, cage: &Cage, reach: &Reach) -> io::Result<RulesetCreated> {
+fn allow(
+    mut rules: RulesetCreated,
+    policy: &Policy,
+    program_files: &ProgramFiles,
+) -> io::Result<RulesetCreated> {
     let read = BitFlags::from(AccessFs::ReadFile);
     let write = AccessFs::ReadFile | AccessFs::WriteFile | AccessFs::Truncate;
-    let must = |path: &Path| PathFd::new(path).map_err(io::Error::other);
-    for path in &reach.runs {
-        rules = add(rules, must(path)?, AccessFs::Execute | AccessFs::ReadFile)?;
+    let open = |path: &Path| PathFd::new(path).map_err(io::Error::other);
+    for path in &program_files.executables {
+        rules = add(rules, open(path)?, AccessFs::Execute | AccessFs::ReadFile)?;
     }
-    if let Some(input) = &cage.input {
-        rules = add(rules, must(input)?, read)?;
+    if let Some(input) = &policy.input {
+        rules = add(rules, open(input)?, read)?;
     }
-    if let Some(output) = &cage.output {
-        rules = add(rules, must(output)?, write)?;
+    if let Some(output) = &policy.output {
+        rules = add(rules, open(output)?, write)?;
     }
-    let usual = USUAL.iter().map(Path::new);
+    let startup_files = STARTUP_FILES.iter().map(Path::new);
     // Paths that do not exist are skipped.
-    for path in reach.reads.iter().map(PathBuf::as_path).chain(usual) {
+    for path in program_files
+        .library_dirs
+        .iter()
+        .map(PathBuf::as_path)
+        .chain(startup_files)
+    {
         if let Ok(found) = PathFd::new(path) {
             rules = add(rules, found, read | AccessFs::ReadDir)?;
         }

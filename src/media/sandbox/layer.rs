@@ -80,7 +80,7 @@ impl Layers {
     /// No layers.
     pub const NONE: Layers = Layers(0);
     /// Layers that every common Linux supports. `--sandbox off` uses only these.
-    pub const OLD: Layers = Layers::NONE
+    pub const BASIC: Layers = Layers::NONE
         .with(Layer::Leash)
         .with(Layer::Privileges)
         .with(Layer::Limits);
@@ -110,7 +110,7 @@ impl Layers {
 }
 
 /// Returns why the kernel does not support a layer; `None` if it does.
-pub(in crate::media) fn lack_of(layer: Layer) -> Option<String> {
+pub(in crate::media) fn unsupported_reason(layer: Layer) -> Option<String> {
     let landlock = |since: i64, linux: &str| match landlock_abi() {
         Ok(abi) if abi >= since => None,
         Ok(abi) => Some(format!(
@@ -123,13 +123,13 @@ pub(in crate::media) fn lack_of(layer: Layer) -> Option<String> {
         Layer::Files => landlock(1, "5.13"),
         Layer::Network => landlock(4, "6.7"),
         Layer::Signals => landlock(6, "6.12"),
-        Layer::Calls => calls::lack(),
+        Layer::Calls => calls::unsupported_reason(),
     }
 }
 
 /// Returns the Landlock ABI version of the kernel.
 pub(in crate::media) fn landlock_abi() -> std::io::Result<i64> {
-    const ASK_VERSION: libc::c_ulong = 1;
+    const GET_VERSION: libc::c_ulong = 1;
     let nothing = std::ptr::null::<u8>();
     // SAFETY: with this flag the kernel reads no memory of this process and creates nothing.
     let abi = unsafe {
@@ -137,7 +137,7 @@ pub(in crate::media) fn landlock_abi() -> std::io::Result<i64> {
             libc::SYS_landlock_create_ruleset,
             nothing,
             0usize,
-            ASK_VERSION,
+            GET_VERSION,
         )
     };
     match abi {
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_set_holds_what_was_put_in_and_not_what_was_taken_out() {
+    fn set_contains_added_layers_and_not_removed_ones() {
         for layer in Layer::ALL {
             assert!(Layers::ALL.has(layer) && !Layers::NONE.has(layer));
             assert!(Layers::NONE.with(layer).has(layer));

@@ -22,13 +22,13 @@ use std::process::Command;
 use rustix::process::{Resource, Rlimit, Signal};
 use rustix::thread::{CapabilitySet, CapabilitySets};
 
-pub(super) use files::Reach;
+pub(super) use files::ProgramFiles;
 pub use layer::{Layer, Layers};
-pub(super) use layer::{lack_of, landlock_abi};
+pub(super) use layer::{landlock_abi, unsupported_reason};
 
 /// Sandbox settings of one child.
 #[derive(Clone, Debug)]
-pub(super) struct Cage {
+pub(super) struct Policy {
     /// Layers to apply.
     pub(super) layers: Layers,
     /// Limit of the address space, bytes.
@@ -39,25 +39,30 @@ pub(super) struct Cage {
     pub(super) file_bytes: u64,
     /// The only file that it may read, besides its libraries.
     pub(super) input: Option<PathBuf>,
-    /// The only file that it may write. The file must exist.
+    /// The only file that it may write. The file open exist.
     pub(super) output: Option<PathBuf>,
 }
 
 /// Limit of open file descriptors. Libraries are mapped and do not count.
 const OPEN_FILES: u64 = 64;
 
-/// Applies the sandbox to the child that `command` will start. `reach` describes its program.
+/// Applies the sandbox to the child that `command` will start. `program_files` describes its program.
 ///
-/// The kernel kills the child when the *thread* that started it ends, so that thread must live as long as the
+/// The kernel kills the child when the *thread* that started it ends, so that thread open live as long as the
 /// process (see `gate`). Fails if a file that the child needs does not exist.
-pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::Result<()> {
-    let ruleset = files::ruleset(cage, reach)?;
-    let mut refusals = match cage.layers.has(Layer::Calls) {
-        true => calls::program(),
-        false => Vec::new(),
+pub(super) fn apply(
+    command: &mut Command,
+    policy: &Policy,
+    program_files: &ProgramFiles,
+) -> io::Result<()> {
+    let ruleset = files::ruleset(policy, program_files)?;
+    let mut refusals = if policy.layers.has(Layer::Calls) {
+        calls::program()
+    } else {
+        Vec::new()
     };
     let parent = rustix::process::getpid();
-    let (layers, limits) = (cage.layers, limits_of(cage));
+    let (layers, limits) = (policy.layers, limits_of(policy));
     let enter = move || {
         rustix::process::setsid()?;
         if layers.has(Layer::Leash) {
@@ -87,11 +92,11 @@ pub(super) fn enclose(command: &mut Command, cage: &Cage, reach: &Reach) -> io::
     Ok(())
 }
 
-fn limits_of(cage: &Cage) -> [(Resource, u64); 5] {
+fn limits_of(policy: &Policy) -> [(Resource, u64); 5] {
     [
-        (Resource::As, cage.memory_bytes),
-        (Resource::Cpu, cage.cpu_s),
-        (Resource::Fsize, cage.file_bytes),
+        (Resource::As, policy.memory_bytes),
+        (Resource::Cpu, policy.cpu_s),
+        (Resource::Fsize, policy.file_bytes),
         (Resource::Nofile, OPEN_FILES),
         (Resource::Core, 0),
     ]
@@ -128,8 +133,9 @@ fn enter_rules(ruleset: Option<&OwnedFd>, refusals: &mut [libc::sock_filter]) ->
     if let Some(ruleset) = ruleset {
         files::enter(ruleset)?;
     }
-    match refusals.is_empty() {
-        true => Ok(()),
-        false => calls::enter(refusals),
+    if refusals.is_empty() {
+        Ok(())
+    } else {
+        calls::enter(refusals)
     }
 }

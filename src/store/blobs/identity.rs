@@ -90,12 +90,12 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::config::{Files, Storage};
+    use crate::config::{FileStore, Storage};
 
     /// Returns a storage with its own database and a folder of files that others may use too.
     fn storage(rows: &Path, files: &Path) -> Storage {
         Storage {
-            store: Some(Files::Folder(files.to_owned())),
+            store: Some(FileStore::Folder(files.to_owned())),
             ..Storage::from(rows)
         }
     }

@@ -32,7 +32,7 @@ use shelf::Shelf;
 
 use super::{Error, Store, Transaction, sql};
 use crate::code::Code;
-use crate::config::{Files, Storage};
+use crate::config::{FileStore, Storage};
 
 /// Kinds of folders.
 const KINDS: [&str; 4] = ["footage", "libraries", "flocks", "fish"];
@@ -92,8 +92,8 @@ impl Blobs {
         let (place, tmp) = match &storage.store {
             None => (storage.data.join("blobs"), storage.data.join("tmp")),
             // Drafts are renamed into this folder, so they must be on the same file system.
-            Some(Files::Folder(folder)) => (folder.clone(), folder.join("tmp")),
-            Some(Files::Bucket { name, prefix }) => {
+            Some(FileStore::Folder(folder)) => (folder.clone(), folder.join("tmp")),
+            Some(FileStore::Bucket { name, prefix }) => {
                 let place = Place::Bucket(Bucket::open(name, prefix).await?);
                 let work = Arc::new(Workplace::open(&storage.data.join("tmp"))?);
                 return Ok(Blobs {

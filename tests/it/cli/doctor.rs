@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::flockreel;
 use crate::common::film::Films;
-use crate::media::cage::compile_attack;
+use crate::media::sandbox::compile_attack;
 
 /// Runs the program as on a kernel without Landlock.
 fn without_landlock(films: &Films, args: &[&str]) -> Output {
@@ -33,7 +33,7 @@ fn finding<'a>(all: &'a Value, name: &str) -> &'a Value {
 }
 
 #[test]
-fn the_doctor_tells_every_layer_and_ends_with_1_where_something_is_missing() {
+fn doctor_lists_every_layer_and_exits_with_1_if_one_is_missing() {
     let films = Films::new();
     let done = flockreel(&films, "doctor --json");
     let here = findings(&done);
@@ -70,7 +70,7 @@ fn the_doctor_tells_every_layer_and_ends_with_1_where_something_is_missing() {
 }
 
 #[test]
-fn a_strict_service_does_not_start_where_a_layer_is_missing() {
+fn strict_service_does_not_start_without_a_layer() {
     let films = Films::new();
     let args = [
         "serve",
@@ -91,7 +91,7 @@ fn a_strict_service_does_not_start_where_a_layer_is_missing() {
 }
 
 #[test]
-fn a_kernel_without_landlock_makes_films_all_the_same() {
+fn films_are_made_on_a_kernel_without_landlock() {
     let films = Films::new();
     let sample = [
         "sample", "-o", "film.mp4", "--frames", "5", "--size", "64x64",

@@ -32,7 +32,7 @@ fn names(films: &Films) -> Vec<String> {
 }
 
 #[test]
-fn a_film_that_is_refused_gets_a_sentence_with_advice_and_leaves_nothing_behind() {
+fn refused_film_prints_advice_and_leaves_no_library() {
     let films = Films::new();
     films.write("text.mp4", "no film at all");
     films.run("-f lavfi -i color=gray:size=64x48:rate=25 -frames:v 40 still.mp4");
@@ -52,7 +52,7 @@ fn a_film_that_is_refused_gets_a_sentence_with_advice_and_leaves_nothing_behind(
 }
 
 #[test]
-fn a_film_whose_scene_moves_leaves_the_picture_that_it_tells_of() {
+fn refused_film_leaves_the_picture_that_its_message_names() {
     let films = Films::new();
     films.run("-f lavfi -i mandelbrot=size=640x480:rate=25,scroll=h=0.013:v=0.007,scale=160:120 -frames:v 60 pan.mp4");
     let done = flockreel(&films, "analyze pan.mp4 -o deep/library");
@@ -67,7 +67,7 @@ fn a_film_whose_scene_moves_leaves_the_picture_that_it_tells_of() {
 }
 
 #[test]
-fn every_option_that_an_advice_names_is_one() {
+fn options_named_by_advice_exist() {
     let films = Films::new();
     let quoted = |code: &Code| code.advice().split('`').skip(1).step_by(2).collect();
     let all: Vec<&str> = Code::ALL
@@ -90,7 +90,7 @@ fn every_option_that_an_advice_names_is_one() {
 }
 
 #[test]
-fn a_hint_that_is_not_understood_is_shown_with_an_example() {
+fn invalid_hint_is_shown_with_an_example() {
     let films = Films::new();
     for (option, example) in [
         ("--animal-at 120", "such as 120:310,95: 120"),
@@ -106,7 +106,7 @@ fn a_hint_that_is_not_understood_is_shown_with_an_example() {
 }
 
 #[test]
-fn a_film_that_is_not_there_is_named() {
+fn missing_film_is_named() {
     let films = Films::new();
     let done = flockreel(&films, "analyze nowhere.mp4 -o library");
     let sentence = String::from_utf8(done.stderr).expect("it is text");
@@ -116,7 +116,7 @@ fn a_film_that_is_not_there_is_named() {
 }
 
 #[test]
-fn a_folder_that_is_no_library_is_named() {
+fn folder_without_a_library_is_named() {
     let films = Films::new();
     for command in ["flock", "fish", "matrix", "sprites"] {
         let done = flockreel(&films, &format!("{command} nowhere -o out.mp4"));
@@ -129,7 +129,7 @@ fn a_folder_that_is_no_library_is_named() {
 }
 
 #[test]
-fn beyond_this_machine_nothing_is_served_without_a_token() {
+fn address_beyond_loopback_needs_a_token() {
     let films = Films::new();
     let serve = "serve --no-sample --bind 0.0.0.0:0 --data data";
     let done = flockreel(&films, serve);
@@ -164,7 +164,7 @@ fn beyond_this_machine_nothing_is_served_without_a_token() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_log_in_json_names_the_request_and_never_a_signature() {
+async fn json_log_names_the_request_and_no_signature() {
     let data = tempfile::tempdir().expect("a temporary folder");
     let flags = ["--log-format", "json", "--metrics-bind", "127.0.0.1:0"];
     let server = Server::start_with(data.path(), &flags);

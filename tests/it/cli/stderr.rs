@@ -118,7 +118,7 @@ fn read_all(mut stderr: PipeReader) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_full_stderr_costs_no_answer() {
+async fn full_stderr_does_not_delay_responses() {
     let full = File::options().write(true).open("/dev/full").unwrap();
     let mut service = Service::start(full, "info").await;
     service.assert_answers(50).await;
@@ -127,7 +127,7 @@ async fn a_full_stderr_costs_no_answer() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_dead_reader_of_stderr_costs_no_answer() {
+async fn dead_reader_of_stderr_does_not_delay_responses() {
     let (reader, stderr) = pipe().unwrap();
     let mut service = Service::start(stderr, "info").await;
     drop(reader);
@@ -137,7 +137,7 @@ async fn a_dead_reader_of_stderr_costs_no_answer() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_stalled_reader_of_stderr_costs_no_answer() {
+async fn stalled_reader_of_stderr_does_not_delay_responses() {
     let (reader, stderr) = pipe().unwrap();
     // Both streams go to the stalled reader, as with `2>&1`.
     let stdout = stderr.try_clone().unwrap();
@@ -152,7 +152,7 @@ async fn a_stalled_reader_of_stderr_costs_no_answer() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn lines_are_written_in_order_and_to_the_last_one() {
+async fn log_lines_are_complete_and_in_order() {
     let (reader, stderr) = pipe().unwrap();
     let mut service = Service::start(stderr, "info").await;
     let log = std::thread::spawn(move || read_all(reader));

@@ -56,7 +56,7 @@ async fn write_on(base: String, next: Arc<AtomicUsize>, stop: Arc<AtomicBool>, k
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_backup_made_while_the_service_writes_is_a_service_with_every_byte() {
+async fn backup_during_writes_is_a_complete_service() {
     let films = Films::new();
     let server = Server::start(&films.path("data"));
     let (next, stop) = (Arc::default(), Arc::new(AtomicBool::new(false)));
@@ -140,7 +140,7 @@ async fn every_film_is_whole(base: &str, n_films: u64) -> Vec<String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_check_names_what_is_broken_and_gc_removes_what_nobody_names() {
+async fn check_names_faults_and_gc_removes_orphans() {
     let films = Films::new();
     let server = Server::start(&films.path("data"));
     let sent = client().post(format!("{}/v1/footage", server.base));
@@ -204,7 +204,7 @@ fn assert_no_copy_is_made(films: &Films) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn gc_beside_a_service_leaves_what_it_is_receiving() {
+async fn gc_keeps_unfinished_uploads_of_a_running_service() {
     let films = Films::new();
     let server = Server::start(&films.path("data"));
     let film = numbered_film(1);
@@ -234,7 +234,7 @@ async fn gc_beside_a_service_leaves_what_it_is_receiving() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_flag_wins_over_the_environment_that_over_the_file_and_that_over_the_default() {
+async fn flags_override_environment_file_and_defaults() {
     let films = Films::new();
     films.write(
         "settings.toml",

@@ -50,7 +50,7 @@ impl TestApp {
 
     /// Starts a service without workers and with additional command-line flags.
     pub(crate) async fn start(flags: &[&str]) -> TestApp {
-        let place = Place::of_tests();
+        let place = Place::from_environment();
         let flags = flags.iter().map(|flag| (*flag).to_owned());
         let flags = [vec!["test".to_owned()], place.flags(), flags.collect()].concat();
         let config = Arguments::parse_from(flags).config;

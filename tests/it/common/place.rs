@@ -27,14 +27,14 @@ impl Place {
     }
 
     /// Returns a place on the servers that the environment names; without any, everything is in its folder.
-    pub(crate) fn of_tests() -> Place {
+    pub(crate) fn from_environment() -> Place {
         let of = |name: &str| std::env::var(name).ok();
         Place::on(of("FLOCKREEL_TEST_POSTGRES"), of("FLOCKREEL_TEST_BUCKET"))
     }
 
     /// Returns a place on the servers. Panics if the environment does not name both.
     pub(crate) fn shared() -> Place {
-        let place = Place::of_tests();
+        let place = Place::from_environment();
         assert_eq!(place.flags.len(), 4, "run it by scripts/with-servers.sh");
         place
     }
@@ -64,12 +64,12 @@ impl Place {
     }
 
     /// Returns the flags for database and bucket only; empty if all is in the folder.
-    pub(crate) fn elsewhere_flags(&self) -> Vec<String> {
+    pub(crate) fn server_flags(&self) -> Vec<String> {
         self.flags.clone()
     }
 
     /// Returns the place of a second machine: another data folder, but the same database and bucket.
-    pub(crate) fn elsewhere(&self) -> Place {
+    pub(crate) fn second_machine(&self) -> Place {
         Place {
             folder: tempfile::tempdir().unwrap(),
             flags: self.flags.clone(),

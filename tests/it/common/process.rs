@@ -20,7 +20,7 @@ use super::{Place, client};
 /// A running `flockreel worker`, and the lines of its stderr.
 pub(crate) struct WorkerProcess {
     pub(crate) child: Child,
-    said: Arc<Mutex<Vec<String>>>,
+    log_lines: Arc<Mutex<Vec<String>>>,
 }
 
 impl WorkerProcess {
@@ -38,18 +38,18 @@ impl WorkerProcess {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        let said = Arc::new(Mutex::new(Vec::new()));
+        let log_lines = Arc::new(Mutex::new(Vec::new()));
         let (lines, to) = (
             BufReader::new(child.stderr.take().unwrap()).lines(),
-            said.clone(),
+            log_lines.clone(),
         );
         std::thread::spawn(move || lines.for_each(|line| to.lock().unwrap().push(line.unwrap())));
-        WorkerProcess { child, said }
+        WorkerProcess { child, log_lines }
     }
 
     /// Returns true if a line of stderr contains these words.
-    pub(crate) fn has_said(&self, words: &str) -> bool {
-        self.said
+    pub(crate) fn has_logged(&self, words: &str) -> bool {
+        self.log_lines
             .lock()
             .unwrap()
             .iter()
@@ -57,8 +57,8 @@ impl WorkerProcess {
     }
 
     /// Returns stderr so far.
-    pub(crate) fn said(&self) -> String {
-        self.said.lock().unwrap().join("\n")
+    pub(crate) fn log(&self) -> String {
+        self.log_lines.lock().unwrap().join("\n")
     }
 
     /// Sends a signal to the process.
@@ -97,7 +97,7 @@ impl Server {
 
     /// Starts the service on a place.
     pub(crate) fn start_at(place: &Place) -> Server {
-        let flags = place.elsewhere_flags();
+        let flags = place.server_flags();
         let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
         Server::start_with(place.data(), &flags)
     }
@@ -175,17 +175,17 @@ impl Server {
     }
 
     /// POSTs JSON, asserts status 202 and returns the response body.
-    pub(crate) async fn accept(&self, path: &str, wish: Value) -> Value {
+    pub(crate) async fn accept(&self, path: &str, request_body: Value) -> Value {
         let request = self.client.post(format!("{}{path}", self.base));
-        let answer = request.json(&wish).send().await.unwrap();
+        let answer = request.json(&request_body).send().await.unwrap();
         json_of(answer, StatusCode::ACCEPTED).await
     }
 
     /// Uploads a film, asserts status 201, and queues its analysis.
     pub(crate) async fn analyze(&self, film: Vec<u8>) -> Value {
         let footage = json_of(self.upload(film).await, StatusCode::CREATED).await;
-        let wish = json!({"footage_id": footage["id"]});
-        self.accept("/v1/analyses", wish).await
+        let request_body = json!({"footage_id": footage["id"]});
+        self.accept("/v1/analyses", request_body).await
     }
 
     /// Polls the job until `is_so` holds and returns it. Panics after four minutes.
@@ -214,19 +214,19 @@ impl Server {
     }
 
     /// Sends SIGTERM without waiting for the end.
-    pub(crate) fn tell_to_stop(&self) {
+    pub(crate) fn send_sigterm(&self) {
         kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
     }
 
     /// Sends SIGTERM, waits for the end and returns the exit code.
     pub(crate) fn terminate(mut self) -> Option<i32> {
-        self.tell_to_stop();
+        self.send_sigterm();
         self.child.wait().unwrap().code()
     }
 
     /// Sends SIGTERM, waits for the end and returns the stderr since the start message.
     pub(crate) fn terminate_and_read(mut self) -> String {
-        self.tell_to_stop();
+        self.send_sigterm();
         self.child.wait().unwrap();
         let log = std::mem::replace(&mut self.log, std::thread::spawn(String::new));
         log.join().unwrap()

@@ -1,4 +1,4 @@
-//! Hints of the user: the part of the film to analyze, a point on the animal, and boxes to ignore.
+//! ReadOptions of the user: the part of the film to analyze, a point on the animal, and boxes to ignore.
 
 use flockreel::analysis::params::{AnimalAtParam, IgnoreParam};
 use flockreel::analysis::{Error, Params};

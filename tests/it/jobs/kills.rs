@@ -63,7 +63,7 @@ async fn assert_swept(place: &Place) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
-    let place = Place::of_tests();
+    let place = Place::from_environment();
     let server = Server::start_at(&place);
     let job = start_job(&server).await;
     server.job_when(&job, is_running).await;
@@ -87,7 +87,7 @@ async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_told_to_stop_gives_its_job_back_unused() {
-    let place = Place::of_tests();
+    let place = Place::from_environment();
     let server = Server::start_at(&place);
     let job = start_job(&server).await;
     server.job_when(&job, is_running).await;
@@ -135,7 +135,7 @@ async fn result_of(server: &Server, job: &Value) -> Vec<String> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed() {
-    let place = Place::of_tests();
+    let place = Place::from_environment();
     let mut server = Server::start_at(&place);
     let mut jobs = Vec::new();
     for _ in 0..3 {
@@ -197,13 +197,13 @@ fn slow_upload(server: &Server) -> (oneshot::Sender<()>, JoinHandle<StatusCode>)
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_server_told_to_stop_refuses_what_is_new_and_ends_what_is_under_way() {
-    let place = Place::of_tests();
+    let place = Place::from_environment();
     let server = Server::start_at(&place);
     let (go_on, upload) = slow_upload(&server);
     let job = start_job(&server).await;
     server.job_when(&job, is_running).await;
     let start = Instant::now();
-    server.tell_to_stop();
+    server.send_sigterm();
     tokio::time::sleep(Duration::from_millis(300)).await;
     let refused = server.upload(numbered_film(2)).await;
     assert_eq!(refused.headers()["retry-after"], "5");

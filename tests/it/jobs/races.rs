@@ -80,7 +80,7 @@ async fn library(store: &Store) -> Uuid {
 
 #[tokio::test]
 async fn processes_that_race_for_jobs_do_each_of_them_once() {
-    let place = Place::of_tests();
+    let place = Place::from_environment();
     let store = Store::open(place.storage()).await.unwrap();
     let library = library(&store).await;
     let mut jobs = Vec::new();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use flockreel::code::Code;
 use flockreel::jobs::masks::Masks;
-use flockreel::media::{Hints, Limits, Video};
+use flockreel::media::{Limits, ReadOptions, Video};
 
 use super::{read_all, read_whole};
 use crate::common::film::Films;
@@ -69,7 +69,7 @@ fn codec_of(name: &str) -> &'static str {
 }
 
 #[test]
-fn each_command_of_an_advice_makes_a_film_that_is_taken() {
+fn commands_of_advice_make_accepted_films() {
     let films = Films::new();
     let mut tried = Vec::new();
     for (code, film) in refused(&films) {
@@ -95,11 +95,11 @@ fn each_command_of_an_advice_makes_a_film_that_is_taken() {
             );
         }
         for fps in rates(code) {
-            let hints = Hints {
+            let options = ReadOptions {
                 fps: Some(fps),
-                ..Hints::default()
+                ..ReadOptions::default()
             };
-            let video = Video::open_with(&film, &Limits::default(), &hints).expect("a good film");
+            let video = Video::open_with(&film, &Limits::default(), &options).expect("a good film");
             let n_frames = read_all(&video).expect("frames").len();
             assert!(n_frames >= 2, "{name}: {fps}: {n_frames}");
         }
@@ -138,15 +138,15 @@ fn the_rates_for_masks_make_them_match(films: &Films) {
     let film = films.test_picture("64x48", 40, slowing);
     let masks = films.test_picture("64x48", 40, "-c:v ffv1 masks.mkv");
     let masked = |fps| {
-        let (limits, hints) = (
+        let (limits, options) = (
             Limits::default(),
-            Hints {
+            ReadOptions {
                 fps,
-                ..Hints::default()
+                ..ReadOptions::default()
             },
         );
-        let video = Video::open_with(&film, &limits, &hints).expect("a good film");
-        let masks = Masks::open(&video, (&film, Some(&masks)), &limits, &hints);
+        let video = Video::open_with(&film, &limits, &options).expect("a good film");
+        let masks = Masks::open(&video, (&film, Some(&masks)), &limits, &options);
         let masks = masks.expect("they can be read").expect("they are given");
         let masked = masks.over(&video).expect("of one size");
         read_all(&masked).map(|frames| frames.len())

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flockreel::jobs::masks::Masks;
-use flockreel::media::{Hints, Limits, Video};
+use flockreel::media::{Limits, ReadOptions, Video};
 use image::{ImageFormat, Rgba, RgbaImage};
 
 use super::read_all;
@@ -32,14 +32,14 @@ fn pictures(films: &Films, is_opaque: bool) -> Vec<(String, Vec<u8>)> {
 }
 
 fn masks_of(path: &Path) -> Option<(Video, Masks)> {
-    let (limits, hints) = (Limits::default(), Hints::default());
+    let (limits, options) = (Limits::default(), ReadOptions::default());
     let video = Video::open(path, &limits).unwrap_or_else(|error| panic!("{path:?}: {error}"));
-    let masks = Masks::open(&video, (path, None), &limits, &hints);
+    let masks = Masks::open(&video, (path, None), &limits, &options);
     Some((video, masks.expect("they can be read")?))
 }
 
 #[test]
-fn the_alpha_of_a_film_and_of_pictures_is_the_mask() {
+fn alpha_of_films_and_pictures_is_the_mask() {
     let films = Films::new();
     let zip = zip_of(&pictures(&films, false));
     let from = "-framerate 25 -i %03d.png";
@@ -73,7 +73,7 @@ fn the_alpha_of_a_film_and_of_pictures_is_the_mask() {
 }
 
 #[test]
-fn an_alpha_that_is_opaque_throughout_tells_nothing() {
+fn opaque_alpha_is_no_mask() {
     let films = Films::new();
     let zip = films.write("a.zip", zip_of(&pictures(&films, true)));
     assert!(Video::open(&zip, &Limits::default()).unwrap().has_alpha());

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use flockreel::code::Code;
 use flockreel::media::Limits;
 
-use super::{n_processes_about, read_whole};
+use super::{n_processes_with, read_whole};
 use crate::common::film::Films;
 
 /// Returns the code with which a file is refused under the default limits.
@@ -25,7 +25,7 @@ fn refusal_within(path: &Path, limits: &Limits) -> Code {
 }
 
 #[test]
-fn what_is_no_video_at_all_is_refused_by_its_first_bytes() {
+fn other_files_are_refused_by_their_first_bytes() {
     let films = Films::new();
     assert_eq!(refusal(&films.write("empty.mp4", "")), Code::NotAVideo);
     assert_eq!(
@@ -44,7 +44,7 @@ fn what_is_no_video_at_all_is_refused_by_its_first_bytes() {
 }
 
 #[test]
-fn a_playlist_under_a_films_name_is_no_film_even_beside_the_film_it_names() {
+fn playlist_with_the_name_of_a_film_is_refused() {
     let films = Films::new();
     films.test_picture("64x48", 25, "-c:v libx264 -pix_fmt yuv420p other.mp4");
     films.test_picture("64x48", 25, "-c:v libx264 -pix_fmt yuv420p other.ts");
@@ -68,7 +68,7 @@ pub(super) const PLAYLISTS: [&str; 4] = [
 ];
 
 #[test]
-fn sound_alone_holds_no_video_stream() {
+fn file_with_only_sound_has_no_video_stream() {
     let films = Films::new();
     let tone = "-f lavfi -i sine=duration=1";
     for name in ["tone.wav", "tone.m4a", "tone.mka", "tone.flac", "tone.mp3"] {
@@ -100,7 +100,7 @@ fn other_containers_and_codecs_are_refused_by_name() {
 }
 
 #[test]
-fn a_film_cut_off_inside_is_truncated_in_every_container() {
+fn cut_off_film_is_truncated_in_every_container() {
     let films = Films::new();
     for (args, name) in [
         ("-c:v libx264 -movflags +faststart", "front.mp4"),
@@ -131,7 +131,7 @@ fn a_film_cut_off_inside_is_truncated_in_every_container() {
 }
 
 #[test]
-fn a_cut_film_can_be_asked_for_up_to_the_cut() {
+fn cut_film_can_be_read_up_to_the_cut() {
     let films = Films::new();
     let film = films.test_picture("160x120", 100, "-c:v libx264 -pix_fmt yuv420p film.mkv");
     let cut = films.cut(&film, 0.6, "cut.mkv");
@@ -144,7 +144,7 @@ fn a_cut_film_can_be_asked_for_up_to_the_cut() {
 }
 
 #[test]
-fn a_film_with_rubbish_inside_ends_well_or_is_refused() {
+fn film_with_damaged_bytes_decodes_or_is_refused() {
     let films = Films::new();
     for name in ["film.mp4", "film.mkv", "film.ts"] {
         let film = films.test_picture(
@@ -169,7 +169,7 @@ fn a_film_with_rubbish_inside_ends_well_or_is_refused() {
 }
 
 #[test]
-fn each_limit_has_its_own_code() {
+fn each_limit_has_its_code() {
     let films = Films::new();
     let film = films.test_picture("64x48", 50, "-c:v libx264 -pix_fmt yuv420p film.mp4");
     type Lower = fn(&mut Limits);
@@ -197,11 +197,11 @@ fn each_limit_has_its_own_code() {
         read_whole(&film, &Limits::default()).map(|frames| frames.len()),
         Ok(50)
     );
-    assert_eq!(n_processes_about(&films.folder().display().to_string()), 0);
+    assert_eq!(n_processes_with(&films.folder().display().to_string()), 0);
 }
 
 #[test]
-fn a_decoder_starved_of_memory_says_so() {
+fn decoder_without_memory_fails_with_memory_limit() {
     let films = Films::new();
     let film = films.test_picture("64x48", 50, "-c:v libx264 -pix_fmt yuv420p film.mp4");
     let limits = Limits {
@@ -213,7 +213,7 @@ fn a_decoder_starved_of_memory_says_so() {
 }
 
 #[test]
-fn pictures_too_small_and_films_of_one_frame_are_refused() {
+fn too_small_pictures_and_films_of_one_frame_are_refused() {
     let films = Films::new();
     let tiny = films.test_picture("8x8", 10, "-c:v libx264 -pix_fmt yuv420p tiny.mp4");
     assert_eq!(refusal(&tiny), Code::TooFewPixels);
@@ -222,7 +222,7 @@ fn pictures_too_small_and_films_of_one_frame_are_refused() {
 }
 
 #[test]
-fn too_many_streams_are_refused_before_any_is_decoded() {
+fn too_many_streams_are_refused_before_decoding() {
     let films = Films::new();
     let maps = "-map 0:v ".repeat(40);
     let film = films.test_picture("64x48", 5, &format!("{maps} -c:v mpeg4 many.mkv"));
@@ -230,7 +230,7 @@ fn too_many_streams_are_refused_before_any_is_decoded() {
 }
 
 #[test]
-fn an_encrypted_film_is_told_as_such() {
+fn encrypted_film_is_refused_as_encrypted() {
     let films = Films::new();
     let key = "00112233445566778899aabbccddeeff";
     let film = films.test_picture(
@@ -245,7 +245,7 @@ fn an_encrypted_film_is_told_as_such() {
 }
 
 #[test]
-fn a_reader_that_goes_away_leaves_no_decoder_behind() {
+fn dropped_reader_leaves_no_decoder() {
     let films = Films::new();
     let film = films.test_picture("320x240", 500, "-c:v libx264 -pix_fmt yuv420p long.mp4");
     let name = film.display().to_string();
@@ -253,7 +253,7 @@ fn a_reader_that_goes_away_leaves_no_decoder_behind() {
     let mut stream = flockreel::footage::FrameSource::open(&video).expect("a decoder");
     let mut frame = flockreel::raster::Frame::default();
     stream.next_frame(&mut frame).expect("a first frame");
-    assert_eq!(n_processes_about(&name), 1);
+    assert_eq!(n_processes_with(&name), 1);
     drop(stream);
-    assert_eq!(n_processes_about(&name), 0);
+    assert_eq!(n_processes_with(&name), 0);
 }

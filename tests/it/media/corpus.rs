@@ -97,9 +97,10 @@ impl Corpus<'_> {
                 let path = self.films.write(&format!("cut{k}.{name}"), cut);
                 // Packet streams have no index or end marker, so a cut may go unnoticed.
                 let endless = ["ts", "mpg", "vob", "h264", "hevc"];
-                match endless.iter().any(|ending| name.ends_with(ending)) {
-                    true => self.damaged(path, &[&DAMAGED[..], &LIES[..]].concat()),
-                    false => self.refused(path, &DAMAGED),
+                if endless.iter().any(|ending| name.ends_with(ending)) {
+                    self.damaged(path, &[&DAMAGED[..], &LIES[..]].concat())
+                } else {
+                    self.refused(path, &DAMAGED)
                 }
             }
             for k in 0..n_flips {

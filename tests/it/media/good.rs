@@ -14,7 +14,7 @@ fn open(path: &std::path::Path) -> Video {
 }
 
 #[test]
-fn every_accepted_codec_gives_all_its_frames() {
+fn accepted_codecs_give_all_frames() {
     let films = Films::new();
     for (codec, name) in [
         ("libx264 -pix_fmt yuv420p", "a.mp4"),
@@ -64,7 +64,7 @@ fn every_accepted_codec_gives_all_its_frames() {
 }
 
 #[test]
-fn the_frames_are_those_that_plain_ffmpeg_decodes() {
+fn frames_equal_those_of_plain_ffmpeg() {
     let films = Films::new();
     let film = films.test_picture("130x98", 30, "-c:v libx264 -pix_fmt yuv420p film.mp4");
     let reference = films.reference(&film, "-pix_fmt yuv420p");
@@ -77,7 +77,7 @@ fn the_frames_are_those_that_plain_ffmpeg_decodes() {
 }
 
 #[test]
-fn frames_spread_over_a_film_are_those_of_reading_it_whole() {
+fn spread_frames_equal_those_of_a_full_read() {
     let films = Films::new();
     for options in [
         "-bf 2",
@@ -100,7 +100,7 @@ fn frames_spread_over_a_film_are_those_of_reading_it_whole() {
 }
 
 #[test]
-fn each_turn_of_the_camera_is_undone() {
+fn camera_orientations_are_undone() {
     let films = Films::new();
     films.test_picture("128x96", 5, "-c:v libx264 -pix_fmt yuv420p upright.mp4");
     for degrees in [90, 180, 270] {
@@ -132,7 +132,7 @@ fn pixels_become_square() {
 }
 
 #[test]
-fn grey_and_full_range_films_keep_their_values() {
+fn gray_and_full_range_films_keep_their_values() {
     let films = Films::new();
     let grey = films.test_picture("64x48", 4, "-pix_fmt gray -c:v ffv1 grey.mkv");
     let tagged = films.test_picture("64x48", 4, "-c:v libx264 -pix_fmt yuvj420p full.mp4");
@@ -153,7 +153,7 @@ fn grey_and_full_range_films_keep_their_values() {
 }
 
 #[test]
-fn the_luma_weights_follow_the_tag_and_rgb_becomes_601() {
+fn luma_weights_follow_the_tag_and_rgb_becomes_601() {
     let films = Films::new();
     let matrix = |args: &str| {
         open(&films.test_picture("64x48", 4, args))
@@ -181,7 +181,7 @@ fn the_luma_weights_follow_the_tag_and_rgb_becomes_601() {
 }
 
 #[test]
-fn a_rate_that_wanders_becomes_constant_with_true_times() {
+fn varying_rate_becomes_constant_with_true_times() {
     let films = Films::new();
     // One of ten frames is missing: times 0, 1, 2, 3, 5, ... in steps of 1/25 s.
     let film = films.test_picture(
@@ -207,7 +207,7 @@ fn a_rate_that_wanders_becomes_constant_with_true_times() {
 }
 
 #[test]
-fn a_picture_that_changes_its_size_does_not_shift_the_frames_after_it() {
+fn picture_of_another_size_does_not_shift_later_frames() {
     let films = Films::new();
     let args = "-c:v libx264 -pix_fmt yuv420p -bf 0";
     let first = films.test_picture("128x96", 20, &format!("{args} first.ts"));

@@ -1,7 +1,7 @@
 //! Gray films of more than 8 bits: the used range is stretched to black and white, and a note reports it.
 
 use flockreel::footage::FrameSource;
-use flockreel::media::{Limits, Note, Video};
+use flockreel::media::{Limits, Notice, Video};
 
 use super::read_all;
 use crate::common::film::Films;
@@ -16,7 +16,7 @@ fn ramp(films: &Films, lum: &str, args: &str) -> Video {
 }
 
 #[test]
-fn what_is_used_of_the_range_becomes_black_to_white() {
+fn used_gray_range_is_stretched() {
     let films = Films::new();
     for (lum, args, wanted) in [
         ("X*64", "-c:v ffv1 twelve-in-sixteen.mkv", [0, 4032, 65_535]),
@@ -38,15 +38,15 @@ fn what_is_used_of_the_range_becomes_black_to_white() {
         ),
     ] {
         let video = ramp(&films, lum, args);
-        let [Note::GrayStretched { from, to, most }] = video.notes() else {
-            panic!("{args}: {:?}", video.notes());
+        let [Notice::GrayStretched { black, white, max }] = video.notices() else {
+            panic!("{args}: {:?}", video.notices());
         };
-        let told = [*from, *to, *most].map(i32::from);
-        let off = told
+        let levels = [*black, *white, *max].map(i32::from);
+        let off = levels
             .iter()
             .zip(wanted)
-            .map(|(told, wanted)| (told - wanted).abs());
-        assert!(off.max() <= Some(4), "{args}: {told:?}");
+            .map(|(level, wanted)| (level - wanted).abs());
+        assert!(off.max() <= Some(4), "{args}: {levels:?}");
         let frames = read_all(&video).expect("frames");
         assert_eq!(
             (frames.len(), video.format().n_frames_hint),
@@ -68,10 +68,10 @@ fn what_is_used_of_the_range_becomes_black_to_white() {
 }
 
 #[test]
-fn eight_bits_of_gray_stay_as_they_are() {
+fn eight_bit_gray_is_unchanged() {
     let films = Films::new();
     let video = ramp(&films, "X*256", "-c:v ffv1 -pix_fmt gray eight.mkv");
-    assert_eq!(video.notes(), []);
+    assert_eq!(video.notices(), []);
     let frames = read_all(&video).expect("frames");
     assert!((39..=41).contains(&frames[0].1.luma()[40]));
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use flockreel::code::Code;
 use flockreel::footage::FrameSource;
-use flockreel::media::{Hints, Limits, Note, Video};
+use flockreel::media::{Limits, Notice, ReadOptions, Video};
 
 use super::{read_all, read_whole};
 use crate::common::film::Films;
@@ -26,7 +26,7 @@ fn read(films: &Films, film: &Path) -> (f64, usize) {
 }
 
 #[test]
-fn sound_longer_than_the_picture_cuts_nothing_off() {
+fn sound_longer_than_the_pictures_is_no_cut() {
     let films = Films::new();
     let picture = "-f lavfi -i testsrc2=size=64x48:rate=25:d=2,noise=alls=20:allf=t -f lavfi -i sine=d=4 -map 0 -map 1";
     for args in [
@@ -51,7 +51,7 @@ fn sound_longer_than_the_picture_cuts_nothing_off() {
 }
 
 #[test]
-fn an_avi_whose_header_counts_ticks_instead_of_frames_is_whole() {
+fn avi_header_that_counts_ticks_is_no_cut() {
     let films = Films::new();
     // The time base has two ticks per frame. Empty chunks fill every second tick.
     films.test_picture("64x48", 40, &format!("{H264} -bf 2 even.mp4"));
@@ -74,7 +74,7 @@ fn an_avi_whose_header_counts_ticks_instead_of_frames_is_whole() {
 }
 
 #[test]
-fn a_part_chosen_by_an_edit_list_is_the_film() {
+fn edit_list_selects_the_frames() {
     let films = Films::new();
     films.test_picture("64x48", 100, &format!("{H264} -g 25 long.mp4"));
     let part = films.run("-ss 1.5 -i long.mp4 -t 2 -c copy part.mp4");
@@ -83,7 +83,7 @@ fn a_part_chosen_by_an_edit_list_is_the_film() {
 }
 
 #[test]
-fn a_recorder_that_stalls_or_whose_clock_is_set_gives_each_picture_once() {
+fn stalls_and_clock_changes_keep_each_picture_once() {
     let films = Films::new();
     films.test_picture("64x48", 80, &format!("{H264} -bf 0 even.mp4"));
     let clocks = [
@@ -103,7 +103,7 @@ fn a_recorder_that_stalls_or_whose_clock_is_set_gives_each_picture_once() {
             (fps - 25.0).abs() < 0.6 && n_frames == 80,
             "{clock}: {n_frames} at {fps}"
         );
-        assert_eq!(open(&film).notes().len(), n_notes, "{clock}");
+        assert_eq!(open(&film).notices().len(), n_notes, "{clock}");
     }
     let bytes = [
         "-output_ts_offset 100 late.ts",
@@ -119,15 +119,15 @@ fn a_recorder_that_stalls_or_whose_clock_is_set_gives_each_picture_once() {
             "{name}: {n_frames} at {fps}"
         );
         assert!(
-            matches!(open(&film).notes(), [Note::TimesLeap { n_leaps: 1, at_s, .. }] if (at_s - 1.56).abs() < 0.05),
+            matches!(open(&film).notices(), [Notice::TimesLeap { n_leaps: 1, at_s, .. }] if (at_s - 1.56).abs() < 0.05),
             "{name}: {:?}",
-            open(&film).notes()
+            open(&film).notices()
         );
     }
 }
 
 #[test]
-fn of_several_streams_the_one_with_the_most_pictures_is_the_film() {
+fn stream_with_the_most_pictures_is_read() {
     let films = Films::new();
     films.test_picture("128x96", 1, "-c:v mjpeg -pix_fmt yuvj420p thumb.jpg");
     films.test_picture("64x48", 40, &format!("{H264} film.mp4"));
@@ -152,7 +152,7 @@ fn of_several_streams_the_one_with_the_most_pictures_is_the_film() {
 }
 
 #[test]
-fn a_film_that_lacks_sound_or_index_is_taken_with_a_note_and_one_that_lacks_pictures_is_not() {
+fn cut_after_the_pictures_gives_a_notice_and_cut_inside_is_refused() {
     let films = Films::new();
     let film =
         "-f lavfi -i testsrc2=size=64x48:rate=25:d=2 -f lavfi -i sine=d=4 -map 0 -map 1 -c:a aac";
@@ -165,10 +165,10 @@ fn a_film_that_lacks_sound_or_index_is_taken_with_a_note_and_one_that_lacks_pict
     let notes = |path: &Path| {
         let video = open(path);
         assert_eq!(read_all(&video).expect("frames").len(), 50, "{path:?}");
-        video.notes().to_vec()
+        video.notices().to_vec()
     };
     assert_eq!(notes(&indexed), []);
-    let whole_picture = [Note::CutAfterPictures { n_pictures: 50 }];
+    let whole_picture = [Notice::CutAfterPictures { n_pictures: 50 }];
     for (name, end) in [
         ("no-sound.mp4", find(b"trak", 1)),
         ("half-sound.mp4", find(b"udta", 0) - 10),
@@ -209,7 +209,7 @@ fn a_film_that_lacks_sound_or_index_is_taken_with_a_note_and_one_that_lacks_pict
 }
 
 #[test]
-fn a_bare_stream_has_the_rate_of_its_header_or_of_a_hint() {
+fn elementary_stream_has_the_rate_of_its_header_or_options() {
     let films = Films::new();
     for (codec, name) in [
         ("libx264", "a.h264"),
@@ -221,40 +221,40 @@ fn a_bare_stream_has_the_rate_of_its_header_or_of_a_hint() {
             &format!("-c:v {codec} -pix_fmt yuv420p {name}"),
         );
         assert_eq!(read(&films, &film), (25.0, 40), "{name}");
-        assert_eq!(open(&film).notes(), []);
+        assert_eq!(open(&film).notices(), []);
     }
     let film = films.path("a.h264");
     let silent =
         "-pix_fmt yuv420p -c:v libx265 -x265-params log-level=none:vui-timing-info=0 b.hevc";
     let silent = films.test_picture("64x48", 40, silent);
     assert_eq!(read(&films, &silent), (30.0, 40));
-    assert_eq!(open(&silent).notes(), [Note::RateAssumed { fps: 30.0 }]);
+    assert_eq!(open(&silent).notices(), [Notice::RateAssumed { fps: 30.0 }]);
     for film in [film, silent] {
-        let hints = Hints {
+        let options = ReadOptions {
             fps: Some(12.5),
-            ..Hints::default()
+            ..ReadOptions::default()
         };
-        let video = Video::open_with(&film, &Limits::default(), &hints).expect("a good film");
+        let video = Video::open_with(&film, &Limits::default(), &options).expect("a good film");
         let frames = read_all(&video).expect("frames");
         assert_eq!((video.format().fps, frames.len()), (12.5, 40));
-        assert!((frames[39].0 - 39.0 / 12.5).abs() < 1e-9 && video.notes().is_empty());
+        assert!((frames[39].0 - 39.0 / 12.5).abs() < 1e-9 && video.notices().is_empty());
     }
 }
 
 #[test]
-fn hints_override_rate_and_pixel_aspect_of_any_file() {
+fn options_override_rate_and_pixel_aspect() {
     let films = Films::new();
     let film = films.test_picture(
         "64x48",
         40,
         "-vf setpts=N*N*0.01/TB,setsar=1 -fps_mode vfr -c:v mpeg4 slowing.mkv",
     );
-    let hints = Hints {
+    let options = ReadOptions {
         fps: Some(2.0),
         pixel_aspect: Some(2.0),
-        ..Hints::default()
+        ..ReadOptions::default()
     };
-    let video = Video::open_with(&film, &Limits::default(), &hints).expect("a good film");
+    let video = Video::open_with(&film, &Limits::default(), &options).expect("a good film");
     let format = video.format();
     assert_eq!((format.width, format.height, format.fps), (128, 48, 2.0));
     assert_eq!(read_all(&video).expect("frames").len(), 40);

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use flockreel::media::{Coding, VideoFormat, VideoWriter};
+use flockreel::media::{Encoding, VideoFormat, VideoWriter};
 use flockreel::raster::{ColorSpec, Frame};
 
 use crate::common::film::Films;
@@ -33,7 +33,7 @@ fn disc(frame_idx: usize) -> Vec<u8> {
         .collect()
 }
 
-fn written(films: &Films, name: &str, coding: Coding) -> std::path::PathBuf {
+fn written(films: &Films, name: &str, coding: Encoding) -> std::path::PathBuf {
     let path = films.path(name);
     let mut writer = VideoWriter::create_as(&path, &FORMAT, coding).expect("an encoder");
     for frame_idx in 0..N_FRAMES {
@@ -63,13 +63,13 @@ fn said(path: &Path, entries: &str) -> Vec<String> {
 }
 
 #[test]
-fn size_rate_and_color_tags_are_told_by_the_file() {
+fn written_files_have_size_rate_and_color_tags() {
     let films = Films::new();
     for (name, coding) in [
-        ("a.webm", Coding::Vp9 { alpha: true }),
-        ("b.webm", Coding::Vp9 { alpha: false }),
-        ("a.mov", Coding::ProRes { alpha: true }),
-        ("b.mov", Coding::ProRes { alpha: false }),
+        ("a.webm", Encoding::Vp9 { alpha: true }),
+        ("b.webm", Encoding::Vp9 { alpha: false }),
+        ("a.mov", Encoding::ProRes { alpha: true }),
+        ("b.mov", Encoding::ProRes { alpha: false }),
     ] {
         let path = written(&films, name, coding);
         let entries = "stream=width,height,avg_frame_rate,nb_read_frames,color_range,color_space,\
@@ -101,11 +101,11 @@ fn size_rate_and_color_tags_are_told_by_the_file() {
 }
 
 #[test]
-fn alpha_comes_back_and_no_rim_is_dark() {
+fn alpha_is_read_back_without_dark_edges() {
     let films = Films::new();
     for (name, coding, decoder, most) in [
-        ("a.webm", Coding::Vp9 { alpha: true }, "libvpx-vp9", 3.0),
-        ("a.mov", Coding::ProRes { alpha: true }, "prores", 0.6),
+        ("a.webm", Encoding::Vp9 { alpha: true }, "libvpx-vp9", 3.0),
+        ("a.mov", Encoding::ProRes { alpha: true }, "prores", 0.6),
     ] {
         written(&films, name, coding);
         let args = format!("-c:v {decoder} -i {name} -pix_fmt rgba -f rawvideo back.raw");
@@ -131,9 +131,9 @@ fn alpha_comes_back_and_no_rim_is_dark() {
 }
 
 #[test]
-fn previews_are_small_move_and_repeat() {
+fn previews_are_small_animated_and_loop() {
     let films = Films::new();
-    let gif = written(&films, "a.gif", Coding::Gif);
+    let gif = written(&films, "a.gif", Encoding::Gif);
     let counted = said(&gif, "stream=nb_read_frames,width,height");
     // 12 frames at 29.97 frames/s last 0.4 s, which gives six frames at 15 frames/s.
     assert!(
@@ -141,20 +141,20 @@ fn previews_are_small_move_and_repeat() {
         "{counted:?}"
     );
     assert!(counted.contains(&"width=98".to_owned()), "{counted:?}");
-    let webp = std::fs::read(written(&films, "a.webp", Coding::Webp)).expect("a file");
+    let webp = std::fs::read(written(&films, "a.webp", Encoding::Webp)).expect("a file");
     assert_eq!((&webp[..4], &webp[8..12]), (&b"RIFF"[..], &b"WEBP"[..]));
     let n_frames = webp.windows(4).filter(|w| w == b"ANMF").count();
     assert!((5..=7).contains(&n_frames), "{n_frames}");
 }
 
 #[test]
-fn equal_frames_give_equal_bytes_of_every_kind() {
+fn equal_frames_give_equal_bytes_in_every_format() {
     let films = Films::new();
     for coding in [
-        Coding::Vp9 { alpha: true },
-        Coding::ProRes { alpha: true },
-        Coding::Webp,
-        Coding::Gif,
+        Encoding::Vp9 { alpha: true },
+        Encoding::ProRes { alpha: true },
+        Encoding::Webp,
+        Encoding::Gif,
     ] {
         let [a, b] = ["a", "b"].map(|name| std::fs::read(written(&films, name, coding)).unwrap());
         assert!(a == b, "{coding:?}");
@@ -162,9 +162,9 @@ fn equal_frames_give_equal_bytes_of_every_kind() {
 }
 
 #[test]
-fn planes_and_rgba_are_not_taken_for_one_another() {
+fn frames_of_the_wrong_kind_are_refused() {
     let films = Films::new();
-    let coding = Coding::ProRes { alpha: true };
+    let coding = Encoding::ProRes { alpha: true };
     let mut writer = VideoWriter::create_as(&films.path("a.mov"), &FORMAT, coding).unwrap();
     assert!(writer.write(&Frame::new(98, 66, FORMAT.color)).is_err());
     assert!(writer.write_rgba(&disc(0)[4..]).is_err());

@@ -4,7 +4,6 @@
 mod advice;
 mod alpha;
 pub(crate) mod bad;
-pub(crate) mod cage;
 pub(crate) mod corpus;
 mod good;
 mod gray;
@@ -12,6 +11,7 @@ mod headers;
 mod kinds;
 mod pictures;
 mod real;
+pub(crate) mod sandbox;
 mod speed;
 mod traced;
 mod written;
@@ -40,7 +40,7 @@ fn read_all(source: &dyn FrameSource) -> Result<Vec<(f64, Frame)>, SourceError> 
 }
 
 /// Returns the number of processes whose arguments contain `text`.
-fn n_processes_about(text: &str) -> usize {
+fn n_processes_with(text: &str) -> usize {
     let processes = std::fs::read_dir("/proc").expect("a Linux machine");
     let about = |entry: &std::fs::DirEntry| {
         let arguments = std::fs::read(entry.path().join("cmdline")).unwrap_or_default();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use flockreel::code::Code;
 use flockreel::footage::{FrameSource, spread_idx};
-use flockreel::media::{Hints, Limits, Note, Video};
+use flockreel::media::{Limits, Notice, ReadOptions, Video};
 use image::{GrayImage, ImageFormat};
 use tiff::encoder::colortype;
 
@@ -14,11 +14,11 @@ use crate::common::film::Films;
 use crate::common::pictures::{SIZE, encoded, gray, stack, stack_of_grays, zip_of, zip_of_grays};
 
 fn open(path: &Path, fps: Option<f64>) -> Video {
-    let hints = Hints {
+    let options = ReadOptions {
         fps,
-        ..Hints::default()
+        ..ReadOptions::default()
     };
-    Video::open_with(path, &Limits::default(), &hints)
+    Video::open_with(path, &Limits::default(), &options)
         .unwrap_or_else(|error| panic!("{path:?}: {error}"))
 }
 
@@ -41,7 +41,7 @@ fn files(format: ImageFormat, ending: &str) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn a_folder_a_zip_and_a_stack_give_their_pictures_in_the_order_of_their_numbers() {
+fn folders_zips_and_stacks_are_read_in_numeric_order() {
     let films = Films::new();
     let pngs = files(ImageFormat::Png, "png");
     let tiffs = (0..12).map(|k| {
@@ -59,7 +59,7 @@ fn a_folder_a_zip_and_a_stack_give_their_pictures_in_the_order_of_their_numbers(
         let video = open(&path, Some(50.0));
         let format = video.format();
         assert_eq!((format.fps, format.n_frames_hint), (50.0, 12), "{path:?}");
-        assert_eq!(video.notes(), [], "{path:?}");
+        assert_eq!(video.notices(), [], "{path:?}");
         let frames = read_all(&video).expect("frames");
         assert_eq!(frames.len(), 12, "{path:?}");
         for (k, (time_s, frame)) in frames.iter().enumerate() {
@@ -80,13 +80,13 @@ fn a_folder_a_zip_and_a_stack_give_their_pictures_in_the_order_of_their_numbers(
 }
 
 #[test]
-fn pictures_without_a_rate_are_taken_at_30_and_colors_are_kept() {
+fn pictures_have_an_assumed_rate_of_30_and_keep_colors() {
     let films = Films::new();
     std::fs::create_dir(films.path("shots")).expect("a folder");
     films.test_picture("64x48", 4, "-pix_fmt rgb24 shots/%03d.png");
     films.run("-i shots/001.png -pix_fmt rgb24 -f rawvideo first.rgb");
     let video = open(&films.path("shots"), None);
-    assert_eq!(video.notes(), [Note::RateAssumed { fps: 30.0 }]);
+    assert_eq!(video.notices(), [Notice::RateAssumed { fps: 30.0 }]);
     let frames = read_all(&video).expect("frames");
     let wanted = std::fs::read(films.path("first.rgb")).expect("pixels");
     let luma =
@@ -101,7 +101,7 @@ fn pictures_without_a_rate_are_taken_at_30_and_colors_are_kept() {
 }
 
 #[test]
-fn gray_of_16_bits_is_stretched_and_pixels_become_square() {
+fn sixteen_bit_gray_is_stretched_and_pixels_become_square() {
     let films = Films::new();
     let page =
         |k: usize| (0..SIZE[0] * SIZE[1]).map(move |at| 1000 + 40 * (at % 64) as u16 + k as u16);
@@ -109,23 +109,23 @@ fn gray_of_16_bits_is_stretched_and_pixels_become_square() {
         "deep.tif",
         stack::<colortype::Gray16>(3, |k| page(k).collect()),
     );
-    let hints = Hints {
+    let options = ReadOptions {
         fps: Some(10.0),
         pixel_aspect: Some(2.0),
-        ..Hints::default()
+        ..ReadOptions::default()
     };
     let video = open(&path, Some(10.0));
     let [
-        Note::GrayStretched {
-            from,
-            to,
-            most: 65_535,
+        Notice::GrayStretched {
+            black,
+            white,
+            max: 65_535,
         },
-    ] = *video.notes()
+    ] = *video.notices()
     else {
-        panic!("{:?}", video.notes());
+        panic!("{:?}", video.notices());
     };
-    assert!((from, to) == (1000, 3522), "{from} to {to}");
+    assert!((black, white) == (1000, 3522), "{black} to {white}");
     let row = &read_all(&video).expect("frames")[0].1.planes[..64];
     for (x, &luma) in row.iter().enumerate() {
         assert!(
@@ -133,13 +133,13 @@ fn gray_of_16_bits_is_stretched_and_pixels_become_square() {
             "{x}: {luma}"
         );
     }
-    let wide = Video::open_with(&path, &Limits::default(), &hints).expect("a good stack");
+    let wide = Video::open_with(&path, &Limits::default(), &options).expect("a good stack");
     assert_eq!((wide.format().width, wide.format().height), (128, 48));
     assert_eq!(read_all(&wide).expect("frames").len(), 3);
 }
 
 #[test]
-fn what_is_no_footage_of_pictures_is_refused_with_its_reason() {
+fn invalid_pictures_are_refused_with_the_reason() {
     let films = Films::new();
     let png = |image: &GrayImage| encoded(image, ImageFormat::Png);
     let named = |pictures: Vec<Vec<u8>>| -> Vec<(String, Vec<u8>)> {
@@ -186,7 +186,7 @@ fn what_is_no_footage_of_pictures_is_refused_with_its_reason() {
 }
 
 #[test]
-fn more_pictures_than_the_limit_are_refused_and_a_folder_without_any() {
+fn too_many_pictures_and_empty_folders_are_refused() {
     let films = Films::new();
     let few = Limits {
         max_frames: 11,
@@ -213,7 +213,7 @@ fn more_pictures_than_the_limit_are_refused_and_a_folder_without_any() {
 }
 
 #[test]
-fn a_tiff_whose_pages_go_in_a_circle_ends() {
+fn tiff_with_circular_pages_is_refused() {
     let films = Films::new();
     let mut bytes = stack_of_grays(2);
     let first = u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]) as usize;

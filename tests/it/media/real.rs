@@ -8,7 +8,7 @@ use flockreel::raster::{Frame, Range};
 use crate::common::film::footage;
 
 #[test]
-fn every_real_clip_decodes_whole_at_its_own_size_and_rate() {
+fn real_clips_decode_at_their_size_and_rate() {
     let Some(folder) = footage() else { return };
     for (name, width, height, fps, n_frames) in [
         ("mouse_openfield.mp4", 640, 480, 1e6 / 33333.0, 1200),

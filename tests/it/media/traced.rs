@@ -20,7 +20,7 @@ const FOLDER: &str = "FLOCKREEL_TRACED_FOLDER";
 const LONGEST: Duration = Duration::from_secs(30);
 
 #[test]
-fn every_bad_film_ends_with_its_code_and_opens_nothing_else() {
+fn bad_films_fail_with_their_code_and_open_no_other_file() {
     let films = Films::new();
     let cases = corpus(&films);
     assert!(cases.len() >= 80, "{}", cases.len());
@@ -54,7 +54,7 @@ fn read_the_folder() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).expect("a folder"));
     // Test the command-line options of the tools without the layers that would also stop them.
     let limits = Limits {
-        layers: Layers::OLD,
+        layers: Layers::BASIC,
         ..Limits::default()
     };
     for entry in std::fs::read_dir(folder).expect("the folder").flatten() {
@@ -76,23 +76,22 @@ fn read_in_a_process(films: &Films) -> (String, Option<String>) {
     let traces = Command::new("strace").args(["-qq", "true"]).output();
     let traces = traces.is_ok_and(|done| done.status.success());
     let program = std::env::current_exe().expect("the path of this program");
-    let mut command = match traces {
-        true => {
-            let mut command = Command::new("strace");
-            let options = [
-                "-f",
-                "-qq",
-                "--seccomp-bpf",
-                "-s",
-                "4096",
-                "-e",
-                calls,
-                "-o",
-            ];
-            command.args(options).arg(log.path()).arg(program);
-            command
-        }
-        false => Command::new(program),
+    let mut command = if traces {
+        let mut command = Command::new("strace");
+        let options = [
+            "-f",
+            "-qq",
+            "--seccomp-bpf",
+            "-s",
+            "4096",
+            "-e",
+            calls,
+            "-o",
+        ];
+        command.args(options).arg(log.path()).arg(program);
+        command
+    } else {
+        Command::new(program)
     };
     let done = command
         .args([

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use flockreel::code::Code;
 use flockreel::footage::FrameSource;
-use flockreel::media::{Limits, Quality, Video, VideoFormat, VideoWriter};
+use flockreel::media::{Encoding, Limits, Quality, Video, VideoFormat, VideoWriter};
 use flockreel::raster::{ColorSpec, Frame, Matrix, Range};
 
-use super::{n_processes_about, read_all};
+use super::{n_processes_with, read_all};
 use crate::common::film::Films;
 
 const FORMAT: VideoFormat = VideoFormat {
@@ -46,7 +46,7 @@ fn write_within(
     limits: &Limits,
 ) -> Result<(), Code> {
     let all = || {
-        let mut writer = VideoWriter::create_with(path, format, quality, limits)?;
+        let mut writer = VideoWriter::create_with(path, format, Encoding::H264(quality), limits)?;
         for frame_idx in 0..n_frames {
             writer.write(&picture(format, frame_idx))?;
         }
@@ -58,7 +58,7 @@ fn write_within(
 /// Writes a film of noise, which no encoder can compress.
 fn write_noise(path: &Path, quality: Quality) -> Result<(), Code> {
     let all = || {
-        let mut writer = VideoWriter::create_with(path, &FORMAT, quality, &Limits::default())?;
+        let mut writer = VideoWriter::create_as(path, &FORMAT, Encoding::H264(quality))?;
         let mut state = 1u32;
         for _ in 0..100 {
             let mut frame = Frame::new(FORMAT.width, FORMAT.height, FORMAT.color);
@@ -74,7 +74,7 @@ fn write_noise(path: &Path, quality: Quality) -> Result<(), Code> {
 }
 
 #[test]
-fn what_is_written_is_read_back_with_its_size_rate_and_colors() {
+fn written_film_is_read_back_with_size_rate_and_colors() {
     let films = Films::new();
     for (matrix, range, fps) in [
         (Matrix::Bt601, Range::Limited, 25.0),
@@ -117,7 +117,7 @@ fn what_is_written_is_read_back_with_its_size_rate_and_colors() {
 }
 
 #[test]
-fn odd_sizes_gain_a_row_and_a_column() {
+fn odd_sizes_are_padded_by_a_row_and_a_column() {
     let films = Films::new();
     let format = VideoFormat {
         width: 97,
@@ -146,7 +146,7 @@ fn equal_frames_give_equal_bytes_and_the_index_comes_first() {
 }
 
 #[test]
-fn a_writer_that_is_dropped_leaves_neither_file_nor_child() {
+fn dropped_writer_leaves_neither_file_nor_child() {
     let films = Films::new();
     let path = films.path("film.mp4");
     let mut writer = VideoWriter::create(&path, &FORMAT).expect("an encoder");
@@ -162,11 +162,11 @@ fn a_writer_that_is_dropped_leaves_neither_file_nor_child() {
             .count(),
         0
     );
-    assert_eq!(n_processes_about(&films.folder().display().to_string()), 0);
+    assert_eq!(n_processes_with(&films.folder().display().to_string()), 0);
 }
 
 #[test]
-fn an_older_file_stands_until_the_new_one_is_whole() {
+fn older_file_is_kept_until_the_new_one_is_complete() {
     let films = Films::new();
     let path = films.write("film.mp4", "older");
     drop(VideoWriter::create(&path, &FORMAT).expect("an encoder"));
@@ -176,7 +176,7 @@ fn an_older_file_stands_until_the_new_one_is_whole() {
 }
 
 #[test]
-fn a_video_larger_than_allowed_is_storage_full_and_leaves_nothing() {
+fn too_large_video_is_storage_full_and_leaves_no_file() {
     let films = Films::new();
     let limits = Limits {
         max_output_bytes: 20_000,
@@ -197,7 +197,7 @@ fn a_video_larger_than_allowed_is_storage_full_and_leaves_nothing() {
 }
 
 #[test]
-fn a_full_disk_is_storage_full_and_leaves_nothing() {
+fn full_disk_is_storage_full_and_leaves_no_file() {
     let films = Films::new();
     let disk = films.path("disk");
     std::fs::create_dir(&disk).expect("a folder");
@@ -223,7 +223,7 @@ fn a_full_disk_is_storage_full_and_leaves_nothing() {
 }
 
 #[test]
-fn a_frame_of_another_size_is_refused() {
+fn frame_of_another_size_is_refused() {
     let films = Films::new();
     let mut writer = VideoWriter::create(&films.path("film.mp4"), &FORMAT).expect("an encoder");
     let error = writer

@@ -108,7 +108,7 @@ async fn at_work(workers: &[WorkerProcess]) -> usize {
     loop {
         let busy = workers
             .iter()
-            .position(|worker| worker.has_said("job claimed"));
+            .position(|worker| worker.has_logged("job claimed"));
         if let Some(busy) = busy {
             return busy;
         }
@@ -123,7 +123,7 @@ async fn a_worker_killed_in_the_middle_changes_no_result() {
     let expected = undisturbed().await;
     let place = Place::shared();
     let server = Server::start_at(&place);
-    let machines = [place.elsewhere(), place.elsewhere()];
+    let machines = [place.second_machine(), place.second_machine()];
     let mut workers: Vec<_> = machines.iter().map(WorkerProcess::start).collect();
     let (jobs, files) = queue_everything(&server).await;
     let killed = workers.remove(at_work(&workers).await);

@@ -40,11 +40,11 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
         .await
         .unwrap();
 
-    let elsewhere = place.elsewhere();
+    let elsewhere = place.second_machine();
     let stalled = WorkerProcess::start(&elsewhere);
-    wait_until("it claims", async || stalled.has_said("job claimed")).await;
+    wait_until("it claims", async || stalled.has_logged("job claimed")).await;
     stalled.signal(Signal::STOP);
-    let fresh = WorkerProcess::start(&place.elsewhere());
+    let fresh = WorkerProcess::start(&place.second_machine());
     let row = async || store.job(job, &Reach::All).await.unwrap().unwrap();
     wait_until("another finishes", async || {
         row().await.state == JobState::Done
@@ -57,10 +57,10 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
     let lets_go = async || {
         ["job stopped", "job result discarded", "job failed"]
             .iter()
-            .any(|words| stalled.has_said(words))
+            .any(|words| stalled.has_logged(words))
     };
     wait_until("the stalled one lets go", lets_go).await;
-    let said = stalled.said();
+    let said = stalled.log();
     assert!(!said.contains("job done"), "{said}");
     assert_eq!(stalled.terminate(), Some(0));
     assert_eq!(fresh.terminate(), Some(0));

@@ -16,13 +16,13 @@ async fn a_worker_tells_of_its_own_jobs_and_not_of_everybodys() {
     let place = Place::shared();
     let server = Server::start_at(&place);
     let flags = ["--metrics-bind", "127.0.0.1:0"];
-    let worker = WorkerProcess::start_with(&place.elsewhere(), &flags);
+    let worker = WorkerProcess::start_with(&place.second_machine(), &flags);
     let begun = Instant::now();
-    while !worker.has_said("waiting for jobs") {
+    while !worker.has_logged("waiting for jobs") {
         assert!(begun.elapsed() < Duration::from_secs(60), "never ready");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    let said = worker.said();
+    let said = worker.log();
     let (_, at) = said.split_once("the metrics are at ").expect(&said);
     let url = at.lines().next().unwrap();
     let told = client().get(url).send().await.unwrap();
@@ -44,7 +44,7 @@ async fn a_worker_tells_of_its_own_jobs_and_not_of_everybodys() {
 async fn a_service_whose_bucket_is_silent_says_within_seconds_that_it_is_not_ready() {
     let place = Place::shared();
     let wire = Wire::to(&std::env::var("AWS_ENDPOINT_URL").unwrap()).await;
-    let flags = place.elsewhere_flags();
+    let flags = place.server_flags();
     let flags: Vec<&str> = flags.iter().map(String::as_str).collect();
     let bucket = [("AWS_ENDPOINT_URL", wire.url.as_str())];
     let server = Server::start_in(place.data(), &flags, &bucket);

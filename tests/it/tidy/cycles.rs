@@ -15,8 +15,6 @@ const KNOWN: [&str; 10] = [
     "src/fish: body, fins, mesh",
     "src/flock/boids/tank: floor, site",
     "src/jobs/flock: film, sink, truth",
-    "src/media/pictures: picture, stack",
-    "src/media: gate, tools",
 ];
 
 /// For each module of a folder the modules beside it that its program text names.

@@ -8,16 +8,16 @@ use std::process::ExitStatus;
 use super::error::Error;
 
 /// The exit of a child process.
-pub(super) struct End {
+pub(super) struct Exit {
     /// Exit code or signal.
     pub(super) status: ExitStatus,
     /// The end of its stderr.
-    pub(super) complaint: String,
+    pub(super) stderr_tail: String,
 }
 
-impl End {
+impl Exit {
     /// Returns the exit if it was successful, otherwise the error that it means.
-    pub(super) fn check(self) -> Result<End, Error> {
+    pub(super) fn check(self) -> Result<Exit, Error> {
         const OUT_OF_MEMORY: [&str; 4] = [
             "Cannot allocate memory",
             "_buffer() failed",
@@ -27,7 +27,7 @@ impl End {
         const SIGKILL: i32 = 9;
         const SIGXCPU: i32 = 24;
         const SIGXFSZ: i32 = 25;
-        let says = |what| self.complaint.contains(what);
+        let says = |what| self.stderr_tail.contains(what);
         match self.status.signal() {
             None if self.status.success() => Ok(self),
             Some(SIGXCPU) => Err(Error::TimeLimit),
@@ -39,20 +39,20 @@ impl End {
             // out of memory.
             signal if signal == Some(SIGKILL) || OUT_OF_MEMORY.into_iter().any(says) => {
                 Err(Error::MemoryLimit {
-                    complaint: self.complaint,
+                    stderr_tail: self.stderr_tail,
                 })
             }
             _ => Err(Error::Crashed {
                 status: self.status.to_string(),
-                complaint: self.complaint,
+                stderr_tail: self.stderr_tail,
             }),
         }
     }
 }
 
 /// Replaces the paths of our files in a message of a child.
-pub(super) fn without(files: &[PathBuf], complaint: String) -> String {
-    files.iter().fold(complaint, |text, file| {
+pub(super) fn hide_paths(files: &[PathBuf], stderr_tail: String) -> String {
+    files.iter().fold(stderr_tail, |text, file| {
         let path = file.to_string_lossy();
         text.replace(&*format!("file:{path}"), "the file")
             .replace(&*path, "the file")

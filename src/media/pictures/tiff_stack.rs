@@ -11,7 +11,6 @@ use tiff::{ColorType, TiffError};
 use super::picture::Picture;
 use crate::media::error::Error;
 use crate::media::limits::Limits;
-use crate::media::probe::check_size;
 
 /// Largest value of one tag, bytes. The strip offsets of the tallest allowed picture need half of it.
 const MAX_TAG_BYTES: usize = 1 << 17;
@@ -25,12 +24,12 @@ pub(super) fn is_tiff(head: &[u8]) -> bool {
 
 /// Opens a TIFF at its first page.
 pub(super) fn open<R: Read + Seek>(from: R, limits: &Limits) -> Result<Decoder<R>, Error> {
-    let most = usize::try_from(limits.max_pixels * 8).unwrap_or(usize::MAX);
+    let max_bytes = usize::try_from(limits.max_pixels * 8).unwrap_or(usize::MAX);
     let mut bounds = TiffLimits::default();
-    bounds.decoding_buffer_size = most;
-    bounds.intermediate_buffer_size = most;
+    bounds.decoding_buffer_size = max_bytes;
+    bounds.intermediate_buffer_size = max_bytes;
     bounds.ifd_value_size = MAX_TAG_BYTES;
-    let decoder = Decoder::new(from).map_err(refused)?;
+    let decoder = Decoder::new(from).map_err(from_tiff)?;
     Ok(decoder.with_limits(bounds))
 }
 
@@ -42,13 +41,9 @@ pub(super) fn n_pages<R: Read + Seek>(
     let start = Instant::now();
     let mut n_pages = 1;
     while pages.more_images() {
-        pages.next_image().map_err(refused)?;
+        pages.next_image().map_err(from_tiff)?;
         n_pages += 1;
-        if n_pages > limits.max_frames {
-            return Err(Error::TooManyFrames {
-                limit: limits.max_frames,
-            });
-        }
+        limits.check_n_frames(n_pages)?;
         if start.elapsed() > limits.base_time {
             return Err(Error::TimeLimit);
         }
@@ -62,19 +57,20 @@ pub(super) fn page<R: Read + Seek>(
     idx: usize,
     limits: &Limits,
 ) -> Result<Picture, Error> {
-    pages.seek_to_image(idx).map_err(refused)?;
-    let (width, height) = pages.dimensions().map_err(refused)?;
-    check_size(u64::from(width), u64::from(height), limits)?;
-    let color = pages.colortype().map_err(refused)?;
-    let is_apart = pages
+    pages.seek_to_image(idx).map_err(from_tiff)?;
+    let (width, height) = pages.dimensions().map_err(from_tiff)?;
+    limits.check_size(width.into(), height.into())?;
+    let color = pages.colortype().map_err(from_tiff)?;
+    let is_planar = pages
         .find_tag_unsigned::<u16>(Tag::PlanarConfiguration)
-        .map_err(refused)?
+        .map_err(from_tiff)?
         == Some(2);
-    let unknown = || Error::NotAVideo(format!("a TIFF of samples that are not read: {color:?}"));
-    if is_apart && !matches!(color, ColorType::Gray(_)) {
-        return Err(unknown());
+    let unsupported =
+        || Error::NotAVideo(format!("a TIFF of samples that are not read: {color:?}"));
+    if is_planar && !matches!(color, ColorType::Gray(_)) {
+        return Err(unsupported());
     }
-    let samples = pages.read_image().map_err(refused)?;
+    let samples = pages.read_image().map_err(from_tiff)?;
     let picture = match (color, samples) {
         (ColorType::Gray(8), DecodingResult::U8(gray)) => {
             ImageBuffer::from_raw(width, height, gray).map(Picture::Gray)
@@ -93,12 +89,12 @@ pub(super) fn page<R: Read + Seek>(
             let rgb = rgb.iter().map(|&level| (level >> 8) as u8);
             ImageBuffer::from_raw(width, height, rgb.collect()).map(Picture::Rgb)
         }
-        _ => return Err(unknown()),
+        _ => return Err(unsupported()),
     };
-    picture.ok_or_else(unknown)
+    picture.ok_or_else(unsupported)
 }
 
-fn refused(error: TiffError) -> Error {
+fn from_tiff(error: TiffError) -> Error {
     match error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
             Error::io("reading the pictures")(error)

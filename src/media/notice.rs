@@ -1,8 +1,8 @@
-//! Notes about accepted footage: assumptions, and faults of the file that were corrected.
+//! Notices about accepted footage: assumptions, and faults of the file that were corrected.
 
-/// One note. It prints as a sentence.
+/// One notice. It prints as a sentence.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Note {
+pub enum Notice {
     /// The file is cut off after its last picture.
     #[error(
         "The file is cut off after its last picture, so only sound or the index is incomplete. All {n_pictures} \
@@ -36,26 +36,26 @@ pub enum Note {
     },
     /// Gray of more than 8 bits was reduced to 8 bits.
     #[error(
-        "The pictures use gray levels {from} to {to} of 0 to {most}. These levels were stretched to black and white."
+        "The pictures use gray levels {black} to {white} of 0 to {max}. These levels were stretched to black and white."
     )]
     GrayStretched {
         /// Level that becomes black.
-        from: u16,
+        black: u16,
         /// Level that becomes white.
-        to: u16,
+        white: u16,
         /// Highest level of the format.
-        most: u16,
+        max: u16,
     },
 }
 
-impl Note {
+impl Notice {
     /// Returns the stable name.
     pub fn code(&self) -> &'static str {
         match self {
-            Note::CutAfterPictures { .. } => "cut_after_pictures",
-            Note::TimesLeap { .. } => "times_leap",
-            Note::RateAssumed { .. } => "rate_assumed",
-            Note::GrayStretched { .. } => "gray_stretched",
+            Notice::CutAfterPictures { .. } => "cut_after_pictures",
+            Notice::TimesLeap { .. } => "times_leap",
+            Notice::RateAssumed { .. } => "rate_assumed",
+            Notice::GrayStretched { .. } => "gray_stretched",
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::raster::{Matrix, Range};
 
 /// An output format.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Coding {
+pub enum Encoding {
     /// H.264 High in MP4, from planar frames; plays in browsers.
     H264(Quality),
     /// VP9 in WebM, from RGBA.
@@ -29,22 +29,25 @@ pub enum Coding {
     Gif,
 }
 
-impl Coding {
+impl Encoding {
     /// Returns whether frames are RGBA, not planar.
     pub fn takes_rgba(self) -> bool {
-        !matches!(self, Coding::H264(_) | Coding::Gif)
+        !matches!(self, Encoding::H264(_) | Encoding::Gif)
     }
 
     /// Returns whether width and height must be even.
     pub(super) fn is_even(self) -> bool {
-        matches!(self, Coding::H264(_))
+        matches!(self, Encoding::H264(_))
     }
 
     /// Returns all arguments of ffmpeg. The output file is last.
     pub(super) fn args(self, part: &Path, format: &VideoFormat) -> Vec<OsString> {
-        let even = |side: u32| match self.is_even() {
-            true => side.next_multiple_of(2),
-            false => side,
+        let even = |side: u32| {
+            if self.is_even() {
+                side.next_multiple_of(2)
+            } else {
+                side
+            }
         };
         let size = format!("{}x{}", even(format.width), even(format.height));
         let (over, under) = fraction(format.fps);
@@ -73,8 +76,8 @@ impl Coding {
 
     fn output(self, format: &VideoFormat) -> String {
         match self {
-            Coding::H264(quality) => h264(format, quality),
-            Coding::Vp9 { alpha } => {
+            Encoding::H264(quality) => h264(format, quality),
+            Encoding::Vp9 { alpha } => {
                 let planes = if alpha { "yuva420p" } else { "yuv420p" };
                 // With alpha, hidden reference frames are off, because they would make the two layers differ
                 // in time.
@@ -84,7 +87,7 @@ impl Coding {
                     from_rgba(planes)
                 )
             }
-            Coding::ProRes { alpha } => {
+            Encoding::ProRes { alpha } => {
                 let planes = if alpha { "yuva444p10le" } else { "yuv444p10le" };
                 let bits = if alpha { 16 } else { 0 };
                 format!(
@@ -93,10 +96,10 @@ impl Coding {
                     from_rgba(planes)
                 )
             }
-            Coding::Webp => format!(
+            Encoding::Webp => format!(
                 "-vf {SMALL} -c:v libwebp_anim -quality 75 -compression_level 3 -loop 0 -f webp"
             ),
-            Coding::Gif => format!(
+            Encoding::Gif => format!(
                 "-vf {SMALL},split[a][b];[a]palettegen=stats_mode=full[p];\
                  [b][p]paletteuse=dither=bayer:bayer_scale=4 -c:v gif -loop 0 -f gif"
             ),
@@ -140,13 +143,13 @@ fn h264(format: &VideoFormat, quality: Quality) -> String {
 
 /// Returns the fraction nearest to a frame rate whose terms ffmpeg accepts (up to 1,001,000).
 fn fraction(fps: f64) -> (u64, u64) {
-    const MOST: f64 = 1_001_000.0;
+    const MAX_TERM: f64 = 1_001_000.0;
     let (mut before, mut last, mut rest) = ((0.0, 1.0), (1.0, 0.0), fps);
     // Continued fraction: each step is the best approximation with terms of its size.
     loop {
         let whole = f64::floor(rest);
         let next = (whole * last.0 + before.0, whole * last.1 + before.1);
-        if next.0 > MOST || next.1 > MOST {
+        if next.0 > MAX_TERM || next.1 > MAX_TERM {
             break;
         }
         (before, last) = (last, next);
@@ -164,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn usual_and_odd_rates_become_their_own_fractions() {
+    fn common_and_odd_rates_become_exact_fractions() {
         assert_eq!(fraction(25.0), (25, 1));
         assert_eq!(fraction(30000.0 / 1001.0), (30000, 1001));
         assert_eq!(fraction(1_000_000.0 / 33333.0), (1_000_000, 33333));

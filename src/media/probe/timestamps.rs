@@ -11,22 +11,22 @@
 
 /// Deviation of a regular step from the usual step, as a share of it. Cameras with a varying rate deviate
 /// less.
-const REGULAR: f64 = 0.5;
+const MAX_DEVIATION: f64 = 0.5;
 
 /// Tolerance for the end of a run, usual steps. More than one step, because the first picture of a stall may
 /// itself be late.
-const ON_TIME: f64 = 1.5;
+const END_TOLERANCE: f64 = 1.5;
 
-/// Longest gap that is kept, seconds, or [`LONGEST_GAP_STEPS`] if longer. Free choice between the tenths of a
+/// Longest gap that is kept, seconds, or [`MAX_GAP_STEPS`] if longer. Free choice between the tenths of a
 /// second that a busy recorder loses and the minutes of a pause.
-const LONGEST_GAP_S: f64 = 1.0;
+const MAX_GAP_S: f64 = 1.0;
 
 /// Longest gap that is kept at low frame rates, usual steps. Free choice.
-const LONGEST_GAP_STEPS: f64 = 8.0;
+const MAX_GAP_STEPS: f64 = 8.0;
 
 /// Corrected timestamps.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Mended {
+pub(super) struct RepairedTimes {
     /// Time of each picture, seconds from the first, never decreasing.
     pub(super) times_s: Vec<f64>,
     /// Removed steps back or far ahead: corrected time of the step and its size, both in seconds.
@@ -36,24 +36,24 @@ pub(super) struct Mended {
 /// Corrects the times of pictures in display order; `None` marks a picture without a time.
 ///
 /// Returns `None` if no two pictures have different times.
-pub(super) fn mend(times_s: &[Option<f64>]) -> Option<Mended> {
-    let told_s = filled(times_s)?;
-    let step_s = usual_step(&told_s)?;
-    let longest_s = LONGEST_GAP_S.max(LONGEST_GAP_STEPS * step_s);
-    let is_regular = |pair: &[f64]| ((pair[1] - pair[0]) / step_s - 1.0).abs() < REGULAR;
-    let mut times_s = told_s.clone();
-    let (mut leaps_s, mut first, mut offset_s) = (Vec::new(), 0, -told_s[0]);
+pub(super) fn repair(times_s: &[Option<f64>]) -> Option<RepairedTimes> {
+    let stored_s = interpolate_missing(times_s)?;
+    let step_s = median_step(&stored_s)?;
+    let max_gap_s = MAX_GAP_S.max(MAX_GAP_STEPS * step_s);
+    let is_regular = |pair: &[f64]| ((pair[1] - pair[0]) / step_s - 1.0).abs() < MAX_DEVIATION;
+    let mut times_s = stored_s.clone();
+    let (mut leaps_s, mut first, mut offset_s) = (Vec::new(), 0, -stored_s[0]);
     times_s[0] = 0.0;
-    while first + 1 < told_s.len() {
-        let irregular = told_s[first..]
+    while first + 1 < stored_s.len() {
+        let irregular = stored_s[first..]
             .windows(2)
             .take_while(|pair| !is_regular(pair));
         let last = first + irregular.count().max(1);
         let is_on_time =
-            last > first + 1 && space_evenly(&mut times_s[first..=last], told_s[first], step_s);
+            last > first + 1 && space_evenly(&mut times_s[first..=last], stored_s[first], step_s);
         for k in first + 1..=last {
-            let leap_s = told_s[k] - told_s[k - 1];
-            if !is_on_time && (leap_s < 0.0 || leap_s > longest_s) {
+            let leap_s = stored_s[k] - stored_s[k - 1];
+            if !is_on_time && (leap_s < 0.0 || leap_s > max_gap_s) {
                 leaps_s.push([times_s[k - 1], leap_s]);
                 offset_s -= leap_s - step_s;
             }
@@ -61,7 +61,7 @@ pub(super) fn mend(times_s: &[Option<f64>]) -> Option<Mended> {
         }
         first = last;
     }
-    Some(Mended { times_s, leaps_s })
+    Some(RepairedTimes { times_s, leaps_s })
 }
 
 /// Spaces the times of a run evenly if it ends on time; returns whether it does. `start_s` is the original
@@ -71,7 +71,7 @@ fn space_evenly(run: &mut [f64], start_s: f64, step_s: f64) -> bool {
     let n_steps = 1 + run[1..].iter().position(|&time| time == end_s).unwrap_or(0);
     let even_s = (end_s - start_s) / n_steps as f64;
     let late_s = (even_s - step_s) * n_steps as f64;
-    if even_s <= 0.0 || late_s.abs() > ON_TIME * step_s {
+    if even_s <= 0.0 || late_s.abs() > END_TOLERANCE * step_s {
         return false;
     }
     for (k, time) in run.iter_mut().enumerate().skip(1) {
@@ -82,7 +82,7 @@ fn space_evenly(run: &mut [f64], start_s: f64, step_s: f64) -> bool {
 }
 
 /// Interpolates missing times between neighbors, and extrapolates at the ends by the usual step.
-fn filled(times_s: &[Option<f64>]) -> Option<Vec<f64>> {
+fn interpolate_missing(times_s: &[Option<f64>]) -> Option<Vec<f64>> {
     let known: Vec<(usize, f64)> = (times_s.iter().enumerate())
         .filter_map(|(k, time)| Some((k, (*time)?)))
         .collect();
@@ -118,7 +118,7 @@ fn filled(times_s: &[Option<f64>]) -> Option<Vec<f64>> {
 }
 
 /// Returns the median over the pictures of the step to the next time. Pictures with equal times share a step.
-fn usual_step(times_s: &[f64]) -> Option<f64> {
+fn median_step(times_s: &[f64]) -> Option<f64> {
     let groups: Vec<&[f64]> = times_s.chunk_by(|a, b| a == b).collect();
     let steps = groups.windows(2).flat_map(|pair| {
         let step_s = (pair[1][0] - pair[0][0]) / pair[0].len() as f64;
@@ -136,9 +136,9 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn mended(times_s: &[f64]) -> Mended {
+    fn repaired(times_s: &[f64]) -> RepairedTimes {
         let times_s: Vec<_> = times_s.iter().copied().map(Some).collect();
-        mend(&times_s).expect("times")
+        repair(&times_s).expect("times")
     }
 
     fn grid(n: u32, fps: f64) -> Vec<f64> {
@@ -154,35 +154,35 @@ mod tests {
     }
 
     #[test]
-    fn a_stall_and_its_burst_are_spaced_evenly() {
+    fn stall_and_burst_are_spaced_evenly() {
         let mut times = grid(90, 30.0);
         for (k, time) in times[40..60].iter_mut().enumerate() {
             *time = 59.0 / 30.0 + k as f64 * 1e-4;
         }
-        let mended = mended(&times);
-        assert_even(&mended.times_s, 30.0);
-        assert_eq!(mended.leaps_s, Vec::<[f64; 2]>::new());
+        let repaired = repaired(&times);
+        assert_even(&repaired.times_s, 30.0);
+        assert_eq!(repaired.leaps_s, Vec::<[f64; 2]>::new());
     }
 
     #[test]
-    fn a_clock_that_stands_still_is_carried_on() {
+    fn stopped_clock_continues_at_the_usual_step() {
         let mut times = grid(90, 30.0);
         times[40..60].fill(40.0 / 30.0);
-        assert_even(&mended(&times).times_s, 30.0);
+        assert_even(&repaired(&times).times_s, 30.0);
         // Some recorders store times in whole seconds.
         let seconds: Vec<f64> = times.iter().map(|time| time.floor()).collect();
-        assert_even(&mended(&seconds).times_s, 30.0);
+        assert_even(&repaired(&seconds).times_s, 30.0);
     }
 
     #[test]
-    fn a_clock_that_is_set_forward_or_back_goes_on() {
+    fn clock_set_forward_or_back_becomes_a_usual_step() {
         for leap_s in [3600.0, 1e11, 5.0, -0.5, -1.0, -3600.0] {
             let mut times = grid(90, 30.0);
             times[50..].iter_mut().for_each(|time| *time += leap_s);
-            let mended = mended(&times);
-            assert_even(&mended.times_s, 30.0);
-            let [[at_s, by_s]] = mended.leaps_s[..] else {
-                panic!("{leap_s}: {:?}", mended.leaps_s);
+            let repaired = repaired(&times);
+            assert_even(&repaired.times_s, 30.0);
+            let [[at_s, by_s]] = repaired.leaps_s[..] else {
+                panic!("{leap_s}: {:?}", repaired.leaps_s);
             };
             assert!((at_s - 49.0 / 30.0).abs() < 0.1, "{leap_s} at {at_s}");
             assert!((by_s / leap_s - 1.0).abs() < 0.1, "{leap_s}: {by_s}");
@@ -190,25 +190,25 @@ mod tests {
     }
 
     #[test]
-    fn lost_pictures_and_a_rate_that_varies_stay_as_they_are() {
+    fn lost_pictures_and_varying_rates_are_kept() {
         let mut lossy = grid(90, 30.0);
         lossy.drain(40..52);
         lossy.remove(20);
         let varies: Vec<f64> = (0..40).map(|k| f64::from(k * k) * 0.01).collect();
         for times in [lossy, varies] {
-            assert_eq!(mended(&times).times_s, times);
+            assert_eq!(repaired(&times).times_s, times);
         }
     }
 
     #[test]
-    fn missing_times_are_filled_in() {
+    fn missing_times_are_interpolated() {
         let mut times: Vec<_> = grid(30, 10.0).into_iter().map(Some).collect();
         for k in [0, 1, 7, 15, 16, 29] {
             times[k] = None;
         }
-        assert_even(&mend(&times).unwrap().times_s, 10.0);
-        assert_eq!(mend(&[None, None, Some(1.0)]), None);
-        assert_eq!(mend(&[Some(1.0), Some(1.0)]), None);
-        assert_eq!(mend(&[]), None);
+        assert_even(&repair(&times).unwrap().times_s, 10.0);
+        assert_eq!(repair(&[None, None, Some(1.0)]), None);
+        assert_eq!(repair(&[Some(1.0), Some(1.0)]), None);
+        assert_eq!(repair(&[]), None);
     }
 }

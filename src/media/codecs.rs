@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::error::Error;
-use super::tools::{answer, whole_place};
+use super::tools::query_ffmpeg;
 
 /// Decoders by the format they read. The first one available is used.
 const DECODERS: [(&str, &[&str]); 14] = [
@@ -38,44 +38,44 @@ const ENCODERS: [(&str, &str); 5] = [
 
 /// Decoders and encoders of an ffmpeg, among those that flockreel uses.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Coders {
+pub struct Codecs {
     /// Names of the available ones.
-    pub has: Vec<&'static str>,
+    pub available: Vec<&'static str>,
     /// Names of the missing ones, each with the effect.
-    pub lacks: Vec<(&'static str, String)>,
+    pub missing: Vec<(&'static str, String)>,
 }
 
-impl Coders {
+impl Codecs {
     /// Queries the installed ffmpeg.
-    pub fn installed() -> Result<Coders, Error> {
-        let place = whole_place()?;
-        let decoders = answer(place, &["-hide_banner", "-decoders"], false)?;
-        let encoders = answer(place, &["-hide_banner", "-encoders"], false)?;
-        Ok(Coders::of(&decoders, &encoders))
+    pub fn installed() -> Result<Codecs, Error> {
+        let decoders = query_ffmpeg(&["-hide_banner", "-decoders"])?;
+        let encoders = query_ffmpeg(&["-hide_banner", "-encoders"])?;
+        Ok(Codecs::from_listings(&decoders, &encoders))
     }
 
-    fn of(decoders: &str, encoders: &str) -> Coders {
+    fn from_listings(decoders: &str, encoders: &str) -> Codecs {
         let (decoders, encoders) = (names(decoders), names(encoders));
-        let mut coders = Coders {
-            has: Vec::new(),
-            lacks: Vec::new(),
+        let mut codecs = Codecs {
+            available: Vec::new(),
+            missing: Vec::new(),
         };
         for (film, names) in DECODERS {
             match names.iter().find(|name| decoders.contains(*name)) {
-                Some(name) => coders.has.push(name),
+                Some(name) => codecs.available.push(name),
                 None => {
-                    let meaning = format!("footage in {film} is refused");
-                    coders.lacks.push((names[0], meaning));
+                    let effect = format!("footage in {film} is refused");
+                    codecs.missing.push((names[0], effect));
                 }
             }
         }
-        for (name, meaning) in ENCODERS {
-            match encoders.contains(name) {
-                true => coders.has.push(name),
-                false => coders.lacks.push((name, meaning.to_owned())),
+        for (name, effect) in ENCODERS {
+            if encoders.contains(name) {
+                codecs.available.push(name)
+            } else {
+                codecs.missing.push((name, effect.to_owned()))
             }
         }
-        coders
+        codecs
     }
 }
 
@@ -90,12 +90,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_build_without_patents_lacks_h264_and_says_what_that_means() {
+    fn missing_codecs_are_listed_with_their_effect() {
         let decoders = " V....D vp9    Google VP9\n V....D libaom-av1   libaom AV1 (codec av1)\n";
-        let coders = Coders::of(decoders, " V..... gif    GIF\n");
-        assert_eq!(coders.has, ["vp9", "libaom-av1", "gif"]);
-        let h264 = coders.lacks.iter().find(|(name, _)| *name == "h264");
+        let codecs = Codecs::from_listings(decoders, " V..... gif    GIF\n");
+        assert_eq!(codecs.available, ["vp9", "libaom-av1", "gif"]);
+        let h264 = codecs.missing.iter().find(|(name, _)| *name == "h264");
         assert_eq!(h264.unwrap().1, "footage in H.264 is refused");
-        assert_eq!(coders.lacks.len(), 14 + 5 - 3);
+        assert_eq!(codecs.missing.len(), 14 + 5 - 3);
     }
 }

@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use flockreel::media::{Layer, Layers, Limits, Quality, Video, VideoFormat, VideoWriter};
+use flockreel::media::{Encoding, Layer, Layers, Limits, Quality, Video, VideoFormat, VideoWriter};
 use flockreel::raster::{ColorSpec, Frame};
 
-use super::n_processes_about;
+use super::n_processes_with;
 use crate::common::film::Films;
 
 /// Environment variable with the folder of the attack, for tests in a process of their own.
@@ -21,7 +21,7 @@ const MISSING: &str = "FLOCKREEL_ATTACK_MISSING";
 
 /// Compiles the attack into the folder, under the names of both tools, and returns its path.
 pub(crate) fn compile_attack(folder: &Path) -> PathBuf {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/media/cage/attack.rs");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/it/media/sandbox/attack.rs");
     let program = folder.join("ffmpeg");
     let done = Command::new("rustc")
         .args(["--edition", "2024", "-C", "panic=abort", "-o"])
@@ -41,7 +41,7 @@ pub(crate) fn compile_attack(folder: &Path) -> PathBuf {
 }
 
 /// Returns a command that runs one ignored test of this program, with the attack in place of the tools.
-fn again(test: &str, folder: &Path) -> Command {
+fn rerun(test: &str, folder: &Path) -> Command {
     let mut command = Command::new(std::env::current_exe().expect("the path of this program"));
     command
         .args(["--exact", test, "--ignored", "--nocapture"])
@@ -51,12 +51,15 @@ fn again(test: &str, folder: &Path) -> Command {
 }
 
 #[test]
-fn every_attack_is_held_by_the_layers_that_are_meant_to() {
+fn attacks_are_stopped_by_exactly_the_intended_layers() {
     let films = Films::new();
     compile_attack(films.folder());
-    let done = again("media::cage::attack_in_every_cage", films.folder())
-        .output()
-        .expect("this program");
+    let done = rerun(
+        "media::sandbox::attack_in_every_set_of_layers",
+        films.folder(),
+    )
+    .output()
+    .expect("this program");
     let said = String::from_utf8_lossy(&done.stdout);
     let complaint = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success(), "{complaint}{said}");
@@ -70,7 +73,7 @@ struct Attempt {
     /// True if a film is written rather than read. The child then has an output file.
     writes: bool,
     /// Sets of layers that stop the attack. Any one set is enough; it needs all of its layers.
-    held_by: Vec<Vec<Layer>>,
+    stopped_by: Vec<Vec<Layer>>,
 }
 
 fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
@@ -78,15 +81,15 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
     let path = |name: &str| folder.join(name).display().to_string();
     let alone = |layers: &[Layer]| layers.iter().map(|&layer| vec![layer]).collect::<Vec<_>>();
     let is_root = rustix::process::getuid().is_root();
-    let attempt = |name, target: String, held_by| Attempt {
+    let attempt = |name, target: String, stopped_by| Attempt {
         name,
         target,
         writes: false,
-        held_by,
+        stopped_by,
     };
-    let writing = |name, target: String, held_by| Attempt {
+    let writing = |name, target: String, stopped_by| Attempt {
         writes: true,
-        ..attempt(name, target, held_by)
+        ..attempt(name, target, stopped_by)
     };
     let mut traced = alone(&[Files, Network, Signals, Calls]);
     let mut raised = alone(&[Calls]);
@@ -94,13 +97,14 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
         traced.push(vec![Privileges]);
     }
     // With CAP_SYS_RESOURCE, a process can raise its limits until the privileges are dropped.
-    let held = rustix::thread::capabilities(None).expect("Linux");
-    let may_raise = held
+    let is_stopped = rustix::thread::capabilities(None).expect("Linux");
+    let may_raise = is_stopped
         .effective
         .contains(rustix::thread::CapabilitySet::SYS_RESOURCE);
-    raised.push(match may_raise {
-        true => vec![Limits, Privileges],
-        false => vec![Limits],
+    raised.push(if may_raise {
+        vec![Limits, Privileges]
+    } else {
+        vec![Limits]
     });
     vec![
         attempt("read", path("secret"), alone(&[Files])),
@@ -130,7 +134,7 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
 
 #[test]
 #[ignore = "started by the test above, with the attack in the place of the tools"]
-fn attack_in_every_cage() {
+fn attack_in_every_set_of_layers() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).expect("a folder"));
     let (tcp, udp) = (
         TcpListener::bind("127.0.0.1:0"),
@@ -143,7 +147,7 @@ fn attack_in_every_cage() {
         &address(tcp.local_addr()),
         &address(udp.local_addr()),
     );
-    let here = flockreel::media::walls()
+    let here = flockreel::media::sandbox_status()
         .expect("the attack tells its version")
         .layers;
     let missing = here
@@ -153,16 +157,20 @@ fn attack_in_every_cage() {
     let here = missing.fold(Layers::ALL, Layers::without);
     let each =
         |change: fn(Layers, Layer) -> Layers, from| Layer::ALL.map(|layer| change(from, layer));
-    let cages = [
+    let layer_sets = [
         vec![Layers::NONE, Layers::ALL],
         each(Layers::without, Layers::ALL).to_vec(),
     ];
-    let cages = [cages.concat(), each(Layers::with, Layers::NONE).to_vec()].concat();
+    let layer_sets = [
+        layer_sets.concat(),
+        each(Layers::with, Layers::NONE).to_vec(),
+    ]
+    .concat();
     for attempt in attempts {
-        for &layers in &cages {
+        for &layers in &layer_sets {
             let layers = layers.and(here);
-            let held = attempt
-                .held_by
+            let is_stopped = attempt
+                .stopped_by
                 .iter()
                 .any(|set| set.iter().all(|&layer| layers.has(layer)));
             let verdict = attempt.make(&folder, layers);
@@ -173,13 +181,16 @@ fn attack_in_every_cage() {
                 .collect();
             assert_eq!(
                 verdict.contains("ATTACK DONE"),
-                !held,
+                !is_stopped,
                 "{} {} in {names:?}: {verdict}",
                 attempt.name,
                 attempt.target
             );
         }
-        println!("{}: held by any of {:?}", attempt.name, attempt.held_by);
+        println!(
+            "{}: is_stopped by any of {:?}",
+            attempt.name, attempt.stopped_by
+        );
     }
 }
 
@@ -196,9 +207,10 @@ impl Attempt {
             ..Limits::default()
         };
         let order = format!("ATTACK {} {}\n", self.name, self.target);
-        match self.writes {
-            true => write(&folder.join("film.mp4"), &order, &limits),
-            false => read(&folder.join("film"), &order, &limits),
+        if self.writes {
+            write(&folder.join("film.mp4"), &order, &limits)
+        } else {
+            read(&folder.join("film"), &order, &limits)
         }
     }
 }
@@ -236,14 +248,15 @@ fn write(film: &Path, order: &str, limits: &Limits) -> String {
     };
     let mut frame = Frame::new(64, 64, format.color);
     frame.planes[..order.len()].copy_from_slice(order.as_bytes());
-    let mut writer = VideoWriter::create_with(film, &format, Quality::default(), limits)
-        .expect("the attack starts");
+    let encoding = Encoding::H264(Quality::default());
+    let mut writer =
+        VideoWriter::create_with(film, &format, encoding, limits).expect("the attack starts");
     let written = writer.write(&frame).and_then(|()| writer.finish());
     written.expect_err("an attack writes no film").to_string()
 }
 
 #[test]
-fn nothing_outlives_its_parent_but_where_leash_or_calls_are_missing() {
+fn child_outlives_its_parent_only_without_leash_or_calls() {
     let films = Films::new();
     compile_attack(films.folder());
     let film = films.write("film", b"\0\0\0\x10ftypisom\0\0\0\0\nATTACK outlive \n");
@@ -254,28 +267,32 @@ fn nothing_outlives_its_parent_but_where_leash_or_calls_are_missing() {
         ("leash", true),
         ("calls", true),
     ] {
-        let mut parent = again("media::cage::start_what_outlives", films.folder())
-            .env(MISSING, missing)
-            .stdout(std::process::Stdio::null())
-            .spawn()
-            .expect("this program");
-        wait_until(|| n_processes_about(&name) > 0);
+        let mut parent = rerun(
+            "media::sandbox::start_a_child_that_outlives_its_parent",
+            films.folder(),
+        )
+        .env(MISSING, missing)
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("this program");
+        wait_until(|| n_processes_with(&name) > 0);
         // Leave the child time to clear its parent-death signal.
         std::thread::sleep(Duration::from_millis(300));
         parent.kill().expect("a process of ours");
         parent.wait().expect("a process of ours");
-        match outlives {
-            false => wait_until(|| n_processes_about(&name) == 0),
-            true => std::thread::sleep(Duration::from_millis(300)),
+        if outlives {
+            std::thread::sleep(Duration::from_millis(300))
+        } else {
+            wait_until(|| n_processes_with(&name) == 0)
         }
-        assert_eq!(n_processes_about(&name) > 0, outlives, "without {missing}");
-        end_all(&name);
+        assert_eq!(n_processes_with(&name) > 0, outlives, "without {missing}");
+        kill_all(&name);
     }
 }
 
 #[test]
 #[ignore = "started by the test above, with the attack in the place of the tools"]
-fn start_what_outlives() {
+fn start_a_child_that_outlives_its_parent() {
     let folder = PathBuf::from(std::env::var_os(FOLDER).expect("a folder"));
     let missing = std::env::var(MISSING).expect("a layer");
     let missing = Layer::ALL.into_iter().find(|layer| layer.name() == missing);
@@ -296,7 +313,7 @@ fn wait_until(condition: impl Fn() -> bool) {
 }
 
 /// Kills the processes whose arguments contain `text`. All of them belong to this test.
-fn end_all(text: &str) {
+fn kill_all(text: &str) {
     for entry in std::fs::read_dir("/proc")
         .expect("a Linux machine")
         .flatten()

@@ -5,15 +5,16 @@ use std::cmp::Ordering;
 /// Compares two names. Runs of digits compare by value, and by length if the values are equal.
 ///
 /// Example: `a2`, `a02`, `a10`, `b1` are in this order.
-pub(super) fn by_number(a: &str, b: &str) -> Ordering {
+pub(super) fn compare_natural(a: &str, b: &str) -> Ordering {
     let (mut a, mut b) = (a, b);
     loop {
         let (piece_a, rest_a) = first_piece(a);
         let (piece_b, rest_b) = first_piece(b);
         let is_number = |piece: &str| piece.starts_with(|c: char| c.is_ascii_digit());
-        let order = match is_number(piece_a) && is_number(piece_b) {
-            true => by_value(piece_a, piece_b),
-            false => piece_a.cmp(piece_b),
+        let order = if is_number(piece_a) && is_number(piece_b) {
+            by_value(piece_a, piece_b)
+        } else {
+            piece_a.cmp(piece_b)
         };
         if order.is_ne() || piece_a.is_empty() {
             return order;
@@ -45,13 +46,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_count_and_letters_spell() {
+    fn digits_compare_by_value_and_letters_by_character() {
         let sorted = [
             "", "a", "a1.png", "a2.png", "a02.png", "a10.png", "a10b", "b1", "é1", "é2",
         ];
         let mut names = sorted;
         names.reverse();
-        names.sort_by(|a, b| by_number(a, b));
+        names.sort_by(|a, b| compare_natural(a, b));
         assert_eq!(names, sorted);
     }
 }
