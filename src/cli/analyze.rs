@@ -139,7 +139,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         .map_err(|error| Error::Usage(format!("cannot write the library: {error}")))?;
     write_views(&args.output, &library)?;
     if let Some(path) = &args.overlay {
-        let part = Part::of(source, params.from_s, params.to_s);
+        let part = Part::new(source, params.from_s, params.to_s);
         overlay::film(&part, &library.poses, path, &progress)?;
     }
     super::say(&view_sentence(&library.poses));

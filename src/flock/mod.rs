@@ -108,17 +108,17 @@ pub fn plan_flock(
     let lens = Lens::of(library, params);
     let mut params = resolved(params, &lens);
     let motion = motion_of(library, &lens);
-    let tank = Tank::of(library, &lens, &motion, &params);
+    let tank = Tank::from_library(library, &lens, &motion, &params);
     let resting_places = RestingPlaces::new(library, &motion, &lens);
     let n_resting = resting_places.capacity(CLEARANCE_BL * lens.length_px);
-    let room_for = tank.room_for().min(n_resting.unwrap_or(u32::MAX));
+    let room_for = tank.capacity().min(n_resting.unwrap_or(u32::MAX));
     params.count = params.count.or(Some(room_for.clamp(2, MOST_BY_DEFAULT)));
     let params = &params;
     let calibration = Calibration::from_library(library, &motion, lens.is_flat()).in_tank(&tank);
     let fps = library.poses.fps;
     let model = Model::new(library, &motion, params);
     let play = |params: &Params, progress: &dyn Progress| {
-        let boids = Boids::at_random(params, &calibration, (&lens, &tank), fps);
+        let boids = Boids::at_random(params, &calibration, &lens, &tank, fps);
         let placer = Placer {
             library,
             motion: &motion,
@@ -135,7 +135,7 @@ pub fn plan_flock(
         }
     };
     let spaced = density::with_spacing(params, fps, |params| {
-        let played = play(params, &Quiet(progress))?;
+        let played = play(params, &CancelOnly(progress))?;
         let places_px = played.placed.iter().map(|one| &one.centroid_px[..]);
         Ok(density::spacing_bl(places_px, lens.length_px))
     })?;

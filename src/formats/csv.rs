@@ -75,7 +75,7 @@ fn cell(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::library::{BeatSpan, Pose, Raw, TailBeat, TailBeatMethod, View};
+    use crate::library::{BeatSpan, Pose, RawPose, TailBeat, TailBeatMethod, View};
 
     fn poses(frames: Vec<Pose>) -> Poses {
         Poses {
@@ -115,9 +115,9 @@ mod tests {
             heading_rad: Some(third),
             length_px: Some(third),
             position_m: Some([third; 3]),
-            raw: Some(Raw {
+            raw: Some(RawPose {
                 forward: Some([third; 3]),
-                ..Raw::default()
+                ..RawPose::default()
             }),
             ..Pose::default()
         };

@@ -135,7 +135,7 @@ pub(super) fn write_rim(
     for (dx, dy) in [(-rim_px, 0.0), (rim_px, 0.0), (0.0, -rim_px), (0.0, rim_px)] {
         pen.text(text, [x + dx, y + dy], dot_px);
     }
-    pen.ink(frame, RIM);
+    pen.draw(frame, RIM);
 }
 
 /// Returns an arrow of length `reach_px` with two barbs of length `barb_px` as one line.

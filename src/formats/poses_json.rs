@@ -213,11 +213,11 @@ struct PoseFile {
 
 #[derive(Serialize, Deserialize)]
 #[serde(transparent)]
-struct RawFile(#[serde(with = "RawFields")] Raw);
+struct RawFile(#[serde(with = "RawFields")] RawPose);
 
 /// Estimates from one frame only, before all frames are combined.
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Raw")]
+#[serde(remote = "RawPose")]
 struct RawFields {
     heading_rad: Option<f64>,
     position_m: Option<[f64; 3]>,
@@ -255,7 +255,7 @@ impl PoseFile {
             pitch_rad: pose.pitch_rad.map(decimals(5)),
             gamma_rad: pose.gamma_rad.map(decimals(5)),
             raw: pose.raw.map(|raw| {
-                RawFile(Raw {
+                RawFile(RawPose {
                     heading_rad: raw.heading_rad.map(decimals(5)),
                     position_m: raw.position_m.map(|p| p.map(decimals(5))),
                     forward: raw.forward.map(|p| p.map(decimals(5))),

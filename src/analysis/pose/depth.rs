@@ -8,7 +8,7 @@
 use crate::analysis::Params;
 use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
-use crate::library::{Animal, Poses, Raw, View};
+use crate::library::{Animal, Poses, RawPose, View};
 
 /// Writes the raw heading of every pose. In side view, with a camera and the animal's size, also the raw
 /// position and direction. From above they are unknown, because the silhouette does not show the height.
@@ -123,9 +123,9 @@ mod tests {
         };
         let from_side = measured(View::Side);
         assert!(from_side.position_m.is_some() && from_side.forward.is_some());
-        let only_heading = Raw {
+        let only_heading = RawPose {
             heading_rad: Some(0.5),
-            ..Raw::default()
+            ..RawPose::default()
         };
         assert_eq!(measured(View::Top), only_heading);
     }

@@ -128,7 +128,7 @@ impl Outputs {
         let limits = Limits::default();
         Ok(match extension(path).as_str() {
             "png" | "jpg" | "jpeg" => OpenBackground::Picture(read_image(path, &limits)?),
-            _ => OpenBackground::Film(Box::new(Video::open(path, &limits)?)),
+            _ => OpenBackground::Video(Box::new(Video::open(path, &limits)?)),
         })
     }
 
@@ -145,7 +145,7 @@ impl OpenBackground {
         match self {
             OpenBackground::FromParams => Backdrop::AsAsked,
             OpenBackground::Picture(picture) => Backdrop::Picture(picture),
-            OpenBackground::Film(video) => Backdrop::Film(video.as_ref()),
+            OpenBackground::Video(video) => Backdrop::Film(video.as_ref()),
         }
     }
 }

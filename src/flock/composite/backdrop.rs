@@ -45,8 +45,8 @@ impl Backdrop {
             Background::Plate => {
                 canvas.pixels.fill(opaque([0; 3]));
                 let rect = view.rect();
-                let plate = Canvas::of_rgb(&resized(&library.background, rect.w, rect.h));
-                canvas.put(&plate, rect);
+                let plate = Canvas::from_rgb(&resized(&library.background, rect.w, rect.h));
+                canvas.copy_box(&plate, rect);
             }
         }
         let mut front = occluders.map(|occluders| Occluders::new(occluders, view));

@@ -58,10 +58,10 @@ impl Painter {
         &mut self,
         context: &DrawContext,
         appearance: &Appearance,
-        nearer: Option<&Cover>,
+        nearer: Option<&Coverage>,
     ) {
         let is_morphed = appearance.fade.is_some() && context.cut == Cut::Morph;
-        let room = Room {
+        let room = Viewport {
             size: context.view.size_px,
             // Morphing needs whole sprites.
             nearer: nearer.filter(|_| !is_morphed),
@@ -88,7 +88,7 @@ impl Painter {
     ) -> Rect {
         if appearance.fade.is_some() || context.haze.is_some() {
             self.paint(context, appearance, Some(cover));
-            canvas.under(&self.layer, cover, context.cpu);
+            canvas.draw_layer_under(&self.layer, cover, context.cpu);
             return self.layer.rect;
         }
         // Without fade and haze the sprite needs no intermediate layer.
@@ -96,7 +96,7 @@ impl Painter {
         let frame = appearance.individual.source_frame[t];
         let sprite =
             (context.sprite_cache).get(context.sprites, frame, place.scale, &mut self.packed);
-        canvas.draw_under(&sprite, &place, cover, context.cpu)
+        canvas.draw_sprite_under(&sprite, &place, cover, context.cpu)
     }
 
     /// Returns the alpha of the layer drawn last, for the ground truth. May overwrite `layer`.
@@ -134,7 +134,7 @@ impl Painter {
         let shift = place
             .center_px
             .map(|px| i64::from(room) - px.floor() as i64);
-        let room = Room { size, nearer: None };
+        let room = Viewport { size, nearer: None };
         self.paint_shifted(context, appearance, room, shift.map(|px| px as f64));
         FullExtent::new(&self.layer.alpha(), self.layer.rect, shift)
     }
@@ -150,7 +150,7 @@ impl Painter {
         &mut self,
         context: &DrawContext,
         appearance: &Appearance,
-        room: Room,
+        room: Viewport,
         shift: [f64; 2],
     ) {
         let (individual, t) = (appearance.individual, appearance.frame_idx);

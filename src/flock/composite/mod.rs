@@ -37,7 +37,7 @@ use super::individual::Individual;
 use super::{Flock, Library};
 use crate::cpu::Level;
 use crate::geometry::Rect;
-use crate::raster::canvas::{Cover, opaque};
+use crate::raster::canvas::{Coverage, opaque};
 use crate::raster::{Canvas, ColorSpec, Frame, RgbImage};
 
 /// Draws the frames of a flock. Frames can be drawn in any order and from any thread.
@@ -216,17 +216,17 @@ impl<'a> Compositor<'a> {
         let own = (!shot.behind.planes.is_empty())
             .then(|| backdrop::scaled_to_cover(&shot.behind.to_rgb(), self.view.size_px));
         if own.is_some() {
-            workspace.cover.touch_all();
+            workspace.cover.mark_all_drawn();
         }
         let behind = own.as_ref().unwrap_or(&self.backdrop.canvas);
-        for rect in workspace.cover.take() {
-            workspace.canvas.under_box(behind, rect, self.cpu);
+        for rect in workspace.cover.take_drawn_boxes() {
+            workspace.canvas.draw_box_under(behind, rect, self.cpu);
             if let Some(front) = self.occluders(shot) {
                 front.draw(&mut workspace.canvas, rect);
             }
             match self.format {
                 PixelFormat::Planar(_) => shot.frame.draw_canvas(&workspace.canvas, rect, self.cpu),
-                PixelFormat::Straight => workspace.canvas.straight_into(rect, &mut shot.rgba),
+                PixelFormat::Straight => workspace.canvas.write_straight(rect, &mut shot.rgba),
             }
             workspace.canvas.clear_box(rect);
         }

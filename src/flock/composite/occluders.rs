@@ -30,7 +30,7 @@ impl Occluders {
         }
         let [width, height] = view.size_px;
         let mut canvas = Canvas::new(width, height);
-        canvas.put(&shown, rect);
+        canvas.copy_box(&shown, rect);
         Occluders { canvas }
     }
 
@@ -100,7 +100,7 @@ mod tests {
         }
         for side in [16, 8, 11, 24, 33] {
             let view = View::fitted([16, 16], [side, side]);
-            let wanted = Canvas::of_rgb(&resized(&plate, side, side));
+            let wanted = Canvas::from_rgb(&resized(&plate, side, side));
             let (mut front, mut shown) = (Occluders::new(&occluders, &view), wanted.clone());
             front.remove_from(&mut shown);
             front.draw(&mut shown, Rect::of_size(side, side));

@@ -35,7 +35,7 @@ impl SpriteCache {
         scale: f64,
         packed: &mut Vec<u8>,
     ) -> Arc<Premultiplied> {
-        let key = (frame, Premultiplied::level_for(scale));
+        let key = (frame, Premultiplied::mip_level(scale));
         let kept = self.with(|entries| entries.sprites.get(&key).cloned());
         kept.unwrap_or_else(|| {
             let sprite = match sprites.matte(frame as usize) {

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::seam::{Snapshot, slope, smooth};
-use crate::flock::boids::measures::pairs_nearer;
+use crate::flock::boids::measures::pairs_within;
 use crate::flock::boids::vector::{Vec3, add_scaled, dot, minus, norm, scaled, unit};
 
 /// Times in which a boid moves aside, and in which it comes back, seconds. The shortest is taken that is not
@@ -88,7 +88,7 @@ pub(super) fn avoid_encounters(
 /// Returns all encounters, ordered by ids and frames.
 fn encounters(snapshots: &[Snapshot], apart_bl: f64) -> Vec<Encounter> {
     let near = |t: usize| {
-        let pairs = pairs_nearer(&snapshots[t].positions, apart_bl);
+        let pairs = pairs_within(&snapshots[t].positions, apart_bl);
         pairs.into_iter().map(move |ids| (ids, t))
     };
     let all = (0..snapshots.len()).into_par_iter().flat_map_iter(near);
@@ -222,7 +222,7 @@ mod tests {
     }
 
     fn n_too_near(snapshots: &[Snapshot]) -> usize {
-        let pairs = |snapshot: &Snapshot| pairs_nearer(&snapshot.positions, 0.5).len();
+        let pairs = |snapshot: &Snapshot| pairs_within(&snapshot.positions, 0.5).len();
         snapshots.iter().map(pairs).sum()
     }
 

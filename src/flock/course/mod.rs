@@ -79,7 +79,7 @@ pub(super) fn simulate_loop(
             continuations = seam::continuations(&snapshots[t], &lead);
         }
         if left <= n_lead {
-            boids.meet(seam::meeting(&lead, &continuations, left));
+            boids.steer_toward(seam::meeting(&lead, &continuations, left));
         }
         boids.advance();
     }
@@ -89,10 +89,10 @@ pub(super) fn simulate_loop(
         fastest_bl_per_s: boids.max_speed_bl_per_s(),
         fps,
     };
-    avoid_encounters(&mut snapshots, limits, |place| boids.inside(place));
+    avoid_encounters(&mut snapshots, limits, |place| boids.confined(place));
     let mut course = Course::new(&boids, lens);
     for snapshot in snapshots {
-        boids.show(snapshot.positions, snapshot.velocities, snapshot.predator);
+        boids.set_states(snapshot.positions, snapshot.velocities, snapshot.predator);
         course.record(&boids, lens);
     }
     course.continuations = Some(continuations);
@@ -169,7 +169,7 @@ fn picture_position(place: Vec3, lens: &Lens, boids: &Boids) -> [f64; 3] {
 
 /// Appends the current position, direction and speed of a boid to its track.
 fn record(track: &mut BoidTrack, lens: &Lens, boids: &Boids, id: usize) {
-    let (place, velocity) = (boids.positions()[id], boids.motion(id));
+    let (place, velocity) = (boids.positions()[id], boids.actual_velocity(id));
     track.position_px.push(picture_position(place, lens, boids));
     if let Some(forward) = &mut track.forward {
         forward.push(unit(boids.velocities()[id]).map(|part| rounded(part, 5)));

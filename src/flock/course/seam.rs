@@ -84,13 +84,13 @@ fn assign(n: usize, square: impl Fn(usize, usize) -> f64) -> Vec<u32> {
 
 /// Returns the positions and velocities to reach, `left` frames before the end of the video. The first frame
 /// follows the last moment of `lead`.
-pub(super) fn meeting(lead: &[Snapshot], continuations: &[u32], left: usize) -> Meeting {
+pub(super) fn meeting(lead: &[Snapshot], continuations: &[u32], left: usize) -> TargetStates {
     let snapshot = &lead[lead.len() - left];
     let n_frames = lead.len() as f64;
     TargetStates {
         // Full weight after a third of the lead.
-        share: smooth(3.0 * (n_frames - left as f64) / n_frames),
-        places: (continuations.iter())
+        weight: smooth(3.0 * (n_frames - left as f64) / n_frames),
+        states: (continuations.iter())
             .map(|&continuation| {
                 let continuation = continuation as usize;
                 (

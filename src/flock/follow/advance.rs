@@ -312,10 +312,10 @@ impl Placer<'_> {
     /// Returns `place`, or the point at which the line from the boid to it leaves the tank.
     fn kept_in_tank(&self, place: [f64; 2], goal: [f64; 2], depth_bl: f64) -> [f64; 2] {
         let [from, to] = [goal, place].map(|px| self.lens.place_bl(px, depth_bl));
-        if self.tank.holds(to) {
+        if self.tank.contains(to) {
             return place;
         }
-        self.lens.picture_px(self.tank.on_the_way(from, to))
+        self.lens.picture_px(self.tank.clip_segment(from, to))
     }
 }
 
@@ -341,8 +341,8 @@ mod tests {
             let (library, params) = (synthetic::library(view), Params::default());
             let lens = Lens::of(&library, &params);
             let motion = motion_of(&library, &lens);
-            let tank = Tank::of(&library, &lens, &motion, &params);
-            let calibration = Calibration::of(&library, &motion, lens.is_flat());
+            let tank = Tank::from_library(&library, &lens, &motion, &params);
+            let calibration = Calibration::from_library(&library, &motion, lens.is_flat());
             let placer = Placer {
                 library: &library,
                 motion: &motion,

@@ -82,7 +82,7 @@ pub(super) fn play(
         for t in first..end {
             step()?;
             let gait = |states: &Vec<u32>| follower.natural.gait(states[t - first]);
-            boids.go_as(states.iter().map(gait).collect());
+            boids.impose_motion(states.iter().map(gait).collect());
             if t > 0 {
                 boids.advance();
             }
@@ -156,7 +156,7 @@ impl Follower<'_> {
                 continue;
             };
             let place = self.placer.lens.place_bl(centroid_px, positions[id][2]);
-            positions[id] = boids.inside(place);
+            positions[id] = boids.confined(place);
             if self.placer.library.poses.view == View::Top {
                 let direction = [libm::cos(heading_rad), libm::sin(heading_rad), 0.0];
                 velocities[id] = scaled(norm(velocities[id]), direction);

@@ -68,7 +68,7 @@ impl<'a> NaturalPlayback<'a> {
             .filter(|&state| self.model.is_endless(state))
             .collect();
         let drawn = (0..N_START_CANDIDATES).filter_map(|k| {
-            let at = random::unit(self.seed, &[draw::START, id as u64, k]);
+            let at = random::uniform(self.seed, &[draw::START, id as u64, k]);
             goes_on.get((at * goes_on.len() as f64) as usize).copied()
         });
         drawn.min_by_key(|&state| cost(state as usize))

@@ -200,7 +200,7 @@ impl Placer<'_> {
 
     /// Returns the random size of an individual relative to the filmed animal.
     pub(super) fn size(&self, id: usize) -> f64 {
-        let spread = 2.0 * random::unit(self.params.seed, &[SIZE_KEY, id as u64]) - 1.0;
+        let spread = 2.0 * random::uniform(self.params.seed, &[SIZE_KEY, id as u64]) - 1.0;
         rounded(1.0 + self.params.variation * spread, 3)
     }
 
