@@ -14,9 +14,6 @@ use crate::order;
 
 /// Share of differing cells above which two samples show different states, 0..=1. Free choice.
 const DIFFERENT: f64 = 0.35;
-/// Neighboring samples must also differ by this multiple of the median share. A moving animal alone makes
-/// twice its area differ. Free choice.
-const UNUSUAL: f64 = 2.5;
 /// Least number of samples for a background. Free choice; a median of five already ignores two outliers.
 pub(super) const LEAST_SAMPLES: u32 = 6;
 /// Least number of samples at one of several camera positions; with fewer, the camera only passed. Free
@@ -82,8 +79,6 @@ fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
         .windows(2)
         .map(|pair| pair[0].mismatch(&pair[1]))
         .collect();
-    let usual = order::median(steps.iter().copied()).unwrap_or(0.0);
-    let limit = DIFFERENT.max(UNUSUAL * usual);
     // Footage of a bare wall looks blank without the animal. There, blank samples show the scene.
     let n_blank = thumbnails
         .iter()
@@ -97,7 +92,7 @@ fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
             goes_on = false;
             continue;
         }
-        goes_on &= steps[k.max(1) - 1] <= limit;
+        goes_on &= steps[k.max(1) - 1] <= DIFFERENT;
         match segments.last_mut().filter(|_| goes_on) {
             Some(segment) => *segment |= 1 << k,
             None => segments.push(1 << k),
