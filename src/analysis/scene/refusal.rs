@@ -11,7 +11,6 @@ use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, LEAST_AREA_PX, Look, Subject};
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
-use crate::order;
 
 /// Least share of the samples in which the animal must be found, 0..=1. Free choice.
 const MOVING_SHARE: f64 = 0.05;
@@ -28,9 +27,6 @@ const OFTEN: f64 = 0.3;
 const LARGE: f64 = 0.15;
 /// Least area of a second animal, as a share of the animal's area. Free choice.
 const COMPARABLE: f64 = 0.5;
-/// Least range of a second animal, as a share of the animal's diagonal. A swaying plant moves less. Free
-/// choice.
-const ROAMS: f64 = 0.5;
 
 /// Moving objects besides the animal that look like it.
 pub(super) enum Company {
@@ -118,9 +114,7 @@ fn company(
             Some((k, [&looks[at], &looks[second(looks, at, subject)?]]))
         })
         .unzip();
-    let seconds: Vec<&Look> = pairs.iter().map(|[_, second]| *second).collect();
-    if (pairs.len() as f64) <= OFTEN * n_samples || range_px(&seconds) < ROAMS * subject.diagonal_px
-    {
+    if (pairs.len() as f64) <= OFTEN * n_samples {
         return Ok(Company::None);
     }
     match Mirror::of(&pairs, subject.diagonal_px) {
@@ -152,16 +146,6 @@ pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option
             && gap_px(&look.box_px, &first.box_px)
                 > longest(&first.box_px).min(longest(&look.box_px))
     })
-}
-
-/// Returns the range of the centroids without the outermost tenth, pixels: the larger of x and y.
-fn range_px(looks: &[&Look]) -> f64 {
-    let along = |axis: usize| {
-        let mut values: Vec<f64> = looks.iter().map(|look| look.centroid_px[axis]).collect();
-        let mut at = |share| order::percentile(&mut values, share).unwrap_or(0.0);
-        at(0.95) - at(0.05)
-    };
-    along(0).max(along(1))
 }
 
 pub(super) fn longest(rect: &Rect) -> u32 {
