@@ -1,9 +1,9 @@
 //! Learns which moving thing is the animal: its size and color, from frames of the whole film.
 //!
 //! Each component of each sample frame is described by its [`Look`]. The [`Subject`] is the look that
-//! explains the most samples as one body. It occurs once per frame, moves about, differs clearly from the
-//! background and stays off the border. A hand, a plant, a shadow or a mirror image explains fewer samples or
-//! stays in place. The subject then scores the candidates of every frame.
+//! explains the most samples as one body. It occurs once per frame, moves about and differs clearly from the
+//! background. A hand, a plant, a shadow or a mirror image explains fewer samples or stays in place. The
+//! subject then scores the candidates of every frame.
 
 use crate::geometry::Rect;
 use crate::order;
@@ -277,7 +277,7 @@ impl Subject {
     /// Returns the score of the subject as an explanation of the samples.
     ///
     /// It grows with the number of fitting samples, area, contrast and number of places. It falls with the
-    /// share of looks on the border and of shadows.
+    /// share of shadows.
     pub fn worth(&self, samples: &[Vec<Look>]) -> f64 {
         let members = self.members(samples);
         let n = members.len() as f64;
@@ -299,9 +299,8 @@ impl Subject {
         let share = |holds: &dyn Fn(&Look) -> bool| {
             members.iter().filter(|look| holds(look)).count() as f64 / n
         };
-        let inside = 1.0 - 0.7 * share(&|look| look.on_border);
         let solid = 1.0 - 0.8 * share(&|look| look.is_shadow);
-        support * roams * inside * solid * self.area_px().sqrt() * self.contrast.max(1.0)
+        support * roams * solid * self.area_px().sqrt() * self.contrast.max(1.0)
     }
 }
 
