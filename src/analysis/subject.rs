@@ -276,11 +276,9 @@ impl Subject {
 
     /// Returns the score of the subject as an explanation of the samples.
     ///
-    /// It grows with the number of fitting samples, area, contrast and number of places. It falls with the
-    /// share of shadows.
+    /// It grows with the number of fitting samples, area, contrast and number of places.
     pub fn worth(&self, samples: &[Vec<Look>]) -> f64 {
         let members = self.members(samples);
-        let n = members.len() as f64;
         if members.is_empty() {
             return 0.0;
         }
@@ -295,12 +293,8 @@ impl Subject {
             .collect();
         places.sort_unstable();
         places.dedup();
-        let roams = (places.len() as f64 / n.clamp(1.0, 4.0)).min(1.0);
-        let share = |holds: &dyn Fn(&Look) -> bool| {
-            members.iter().filter(|look| holds(look)).count() as f64 / n
-        };
-        let solid = 1.0 - 0.8 * share(&|look| look.is_shadow);
-        support * roams * solid * self.area_px().sqrt() * self.contrast.max(1.0)
+        let roams = (places.len() as f64 / members.len().min(4) as f64).min(1.0);
+        support * roams * self.area_px().sqrt() * self.contrast.max(1.0)
     }
 }
 
