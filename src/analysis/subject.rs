@@ -19,8 +19,6 @@ const COLOR_SPREAD: f64 = 14.0;
 /// Standard deviation of log area between frames: a fish turned toward the camera covers a third. Free
 /// choice.
 const AREA_SPREAD: f64 = 0.45;
-/// Weight of the area's cost for a small component that the border may have cut. Free choice.
-const CUT_WEIGHT: f64 = 0.15;
 /// Cost below which a look fits the subject: two standard deviations, squared.
 pub const FITS: f64 = 4.0;
 /// Number of components per sample that are tried as the subject. Free choice.
@@ -217,14 +215,11 @@ impl Subject {
     pub fn cost(&self, look: &Look) -> f64 {
         let usual = self.color_in(look.light);
         let color = usual.map_or(0.0, |usual| usual.distance(&look.color)) / COLOR_SPREAD;
-        let area = self.area_cost(look.area_px);
-        // The border may cut off any part of the animal.
-        let is_part = look.on_border && look.area_px < self.area_px();
-        (if is_part { CUT_WEIGHT * area } else { area }) + color * color
+        self.area_cost(look.area_px) + color * color
     }
 
     /// Returns the part of the cost that comes from the area: 0 between the 5th and 95th percentile.
-    pub fn area_cost(&self, area_px: f64) -> f64 {
+    fn area_cost(&self, area_px: f64) -> f64 {
         let [low, _, high] = self.areas_px;
         let off = libm::log(area_px / area_px.clamp(low, high)) / AREA_SPREAD;
         off * off
