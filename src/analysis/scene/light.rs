@@ -31,8 +31,6 @@ const BRIGHTEST_GAIN: f32 = 3.9;
 const ALONG: usize = 160;
 /// Least number of bright pixels for the factor of a row or column. Free choice.
 const LEAST_ALONG: usize = 24;
-/// Light is colored if a channel's gain deviates from the luma gain by at least this share. Free choice.
-const COLORED: f32 = 0.02;
 /// Neighbors on either side whose factors are averaged. A 100 Hz lamp gives at most about ten bands in a
 /// picture, and they are far broader.
 const SMOOTH: usize = 2;
@@ -85,25 +83,10 @@ impl Light {
         self.field.as_ref().map_or(1.0, of)
     }
 
-    /// Divides a frame by its light: luma by gain and factor of the pixel, chroma by the luma gain. If the
-    /// light is colored, each RGB channel is then divided by its remaining gain.
+    /// Divides a frame by its light: luma by gain and factor of the pixel, chroma by the luma gain. The color
+    /// of the light remains.
     pub fn undo(&self, frame: &mut Frame) {
         let gain = self.luma();
-        self.undo_gain(frame, gain);
-        let tint = self.rgb.map(|of_channel| of_channel / gain);
-        if tint.iter().all(|t| (t - 1.0).abs() < COLORED) {
-            return;
-        }
-        let mut image = frame.to_rgb();
-        for pixel in image.pixels.chunks_exact_mut(3) {
-            for (value, tint) in pixel.iter_mut().zip(tint) {
-                *value = (f32::from(*value) / tint).round().min(255.0) as u8;
-            }
-        }
-        frame.draw_all_rgb(&image);
-    }
-
-    fn undo_gain(&self, frame: &mut Frame, gain: f32) {
         if (gain - 1.0).abs() < 0.002 && !self.is_uneven() {
             return;
         }
