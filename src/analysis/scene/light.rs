@@ -223,16 +223,14 @@ fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
 }
 
 /// Returns the median of the counted ratios within a quarter of their median. Returns `None` when too few
-/// pixels are bright enough or when most ratios disagree, because then something other than light differs.
+/// pixels are bright enough.
 fn median_ratio(counts: &[u16; 4 * STEPS]) -> Option<f32> {
     let n: u32 = counts.iter().map(|&count| u32::from(count)).sum();
     let middle = median_step(counts, 0..4 * STEPS);
     let near = middle - middle / 4..(middle + middle / 4 + 1).min(4 * STEPS);
-    let n_near: u32 = counts[near.clone()].iter().map(|&c| u32::from(c)).sum();
     let gain = median_step(counts, near) as f32 / STEPS as f32;
-    let agree =
-        n >= LEAST_PROBES && 2 * n_near > n && (DARKEST_GAIN..BRIGHTEST_GAIN).contains(&gain);
-    agree.then_some(gain)
+    let is_light = n >= LEAST_PROBES && (DARKEST_GAIN..BRIGHTEST_GAIN).contains(&gain);
+    is_light.then_some(gain)
 }
 
 /// Returns the step at which the cumulative count within `steps` reaches half.
