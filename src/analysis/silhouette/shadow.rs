@@ -1,8 +1,7 @@
 //! Removes cast shadows from silhouettes.
 //!
 //! A shadow pixel is darker than the background, but has its color and its texture (Horprasert et al. 1999).
-//! Only weak pixels are removed. None are removed when the animal is much darker than the background: a black
-//! mouse cannot be told from its own shadow. See docs/explanation/algorithms.md, "Silhouette".
+//! Only weak pixels are removed. See docs/explanation/algorithms.md, "Silhouette".
 
 use std::ops::RangeInclusive;
 
@@ -17,14 +16,9 @@ const RATIO: RangeInclusive<f32> = 0.45..=0.95;
 const RADIUS: i64 = 2;
 /// Least correlation of a shadow's texture with the background's. Free choice.
 const CORRELATION: f32 = 0.9;
-/// An animal is dark below this share of the background's brightness. Free choice.
-const DARK: f32 = 0.45;
 
 /// Clears the weak pixels that are shadow. Core pixels stay set.
 pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Plate) {
-    if is_dark(core, difference, plate) {
-        return;
-    }
     let rect = difference.rect;
     for k in 0..weak.bits.len() {
         if weak.bits[k] == 1 && core.bits[k] == 0 {
@@ -45,25 +39,6 @@ pub fn is_shadow_alone(difference: &Difference, plate: &Plate, component: &Compo
         mask.bits[k] == 1 && has_shadow_color(difference, plate, k % width, k / width)
     });
     10 * like.count() as u64 >= 7 * component.area
-}
-
-/// Returns whether the median brightness of the core pixels is below [`DARK`] times the background's.
-fn is_dark(core: &Mask, difference: &Difference, plate: &Plate) -> bool {
-    let rect = difference.rect;
-    let mut ratios: Vec<f32> = (0..core.bits.len())
-        .filter(|&k| core.bits[k] == 1)
-        .map(|k| {
-            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            let sum = |rgb: [u8; 3]| rgb.iter().map(|&c| f32::from(c)).sum::<f32>();
-            sum(difference.rgb.pixel(x as u32, y as u32))
-                / sum(plate.rgb.pixel(rect.x + x as u32, rect.y + y as u32)).max(1.0)
-        })
-        .collect();
-    if ratios.is_empty() {
-        return false;
-    }
-    let middle = ratios.len() / 2;
-    *ratios.select_nth_unstable_by(middle, f32::total_cmp).1 < DARK
 }
 
 fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
