@@ -204,7 +204,6 @@ impl Draft {
                     .map(|(window, plate)| (*window, plate))
                     .collect();
                 resting::mark(&mut seen, whole, &windows, subject);
-                resting::mark_settled(&mut seen, whole, part.samples, survey, subject);
             }
         }
         seen

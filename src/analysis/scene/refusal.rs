@@ -148,7 +148,7 @@ pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option
     })
 }
 
-pub(super) fn longest(rect: &Rect) -> u32 {
+fn longest(rect: &Rect) -> u32 {
     rect.w.max(rect.h)
 }
 
