@@ -143,8 +143,6 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
     rows.flat_map(|row| row[1..=w].iter().copied()).collect()
 }
 
-/// Alpha below this value is noise, 0..=1. Free choice.
-const TRACE: f32 = 0.04;
 /// Half the width of gaps in the silhouette that count as narrow, pixels. A wire across the animal leaves
 /// one.
 const GAP_PX: u32 = 2;
@@ -212,7 +210,8 @@ impl Puller<'_> {
             Some(core) if !is_shadow => self.thinned(alpha, core, k),
             _ => alpha,
         };
-        if alpha < TRACE {
+        let level = (alpha * 255.0 + 0.5) as u8;
+        if level == 0 {
             return [0; 4];
         }
         let color = match !is_shadow && alpha <= 0.2 {
@@ -223,7 +222,7 @@ impl Puller<'_> {
             }
         };
         let [r, g, b] = color.map(|c| (c + 0.5) as u8);
-        [r, g, b, (alpha * 255.0 + 0.5) as u8]
+        [r, g, b, level]
     }
 
     /// Returns the color of the nearest inside pixels for a part at most 2 pixels broad; `None` for broader
