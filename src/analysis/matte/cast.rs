@@ -24,9 +24,6 @@ const LIGHTER: f64 = 0.75;
 /// Erosions that a dark region must survive; thinner ones, such as wires, show no image. Free choice.
 const THIN_PX: u32 = 3;
 
-/// A limb is smaller than the body by more than this factor. Free choice.
-const LIMB: u64 = 8;
-
 /// The ground on which the animal stands.
 pub(super) struct Ground<'a> {
     plate: &'a Plate,
@@ -66,18 +63,17 @@ impl Ground<'_> {
         on_ground
     }
 
-    /// Clears the faint pixels of mirror images in `solid`; returns the mask of the images.
+    /// Clears the faint pixels of mirror images in `solid`.
     ///
     /// An image is a broad region of `mask` on darker things where most pixels do not have the coat's color.
     /// Its middle may be as dark as the animal, but it fades toward its edges.
-    pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) -> Mask {
+    pub(super) fn clear_faded(&self, solid: &mut Mask, mask: &Mask, coat: &Coat) {
         let rect = solid.rect;
         let mut on_dark = mask.clone();
         for (bit, on_ground) in on_dark.bits.iter_mut().zip(self.on(mask).bits) {
             *bit &= 1 - on_ground;
         }
         let broad = on_dark.eroded_by(THIN_PX);
-        let mut images = Mask::new(rect);
         for region in components(&on_dark) {
             let pixels = numbers(&region, rect);
             if pixels.iter().all(|&k| broad.bits[k] == 0) {
@@ -87,44 +83,6 @@ impl Ground<'_> {
             if 2 * n_own < pixels.len() {
                 let faint = pixels.into_iter().filter(|&k| coat.is_faint(k));
                 faint.for_each(|k| solid.bits[k] = 0);
-                images.add(&region.mask(region.rect));
-            }
-        }
-        images
-    }
-
-    /// Clears pieces apart from the largest one that lie mostly on darker things: they are mirror images.
-    ///
-    /// A limb with a hidden part stays. It is small, has mostly the coat's color, is separated by dark things
-    /// only, and does not overlap `images`.
-    pub(super) fn clear_images(&self, solid: &mut Mask, images: &Mask, coat: &Coat) {
-        let (rect, width) = (solid.rect, solid.width());
-        let is_dark =
-            |k: usize| self.is_dark(rect.x + (k % width) as u32, rect.y + (k / width) as u32);
-        let mut pieces = components(solid);
-        pieces.sort_by_key(|piece| std::cmp::Reverse(piece.area));
-        let is_apart = pieces.len() > 1;
-        let Some(body) = pieces.first().filter(|_| is_apart) else {
-            return;
-        };
-        let mut passable = solid.clone();
-        for (k, bit) in passable.bits.iter_mut().enumerate() {
-            *bit |= u8::from(is_dark(k));
-        }
-        let reached = (components(&passable).iter().map(|part| part.mask(rect)))
-            .find(|part| part.bits[numbers(body, rect)[0]] == 1);
-        for piece in &pieces[1..] {
-            let pixels = numbers(piece, rect);
-            let n_dark = pixels.iter().filter(|&&k| is_dark(k)).count() as u64;
-            let n_own = pixels.iter().filter(|&&k| coat.matches(k)).count() as u64;
-            let is_reached = reached
-                .as_ref()
-                .is_some_and(|part| part.bits[pixels[0]] == 1);
-            let is_image = pixels.iter().any(|&k| images.bits[k] == 1);
-            let is_limb =
-                !is_image && LIMB * piece.area < body.area && is_reached && 2 * n_own >= piece.area;
-            if 2 * n_dark > piece.area && !is_limb {
-                pixels.iter().for_each(|&k| solid.bits[k] = 0);
             }
         }
     }

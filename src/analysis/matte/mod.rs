@@ -54,8 +54,7 @@ pub fn pull(
     let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
     let mut solid = coat.without_halo(&mask, band_px);
     let ground = Ground::of(&solid, plate);
-    let images = ground.clear_faded(&mut solid, &mask, &coat);
-    ground.clear_images(&mut solid, &images, &coat);
+    ground.clear_faded(&mut solid, &mask, &coat);
     let inside = solid.eroded_by(band_px);
     let outer = mask.dilated_by(band_px);
     let mut closed = solid.dilated_by(GAP_PX).eroded_by(GAP_PX);
