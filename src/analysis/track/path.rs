@@ -1,8 +1,8 @@
 //! Chooses the animal's path: at most one candidate per frame, for the whole film at once.
 //!
 //! Dynamic programming finds the cheapest path. A candidate costs its misfit to the subject. A step costs its
-//! excess over the usual distance, and its change of area. A frame without the animal has a fixed cost. So a
-//! hand, a speck or half a silhouette is chosen only where no candidate fits better.
+//! excess over the usual distance. A frame without the animal has a fixed cost. So a hand, a speck or half a
+//! silhouette is chosen only where no candidate fits better.
 
 use super::confidence;
 use super::sighting::Sighting;
@@ -14,7 +14,7 @@ use crate::order;
 pub(super) const MOST_COST: f64 = 24.0;
 /// Cost of a frame without the animal. Free choice.
 const ABSENT: f64 = 10.0;
-/// Greatest cost of a step's distance. Free choice.
+/// Greatest cost of a step. Free choice.
 const FARTHEST: f64 = 80.0;
 /// A step is a leap beyond this many spreads of the distance. Free choice.
 const LEAP: f64 = 2.0;
@@ -24,8 +24,6 @@ const NEARER: f64 = 3.0;
 const TAKEN: f64 = 400.0;
 /// Weight of a candidate's cost up to `FITS`. Free choice.
 const FITTING: f64 = 0.05;
-/// Greatest cost of a change of area. Free choice.
-const LARGEST_CHANGE: f64 = 3.0;
 /// Standard deviation of the change of log area between successive frames. Free choice.
 const CHANGE_SPREAD: f64 = 0.3;
 /// Reward of a candidate that the user pointed at; it exceeds the sum of all other costs.
@@ -242,14 +240,9 @@ impl Steps {
         }
     }
 
+    /// Returns the cost of a step over `n_frames` frames: 0 up to the usual distance.
     fn cost(&self, a: &Look, b: &Look, n_frames: usize) -> f64 {
         let n = n_frames as f64;
-        let change = libm::log(b.area_px / a.area_px) / (CHANGE_SPREAD * n.sqrt());
-        self.far(a, b, n) + (0.5 * change * change).min(LARGEST_CHANGE)
-    }
-
-    /// Returns the part of the cost that comes from the distance.
-    fn far(&self, a: &Look, b: &Look, n: f64) -> f64 {
         let beyond = (distance(a.centroid_px, b.centroid_px) - self.usual_px * n).max(0.0);
         let far = beyond / (self.spread_px * n.sqrt());
         (0.5 * far * far).min(FARTHEST)
