@@ -1,8 +1,8 @@
 //! Chooses the animal's path: at most one candidate per frame, for the whole film at once.
 //!
-//! Dynamic programming finds the cheapest path. A candidate costs its misfit to the subject. A step costs its
-//! excess over the usual distance. A frame without the animal has a fixed cost. So a hand, a speck or half a
-//! silhouette is chosen only where no candidate fits better.
+//! Dynamic programming finds the cheapest path. A candidate costs half its misfit to the subject. A step costs
+//! its excess over the usual distance. A frame without the animal has a fixed cost. So a hand, a speck or half
+//! a silhouette is chosen only where no candidate fits better.
 
 use super::confidence;
 use super::sighting::Sighting;
@@ -22,8 +22,6 @@ const LEAP: f64 = 2.0;
 const NEARER: f64 = 3.0;
 /// Extra cost of a leap to a thing that was visible together with the start of the leap. Free choice.
 const TAKEN: f64 = 400.0;
-/// Weight of a candidate's cost up to `FITS`. Free choice.
-const FITTING: f64 = 0.05;
 /// Standard deviation of the change of log area between successive frames. Free choice.
 const CHANGE_SPREAD: f64 = 0.3;
 /// Reward of a candidate that the user pointed at; it exceeds the sum of all other costs.
@@ -71,7 +69,7 @@ pub(super) fn choose(
         };
         let path = |(at, candidate): (usize, &Candidate)| {
             let mut path = paths.to(t, candidate);
-            path.cost += of_look(candidate.cost) + smaller(candidate);
+            path.cost += 0.5 * candidate.cost + smaller(candidate);
             if pin == Some((t, at)) {
                 path.cost -= PINNED;
             }
@@ -201,13 +199,6 @@ fn judged(
         }
     }
     judged
-}
-
-/// Returns the cost of a look in a path: nearly 0 up to `FITS`, then half of the excess.
-///
-/// Looks of successive frames are alike, so small differences carry less information than independent ones.
-fn of_look(cost: f64) -> f64 {
-    FITTING * cost.min(FITS) + 0.5 * (cost - FITS).max(0.0)
 }
 
 /// Parameters of the cost of a step between two looks.
