@@ -3,10 +3,9 @@
 //! Alpha is 1 inside the silhouette. In a band around the outline, alpha is the pixel's share of the way from
 //! the background's color to the animal's color nearby. The background's share is then subtracted from the
 //! color. Shadows are left out, because a sprite would turn them with the body; `shadow` measures them.
-//! Mirror images are left out too (`cast`).
 //!
 //! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
-//! for shadows and mirror images. See docs/explanation/algorithms.md, "Mattes".
+//! for shadows. See docs/explanation/algorithms.md, "Mattes".
 
 mod cast;
 mod given;
@@ -52,9 +51,7 @@ pub fn pull(
     let on_ground = Ground::of(&mask, plate).on(&mask);
     let coat_of = |mask: &Mask| Coat::of(mask, &difference, plate);
     let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
-    let mut solid = coat.without_halo(&mask, band_px);
-    let ground = Ground::of(&solid, plate);
-    ground.clear_faded(&mut solid, &mask, &coat);
+    let solid = coat.without_halo(&mask, band_px);
     let inside = solid.eroded_by(band_px);
     let outer = mask.dilated_by(band_px);
     let mut closed = solid.dilated_by(GAP_PX).eroded_by(GAP_PX);

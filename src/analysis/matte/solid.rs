@@ -80,12 +80,12 @@ impl Coat<'_> {
     }
 
     /// Returns whether a pixel differs much less from the background than the starkest pixels.
-    pub(super) fn is_faint(&self, k: usize) -> bool {
+    fn is_faint(&self, k: usize) -> bool {
         self.level(k) < FAINT * self.starkest || self.share(k) < FAINT * self.starkest_share
     }
 
     /// Returns whether a pixel has the coat's color: it is much nearer to it than to the background.
-    pub(super) fn matches(&self, k: usize) -> bool {
+    fn matches(&self, k: usize) -> bool {
         let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         let off = seen.iter().zip(self.color);
         let most_off = off.fold(0.0, |most, (&seen, color)| {
