@@ -14,7 +14,6 @@ pub mod asymmetry;
 mod body;
 mod confidence;
 mod movers;
-mod parting;
 mod path;
 pub mod sighting;
 
@@ -36,11 +35,6 @@ use crate::scratch::{Full, Scratch};
 
 /// Greatest number of candidates per frame. Free choice.
 const MOST_CANDIDATES: usize = 3;
-/// A component above this multiple of the animal's median area is also tried in parts: it may be the animal
-/// and something that touches it. Free choice.
-const MERGED: f64 = 1.2;
-/// Extra cost of a candidate that is a part of a component. Free choice.
-const PART_COST: f64 = 2.0;
 /// One frame in this many keeps the animal's surroundings. Free choice: it bounds the memory.
 const AROUND_EVERY: usize = 8;
 /// Least area of a reported mover, as a share of the animal's median area. Free choice.
@@ -224,7 +218,7 @@ fn look(
 
 /// Returns the candidates of a frame and the components that may be movers.
 ///
-/// Candidates are components, or parts of them, with their looks and costs; the cheapest come first.
+/// Candidates are components with their looks and costs; the cheapest come first.
 fn described(
     frame: &Frame,
     placed: &Placed<'_>,
@@ -258,15 +252,6 @@ fn described(
         let whole = describe(&component, frame, placed);
         if component.area as f64 >= LEAST_OTHER * subject.area_px() {
             others.push(Other::of(&whole, subject, is_image(&whole)));
-        }
-        if component.area as f64 > MERGED * subject.area_px() && !scene.is_masked {
-            let difference =
-                silhouette::difference(frame, placed.plate, &placed.light, component.rect);
-            for part in parting::parts_of(&component, &difference, subject.area_px()) {
-                let look = describe(&part, frame, placed);
-                let cost = subject.cost(&look) + PART_COST;
-                found.push((part, look, cost));
-            }
         }
         let cost = subject.cost(&whole);
         found.push((component, whole, cost));

@@ -29,7 +29,7 @@ const PINNED: f64 = 1e9;
 /// Greatest number of frames that a step spans; after a longer gap the animal may be anywhere. Free choice.
 const MOST_MISSED: usize = 30;
 
-/// A component, or a part of one, that may be the animal in a frame.
+/// A component that may be the animal in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Candidate {
     /// Its size, color and place.
