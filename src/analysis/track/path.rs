@@ -1,8 +1,8 @@
 //! Chooses the animal's path: at most one candidate per frame, for the whole film at once.
 //!
-//! Dynamic programming finds the cheapest path. A candidate costs half its misfit to the subject. A step costs
-//! its excess over the usual distance. A frame without the animal has a fixed cost. So a hand, a speck or half
-//! a silhouette is chosen only where no candidate fits better.
+//! Dynamic programming finds the cheapest path. A candidate costs half its misfit to the subject. A leap to
+//! a thing that was seen elsewhere at the same time costs much. A frame without the animal has a fixed cost.
+//! So a hand, a speck or half a silhouette is chosen only where no candidate fits better.
 
 use super::confidence;
 use super::sighting::Sighting;
@@ -14,8 +14,6 @@ use crate::order;
 pub(super) const MOST_COST: f64 = 24.0;
 /// Cost of a frame without the animal. Free choice.
 const ABSENT: f64 = 10.0;
-/// Greatest cost of a step. Free choice.
-const FARTHEST: f64 = 80.0;
 /// A step is a leap beyond this many spreads of the distance. Free choice.
 const LEAP: f64 = 2.0;
 /// A leap leads to another thing when that one was closer by this factor. Free choice.
@@ -121,9 +119,8 @@ impl Paths<'_> {
 
     /// Returns the cheapest path to a candidate of frame `t`, without the candidate's own cost.
     fn to(&self, t: usize, candidate: &Candidate) -> Path {
-        let afar = self.forgotten.from.map_or(0.0, |_| FARTHEST);
         let mut best = Path {
-            cost: self.forgotten.cost + ABSENT * t as f64 + afar,
+            cost: self.forgotten.cost + ABSENT * t as f64,
             ..self.forgotten
         };
         for before in t.saturating_sub(MOST_MISSED)..t {
@@ -133,9 +130,6 @@ impl Paths<'_> {
                 let others = beside.filter(|(k, _)| *k != at).map(|(_, o)| &o.look);
                 let cost = self.best[before][at].cost
                     + ABSENT * n_missed as f64
-                    + self
-                        .steps
-                        .cost(&previous.look, &candidate.look, n_missed + 1)
                     + self.steps.taken(&previous.look, &candidate.look, others);
                 if cost < best.cost {
                     let from = Some((before, at));
@@ -201,7 +195,7 @@ fn judged(
     judged
 }
 
-/// Parameters of the cost of a step between two looks.
+/// Movement of the animal from frame to frame, which tells a leap from a step.
 struct Steps {
     /// 90th percentile of the animal's movement from frame to frame, pixels.
     usual_px: f64,
@@ -229,14 +223,6 @@ impl Steps {
             usual_px: order::percentile(&mut steps, 0.9).unwrap_or(0.0),
             spread_px: (0.5 * subject.diagonal_px).max(4.0),
         }
-    }
-
-    /// Returns the cost of a step over `n_frames` frames: 0 up to the usual distance.
-    fn cost(&self, a: &Look, b: &Look, n_frames: usize) -> f64 {
-        let n = n_frames as f64;
-        let beyond = (distance(a.centroid_px, b.centroid_px) - self.usual_px * n).max(0.0);
-        let far = beyond / (self.spread_px * n.sqrt());
-        (0.5 * far * far).min(FARTHEST)
     }
 
     fn is_leap(&self, a: &Look, b: &Look) -> bool {
