@@ -8,12 +8,12 @@
 use crate::geometry::Rect;
 use crate::order;
 use crate::raster::RgbImage;
-use crate::raster::runs::Component;
+use crate::raster::runs::{Component, Run};
 
 /// Histogram bins of a color channel. Free choice.
 const N_BINS: usize = 16;
 /// Greatest number of pixels sampled from a component. Free choice: it bounds the time.
-const MOST_PX: u64 = 2048;
+const MAX_SAMPLED_PX: u64 = 2048;
 /// Standard deviation of one animal's color between frames, levels of 255. Free choice.
 const COLOR_SPREAD: f64 = 14.0;
 /// Standard deviation of log area between frames: a fish turned toward the camera covers a third. Free
@@ -22,7 +22,7 @@ const AREA_SPREAD: f64 = 0.45;
 /// Cost below which a look fits the subject: two standard deviations, squared.
 pub const FITS: f64 = 4.0;
 /// Number of components per sample that are tried as the subject. Free choice.
-const SEEDS_EACH: usize = 3;
+const SEEDS_PER_SAMPLE: usize = 3;
 /// Least area of a component, pixels; smaller ones are noise. Free choice.
 pub const LEAST_AREA_PX: u64 = 12;
 
@@ -32,7 +32,7 @@ pub struct Color([[f32; N_BINS]; 3]);
 
 impl Color {
     /// Returns the color histogram of RGB pixels.
-    pub fn of<'a>(pixels: impl Iterator<Item = &'a [u8]>) -> Color {
+    pub fn from_pixels<'a>(pixels: impl Iterator<Item = &'a [u8]>) -> Color {
         let mut counts = [[0.0f32; N_BINS]; 3];
         let mut n = 0.0;
         for rgb in pixels {
@@ -57,13 +57,13 @@ impl Color {
 
     /// Returns the earth mover's distance of two colors, as the mean over the channels, levels of 255.
     pub fn distance(&self, other: &Color) -> f64 {
-        let of = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {
+        let channel = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {
             a.iter()
                 .zip(b)
                 .map(|(a, b)| f64::from((a - b).abs()))
                 .sum::<f64>()
         };
-        let sum: f64 = self.0.iter().zip(&other.0).map(of).sum();
+        let sum: f64 = self.0.iter().zip(&other.0).map(channel).sum();
         sum * 255.0 / (N_BINS - 1) as f64 / 3.0
     }
 
@@ -105,7 +105,7 @@ pub struct Look {
 
 impl Look {
     /// Measures a component. `rgb` and `levels` (differences from the background) cover the component's box.
-    pub fn of(
+    pub fn measure(
         component: &Component,
         rgb: &RgbImage,
         levels: &[u8],
@@ -113,18 +113,18 @@ impl Look {
         light: usize,
     ) -> Look {
         let rect = component.rect;
-        let step = component.area.div_ceil(MOST_PX).max(1) as usize;
+        let step = component.area.div_ceil(MAX_SAMPLED_PX).max(1) as usize;
         let indices = || {
-            let of = move |run: &crate::raster::runs::Run| {
+            let indices_of = move |run: &Run| {
                 let row = (run.y - rect.y) as usize * rect.w as usize;
                 (run.x0 - rect.x) as usize + row..(run.x1 - rect.x) as usize + row
             };
-            component.runs.iter().flat_map(of).step_by(step)
+            component.runs.iter().flat_map(indices_of).step_by(step)
         };
         let n = indices().count().max(1) as f64;
         Look {
             area_px: component.area as f64,
-            color: Color::of(indices().map(|k| &rgb.pixels[3 * k..3 * k + 3])),
+            color: Color::from_pixels(indices().map(|k| &rgb.pixels[3 * k..3 * k + 3])),
             contrast: indices().map(|k| f64::from(levels[k])).sum::<f64>() / n,
             box_px: rect,
             centroid_px: component.centroid_px(),
@@ -168,7 +168,7 @@ impl Subject {
     /// `at` is a sample and the index of its component that is known to be the animal.
     pub fn learn(samples: &[Vec<Look>], at: Option<(usize, usize)>) -> Option<Subject> {
         let seed = match at {
-            Some((sample, component)) => Subject::like(&samples[sample][component]),
+            Some((sample, component)) => Subject::from_look(&samples[sample][component]),
             None => best_seed(samples)?,
         };
         let mut subject = seed;
@@ -179,7 +179,7 @@ impl Subject {
     }
 
     /// Returns the subject of a single look.
-    fn like(look: &Look) -> Subject {
+    fn from_look(look: &Look) -> Subject {
         Subject {
             colors: (0..=look.light)
                 .map(|light| (light == look.light).then(|| look.color.clone()))
@@ -272,7 +272,7 @@ impl Subject {
     /// Returns the score of the subject as an explanation of the samples.
     ///
     /// It grows with the number of fitting samples, area, contrast and number of places.
-    pub fn worth(&self, samples: &[Vec<Look>]) -> f64 {
+    pub fn score(&self, samples: &[Vec<Look>]) -> f64 {
         let members = self.members(samples);
         if members.is_empty() {
             return 0.0;
@@ -300,16 +300,16 @@ fn best_seed(samples: &[Vec<Look>]) -> Option<Subject> {
             .filter(|&k| looks[k].may_be_animal())
             .collect();
         real.sort_by(|&a, &b| looks[b].area_px.total_cmp(&looks[a].area_px));
-        real.truncate(SEEDS_EACH);
+        real.truncate(SEEDS_PER_SAMPLE);
         real
     };
     let seeds = samples
         .iter()
         .flat_map(|looks| largest(looks).into_iter().map(|k| &looks[k]));
-    let with_worth = seeds
-        .map(Subject::like)
-        .map(|subject| (subject.worth(samples), subject));
-    let best = with_worth.max_by(|a, b| a.0.total_cmp(&b.0));
+    let scored = seeds
+        .map(Subject::from_look)
+        .map(|subject| (subject.score(samples), subject));
+    let best = scored.max_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, subject)| subject)
 }
 
@@ -330,7 +330,7 @@ mod tests {
         };
         Look {
             area_px: f64::from(side * side),
-            color: Color::of(std::iter::once(rgb.as_slice())),
+            color: Color::from_pixels(std::iter::once(rgb.as_slice())),
             contrast: 60.0,
             box_px,
             centroid_px: [f64::from(x), 80.0],
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_is_there_for_most_of_the_film_and_goes_places_is_the_subject() {
+    fn subject_is_seen_in_most_samples_and_moves_about() {
         let samples: Vec<Vec<Look>> = (0..40)
             .map(|k| match k {
                 0..8 => vec![look(SKIN, 90, 200, 0)],
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn in_another_light_the_subject_has_another_color() {
+    fn subject_has_a_color_for_each_light() {
         let samples: Vec<Vec<Look>> = (0..40)
             .map(|k| match k {
                 0..20 => vec![look(ORANGE, 30, 20 + 10 * k, 0)],

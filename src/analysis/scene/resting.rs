@@ -5,58 +5,63 @@
 //! shows the animal, its pixels count as taken in that window. Otherwise they count as taken in all windows
 //! that look like the whole.
 
+use super::background::Background;
 use super::light::Light;
 use super::occupancy::Occupancy;
-use super::plate::Plate;
-use super::states::Part;
+use super::states::SampleGroup;
 use super::survey::color_in;
 use crate::analysis::silhouette;
 use crate::analysis::subject::{FITS, Look, Subject};
 use crate::raster::runs::Component;
 
 /// Least area of a component, as a share of the subject's area. Free choice.
-const LEAST_SHARE: f64 = 0.3;
+const MIN_AREA_SHARE: f64 = 0.3;
 /// Mean difference below which two backgrounds show the same, levels of 255. Free choice.
 const SAME_LEVELS: f64 = 10.0;
 
-/// Marks the samples and pixels in which the subject rests as taken. `windows` are parts of the state that
-/// `whole` describes, with their backgrounds.
-pub(super) fn mark(
-    seen: &mut Occupancy,
-    whole: &Plate,
-    windows: &[(Part, &Plate)],
+/// Marks the samples and pixels in which the subject rests as taken. `windows` are time windows of the state
+/// that `whole` describes, with their backgrounds.
+pub(super) fn mark_resting(
+    occupancy: &mut Occupancy,
+    whole: &Background,
+    windows: &[(SampleGroup, &Background)],
     subject: &Subject,
 ) {
-    for (part, plate) in windows {
-        let found = silhouette::components(&plate.frame, whole, &Light::SAME, &[]);
+    for (window, background) in windows {
+        let found = silhouette::components(&background.frame, whole, &Light::NEUTRAL, &[]);
         for component in found {
-            if (component.area as f64) < LEAST_SHARE * subject.area_px() {
+            if (component.area as f64) < MIN_AREA_SHARE * subject.area_px() {
                 continue;
             }
-            let here = cost(subject, plate, whole, &component);
-            let there = cost(subject, whole, plate, &component);
+            let here = cost(subject, background, whole, &component);
+            let there = cost(subject, whole, background, &component);
             if here.min(there) > FITS {
                 continue;
             }
-            let rests = match here < there {
-                true => part.samples,
-                false => {
-                    let same = windows
-                        .iter()
-                        .filter(|(_, other)| is_same(other, whole, &component));
-                    same.fold(0, |all, (part, _)| all | part.samples)
-                }
+            let rests = if here < there {
+                window.samples
+            } else {
+                let same = windows
+                    .iter()
+                    .filter(|(_, other)| is_same(other, whole, &component));
+                same.fold(0, |all, (window, _)| all | window.samples)
             };
-            seen.take(&component, [whole.frame.width, whole.frame.height], rests);
+            occupancy.mark_taken(&component, [whole.frame.width, whole.frame.height], rests);
         }
     }
 }
 
-/// Returns how unlike the subject (`Subject::cost`) a component of `plate` looks in front of `behind`.
-fn cost(subject: &Subject, plate: &Plate, behind: &Plate, component: &Component) -> f64 {
-    let difference = silhouette::difference(&plate.frame, behind, &Light::SAME, component.rect);
-    let picture = [plate.frame.width, plate.frame.height];
-    let look = Look::of(
+/// Returns how unlike the subject (`Subject::cost`) a component of `background` looks in front of `behind`.
+fn cost(
+    subject: &Subject,
+    background: &Background,
+    behind: &Background,
+    component: &Component,
+) -> f64 {
+    let difference =
+        silhouette::difference(&background.frame, behind, &Light::NEUTRAL, component.rect);
+    let picture = [background.frame.width, background.frame.height];
+    let look = Look::measure(
         component,
         &difference.rgb,
         &difference.levels,
@@ -64,14 +69,15 @@ fn cost(subject: &Subject, plate: &Plate, behind: &Plate, component: &Component)
         behind.light,
     );
     subject.cost(&Look {
-        color: color_in(&plate.rgb, component),
+        color: color_in(&background.rgb, component),
         ..look
     })
 }
 
 /// Returns whether two backgrounds show the same within a component.
-fn is_same(plate: &Plate, other: &Plate, component: &Component) -> bool {
-    let difference = silhouette::difference(&plate.frame, other, &Light::SAME, component.rect);
+fn is_same(background: &Background, other: &Background, component: &Component) -> bool {
+    let difference =
+        silhouette::difference(&background.frame, other, &Light::NEUTRAL, component.rect);
     let mask = component.mask(component.rect);
     let inside = difference
         .levels

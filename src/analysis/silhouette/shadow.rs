@@ -6,24 +6,24 @@
 use std::ops::RangeInclusive;
 
 use super::Difference;
-use crate::analysis::scene::plate::Plate;
+use crate::analysis::scene::background::Background;
 use crate::raster::Mask;
 use crate::raster::runs::Component;
 
 /// Brightness of a shadow as a share of the background's. Free choice.
-const RATIO: RangeInclusive<f32> = 0.45..=0.95;
+const BRIGHTNESS: RangeInclusive<f32> = 0.45..=0.95;
 /// Half side of the square whose texture is compared, pixels. Free choice.
 const RADIUS: i64 = 2;
 /// Least correlation of a shadow's texture with the background's. Free choice.
-const CORRELATION: f32 = 0.9;
+const MIN_CORRELATION: f32 = 0.9;
 
 /// Clears the weak pixels that are shadow. Core pixels stay set.
-pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Plate) {
+pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, background: &Background) {
     let rect = difference.rect;
     for k in 0..weak.bits.len() {
         if weak.bits[k] == 1 && core.bits[k] == 0 {
             let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            if is_shadow(difference, plate, x, y) {
+            if is_shadow(difference, background, x, y) {
                 weak.bits[k] = 0;
             }
         }
@@ -32,28 +32,33 @@ pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Pla
 
 /// Returns whether at least 70 % of a component's pixels have the color of a shadow. `difference` covers its
 /// box.
-pub fn is_shadow_alone(difference: &Difference, plate: &Plate, component: &Component) -> bool {
+pub fn is_all_shadow(
+    difference: &Difference,
+    background: &Background,
+    component: &Component,
+) -> bool {
     let mask = component.mask(component.rect);
     let width = mask.width();
     let like = (0..mask.bits.len()).filter(|&k| {
-        mask.bits[k] == 1 && has_shadow_color(difference, plate, k % width, k / width)
+        mask.bits[k] == 1 && has_shadow_color(difference, background, k % width, k / width)
     });
     10 * like.count() as u64 >= 7 * component.area
 }
 
-fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
-    has_shadow_color(difference, plate, x, y) && correlation(difference, plate, x, y) > CORRELATION
+fn is_shadow(difference: &Difference, background: &Background, x: usize, y: usize) -> bool {
+    has_shadow_color(difference, background, x, y)
+        && correlation(difference, background, x, y) > MIN_CORRELATION
 }
 
 /// Returns whether a pixel has the background's color at a brightness that a shadow may have.
-fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
-    has_darker_color(difference, plate, x, y, RATIO)
+fn has_shadow_color(difference: &Difference, background: &Background, x: usize, y: usize) -> bool {
+    has_darker_color(difference, background, x, y, BRIGHTNESS)
 }
 
 /// Returns whether a pixel has the background's color, at a share of its brightness within `ratios`.
 pub fn has_darker_color(
     difference: &Difference,
-    plate: &Plate,
+    background: &Background,
     x: usize,
     y: usize,
     ratios: RangeInclusive<f32>,
@@ -62,7 +67,7 @@ pub fn has_darker_color(
     let (px, py) = (rect.x + x as u32, rect.y + y as u32);
     let color = |rgb: [u8; 3]| rgb.map(f32::from);
     let i = color(difference.rgb.pixel(x as u32, y as u32));
-    let b = color(plate.rgb.pixel(px, py));
+    let b = color(background.rgb.pixel(px, py));
     let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let ratio = dot(i, b) / dot(b, b).max(1.0);
     if !ratios.contains(&ratio) {
@@ -73,14 +78,14 @@ pub fn has_darker_color(
         i[1] - ratio * b[1],
         i[2] - ratio * b[2],
     ];
-    let sigma = plate.sigma[py as usize * plate.frame.width as usize + px as usize];
+    let sigma = background.sigma[py as usize * background.frame.width as usize + px as usize];
     dot(gap, gap) < (3.0 * sigma).powi(2)
 }
 
 /// Returns the normalized correlation of the green channel with the background's around a pixel, -1..=1.
 ///
 /// Returns 1 where both are flat: a shadow on an even wall has no texture to compare.
-fn correlation(difference: &Difference, plate: &Plate, x: usize, y: usize) -> f32 {
+fn correlation(difference: &Difference, background: &Background, x: usize, y: usize) -> f32 {
     let rect = difference.rect;
     let (mut n, mut i1, mut b1, mut ii, mut bb, mut ib) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for dy in -RADIUS..=RADIUS {
@@ -91,7 +96,7 @@ fn correlation(difference: &Difference, plate: &Plate, x: usize, y: usize) -> f3
             }
             let (sx, sy) = (sx as u32, sy as u32);
             let i = f32::from(difference.rgb.pixel(sx, sy)[1]);
-            let b = f32::from(plate.rgb.pixel(rect.x + sx, rect.y + sy)[1]);
+            let b = f32::from(background.rgb.pixel(rect.x + sx, rect.y + sy)[1]);
             n += 1.0;
             i1 += i;
             b1 += b;

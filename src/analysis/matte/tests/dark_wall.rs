@@ -1,4 +1,4 @@
-//! Tests of mattes with mirror images of the animal in things darker than its ground.
+//! Tests of mattes in front of things darker than the animal's ground, such as a wall.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn nearly_black(x: u32, _: u32) -> u8 {
 /// A light animal on it, in two parts, one of them dimmer.
 fn in_the_dark(x: u32, y: u32) -> u8 {
     let is_leg = (64..76).contains(&x) && (30..34).contains(&y);
-    match (away([x, y], BODY), is_leg) {
+    match (steps_away([x, y], BODY), is_leg) {
         (0, _) => 200,
         (_, true) => 120,
         _ => nearly_black(x, y),
@@ -32,14 +32,15 @@ fn striped(x: u32, _: u32) -> u8 {
 /// A body with a tail, a part of which is hidden in front of the stripe.
 fn with_a_hidden_part(x: u32, y: u32) -> u8 {
     let is_tail = ((60..64).contains(&x) || (68..84).contains(&x)) && (30..33).contains(&y);
-    match away([x, y], BODY) == 0 || is_tail {
-        true => FUR,
-        false => striped(x, y),
+    if steps_away([x, y], BODY) == 0 || is_tail {
+        FUR
+    } else {
+        striped(x, y)
     }
 }
 
 #[test]
-fn a_limb_apart_from_the_body_is_no_image() {
+fn limb_apart_from_the_body_is_kept() {
     let light = drawn_on(nearly_black, in_the_dark);
     let tail = drawn_on(striped, with_a_hidden_part);
     for x in 70..74 {
@@ -50,14 +51,14 @@ fn a_limb_apart_from_the_body_is_no_image() {
 
 /// That body, half of it in front of the wall.
 fn across_the_wall(x: u32, y: u32) -> u8 {
-    match away([x.saturating_sub(25), y], BODY) {
+    match steps_away([x.saturating_sub(25), y], BODY) {
         0 => FUR,
         _ => wall(x, y),
     }
 }
 
 #[test]
-fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
+fn animal_in_front_of_a_dark_wall_is_whole() {
     let drawn = drawn_on(wall, across_the_wall);
     for (x, y) in (25..41).flat_map(|y| (55..85).map(move |x| (x, y))) {
         let shown = drawn.over(240, [x, y]);
@@ -69,7 +70,7 @@ fn an_animal_that_reaches_over_a_dark_wall_is_whole() {
 fn with_a_large_image(x: u32, y: u32) -> u8 {
     let is_cast = (BODY.right()..68).contains(&x) && (28..38).contains(&y);
     let is_image = x >= 72 && (18..48).contains(&y);
-    match (away([x, y], BODY), is_cast, is_image) {
+    match (steps_away([x, y], BODY), is_cast, is_image) {
         (0, ..) => FUR,
         (_, true, _) => PAPER / 5 * 4,
         (.., true) => WALL - 12,
@@ -78,7 +79,7 @@ fn with_a_large_image(x: u32, y: u32) -> u8 {
 }
 
 #[test]
-fn a_large_image_does_not_make_the_shadow_part_of_the_animal() {
+fn large_image_does_not_make_the_shadow_opaque() {
     let drawn = drawn_on(wall, with_a_large_image);
     for (x, y) in (29..37).flat_map(|y| (63..68).map(move |x| (x, y))) {
         assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
