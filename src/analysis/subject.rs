@@ -55,6 +55,16 @@ impl Color {
         Color(counts)
     }
 
+    /// Returns the color histogram of a picture inside a component.
+    pub fn in_component(picture: &RgbImage, component: &Component) -> Color {
+        let row = |run: &Run| {
+            let first = run.y as usize * picture.width as usize;
+            let pixels = first + run.x0 as usize..first + run.x1 as usize;
+            picture.pixels[3 * pixels.start..3 * pixels.end].chunks(3)
+        };
+        Color::from_pixels(component.runs.iter().flat_map(row))
+    }
+
     /// Returns the earth mover's distance of two colors, as the mean over the channels, levels of 255.
     pub fn distance(&self, other: &Color) -> f64 {
         let channel = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {

@@ -5,7 +5,6 @@
 
 use super::background::{Background, Threshold};
 use super::fill;
-use super::light;
 use super::occupancy::Occupancy;
 use super::resting;
 use super::samples::Samples;
@@ -23,8 +22,6 @@ use crate::raster::{Frame, RgbImage};
 const MIN_FREE_SAMPLES: u32 = 3;
 /// Random seed of the texture synthesis.
 const FILL_SEED: u64 = 1;
-/// Number of frames compared to detect uneven light. Free choice.
-const N_LIGHT_FRAMES: usize = 16;
 /// Median share of the picture that differs, from which higher thresholds are tried. Free choice.
 const BUSY_SHARE: f64 = 0.03;
 /// Factor by which a higher threshold must raise the starkness to be kept. Free choice.
@@ -54,10 +51,10 @@ impl BackgroundEstimate {
         let groups = states::group_samples(samples)?;
         let mut backgrounds = Vec::with_capacity(groups.len());
         for group in &groups {
-            let reference = bright_reference(samples, group.samples);
+            let reference = samples.bright_reference(group.samples);
             let mut background =
                 Background::without_noise(samples.frames[reference].clone(), params.threshold);
-            equalize_light(samples, group.samples, &mut background);
+            samples.equalize_light(group.samples, &mut background);
             backgrounds.push(Background {
                 uneven_light: background.uneven_light,
                 light: group.light,
@@ -98,7 +95,7 @@ impl BackgroundEstimate {
         let mut background = Background::without_noise(frame, params.threshold);
         let group = all_samples(samples);
         if !samples.are_masked() {
-            equalize_light(samples, group.samples, &mut background);
+            samples.equalize_light(group.samples, &mut background);
         }
         Ok(BackgroundEstimate::new(
             samples,
@@ -364,34 +361,6 @@ fn all_samples(samples: &Samples) -> SampleGroup {
 fn background_of(groups: &[SampleGroup], n_samples: usize) -> Vec<Option<usize>> {
     let group_of = |k: usize| groups.iter().position(|group| group.samples >> k & 1 == 1);
     (0..n_samples).map(group_of).collect()
-}
-
-/// Returns the sample whose mean luma is the third quartile. A bright reference keeps gains low, because a
-/// gain above 1 loses levels. The brightest sample may be a flash.
-fn bright_reference(samples: &Samples, group: u64) -> usize {
-    let mean = |k: usize| {
-        let luma = samples.frames[k].luma();
-        let sum: u64 = luma.iter().step_by(7).map(|&v| u64::from(v)).sum();
-        sum / luma.len().div_ceil(7).max(1) as u64
-    };
-    let mut by_light: Vec<(u64, usize)> = states::indices(group).map(|k| (mean(k), k)).collect();
-    by_light.sort_unstable();
-    by_light[by_light.len() * 3 / 4].1
-}
-
-/// Divides the samples of a group by their light relative to a background. Sets `uneven_light` of the
-/// background.
-fn equalize_light(samples: &mut Samples, group: u64, background: &mut Background) {
-    let members: Vec<usize> = states::indices(group).collect();
-    let step = members.len().div_ceil(N_LIGHT_FRAMES).max(1);
-    let some: Vec<&Frame> = members
-        .iter()
-        .step_by(step)
-        .map(|&k| &samples.frames[k])
-        .collect();
-    background.uneven_light = light::is_uneven(some.into_iter(), background);
-    let background = &*background;
-    samples.change(group, |frame| light::measure(frame, background).undo(frame));
 }
 
 /// Raises the core thresholds to at least a quarter of the animal's contrast. Beside a black mouse on white

@@ -128,10 +128,7 @@ pub fn measure(frame: &Frame, background: &Background) -> Light {
 }
 
 /// Returns whether the light of the footage varies over the picture, measured on some of its frames.
-pub fn is_uneven<'a>(
-    frames: impl ExactSizeIterator<Item = &'a Frame>,
-    background: &Background,
-) -> bool {
+pub fn is_uneven(frames: &[&Frame], background: &Background) -> bool {
     let n_frames = frames.len();
     let deviates = |frame: &Frame| {
         let gain = luma_of(gain(frame, background));
@@ -142,7 +139,7 @@ pub fn is_uneven<'a>(
         };
         deviation(&factors.rows).max(deviation(&factors.columns)) > UNEVEN_DEVIATION
     };
-    let n_uneven = frames.filter(|frame| deviates(frame)).count();
+    let n_uneven = frames.iter().filter(|frame| deviates(frame)).count();
     n_uneven as f64 > UNEVEN_SHARE * n_frames as f64
 }
 

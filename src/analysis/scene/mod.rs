@@ -21,6 +21,7 @@ pub mod background;
 mod background_estimate;
 mod camera_shift;
 mod fill;
+mod ghost;
 pub mod light;
 pub mod mirror;
 mod occupancy;

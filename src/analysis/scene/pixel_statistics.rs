@@ -6,8 +6,7 @@ use rayon::prelude::*;
 use super::background::MIN_SIGMA;
 use super::occupancy::Occupancy;
 use super::ranks::{self, Wanted};
-use super::samples::Samples;
-use super::states;
+use super::samples::{Samples, indices};
 use crate::raster::Frame;
 
 /// Kind of a plane: a luma value belongs to one pixel, a chroma value to four.
@@ -189,7 +188,7 @@ impl Samples {
                     for wanted in &mut wanted {
                         wanted.free = packed(wanted.free, group);
                     }
-                    let members = states::indices(group);
+                    let members = indices(group);
                     let samples: Vec<&[u8]> = members
                         .clone()
                         .map(|k| &self.frames[k].planes[bytes.clone()])
@@ -215,7 +214,7 @@ fn packed(free: u64, group: u64) -> u64 {
         return u64::MAX >> (64 - group.count_ones());
     }
     let bit = |(to, from): (usize, usize)| (free >> from & 1) << to;
-    states::indices(group)
+    indices(group)
         .enumerate()
         .map(bit)
         .fold(0, |all, bit| all | bit)

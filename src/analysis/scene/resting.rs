@@ -9,9 +9,8 @@ use super::background::Background;
 use super::light::Light;
 use super::occupancy::Occupancy;
 use super::states::SampleGroup;
-use super::survey::color_in;
 use crate::analysis::silhouette;
-use crate::analysis::subject::{FITS, Look, Subject};
+use crate::analysis::subject::{Color, FITS, Look, Subject};
 use crate::raster::runs::Component;
 
 /// Least area of a component, as a share of the subject's area. Free choice.
@@ -69,7 +68,7 @@ fn cost(
         behind.light,
     );
     subject.cost(&Look {
-        color: color_in(&background.rgb, component),
+        color: Color::in_component(&background.rgb, component),
         ..look
     })
 }

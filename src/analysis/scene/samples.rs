@@ -8,6 +8,8 @@ use std::ops::ControlFlow;
 
 use rayon::prelude::*;
 
+use super::background::Background;
+use super::light;
 use super::ranks::MAX_SAMPLES;
 use super::thumbnail::Thumbnail;
 use crate::analysis::params::AnimalAtParam;
@@ -21,6 +23,9 @@ use crate::raster::Frame;
 const MIN_SAMPLES: usize = 16;
 /// Memory for the samples, bytes. Free choice.
 const MEMORY_BYTES: usize = 128 << 20;
+
+/// Number of frames compared to detect uneven light. Free choice.
+const N_LIGHT_FRAMES: u32 = 16;
 
 /// The samples of a footage.
 pub(super) struct Samples {
@@ -101,12 +106,30 @@ impl Samples {
         self.frames.iter().all(|frame| frame.mask.is_some())
     }
 
-    /// Applies `change` to the samples of `group`, in parallel.
-    pub(super) fn change(&mut self, group: u64, change: impl Fn(&mut Frame) + Sync) {
-        let members = self.frames.par_iter_mut().enumerate();
-        members
+    /// Returns the sample of `group` whose mean luma is the third quartile. A bright reference keeps gains low,
+    /// because a gain above 1 loses levels. The brightest sample may be a flash.
+    pub(super) fn bright_reference(&self, group: u64) -> usize {
+        let mean = |k: usize| {
+            let luma = self.frames[k].luma();
+            let sum: u64 = luma.iter().step_by(7).map(|&v| u64::from(v)).sum();
+            sum / luma.len().div_ceil(7).max(1) as u64
+        };
+        let mut by_light: Vec<(u64, usize)> = indices(group).map(|k| (mean(k), k)).collect();
+        by_light.sort_unstable();
+        by_light[by_light.len() * 3 / 4].1
+    }
+
+    /// Divides the samples of `group` by their light relative to a background. Sets `uneven_light` of the
+    /// background.
+    pub(super) fn equalize_light(&mut self, group: u64, background: &mut Background) {
+        let step = group.count_ones().div_ceil(N_LIGHT_FRAMES).max(1) as usize;
+        let members = indices(group).step_by(step).map(|k| &self.frames[k]);
+        let compared: Vec<&Frame> = members.collect();
+        background.uneven_light = light::is_uneven(&compared, background);
+        let samples = self.frames.par_iter_mut().enumerate();
+        samples
             .filter(|(k, _)| group >> k & 1 == 1)
-            .for_each(|(_, frame)| change(frame));
+            .for_each(|(_, frame)| light::measure(frame, background).undo(frame));
     }
 
     /// Returns a thumbnail of every sample.
@@ -139,4 +162,9 @@ fn replace_nearest(
     }
     frame_idx[k] = wanted;
     Ok(k)
+}
+
+/// Returns the indices of the set bits, in ascending order.
+pub(super) fn indices(mask: u64) -> impl Iterator<Item = usize> + Clone {
+    (0..64).filter(move |k| mask >> k & 1 == 1)
 }

@@ -7,7 +7,7 @@
 //! scene join no state: black frames, title cards, a hand over the lens.
 
 use super::camera_shift::Correlator;
-use super::samples::Samples;
+use super::samples::{Samples, indices};
 use super::thumbnail::Thumbnail;
 use crate::analysis::Error;
 use crate::order;
@@ -207,9 +207,4 @@ fn refusal(samples: &Samples, thumbnails: &[Thumbnail], dropped: &[SampleGroup])
 
 fn length([x, y]: [f64; 2]) -> f64 {
     libm::hypot(x, y)
-}
-
-/// Returns the indices of the set bits, in ascending order.
-pub(super) fn indices(mask: u64) -> impl Iterator<Item = usize> + Clone {
-    (0..64).filter(move |k| mask >> k & 1 == 1)
 }

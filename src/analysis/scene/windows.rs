@@ -4,7 +4,8 @@
 //! A group is split where two backgrounds explain its samples much better than one. Thumbnails measure this,
 //! without the cells that the animal covers. The module also cuts groups into short windows of equal size.
 
-use super::states::{MIN_SAMPLES, SampleGroup, indices};
+use super::samples::indices;
+use super::states::{MIN_SAMPLES, SampleGroup};
 use super::thumbnail::Thumbnail;
 
 /// Share of differing cells below which one background is enough, 0..=1. Free choice.
