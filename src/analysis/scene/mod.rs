@@ -19,7 +19,6 @@ use crate::raster::{Frame, RgbImage};
 
 pub mod background;
 mod background_estimate;
-mod camera_shift;
 mod fill;
 mod ghost;
 pub mod light;
@@ -27,7 +26,6 @@ pub mod mirror;
 mod occupancy;
 mod pixel_statistics;
 mod probes;
-mod ranks;
 mod refusal;
 mod resting;
 mod samples;

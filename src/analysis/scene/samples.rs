@@ -10,7 +10,6 @@ use rayon::prelude::*;
 
 use super::background::Background;
 use super::light;
-use super::ranks::MAX_SAMPLES;
 use super::thumbnail::Thumbnail;
 use crate::analysis::params::AnimalAtParam;
 use crate::analysis::{Error, LEAST_FRAMES, Params};
@@ -19,6 +18,8 @@ use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::Frame;
 
+/// Largest number of samples: one bit each in a 64-bit word.
+pub(super) const MAX_SAMPLES: usize = 64;
 /// Least number of samples, even where they exceed the memory budget. Free choice.
 const MIN_SAMPLES: usize = 16;
 /// Memory for the samples, bytes. Free choice.

@@ -6,7 +6,9 @@
 //! are merged. Phase correlation (`camera_shift`) then splits a state by camera position. Samples without a
 //! scene join no state: black frames, title cards, a hand over the lens.
 
-use super::camera_shift::Correlator;
+mod camera_shift;
+
+use self::camera_shift::Correlator;
 use super::samples::{Samples, indices};
 use super::thumbnail::Thumbnail;
 use crate::analysis::Error;

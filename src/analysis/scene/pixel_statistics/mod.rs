@@ -1,11 +1,13 @@
 //! Order statistics of each pixel over the samples: the median, the commonest value and the noise
 //! (docs/explanation/algorithms.md, "Background" and "Light and noise").
 
+mod ranks;
+
 use rayon::prelude::*;
 
+use self::ranks::Wanted;
 use super::background::MIN_SIGMA;
 use super::occupancy::Occupancy;
-use super::ranks::{self, Wanted};
 use super::samples::{Samples, indices};
 use crate::raster::Frame;
 

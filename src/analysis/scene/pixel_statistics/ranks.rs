@@ -5,8 +5,8 @@
 //! the samples below a candidate, for 64 neighboring pixels at once, in loops that the compiler vectorizes.
 //! Samples that are left out hold 255, so no candidate exceeds them.
 
-/// Largest number of samples: one bit each in a 64-bit word.
-pub(super) const MAX_SAMPLES: usize = 64;
+use crate::analysis::scene::samples::MAX_SAMPLES;
+
 /// Largest difference between values of an unchanged scene, levels of 255. It covers noise and residual
 /// flicker. Free choice.
 const SAME_LEVELS: u8 = 10;
