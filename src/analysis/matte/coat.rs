@@ -76,11 +76,13 @@ impl Coat<'_> {
     ///
     /// A shadow differs by more levels where the floor is brighter; the share stays equal.
     fn share(&self, k: usize) -> f64 {
-        let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
-        let (x, y) = ((k % width) as u32, (k / width) as u32);
-        let seen = self.difference.rgb.pixel(x, y);
-        let back = self.background.rgb.pixel(rect.x + x, rect.y + y);
-        let brightest = seen.into_iter().chain(back).fold(1, u8::max);
+        let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
+        let px = self.background.px_in(self.difference.rect, k);
+        let back = &self.background.rgb.pixels[3 * px..3 * px + 3];
+        let brightest = seen
+            .iter()
+            .chain(back)
+            .fold(1, |most, &value| value.max(most));
         self.level(k) / f64::from(brightest)
     }
 
@@ -102,26 +104,17 @@ impl Coat<'_> {
 
     /// Returns whether a faint pixel has the background's color, but darker.
     pub(super) fn is_shadow(&self, k: usize) -> bool {
-        let width = self.difference.rect.w as usize;
         self.is_faint(k)
             && !self.matches(k)
-            && shadow::has_darker_color(
-                self.difference,
-                self.background,
-                k % width,
-                k / width,
-                SHADOW_BRIGHTNESS,
-            )
+            && shadow::has_darker_color(self.difference, self.background, k, SHADOW_BRIGHTNESS)
     }
 
     /// Returns whether a faint pixel cannot be told from the background.
     fn is_floor(&self, k: usize) -> bool {
-        let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
-        let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
-        let at = y * self.background.frame.width as usize + x;
+        let px = self.background.px_in(self.difference.rect, k);
         self.is_faint(k)
             && !self.matches(k)
-            && self.difference.levels[k] <= self.background.weak_threshold(at)
+            && self.difference.levels[k] <= self.background.weak_threshold(px)
     }
 
     /// Returns the mask without the soft shadow around the animal and without the floor between its parts.

@@ -16,48 +16,19 @@ const BLACK_OFFSET: f32 = 48.0;
 /// things.
 const GROUND_PERCENTILE: f64 = 0.75;
 
-/// The ground on which the animal stands.
-pub(super) struct Ground<'a> {
-    background: &'a Background,
-    /// Brightness: the sum of R, G and B, 0..=765.
-    brightness: f32,
-}
-
-impl Ground<'_> {
-    /// Returns the ground behind the animal in `mask`.
-    pub(super) fn new<'a>(mask: &Mask, background: &'a Background) -> Ground<'a> {
-        let (rect, width) = (mask.rect, mask.width());
-        let covered = (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
-        let mut behind: Vec<f64> = covered
-            .map(|k| {
-                let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
-                f64::from(brightness(background, x, y))
-            })
-            .collect();
-        Ground {
-            background,
-            brightness: percentile(&mut behind, GROUND_PERCENTILE).unwrap_or(0.0) as f32,
-        }
+/// Returns the part of a mask that lies on the ground and not on darker things.
+pub(super) fn part_on_ground(mask: &Mask, background: &Background) -> Mask {
+    let brightness = |k: usize| {
+        let color = background.color(background.px_in(mask.rect, k));
+        color.iter().sum::<f32>()
+    };
+    let covered = (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
+    let mut behind: Vec<f64> = covered.map(|k| f64::from(brightness(k))).collect();
+    let of_ground = percentile(&mut behind, GROUND_PERCENTILE).unwrap_or(0.0) as f32;
+    let mut on_ground = mask.clone();
+    for (k, bit) in on_ground.bits.iter_mut().enumerate() {
+        let is_dark = brightness(k) + BLACK_OFFSET < MAX_DARK_SHARE * (of_ground + BLACK_OFFSET);
+        *bit &= u8::from(!is_dark);
     }
-
-    /// Returns whether the background at a place of the frame is much darker than the ground.
-    fn is_dark(&self, x: u32, y: u32) -> bool {
-        brightness(self.background, x, y) + BLACK_OFFSET
-            < MAX_DARK_SHARE * (self.brightness + BLACK_OFFSET)
-    }
-
-    /// Returns the part of a mask that lies on the ground and not on darker things.
-    pub(super) fn part_on_ground(&self, mask: &Mask) -> Mask {
-        let (rect, width) = (mask.rect, mask.width());
-        let mut on_ground = mask.clone();
-        for (k, bit) in on_ground.bits.iter_mut().enumerate() {
-            let (x, y) = (rect.x + (k % width) as u32, rect.y + (k / width) as u32);
-            *bit &= u8::from(!self.is_dark(x, y));
-        }
-        on_ground
-    }
-}
-
-fn brightness(background: &Background, x: u32, y: u32) -> f32 {
-    background.rgb.pixel(x, y).map(f32::from).iter().sum()
+    on_ground
 }

@@ -12,7 +12,6 @@ mod given;
 mod ground;
 
 use self::coat::Coat;
-use self::ground::Ground;
 use super::scene::background::Background;
 use super::scene::light::Light;
 use super::silhouette::{self, Difference};
@@ -48,7 +47,7 @@ pub fn pull(
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, background, light, rect);
     let mask = over_box(silhouette, rect);
-    let on_ground = Ground::new(&mask, background).part_on_ground(&mask);
+    let on_ground = ground::part_on_ground(&mask, background);
     let coat_of = |mask: &Mask| Coat::measure(mask, &difference, background);
     let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
     let solid = coat.without_halo(&mask, band_px);
@@ -177,15 +176,12 @@ impl MattePuller<'_> {
     }
 
     /// Returns the index of a pixel in the background image.
-    fn background_idx(&self, k: usize) -> usize {
-        let (rect, width) = (self.mask.rect, self.mask.width());
-        let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
-        y * self.background.frame.width as usize + x
+    fn background_px(&self, k: usize) -> usize {
+        self.background.px_in(self.mask.rect, k)
     }
 
     fn background_color(&self, k: usize) -> [f32; 3] {
-        let at = 3 * self.background_idx(k);
-        [0, 1, 2].map(|c| f32::from(self.background.rgb.pixels[at + c]))
+        self.background.color(self.background_px(k))
     }
 
     /// Returns the straight color and the alpha of a pixel of the band.
@@ -265,7 +261,7 @@ impl MattePuller<'_> {
     }
 
     fn noise_squared(&self, k: usize) -> f32 {
-        (3.0 * self.background.sigma[self.background_idx(k)]).powi(2)
+        (3.0 * self.background.sigma[self.background_px(k)]).powi(2)
     }
 
     /// Returns the animal's color near a pixel of the band; `None` outside the band.

@@ -6,6 +6,7 @@
 
 use super::probes::{self, Probe};
 use crate::analysis::silhouette::Blocks;
+use crate::geometry::Rect;
 use crate::raster::{Frame, RgbImage};
 
 /// Least noise of a pixel, levels of 255. A lossy codec hides noise of the background. Free choice.
@@ -98,10 +99,29 @@ impl Background {
         Background::new(frame, vec![MIN_SIGMA; n_px], threshold)
     }
 
+    /// Replaces the picture; noise and thresholds stay.
+    pub(super) fn set_picture(&mut self, frame: Frame) {
+        self.rgb = frame.to_rgb();
+        self.probes = probes::of_background(&self.rgb);
+        self.blocks = Blocks::new(&frame);
+        self.frame = frame;
+    }
+
     /// Sets the thresholds of all pixels.
     pub(super) fn set_threshold(&mut self, threshold: Threshold) {
         self.core_threshold = core_thresholds(&self.sigma, threshold);
         self.weak_share = threshold.weak_share;
+    }
+
+    /// Returns the index in the picture of pixel `k` of a box.
+    pub fn px_in(&self, rect: Rect, k: usize) -> usize {
+        let width = rect.w as usize;
+        (rect.y as usize + k / width) * self.frame.width as usize + rect.x as usize + k % width
+    }
+
+    /// Returns the color of a pixel, levels of 255.
+    pub fn color(&self, px: usize) -> [f32; 3] {
+        [0, 1, 2].map(|c| f32::from(self.rgb.pixels[3 * px + c]))
     }
 
     /// Returns the difference above which a pixel beside a certain one counts, levels of 255.

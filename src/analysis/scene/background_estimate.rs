@@ -248,7 +248,7 @@ impl BackgroundEstimate {
     pub(super) fn repaint(&mut self, samples: &Samples, occupancy: &Occupancy, is_given: bool) {
         if !is_given {
             for (background, group) in self.backgrounds.iter_mut().zip(&self.groups) {
-                background.frame = repainted(background, group, samples, occupancy);
+                background.set_picture(repainted(background, group, samples, occupancy));
             }
         }
         let frames: Vec<&Frame> = self
@@ -262,11 +262,9 @@ impl BackgroundEstimate {
             .map(|group| samples.noise(group.state_samples, &frames, occupancy))
             .collect();
         for (background, sigma) in self.backgrounds.iter_mut().zip(sigmas) {
-            *background = Background {
-                uneven_light: background.uneven_light,
-                light: background.light,
-                ..Background::new(background.frame.clone(), sigma, self.threshold)
-            };
+            background.sigma = sigma;
+            background.set_threshold(Threshold::usual(self.threshold));
+            background.never_seen_px = 0;
         }
         if !is_given {
             self.fill_unknown(samples, occupancy, fill::smooth);
@@ -306,7 +304,6 @@ impl BackgroundEstimate {
         occupancy: &Occupancy,
         fill: impl Fn(&mut RgbImage, &[bool]),
     ) {
-        let threshold = self.threshold;
         for (background, group) in self.backgrounds.iter_mut().zip(&self.groups) {
             let unknown: Vec<bool> = (0..samples.n_px())
                 .map(|px| occupancy.free(px, group.state_samples) == 0)
@@ -324,14 +321,8 @@ impl BackgroundEstimate {
             fill(&mut background.rgb, &unknown);
             let mut frame = background.frame.clone();
             frame.draw_rgb(&background.rgb, hole);
-            *background = Background {
-                never_seen_px: places().count() as u64,
-                uneven_light: background.uneven_light,
-                light: background.light,
-                core_threshold: std::mem::take(&mut background.core_threshold),
-                weak_share: background.weak_share,
-                ..Background::new(frame, std::mem::take(&mut background.sigma), threshold)
-            };
+            background.never_seen_px = places().count() as u64;
+            background.set_picture(frame);
         }
     }
 }

@@ -40,32 +40,19 @@ impl Mirror {
     pub fn split(&self, component: Component) -> Vec<Component> {
         let rect = component.rect;
         let line = self.line_px.round().max(0.0) as u32;
-        let halves = match self.axis {
-            0 if rect.x < line && line < rect.right() => [
-                Rect {
-                    w: line - rect.x,
-                    ..rect
-                },
-                Rect {
-                    x: line,
-                    w: rect.right() - line,
-                    ..rect
-                },
-            ],
-            1 if rect.y < line && line < rect.bottom() => [
-                Rect {
-                    h: line - rect.y,
-                    ..rect
-                },
-                Rect {
-                    y: line,
-                    h: rect.bottom() - line,
-                    ..rect
-                },
-            ],
+        let [mut before, mut after] = [rect; 2];
+        match self.axis {
+            0 if rect.x < line && line < rect.right() => {
+                before.w = line - rect.x;
+                (after.x, after.w) = (line, rect.right() - line);
+            }
+            1 if rect.y < line && line < rect.bottom() => {
+                before.h = line - rect.y;
+                (after.y, after.h) = (line, rect.bottom() - line);
+            }
             _ => return vec![component],
-        };
-        halves
+        }
+        [before, after]
             .into_iter()
             .flat_map(|half| runs::components(&component.mask(half)))
             .collect()

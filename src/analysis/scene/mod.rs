@@ -122,18 +122,14 @@ impl Scene {
             .filter_map(|at| self.samples.get(at));
         let mut tried: Vec<usize> = near.filter_map(|(_, background)| *background).collect();
         tried.dedup();
-        let likely = tried
-            .iter()
-            .map(|&background_idx| self.compare(background_idx, frame))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let best = match likely.filter(|(_, share)| *share <= MAX_DIFFERING_SHARE) {
-            Some(likely) => Some(likely),
-            None => (0..self.backgrounds.len())
-                .filter(|background_idx| !tried.contains(background_idx))
-                .map(|background_idx| self.compare(background_idx, frame))
+        let best_of = |backgrounds: &[usize]| {
+            let compared = backgrounds.iter().map(|&at| self.compare(at, frame));
+            compared
                 .filter(|(_, share)| *share <= MAX_DIFFERING_SHARE)
-                .min_by(|a, b| a.1.total_cmp(&b.1)),
+                .min_by(|a, b| a.1.total_cmp(&b.1))
         };
+        let others = (0..self.backgrounds.len()).filter(|at| !tried.contains(at));
+        let best = best_of(&tried).or_else(|| best_of(&others.collect::<Vec<_>>()));
         best.map(|(placed, _)| placed)
     }
 

@@ -139,8 +139,7 @@ pub fn difference(frame: &Frame, background: &Background, light: &Light, rect: R
     }
     if let Some(other) = &background.other {
         for (k, level) in levels.iter_mut().enumerate() {
-            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            let at = ((rect.y as usize + y) * width + rect.x as usize + x) * 3;
+            let at = 3 * background.px_in(rect, k);
             let (base, other) = (
                 &background.rgb.pixels[at..at + 3],
                 &other.pixels[at..at + 3],
@@ -209,12 +208,11 @@ fn components_in_box(
 /// Returns the components of pixels above the weak threshold that contain a pixel above the core threshold.
 fn hysteresis(difference: &Difference, background: &Background) -> Vec<Component> {
     let rect = difference.rect;
-    let width = background.frame.width as usize;
     let mut weak = Mask::new(rect);
     let mut core = Mask::new(rect);
     let row_length = rect.w as usize;
     for (k, &level) in difference.levels.iter().enumerate() {
-        let px = (rect.y as usize + k / row_length) * width + rect.x as usize + k % row_length;
+        let px = background.px_in(rect, k);
         weak.bits[k] = u8::from(level > background.weak_threshold(px));
         core.bits[k] = u8::from(level > background.core_threshold[px]);
     }

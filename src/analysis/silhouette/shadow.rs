@@ -19,13 +19,9 @@ const MIN_CORRELATION: f32 = 0.9;
 
 /// Clears the weak pixels that are shadow. Core pixels stay set.
 pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, background: &Background) {
-    let rect = difference.rect;
     for k in 0..weak.bits.len() {
-        if weak.bits[k] == 1 && core.bits[k] == 0 {
-            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            if is_shadow(difference, background, x, y) {
-                weak.bits[k] = 0;
-            }
+        if weak.bits[k] == 1 && core.bits[k] == 0 && is_shadow(difference, background, k) {
+            weak.bits[k] = 0;
         }
     }
 }
@@ -38,55 +34,46 @@ pub fn is_all_shadow(
     component: &Component,
 ) -> bool {
     let mask = component.mask(component.rect);
-    let width = mask.width();
-    let like = (0..mask.bits.len()).filter(|&k| {
-        mask.bits[k] == 1 && has_shadow_color(difference, background, k % width, k / width)
-    });
+    let like = (0..mask.bits.len())
+        .filter(|&k| mask.bits[k] == 1 && has_shadow_color(difference, background, k));
     10 * like.count() as u64 >= 7 * component.area
 }
 
-fn is_shadow(difference: &Difference, background: &Background, x: usize, y: usize) -> bool {
-    has_shadow_color(difference, background, x, y)
-        && correlation(difference, background, x, y) > MIN_CORRELATION
+fn is_shadow(difference: &Difference, background: &Background, k: usize) -> bool {
+    has_shadow_color(difference, background, k)
+        && correlation(difference, background, k) > MIN_CORRELATION
 }
 
 /// Returns whether a pixel has the background's color at a brightness that a shadow may have.
-fn has_shadow_color(difference: &Difference, background: &Background, x: usize, y: usize) -> bool {
-    has_darker_color(difference, background, x, y, BRIGHTNESS)
+fn has_shadow_color(difference: &Difference, background: &Background, k: usize) -> bool {
+    has_darker_color(difference, background, k, BRIGHTNESS)
 }
 
 /// Returns whether a pixel has the background's color, at a share of its brightness within `ratios`.
 pub fn has_darker_color(
     difference: &Difference,
     background: &Background,
-    x: usize,
-    y: usize,
+    k: usize,
     ratios: RangeInclusive<f32>,
 ) -> bool {
-    let rect = difference.rect;
-    let (px, py) = (rect.x + x as u32, rect.y + y as u32);
-    let color = |rgb: [u8; 3]| rgb.map(f32::from);
-    let i = color(difference.rgb.pixel(x as u32, y as u32));
-    let b = color(background.rgb.pixel(px, py));
+    let px = background.px_in(difference.rect, k);
+    let i = [0, 1, 2].map(|c| f32::from(difference.rgb.pixels[3 * k + c]));
+    let b = background.color(px);
     let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let ratio = dot(i, b) / dot(b, b).max(1.0);
     if !ratios.contains(&ratio) {
         return false;
     }
-    let gap = [
-        i[0] - ratio * b[0],
-        i[1] - ratio * b[1],
-        i[2] - ratio * b[2],
-    ];
-    let sigma = background.sigma[py as usize * background.frame.width as usize + px as usize];
-    dot(gap, gap) < (3.0 * sigma).powi(2)
+    let gap = [0, 1, 2].map(|c| i[c] - ratio * b[c]);
+    dot(gap, gap) < (3.0 * background.sigma[px]).powi(2)
 }
 
 /// Returns the normalized correlation of the green channel with the background's around a pixel, -1..=1.
 ///
 /// Returns 1 where both are flat: a shadow on an even wall has no texture to compare.
-fn correlation(difference: &Difference, background: &Background, x: usize, y: usize) -> f32 {
+fn correlation(difference: &Difference, background: &Background, k: usize) -> f32 {
     let rect = difference.rect;
+    let (x, y) = (k % rect.w as usize, k / rect.w as usize);
     let (mut n, mut i1, mut b1, mut ii, mut bb, mut ib) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for dy in -RADIUS..=RADIUS {
         for dx in -RADIUS..=RADIUS {
