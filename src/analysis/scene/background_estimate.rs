@@ -119,6 +119,12 @@ impl BackgroundEstimate {
         }
     }
 
+    /// Returns the background of each sample; `None` for a sample without one.
+    pub(super) fn of_samples(&self) -> Vec<Option<&Background>> {
+        let of_sample = |at: &Option<usize>| at.map(|at| &self.backgrounds[at]);
+        self.background_of.iter().map(of_sample).collect()
+    }
+
     /// Surveys the samples and sets the threshold of the backgrounds. Where much of the picture differs,
     /// thresholds twice and four times as high are tried. One is kept if the animal's contrast is at least
     /// twice the threshold and its starkness grows. At a low threshold, a black mouse forms one component
@@ -148,7 +154,7 @@ impl BackgroundEstimate {
 
     fn survey_at(&mut self, threshold: Threshold, samples: &Samples) -> Survey {
         self.set_threshold(threshold);
-        Survey::new(samples, &self.backgrounds, &self.background_of)
+        Survey::new(samples, &self.of_samples())
     }
 
     fn set_threshold(&mut self, threshold: Threshold) {
@@ -195,7 +201,7 @@ impl BackgroundEstimate {
 
     /// Returns the samples in which each pixel shows the scene.
     pub(super) fn occupancy(&self, samples: &Samples, survey: &Survey) -> Occupancy {
-        Occupancy::new(samples, &self.backgrounds, &self.background_of, survey)
+        Occupancy::new(samples, &self.of_samples(), survey)
     }
 
     /// Returns the samples in which each pixel shows the scene. It combines the survey of short windows with
@@ -225,9 +231,9 @@ impl BackgroundEstimate {
     /// Splits the groups whose scene changes for good.
     pub(super) fn split_in_time(&mut self, samples: &Samples, occupancy: &Occupancy) {
         let thumbnails = samples.thumbnails();
-        let first = &samples.frames[0];
-        let side = Thumbnail::cell_px(first.width, first.height);
-        let taken = occupancy.taken_in_cells(side, [first.width, first.height]);
+        let [width, height] = samples.size_px();
+        let side = Thumbnail::cell_px(width, height);
+        let taken = occupancy.taken_in_cells(side, [width, height]);
         let is_free = |k: usize, cell: usize| taken[cell] >> k & 1 == 0;
         let (mut groups, mut backgrounds) = (Vec::new(), Vec::new());
         for (group, background) in self.groups.iter().zip(&self.backgrounds) {
@@ -285,8 +291,7 @@ impl BackgroundEstimate {
                 fill::sample_texture(image, unknown, FILL_SEED)
             });
         }
-        let first = &samples.frames[0];
-        let taken = occupancy.taken_in_cells(blocks::SIDE, [first.width, first.height]);
+        let taken = occupancy.taken_in_cells(blocks::SIDE, samples.size_px());
         for (background, group) in self.backgrounds.iter_mut().zip(&self.groups) {
             background.other = sway::other_color(&samples.frames, &background.frame, |px| {
                 occupancy.free(px, group.samples)

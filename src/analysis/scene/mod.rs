@@ -87,7 +87,7 @@ impl Scene {
         samples: &Samples,
         similar_objects: SimilarObjects,
     ) -> Result<Scene, Error> {
-        let survey = Survey::new(samples, &estimate.backgrounds, &estimate.background_of);
+        let survey = Survey::new(samples, &estimate.of_samples());
         let frames = samples.frame_idx.iter().copied();
         Ok(Scene {
             backgrounds: estimate.backgrounds,
@@ -200,8 +200,8 @@ fn estimate_masked(
         Some(image) => BackgroundEstimate::from_image(image, samples, params)?,
         None => BackgroundEstimate::from_all_samples(samples, params),
     };
-    let survey = Survey::new(samples, &estimate.backgrounds, &estimate.background_of);
-    let similar_objects = refusal::check_masked(&survey, samples, params)?;
+    let survey = Survey::new(samples, &estimate.of_samples());
+    let similar_objects = refusal::check(&survey, samples, params)?;
     let occupancy = estimate.occupancy(samples, &survey);
     estimate.repaint(samples, &occupancy, given.is_some());
     estimate.finish(samples, &occupancy, &survey, given.is_some());

@@ -28,8 +28,7 @@ impl Occupancy {
     /// size count.
     pub(super) fn new(
         samples: &Samples,
-        backgrounds: &[Background],
-        background_of: &[Option<usize>],
+        backgrounds: &[Option<&Background>],
         survey: &Survey,
     ) -> Occupancy {
         let n_px = samples.n_px();
@@ -40,7 +39,7 @@ impl Occupancy {
         };
         let least_area = survey.least_area_px();
         for (k, components) in survey.components.iter().enumerate() {
-            let Some(background) = background_of[k].map(|at| &backgrounds[at].frame) else {
+            let Some(background) = backgrounds[k].map(|background| &background.frame) else {
                 continue;
             };
             for (at, component) in components.iter().enumerate() {

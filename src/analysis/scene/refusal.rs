@@ -39,22 +39,33 @@ pub(super) enum SimilarObjects {
 }
 
 /// Checks footage by the survey of its samples; fails with the reason to refuse it. Returns the objects that
-/// resemble the animal.
+/// resemble the animal. With masks of the animal, the scene may move.
 pub(super) fn check(
     survey: &Survey,
     samples: &Samples,
     params: &Params,
 ) -> Result<SimilarObjects, Error> {
-    let n_samples = survey.looks.len() as f64;
-    let n_px = samples.n_px() as f64;
     if let Some(at) = params.animal_at
         && !survey.is_pinned
     {
         return Err(Error::NothingAtPoint(at));
     }
-    let Some(subject) = &survey.subject else {
-        return Err(Error::NothingMoves);
-    };
+    match &survey.subject {
+        None if samples.are_masked() => Err(Error::MasksEmpty),
+        None => Err(Error::NothingMoves),
+        Some(subject) => {
+            if !samples.are_masked() {
+                check_scene(survey, samples, subject)?;
+            }
+            similar_objects(survey, samples, subject, params)
+        }
+    }
+}
+
+/// Fails if the scene moves, or if the animal is found too rarely or is too large.
+fn check_scene(survey: &Survey, samples: &Samples, subject: &Subject) -> Result<(), Error> {
+    let n_samples = survey.looks.len() as f64;
+    let n_px = samples.n_px() as f64;
     let animal_area_px = |k: usize| survey.animal[k].map_or(0.0, |at| survey.looks[k][at].area_px);
     let other_area_px =
         |k: usize| survey.looks[k].iter().map(|l| l.area_px).sum::<f64>() - animal_area_px(k);
@@ -86,22 +97,7 @@ pub(super) fn check(
             box_px: look.box_px,
         });
     }
-    similar_objects(survey, samples, subject, params)
-}
-
-/// Checks footage with masks of the animal; a moving scene is allowed.
-pub(super) fn check_masked(
-    survey: &Survey,
-    samples: &Samples,
-    params: &Params,
-) -> Result<SimilarObjects, Error> {
-    if let Some(at) = params.animal_at
-        && !survey.is_pinned
-    {
-        return Err(Error::NothingAtPoint(at));
-    }
-    let subject = survey.subject.as_ref().ok_or(Error::MasksEmpty)?;
-    similar_objects(survey, samples, subject, params)
+    Ok(())
 }
 
 /// Returns the objects that resemble the animal. Fails if they are animals and the parameters do not say

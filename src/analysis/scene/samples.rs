@@ -138,6 +138,11 @@ impl Samples {
         self.frames.par_iter().map(Thumbnail::new).collect()
     }
 
+    /// Returns width and height of a frame, pixels.
+    pub(super) fn size_px(&self) -> [u32; 2] {
+        [self.frames[0].width, self.frames[0].height]
+    }
+
     /// Returns the number of pixels of a frame.
     pub(super) fn n_px(&self) -> usize {
         self.frames[0].width as usize * self.frames[0].height as usize

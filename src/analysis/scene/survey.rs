@@ -52,57 +52,41 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// Compares every sample with its background. The light of the samples must be equalized. If the animal
-    /// has a tether, cuts it off and repeats the survey.
-    pub(super) fn new(
-        samples: &Samples,
-        backgrounds: &[Background],
-        background_of: &[Option<usize>],
-    ) -> Survey {
-        let components_of = |k: usize| {
-            let background = background_of[k].map(|at| &backgrounds[at]);
-            background.map_or(Vec::new(), |background| {
-                silhouette::components(
-                    &samples.frames[k],
-                    background,
-                    &Light::NEUTRAL,
-                    &samples.ignored[k],
-                )
-            })
+    /// Compares every sample with its background in `backgrounds`. The light of the samples must be equalized.
+    /// If the animal has a tether, cuts it off and repeats the survey.
+    pub(super) fn new(samples: &Samples, backgrounds: &[Option<&Background>]) -> Survey {
+        let components_of = |k: usize| match backgrounds[k] {
+            Some(background) => {
+                let (frame, ignored) = (&samples.frames[k], &samples.ignored[k]);
+                silhouette::components(frame, background, &Light::NEUTRAL, ignored)
+            }
+            None => Vec::new(),
         };
         let found: Vec<Vec<Component>> = (0..samples.frames.len())
             .into_par_iter()
             .map(components_of)
             .collect();
-        let whole = Survey::from_components(found.clone(), samples, backgrounds, background_of);
+        let whole = Survey::from_components(found.clone(), samples, backgrounds);
         if samples.are_masked() {
             return whole;
         }
         let Some(thin_px) = whole.thin_px(samples) else {
             return whole;
         };
-        let first = &samples.frames[0];
-        let cut = |components: Vec<Component>| {
-            let picture = [first.width, first.height];
-            let cut = |component| tether::cut_all(component, thin_px, picture);
-            components.into_iter().flat_map(cut).collect()
-        };
+        let cut = |component| tether::cut_all(component, thin_px, samples.size_px());
+        let without_tether = found
+            .into_iter()
+            .map(|c| c.into_iter().flat_map(cut).collect());
         Survey {
             tether_px: Some(thin_px),
-            ..Survey::from_components(
-                found.into_iter().map(cut).collect(),
-                samples,
-                backgrounds,
-                background_of,
-            )
+            ..Survey::from_components(without_tether.collect(), samples, backgrounds)
         }
     }
 
     fn from_components(
         mut found: Vec<Vec<Component>>,
         samples: &Samples,
-        backgrounds: &[Background],
-        background_of: &[Option<usize>],
+        backgrounds: &[Option<&Background>],
     ) -> Survey {
         for components in &mut found {
             components.retain(|c| c.area >= LEAST_AREA_PX);
@@ -110,10 +94,9 @@ impl Survey {
             components.truncate(MAX_COMPONENTS);
         }
         let looks_of = |(k, components): (usize, &Vec<Component>)| {
-            let background = background_of[k].map(|at| &backgrounds[at]);
             let looks = components
                 .iter()
-                .filter_map(|c| Some(measure(&samples.frames[k], background?, c)));
+                .filter_map(|c| Some(measure(&samples.frames[k], backgrounds[k]?, c)));
             looks.collect()
         };
         let mut looks: Vec<Vec<Look>> = found.par_iter().enumerate().map(looks_of).collect();
@@ -122,18 +105,15 @@ impl Survey {
             Some((k, at))
         });
         let subject = Subject::learn(&looks, pinned);
-        for (k, (looks, components)) in looks.iter_mut().zip(&found).enumerate() {
+        for ((looks, components), background) in looks.iter_mut().zip(&found).zip(backgrounds) {
             for (look, component) in looks.iter_mut().zip(components) {
+                let shows_animal = |background: &Background, subject: &Subject| {
+                    subject.prefers(&Color::in_component(&background.rgb, component), look)
+                };
                 look.is_ghost = look.is_ghost
                     && scenery::recurs_exactly(&found, component, MIN_GHOST_SAMPLES)
-                    && background_of[k]
-                        .zip(subject.as_ref())
-                        .is_some_and(|(at, subject)| {
-                            subject.prefers(
-                                &Color::in_component(&backgrounds[at].rgb, component),
-                                look,
-                            )
-                        });
+                    && (background.zip(subject.as_ref()))
+                        .is_some_and(|(background, subject)| shows_animal(background, subject));
             }
         }
         let mut animal = match &subject {
@@ -161,8 +141,7 @@ impl Survey {
     /// tether is a thin part that reaches the border or always ends at one place. The end of a tail moves
     /// with the animal.
     fn thin_px(&self, samples: &Samples) -> Option<u32> {
-        let first = &samples.frames[0];
-        let picture = [first.width, first.height];
+        let picture = samples.size_px();
         let animals = self.animal.iter().enumerate();
         let animals: Vec<&Component> = animals
             .filter_map(|(k, at)| Some(&self.components[k][(*at)?]))
